@@ -1,0 +1,158 @@
+"""Results appear whole or not at all: everything is written beside its place first, then renamed together."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from types import TracebackType
+
+from .errors import BadRequest, UnwritableOutput
+
+
+class OutputFiles:
+    """The files of one piece of work. Leaving the `with` block puts all in place; an exception removes every trace.
+
+    overwrite: whether existing files may be replaced. All methods raise UnwritableOutput with the path and the reason.
+    A file that stood there before is replaced in one step and never half written; if putting several in place fails
+    midway, the new ones among them are taken away again.
+    """
+
+    def __init__(self, overwrite: bool = False) -> None:
+        self._overwrite = overwrite
+        self._staged: dict[Path, Path] = {}  # target: temporary file beside it
+        self._made: list[Path] = []  # folders, outermost first
+
+    def __enter__(self) -> OutputFiles:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.commit()
+        else:
+            self.discard()
+
+    def check(self, *paths: str | Path) -> None:
+        """Asks before the work whether these files could be written: folder there and writable, nothing in the way.
+
+        Raises BadRequest where two of the paths are the same file.
+        """
+        targets = [_real(path) for path in paths]
+        for target in targets:
+            if targets.count(target) > 1:
+                raise BadRequest(f"{target}: named for two outputs; give each its own name")
+            if not target.parent.is_dir():
+                raise UnwritableOutput(f"{target}: no folder {target.parent}; create it or choose another")
+            self._check_free(target)
+            _probe(target.parent)
+
+    def check_folder(self, folder: str | Path, names: Iterable[str] = ()) -> None:
+        """Asks before the work whether these files could be written into a folder, which may be yet to come."""
+        root = _real(folder)
+        for name in names:
+            self._check_free(root / name)
+        there = root
+        while not there.exists() and there != there.parent:
+            there = there.parent
+        if not there.is_dir():
+            raise UnwritableOutput(f"{root}: {there} is a file, not a folder; choose another name")
+        _probe(there)
+
+    def add(self, path: str | Path, data: bytes) -> None:
+        """Stages a file in a folder that exists."""
+        target = _real(path)
+        if target in self._staged:
+            raise BadRequest(f"{target}: named for two outputs; give each its own name")
+        self._check_free(target)
+        # Hidden, and without the target's name, which may be as long as the file system allows
+        temporary = target.parent / f".edf-{os.getpid()}-{secrets.token_hex(6)}.tmp"
+        self._staged[target] = temporary
+        try:
+            with open(temporary, "xb") as file:
+                file.write(data)
+        except OSError as error:
+            raise _unwritable(target, error) from error
+
+    def add_to_folder(self, folder: str | Path, name: str, data: bytes) -> None:
+        """Stages a file in a folder that is made where it is missing."""
+        root = _real(folder)
+        missing = [parent for parent in (root, *root.parents) if not parent.exists()]
+        for one in reversed(missing):
+            try:
+                one.mkdir()
+            except FileExistsError:  # somebody else's, in this moment
+                continue
+            except OSError as error:
+                raise _unwritable(one, error) from error
+            self._made.append(one)
+        self.add(root / name, data)
+
+    def commit(self) -> None:
+        """Puts all staged files in place, or none."""
+        new: list[Path] = []
+        try:
+            for target in self._staged:
+                self._check_free(target)
+            new = [target for target in self._staged if not target.exists()]
+            for target, temporary in self._staged.items():
+                try:
+                    os.replace(temporary, target)
+                except OSError as error:
+                    raise _unwritable(target, error) from error
+        except BaseException:
+            for target in new:
+                if not self._staged[target].exists():  # renamed
+                    _quietly(target.unlink)
+            self.discard()
+            raise
+        self._staged.clear()
+        self._made.clear()
+
+    def discard(self) -> None:
+        """Removes everything staged, and the folders made for it as far as they are empty."""
+        for temporary in self._staged.values():
+            _quietly(temporary.unlink)
+        for folder in reversed(self._made):
+            _quietly(folder.rmdir)
+        self._staged.clear()
+        self._made.clear()
+
+    def _check_free(self, target: Path) -> None:
+        if target.is_dir():
+            raise UnwritableOutput(f"{target}: a folder of this name exists; choose another name")
+        if target.exists() and not target.is_file():  # /dev/null would be replaced by a file
+            raise UnwritableOutput(f"{target}: not a regular file; choose another name")
+        if target.exists() and not self._overwrite:
+            raise UnwritableOutput(f"{target} exists: use --overwrite or choose another name")
+
+
+def _real(path: str | Path) -> Path:
+    """Links followed, so that a link is written through and not replaced."""
+    return Path(os.path.realpath(path))
+
+
+def _probe(folder: Path) -> None:
+    """Writes and removes a file: asking the permissions is wrong on Windows, for root and on read-only mounts."""
+    trial = folder / f".edf-{os.getpid()}-{secrets.token_hex(6)}.tmp"
+    try:
+        trial.touch(exist_ok=False)
+        trial.unlink()
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+
+
+def _quietly(remove: Callable[[], None]) -> None:
+    try:
+        remove()
+    except OSError:
+        pass  # gone already, or not ours any more: the first error is the one to tell
+
+
+def _unwritable(path: Path, error: OSError) -> UnwritableOutput:
+    full = error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", None), errno.EFBIG)
+    advice = "free some space or choose another disk" if full else "choose another place"
+    return UnwritableOutput(f"{path} cannot be written: {error.strerror or error}; {advice}")
