@@ -1,0 +1,205 @@
+"""Robust refinement of (f, f', R, t) on the Sampson distance, with a prior on the focal length.
+
+Levenberg-Marquardt on iteratively reweighted residuals (Cauchy loss), 6 or 7 unknowns. Written on NumPy alone because
+scipy.optimize takes longer to load than this takes to run, and a stitch is a short-lived process.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .camera import Camera
+from .epipolar import (
+    Array,
+    fundamental_from_pose,
+    homogeneous,
+    infinite_homography,
+    project,
+    rotation_from_vector,
+    sampson_residuals,
+)
+from .features import Matches
+
+# Errors of neighbouring matches go together (lens distortion, rolling shutter): more than this many are not more
+# evidence against a prior, however many there are.
+EFFECTIVE_MATCHES = 300
+SYSTEMATIC_PX = 0.5
+# Where infinity is seen depends on the whole calibration: distortion moves it by this much.
+BEYOND_PX = 2.0
+
+
+@dataclass(frozen=True)
+class Pose:
+    """K, K_prime (3, 3) px, R (3, 3), t (3,) with |t| = 1: the target camera sees X at R X + t."""
+
+    K: Array
+    K_prime: Array
+    R: Array
+    t: Array
+
+    @property
+    def F(self) -> Array:
+        """The fundamental matrix of the pose, x'ᵀ F x = 0."""
+        return fundamental_from_pose(self.K, self.K_prime, self.R, self.t)
+
+
+def refine_pose(
+    matches: Matches,
+    pose: Pose,
+    camera: Camera,
+    camera_prime: Camera,
+    sigma: float,
+    zoom: bool = False,
+    iterations: int = 20,
+) -> tuple[Pose, float]:
+    """The pose that minimises Σ log(1 + (r/σ)²) over Sampson distances r plus the focal prior; and that cost.
+
+    sigma: noise of a Sampson distance in px. zoom: let the second focal length go its own way. A camera with a fixed
+    focal length keeps it.
+    """
+    problem = _Problem(matches, camera, camera_prime, sigma, zoom)
+    cost, damping = problem.cost(pose), 1e-3
+    for _ in range(iterations):
+        normal, gradient = problem.normal_equations(pose)
+        improved = False
+        while damping < 1e4:
+            step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), gradient)
+            candidate = problem.moved(pose, step)
+            new_cost = problem.cost(candidate)
+            if new_cost < cost:
+                improved = True
+                break
+            damping *= 10
+        if not improved:
+            break
+        gain, pose, cost, damping = cost - new_cost, candidate, new_cost, max(damping / 10, 1e-9)
+        if gain < 1e-5 * cost + 1e-12:
+            break
+    return pose, cost
+
+
+def focal_deviation(matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, sigma: float) -> float:
+    """Standard deviation of log f given matches and prior (0 where it is fixed), from the normal matrix at the
+    optimum."""
+    problem = _Problem(matches, camera, camera_prime, sigma, False)
+    if not problem.focal_free:
+        return 0.0
+    normal, _ = problem.normal_equations(pose)
+    return float(np.sqrt(max(np.linalg.pinv(normal)[0, 0], 0.0)))
+
+
+class _Problem:
+    """The least-squares problem around a pose: unknowns [log f,] [log f',] rotation (3), direction of t (2)."""
+
+    def __init__(self, matches: Matches, camera: Camera, camera_prime: Camera, sigma: float, zoom: bool) -> None:
+        self.matches, self.camera, self.camera_prime = matches, camera, camera_prime
+        # below this, what is left is the lens, not the points: it must not overrule a prior
+        self.sigma = max(sigma, SYSTEMATIC_PX * matches.scale)
+        self.sigma_beyond = BEYOND_PX * matches.scale
+        self.focal_free = not (camera.fixed or camera_prime.fixed)
+        self.zoom = zoom and self.focal_free
+        self.weight = min(1.0, EFFECTIVE_MATCHES / max(1, len(matches)))
+        self.x, self.y = homogeneous(matches.x), homogeneous(matches.y)
+
+    def moved(self, pose: Pose, step: Array) -> Pose:
+        """The pose after a step in the unknowns."""
+        K, K_prime = pose.K, pose.K_prime
+        if self.focal_free:
+            K = _zoomed(K, np.exp(np.clip(step[0], -0.3, 0.3)))
+            factor = step[1] if self.zoom else step[0]
+            K_prime = _zoomed(K_prime, np.exp(np.clip(factor, -0.3, 0.3)))
+        omega, tangent = step[-5:-2], step[-2:]
+        t = pose.t + _tangent_basis(pose.t) @ tangent
+        return Pose(K, K_prime, rotation_from_vector(omega) @ pose.R, t / np.linalg.norm(t))
+
+    def cost(self, pose: Pose) -> float:
+        r = sampson_residuals(pose.F, self.matches.x, self.matches.y) / self.sigma
+        c = self._beyond_infinity(pose) / self.sigma_beyond
+        evidence = np.log1p(r * r).sum() + np.log1p(c * c).sum()
+        return float(self.weight * evidence + sum(e * e for e, _ in self._prior(pose)))
+
+    def _beyond_infinity(self, pose: Pose) -> Array:
+        """How far (px, along its line) each match lies on the wrong side of its point at infinity; 0 for those in
+        front.
+
+        F alone trades focal length against rotation almost freely; that the world lies in front of the cameras decides
+        it. Without this term a pair of parallel-looking cameras can end with most of its points behind them.
+        """
+        q = self.x @ infinite_homography(pose.K, pose.K_prime, pose.R).T
+        e = pose.K_prime @ pose.t
+        direction = (e[:2] * q[:, 2:] - q[:, :2] * e[2]) * np.sign(q[:, 2:])
+        length = np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-12)
+        along = np.sum((self.matches.y - project(q)) * direction, axis=1) / length
+        return np.minimum(along, 0.0)
+
+    def _prior(self, pose: Pose) -> list[tuple[float, Array]]:
+        """Residuals of the prior with their derivatives by the unknowns; the second focal's ratio to the first is kept
+        near what the files say."""
+        if not self.focal_free:
+            return []
+        size = 7 if self.zoom else 6
+        off = np.log(pose.K[0, 0] / self.camera.focal)
+        d_first = np.zeros(size)
+        d_first[0] = 1 / self.camera.log_sigma
+        out = [(off / self.camera.log_sigma, d_first)]
+        if self.zoom:
+            ratio = np.log(pose.K_prime[0, 0] / self.camera_prime.focal) - off
+            d_ratio = np.zeros(size)
+            d_ratio[:2] = (-1 / 0.3, 1 / 0.3)
+            out.append((ratio / 0.3, d_ratio))
+        return out
+
+    def normal_equations(self, pose: Pose) -> tuple[Array, Array]:
+        """Gauss-Newton normal matrix and gradient (of half the cost), residuals reweighted by the Cauchy loss."""
+        size = 5 + self.focal_free + self.zoom
+        residual, by_F = self._residuals_and_derivative(pose)
+        beyond = self._beyond_infinity(pose)
+        J, J_beyond = np.empty((len(residual), size)), np.empty((len(residual), size))
+        h = 1e-6
+        for k in range(size):
+            step = np.zeros(size)
+            step[k] = h
+            forward, backward = self.moved(pose, step), self.moved(pose, -step)
+            J[:, k] = by_F @ ((forward.F - backward.F) / (2 * h)).ravel()
+            J_beyond[:, k] = (self._beyond_infinity(forward) - self._beyond_infinity(backward)) / (2 * h)
+        normal, gradient = np.zeros((size, size)), np.zeros(size)
+        for value, jacobian, sigma in ((residual, J, self.sigma), (beyond, J_beyond, self.sigma_beyond)):
+            r = value / sigma
+            w = self.weight / (1 + r * r) / sigma
+            normal += (jacobian * (w / sigma)[:, None]).T @ jacobian
+            gradient += jacobian.T @ (w * r)
+        for e, d in self._prior(pose):
+            normal += np.outer(d, d)
+            gradient += e * d
+        return normal, gradient
+
+    def _residuals_and_derivative(self, pose: Pose) -> tuple[Array, Array]:
+        """Sampson residuals (N,) and their derivatives by the nine entries of F (N, 9)."""
+        F, x, y = pose.F, self.x, self.y
+        line_y, line_x = x @ F.T, y @ F
+        algebraic = np.sum(y * line_y, axis=1)
+        squared = line_y[:, 0] ** 2 + line_y[:, 1] ** 2 + line_x[:, 0] ** 2 + line_x[:, 1] ** 2
+        root = np.sqrt(np.maximum(squared, 1e-300))
+        d_algebraic = y[:, :, None] * x[:, None, :]
+        d_squared = np.zeros_like(d_algebraic)
+        d_squared[:, :2, :] += 2 * line_y[:, :2, None] * x[:, None, :]
+        d_squared[:, :, :2] += 2 * y[:, :, None] * line_x[:, None, :2]
+        derivative = d_algebraic / root[:, None, None] - d_squared * (algebraic / (2 * root**3))[:, None, None]
+        return algebraic / root, derivative.reshape(len(x), 9)
+
+
+def _zoomed(K: Array, factor: float) -> Array:
+    out = K.copy()
+    out[0, 0] *= factor
+    out[1, 1] *= factor
+    return out
+
+
+def _tangent_basis(t: Array) -> Array:
+    """Two unit vectors (3, 2) perpendicular to t."""
+    axis = np.eye(3)[int(np.argmin(np.abs(t)))]
+    first = np.cross(t, axis)
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(t, first)])
