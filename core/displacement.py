@@ -1,0 +1,213 @@
+"""The epipolar displacement field: one scalar d, inverse depth in baselines, for every point of the canvas.
+
+Target pixel of a canvas point p: x'(p) ~ H_inf p + d(p) e' (DESIGN 1; the idea of sliding along epipolar lines: Yu and
+Da, arXiv 2311.16637). d is affine exactly where the scene is a plane, so a thin-plate spline for d bends only where
+matches ask for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .canvas import Grid
+from .epipolar import Array, homogeneous, project
+from .errors import DegenerateGeometry, NoOverlap
+from .spline import SmoothingProblem, ThinPlateSpline, spread_points
+from .two_view import TwoView
+
+CENTRE_BUDGET = 1000
+# λ in units of W·H of the reference: where the search for the best one starts, and how far it goes.
+SMOOTHING_START = 1e-3
+SMOOTHING_LADDER = SMOOTHING_START * 10.0 ** np.arange(-3.0, 2.01, 0.5)
+PRUNE_SIGMAS = 3.0
+GROSS_DEVIATIONS = 10.0
+MIN_CENTRES = 8
+
+
+@dataclass(frozen=True)
+class StrictField:
+    """d(p) = m·p + α(p) g(p): a plane, and a spline of what the plane leaves, faded out beyond the overlap.
+
+    plane (3,): m on homogeneous reference pixels; spline: g; fade_px: width of the fade; smoothing: λ in units of W·H;
+    `kept` (N,): the matches (of those given) the spline stands on; residual_px: their RMS along the line; held_out_px:
+    RMS leave-one-out; negative_share: share of inliers with d < 0.
+    """
+
+    two_view: TwoView
+    size: tuple[int, int]
+    target_size: tuple[int, int]
+    plane: Array
+    spline: ThinPlateSpline
+    fade_px: float
+    smoothing: float
+    kept: NDArray[np.bool_]
+    residual_px: float
+    held_out_px: float
+    negative_share: float
+
+    name = "strict"
+
+    def on_grid(self, grid: Grid) -> Array:
+        """Inverse depth (rows, columns), float64, at a grid's nodes."""
+        points = grid.points
+        plane = points @ self.plane[:2] + self.plane[2]
+        bend = self.spline.on_axes(grid.xs, grid.ys)
+        return plane + self._fade(grid, plane + bend) * bend
+
+    def at(self, points: Array) -> Array:
+        """Inverse depth (N,) at points (N, 2) of the overlap, where nothing fades."""
+        return points @ self.plane[:2] + self.plane[2] + self.spline.at(points)
+
+    def _fade(self, grid: Grid, unfaded: Array) -> Array:
+        """α (rows, columns): 1 in the overlap, smoothly to 0 over fade_px outside it."""
+        target = target_points(self.two_view, grid.points, unfaded)
+        inside = (grid.points >= 0).all(axis=-1) & (grid.points <= np.array(self.size) - 1).all(axis=-1)
+        with np.errstate(invalid="ignore"):
+            inside &= (target >= 0).all(axis=-1) & (target <= np.array(self.target_size) - 1).all(axis=-1)
+        if not inside.any():
+            return np.zeros(unfaded.shape)
+        # a node beside the last inside one may touch the overlap: distances count from one cell on
+        steps = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        u = np.clip((steps.astype(np.float64) - 1) * grid.step / self.fade_px, 0.0, 1.0)
+        return 1 - u * u * (3 - 2 * u)
+
+
+def target_points(two_view: TwoView, points: Array, inverse_depth: Array) -> Array:
+    """π(H_inf p + d e') (…, 2) for points (…, 2) and d (…); NaN where the point lies behind the target camera."""
+    ray = homogeneous(points) @ two_view.H_inf.T + inverse_depth[..., None] * two_view.e_prime
+    # relative to the ray's own length: less than this in front is behind for any picture
+    behind = ray[..., 2] <= 1e-6 * np.abs(ray[..., :2]).max(axis=-1)
+    ray[behind] = np.nan
+    return project(ray)
+
+
+def inverse_depths(two_view: TwoView, x: Array, y: Array) -> tuple[Array, Array]:
+    """d_i = argmin |π(q_i + d e') − y_i| along each epipolar line, and s_i = |∂π/∂d| there in px per unit of d.
+
+    Started at −(y×q)·(y×e') / |y×e'|², then Gauss-Newton; q = H_inf x. NaN where that runs behind the target camera.
+    """
+    q = homogeneous(x) @ two_view.H_inf.T
+    e = two_view.e_prime
+    yh = homogeneous(y)
+    cross_e = np.cross(yh, e)
+    d = -np.sum(np.cross(yh, q) * cross_e, axis=1) / np.maximum(np.sum(cross_e**2, axis=1), 1e-300)
+    for _ in range(8):
+        ray = q + d[:, None] * e
+        slope = _slope(ray, e)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = np.sum(slope * (y - project(ray)), axis=1) / np.maximum(np.sum(slope**2, axis=1), 1e-300)
+        d = np.where(np.isfinite(step), d + step, d)
+    ray = q + d[:, None] * e
+    behind = ray[:, 2] <= 0
+    return np.where(behind, np.nan, d), np.where(behind, np.nan, np.linalg.norm(_slope(ray, e), axis=1))
+
+
+def _slope(ray: Array, e: Array) -> Array:
+    """∂π(ray)/∂d when the ray moves by e per unit of d."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (e[:2] * ray[:, 2:] - ray[:, :2] * e[2]) / ray[:, 2:] ** 2
+
+
+def fit_plane(x: Array, d: Array, sensitivity: Array, noise_px: float) -> Array:
+    """m (3,) that minimises Σ ρ(s_i (d_i − m·x_i)) robustly (Cauchy, scale from the residuals, at least noise_px)."""
+    centre, scale = x.mean(axis=0), max(float(x.std()), 1e-9)
+    design = np.column_stack([(x - centre) / scale, np.ones(len(x))])
+    weight = sensitivity.copy()
+    coefficients = np.zeros(3)
+    for _ in range(50):
+        previous = coefficients
+        coefficients = np.linalg.lstsq(design * weight[:, None], d * weight, rcond=None)[0]
+        residual = sensitivity * (d - design @ coefficients)
+        scale_px = max(noise_px, float(np.median(np.abs(residual))) / 0.6745)
+        weight = sensitivity / np.sqrt(1 + (residual / (2.385 * scale_px)) ** 2)
+        if np.abs(coefficients - previous).max() < 1e-10 * np.abs(coefficients).max():
+            break
+    a, b = coefficients[:2] / scale
+    return np.array([a, b, coefficients[2] - a * centre[0] - b * centre[1]])
+
+
+def fit_strict(
+    two_view: TwoView, x: Array, y: Array, size: tuple[int, int], target_size: tuple[int, int], noise_scale: float = 1.0
+) -> StrictField:
+    """The strict field of inlier matches x ↔ y (N, 2) px (DESIGN 1, "The strict field, in full").
+
+    size, target_size: (W, H) px; noise_scale: unit of the matches' noise in px. Raises NoOverlap or DegenerateGeometry.
+    """
+    d, sensitivity = inverse_depths(two_view, x, y)
+    usable = np.isfinite(d) & np.isfinite(sensitivity)
+    # where the line is seen end-on (beside the epipole) a pixel says nothing about d
+    usable &= sensitivity > 1e-3 * np.median(sensitivity[usable]) if usable.any() else usable
+    if usable.sum() < MIN_CENTRES:
+        raise DegenerateGeometry(
+            f"only {int(usable.sum())} of {len(x)} matches tell a depth, at least {MIN_CENTRES} needed: "
+            "the camera moved too little, "
+            "or straight at what it saw"
+        )
+    index = np.flatnonzero(usable)
+    area = float(size[0] * size[1])
+    noise_px = max(two_view.sigma, 0.1 * noise_scale)
+    plane = fit_plane(x[index], d[index], sensitivity[index], noise_px)
+    off_line = np.linalg.norm(target_points(two_view, x[index], d[index]) - y[index], axis=1)
+    index = index[spread_points(x[index], off_line, CENTRE_BUDGET, np.sqrt(area) / 200)]
+    g = d - (x @ plane[:2] + plane[2])
+    index, spline, residual, smoothing, held_out_px = _prune_and_smooth(x, g, sensitivity, index, np.sqrt(area))
+    s = sensitivity[index]
+    bend_px = s * np.abs(spline.at(x[index]))
+    kept = np.zeros(len(x), bool)
+    kept[index] = True
+    field = StrictField(
+        two_view, size, target_size, plane, spline,
+        fade_px=max(5 * float(np.percentile(bend_px, 98)), 8 * noise_scale), smoothing=smoothing, kept=kept,
+        residual_px=float(np.sqrt(np.mean((s * residual) ** 2))), held_out_px=held_out_px,
+        negative_share=float(np.mean(d[index] < 0)),
+    )  # fmt: skip
+    if not np.isfinite(spline.weights).all():
+        raise NoOverlap("the matches do not determine a displacement field: they lie on a single line")
+    return field
+
+
+def _prune_and_smooth(
+    x: Array, g: Array, sensitivity: Array, index: NDArray[np.intp], unit: float
+) -> tuple[NDArray[np.intp], ThinPlateSpline, Array, float, float]:
+    """Drop what lies beyond 3σ of the spline (outliers along the line pass every epipolar test), choose λ, drop again,
+    until stable.
+
+    Returns the kept indices, the spline, its residuals, λ and the leave-one-out RMS in px.
+    """
+
+    def problem(index: NDArray[np.intp]) -> SmoothingProblem:
+        s = sensitivity[index]
+        return SmoothingProblem.build(x[index], np.median(s) / s, unit)
+
+    # gross errors first: they would bend the spline towards themselves, so each is judged by the spline without it
+    while True:
+        error = np.abs(sensitivity[index] * problem(index).held_out_at(g[index], SMOOTHING_START))
+        keep = error <= GROSS_DEVIATIONS * np.median(error) / 0.6745 + 1e-9
+        if keep.all() or keep.sum() < MIN_CENTRES:
+            break
+        index = index[keep]
+    smoothing = _best_smoothing(problem(index), g[index], sensitivity[index])
+    while True:
+        spline, residual = problem(index).solve(g[index], smoothing)
+        error = np.abs(sensitivity[index] * residual)
+        keep = error <= PRUNE_SIGMAS * np.sqrt(np.mean(error**2)) + 1e-9
+        if keep.all() or keep.sum() < MIN_CENTRES:
+            break
+        index = index[keep]
+    held_out = sensitivity[index] * problem(index).held_out_at(g[index], smoothing)
+    return index, spline, residual, smoothing, float(np.sqrt(np.mean(held_out**2)))
+
+
+def _best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> float:
+    """λ of the ladder with the least leave-one-out error in px.
+
+    Large errors count in proportion, not squared: a few depth edges must not decide for the whole picture.
+    """
+    error = np.abs(problem.held_out(g, SMOOTHING_LADDER)) * sensitivity
+    knee = 3 * np.median(error, axis=1, keepdims=True) + 1e-12
+    score = np.where(error < knee, error**2, knee * (2 * error - knee)).mean(axis=1)
+    return float(SMOOTHING_LADDER[int(np.argmin(score))])

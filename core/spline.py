@@ -1,0 +1,138 @@
+"""Smoothing thin-plate splines in the plane, with the smoothing chosen by leave-one-out cross-validation.
+
+Theory: Duchon 1977; Wahba, Spline Models for Observational Data (1990), chapters 2.4 and 4.2. The null space of the
+bending energy is the affine functions: with few or distant points the spline is a plane.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .epipolar import Array
+
+# Nodes are evaluated in slabs of about this many kernel values, so that memory stays bounded.
+SLAB = 2_000_000
+
+
+@dataclass(frozen=True)
+class ThinPlateSpline:
+    """f(p) = Σ w_i ½ r_i² ln r_i² + a·(p, 1) over centres in normalised coordinates (p − centre) / scale."""
+
+    centres: Array
+    weights: Array
+    affine: Array
+    centre: Array
+    scale: float
+
+    def at(self, points: Array) -> Array:
+        """Values at points (N, 2) px, float64."""
+        p = (np.asarray(points, np.float64) - self.centre) / self.scale
+        out = p @ self.affine[:2] + self.affine[2]
+        rows = max(1, SLAB // max(1, len(self.centres)))
+        for start in range(0, len(p), rows):
+            out[start : start + rows] += kernel(p[start : start + rows], self.centres) @ self.weights
+        return out
+
+    def on_axes(self, xs: Array, ys: Array) -> Array:
+        """Values (len(ys), len(xs)) on the grid of two axes in px: the kernel in float32, squared distances added from
+        the axes.
+
+        Adding dx² + dy² instead of expanding |p|² + |c|² − 2p·c keeps full relative precision close to a centre.
+        """
+        x = (np.asarray(xs, np.float64) - self.centre[0]) / self.scale
+        y = (np.asarray(ys, np.float64) - self.centre[1]) / self.scale
+        dx2 = ((x[:, None] - self.centres[:, 0]) ** 2).astype(np.float32)
+        dy2 = ((y[:, None] - self.centres[:, 1]) ** 2).astype(np.float32)
+        weights = (0.5 * self.weights).astype(np.float32)
+        out = (x * self.affine[0])[None, :] + (y * self.affine[1] + self.affine[2])[:, None]
+        rows = max(1, SLAB // max(1, dx2.size))
+        for start in range(0, len(y), rows):
+            r2 = dy2[start : start + rows, None, :] + dx2[None, :, :]
+            np.maximum(r2, np.float32(1e-20), out=r2)
+            log = cv2.log(r2.reshape(-1, r2.shape[2])).reshape(r2.shape)
+            np.multiply(r2, log, out=r2)
+            out[start : start + rows] += r2 @ weights
+        return out
+
+
+def kernel(points: Array, centres: Array) -> Array:
+    """½ r² ln r² between points (N, 2) and centres (M, 2), zero at r = 0."""
+    r2 = ((points[:, None, :] - centres[None, :, :]) ** 2).sum(axis=2)
+    return 0.5 * r2 * np.log(np.maximum(r2, 1e-300))
+
+
+@dataclass(frozen=True)
+class SmoothingProblem:
+    """(Φ + 8πλ D) w + M a = g with Mᵀ w = 0 for points (N, 2) px and relative noise √D (N,); lengths in units of
+    `scale` px."""
+
+    centres: Array
+    noise: Array
+    centre: Array
+    scale: float
+
+    @staticmethod
+    def build(points: Array, noise: Array, scale: float) -> SmoothingProblem:
+        """Points moved to their centroid and divided by `scale`, the unit in which λ is meant; both leave the solution
+        alone."""
+        centre = points.mean(axis=0)
+        return SmoothingProblem((points - centre) / scale, noise, centre, scale)
+
+    def system(self, smoothing: float) -> Array:
+        """The bordered matrix [[Φ + 8πλ D, M], [Mᵀ, 0]] (N + 3, N + 3)."""
+        n = len(self.noise)
+        system = np.zeros((n + 3, n + 3))
+        system[:n, :n] = kernel(self.centres, self.centres)
+        system[np.arange(n), np.arange(n)] += 8 * np.pi * smoothing * self.noise**2
+        system[:n, n:] = np.column_stack([self.centres, np.ones(n)])
+        system[n:, :n] = system[:n, n:].T
+        return system
+
+    def solve(self, values: Array, smoothing: float) -> tuple[ThinPlateSpline, Array]:
+        """The spline of values (N,) at λ = smoothing, and its residuals g − f = 8πλ D w (N,)."""
+        n = len(values)
+        solution = np.linalg.solve(self.system(smoothing), np.concatenate([values, np.zeros(3)]))
+        spline = ThinPlateSpline(self.centres, solution[:n], solution[n:], self.centre, self.scale)
+        return spline, 8 * np.pi * smoothing * self.noise**2 * solution[:n]
+
+    def held_out_at(self, values: Array, smoothing: float) -> Array:
+        """Leave-one-out residuals (N,) at one λ: w_i / (S⁻¹)_ii with S the system (Dubrule 1983 for kriging, the same
+        equations)."""
+        n = len(values)
+        inverse = np.linalg.inv(self.system(smoothing))
+        return (inverse[:n, :n] @ values) / np.diag(inverse)[:n]
+
+    def held_out(self, values: Array, ladder: Array) -> Array:
+        """Leave-one-out residuals (len(ladder), N) of values (N,), one row for each λ.
+
+        With v = √D w, on the complement Q of D^-½ M the system is (Qᵀ D^-½ Φ D^-½ Q + 8πλ I) z = …: one
+        eigen-decomposition serves every λ, and the residual at a point the spline never saw is √D_i v_i / G_ii with G =
+        Q (…)⁻¹ Qᵀ (Wahba eq. 4.2.8 in these coordinates).
+        """
+        root = self.noise
+        polynomial = np.column_stack([self.centres, np.ones(len(root))]) / root[:, None]
+        q = np.linalg.qr(polynomial, mode="complete")[0][:, 3:]
+        eigenvalues, vectors = np.linalg.eigh(q.T @ (kernel(self.centres, self.centres) / np.outer(root, root)) @ q)
+        basis = q @ vectors
+        projected, squared = basis.T @ (values / root), basis**2
+        out = np.empty((len(ladder), len(values)))
+        for i, smoothing in enumerate(ladder):
+            gain = 1.0 / (np.maximum(eigenvalues, 0.0) + 8 * np.pi * smoothing)
+            out[i] = (basis @ (gain * projected)) / np.maximum(squared @ gain, 1e-300) * root
+        return out
+
+
+def spread_points(points: Array, quality: Array, budget: int, spacing: float) -> NDArray[np.intp]:
+    """Indices of at most `budget` points (N, 2), no two in one cell of `spacing` px, the best (smallest quality) of
+    each cell."""
+    cells = np.floor(points / spacing).astype(np.int64)
+    order = np.lexsort((quality, cells[:, 0], cells[:, 1]))
+    first = np.r_[True, np.any(np.diff(cells[order], axis=0) != 0, axis=1)]
+    chosen = order[first]
+    if len(chosen) > budget:  # coarser cells until the budget holds them: about the square root of the excess
+        return spread_points(points, quality, budget, spacing * max(1.05, float(np.sqrt(len(chosen) / budget))))
+    return np.sort(chosen)
