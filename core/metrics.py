@@ -1,0 +1,95 @@
+"""How well a stitch holds: alignment and epipolar exactness in px, folds, and the overlap's PSNR and SSIM."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .epipolar import Array, distance_to_line
+from .images import Picture
+from .warp import Warp
+
+# Constants of the structural similarity index for 8 bit (Wang et al., IEEE TIP 2004, section III-B).
+SSIM_C1, SSIM_C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+
+
+def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
+    """Peak signal-to-noise ratio in dB of two 8-bit pictures (H, W, C) over a mask (H, W); inf where they are equal."""
+    error = np.square(a[mask].astype(np.float32) - b[mask].astype(np.float32)).mean(dtype=np.float64)
+    return float("inf") if error == 0 else float(10 * np.log10(255.0**2 / error))
+
+
+def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
+    """Mean structural similarity of two 8-bit pictures (H, W, C) as gray, 11×11 Gaussian of σ 1.5, where the whole
+    window lies in the mask.
+
+    NaN where no window fits (Wang et al. 2004).
+    """
+    inner = cv2.erode(np.pad(mask.astype(np.uint8), 5), np.ones((11, 11), np.uint8))[5:-5, 5:-5] > 0
+    if not inner.any():
+        return float("nan")
+    x, y = (_gray(picture).astype(np.float32) for picture in (a, b))
+
+    def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
+        return cv2.GaussianBlur(values, (11, 11), 1.5)
+
+    mx, my = smooth(x), smooth(y)
+    vx, vy, vxy = smooth(x * x) - mx * mx, smooth(y * y) - my * my, smooth(x * y) - mx * my
+    index = (2 * mx * my + SSIM_C1) * (2 * vxy + SSIM_C2) / ((mx * mx + my * my + SSIM_C1) * (vx + vy + SSIM_C2))
+    return float(index[inner].mean(dtype=np.float64))
+
+
+def _gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return picture[..., 0] if picture.shape[2] == 1 else cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+
+
+def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
+    """PSNR (dB), SSIM and size of the overlap, between the 8-bit views of the reference and of the warped target.
+
+    Exposure differences are in it; it is what a reader of the literature calls alignment quality on the overlap.
+    """
+    height, width = reference.view.shape[:2]
+    x, y = warp.canvas.offset
+    box = (slice(y, y + height), slice(x, x + width))
+    inside = warp.inside((target.view.shape[1], target.view.shape[0]))[box]
+    if reference.alpha is not None:
+        inside = inside & (reference.alpha > 0)
+    if not inside.any():
+        return {"overlap_px": 0, "overlap_psnr_db": float("nan"), "overlap_ssim": float("nan")}
+    map_x, map_y = (np.where(inside, m[box], -1).astype(np.float32) for m in (warp.map_x, warp.map_y))
+    fetched = cv2.remap(target.view, map_x, map_y, cv2.INTER_LINEAR).reshape(height, width, -1)
+    return {
+        "overlap_px": int(inside.sum()),
+        "overlap_psnr_db": psnr(reference.view, fetched, inside),
+        "overlap_ssim": ssim(reference.view, fetched, inside),
+    }
+
+
+def look_up(warp: Warp, x: Array) -> Array:
+    """The map (N, 2) at points (N, 2) of the reference, bilinear between canvas pixels; NaN outside."""
+    at = (x + np.array(warp.canvas.offset)).astype(np.float32)
+    columns = [
+        cv2.remap(m, at[:, :1].copy(), at[:, 1:].copy(), cv2.INTER_LINEAR, borderValue=float("nan")).ravel()
+        for m in (warp.map_x, warp.map_y)
+    ]
+    return np.column_stack(columns).astype(np.float64)
+
+
+def folds(warp: Warp, target_size: tuple[int, int]) -> float:
+    """Share of the pixels that show the target where the map turns over (its Jacobian changes sign)."""
+    x, y = warp.map_x, warp.map_y
+    turn: NDArray = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1]) - (x[1:, :-1] - x[:-1, :-1]) * (
+        y[:-1, 1:] - y[:-1, :-1]
+    )
+    turn = turn[warp.inside(target_size)[:-1, :-1] & np.isfinite(turn)]
+    if turn.size == 0:
+        return 0.0
+    return float(np.mean(np.sign(turn) != np.sign(np.median(turn))))
+
+
+def distances_off_line(F: Array, points: Array, mapped: Array) -> Array:
+    """Distance in px (N,) of mapped target points from the epipolar lines of their reference points, finite ones
+    only."""
+    finite = np.isfinite(mapped).all(axis=1)
+    return distance_to_line(F, points[finite], mapped[finite])

@@ -1,0 +1,101 @@
+"""What a stitch leaves on disk: panorama, layers, warp and report, each as bytes for `OutputFiles`."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .errors import BadRequest
+from .images import encode_picture, output_bits
+from .output_files import OutputFiles
+from .pipeline import StitchResult
+from .report import plain
+from .warp import Layer
+
+
+@dataclass(frozen=True)
+class OutputRequest:
+    """Where the results go: the panorama always, the others where a path is given."""
+
+    panorama: Path
+    report: Path | None = None
+    layers: Path | None = None
+    warp: Path | None = None
+
+    @property
+    def timing(self) -> Path | None:
+        """Seconds stand in a file of their own beside the report, which is the same for the same input."""
+        return None if self.report is None else self.report.with_name(self.report.stem + ".timing.json")
+
+
+def check(request: OutputRequest, files: OutputFiles) -> None:
+    """Asks before the work whether everything could be written. Raises BadRequest or UnwritableOutput."""
+    output_bits((8,), request.panorama.suffix)
+    if request.warp is not None and request.warp.suffix.lower() != ".npz":
+        raise BadRequest(f"the warp is written as .npz, not {request.warp.suffix or 'a file of no kind'}")
+    files.check(*(p for p in (request.panorama, request.report, request.timing, request.warp) if p is not None))
+    if request.layers is not None:
+        names = [f"{layer}{suffix}" for layer in ("reference", "target") for suffix in (".png", ".exr")]
+        files.check_folder(request.layers, names)
+
+
+def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> list[str]:
+    """Stages every requested file; returns warnings about what a file kind could not hold."""
+    exif = result.reference.exif
+    icc = result.reference.icc
+    alpha = None if result.alpha.min() >= 1.0 else result.alpha
+    data, warned = encode_picture(result.pixels, alpha, result.bits, request.panorama.suffix, icc, exif)
+    files.add(request.panorama, data)
+    warnings = list(warned)
+    if request.layers is not None:
+        for name, layer in (("reference", result.reference_layer), ("target", result.target_layer)):
+            _add_layer(files, request.layers, name, layer, result)
+    if request.warp is not None:
+        files.add(request.warp, warp_bytes(result))
+    if request.report is not None and request.timing is not None:
+        files.add(request.report, json_bytes({**result.report, "warnings": [*result.warnings, *warnings]}))
+        files.add(request.timing, json_bytes({"seconds": result.seconds}))
+    return warnings
+
+
+def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result: StitchResult) -> None:
+    icc, exif = result.reference.icc, result.reference.exif
+    files.add_to_folder(
+        folder, f"{name}.png", encode_picture(layer.pixels, layer.alpha, result.bits, ".png", icc, exif)[0]
+    )
+    if result.bits == 32:
+        files.add_to_folder(folder, f"{name}.exr", encode_picture(layer.pixels, layer.alpha, 32, ".exr", icc, exif)[0])
+
+
+def warp_bytes(result: StitchResult) -> bytes:
+    """The .npz of DESIGN 5: x' ~ H_inf p + inverse_depth e' for canvas pixels p + offset; NaN for what a model
+    lacks."""
+    view, warp = result.two_view, result.warp
+    arrays: dict[str, np.ndarray] = {
+        "map_x": warp.map_x, "map_y": warp.map_y, "offset": np.array(warp.canvas.offset, np.int64),
+        "F": view.F, "H_inf": view.H_inf, "e_prime": view.e_prime, "inverse_depth": warp.inverse_depth,
+        "K": view.K, "K_prime": view.K_prime, "R": view.R, "t": view.t,
+        "dist": result.cameras[0].distortion, "dist_prime": result.cameras[1].distortion,
+    }  # fmt: skip
+    return npz_bytes(arrays)
+
+
+def npz_bytes(arrays: dict[str, np.ndarray]) -> bytes:
+    """An .npz file of arrays, the same bytes whenever it is made (numpy.savez puts the time of day into it)."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
+        for name, array in arrays.items():
+            with archive.open(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def json_bytes(value: dict[str, Any]) -> bytes:
+    """JSON as people read it; NaN and infinity become null."""
+    return (json.dumps(plain(value), indent=1, ensure_ascii=False) + "\n").encode()
