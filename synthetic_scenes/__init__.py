@@ -1,0 +1,1 @@
+"""Scenes with known cameras, their ground truth, and what an estimate is measured against it."""
