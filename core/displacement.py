@@ -25,6 +25,8 @@ SMOOTHING_START = 1e-3
 SMOOTHING_LADDER = SMOOTHING_START * 10.0 ** np.arange(-3.0, 2.01, 0.5)
 PRUNE_SIGMAS = 3.0
 GROSS_DEVIATIONS = 10.0
+# Whatever σ says, an error this small (px) is no outlier; and so much agreement among the nearest makes a thing.
+PRUNE_FLOOR_PX, NEIGHBOURS, SUPPORT = 1.0, 8, 3
 MIN_CENTRES = 8
 
 
@@ -154,7 +156,9 @@ def fit_strict(
     off_line = np.linalg.norm(target_points(two_view, x[index], d[index]) - y[index], axis=1)
     index = index[spread_points(x[index], off_line, CENTRE_BUDGET, np.sqrt(area) / 200)]
     g = d - (x @ plane[:2] + plane[2])
-    index, spline, residual, smoothing, held_out_px = _prune_and_smooth(x, g, sensitivity, index, np.sqrt(area))
+    index, spline, residual, smoothing, held_out_px = _prune_and_smooth(
+        x, g, sensitivity, index, np.sqrt(area), noise_scale
+    )
     s = sensitivity[index]
     bend_px = s * np.abs(spline.at(x[index]))
     kept = np.zeros(len(x), bool)
@@ -171,13 +175,15 @@ def fit_strict(
 
 
 def _prune_and_smooth(
-    x: Array, g: Array, sensitivity: Array, index: NDArray[np.intp], unit: float
+    x: Array, g: Array, sensitivity: Array, index: NDArray[np.intp], unit: float, noise_scale: float
 ) -> tuple[NDArray[np.intp], ThinPlateSpline, Array, float, float]:
     """Drop what lies beyond 3σ of the spline (outliers along the line pass every epipolar test), choose λ, drop again,
     until stable.
 
     Returns the kept indices, the spline, its residuals, λ and the leave-one-out RMS in px.
     """
+
+    floor = PRUNE_FLOOR_PX * noise_scale
 
     def problem(index: NDArray[np.intp]) -> SmoothingProblem:
         s = sensitivity[index]
@@ -186,7 +192,8 @@ def _prune_and_smooth(
     # gross errors first: they would bend the spline towards themselves, so each is judged by the spline without it
     while True:
         error = np.abs(sensitivity[index] * problem(index).held_out_at(g[index], SMOOTHING_START))
-        keep = error <= GROSS_DEVIATIONS * np.median(error) / 0.6745 + 1e-9
+        keep = error <= max(GROSS_DEVIATIONS * np.median(error) / 0.6745, floor)
+        keep |= _supported(x[index], g[index], sensitivity[index], floor)
         if keep.all() or keep.sum() < MIN_CENTRES:
             break
         index = index[keep]
@@ -194,12 +201,28 @@ def _prune_and_smooth(
     while True:
         spline, residual = problem(index).solve(g[index], smoothing)
         error = np.abs(sensitivity[index] * residual)
-        keep = error <= PRUNE_SIGMAS * np.sqrt(np.mean(error**2)) + 1e-9
+        keep = error <= max(PRUNE_SIGMAS * np.sqrt(np.mean(error**2)), floor)
+        keep |= _supported(x[index], g[index], sensitivity[index], floor)
         if keep.all() or keep.sum() < MIN_CENTRES:
             break
         index = index[keep]
     held_out = sensitivity[index] * problem(index).held_out_at(g[index], smoothing)
     return index, spline, residual, smoothing, float(np.sqrt(np.mean(held_out**2)))
+
+
+def _supported(x: Array, g: Array, sensitivity: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Which points (N,) agree with at least three of their eight nearest to within `tolerance` px along the line.
+
+    A thing in front of a wall is as far from the spline as an outlier, but it does not stand alone: without this,
+    pruning would peel it off from its edges inwards.
+    """
+    if len(x) <= NEIGHBOURS:
+        return np.zeros(len(x), bool)
+    apart = np.subtract.outer(x[:, 0], x[:, 0]) ** 2 + np.subtract.outer(x[:, 1], x[:, 1]) ** 2
+    np.fill_diagonal(apart, np.inf)
+    nearest = np.argpartition(apart, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]
+    agrees = np.abs(g[nearest] - g[:, None]) * sensitivity[:, None] <= tolerance
+    return agrees.sum(axis=1) >= SUPPORT
 
 
 def _best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> float:

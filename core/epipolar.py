@@ -43,14 +43,20 @@ def rotation_angle(R1: Array, R2: Array) -> float:
     return float(np.degrees(2 * np.arcsin(min(1.0, np.linalg.norm(R1 - R2) / (2 * np.sqrt(2))))))
 
 
+def inverse_intrinsics(K: Array) -> Array:
+    """K⁻¹ of [[fx, s, cx], [0, fy, cy], [0, 0, 1]], written out: a refinement asks for it thousands of times."""
+    fx, s, cx, fy, cy = K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2]
+    return np.array([[1 / fx, -s / (fx * fy), (s * cy - cx * fy) / (fx * fy)], [0, 1 / fy, -cy / fy], [0, 0, 1]])
+
+
 def infinite_homography(K: Array, K_prime: Array, R: Array) -> Array:
     """H_inf = K' R K⁻¹, sign kept, so that H_inf p has a positive third part in front of the target camera."""
-    return K_prime @ R @ np.linalg.inv(K)
+    return K_prime @ R @ inverse_intrinsics(K)
 
 
 def fundamental_from_pose(K: Array, K_prime: Array, R: Array, t: Array) -> Array:
     """F = K'⁻ᵀ [t]ₓ R K⁻¹, scaled to Frobenius norm 1."""
-    F = np.linalg.inv(K_prime).T @ skew(t) @ R @ np.linalg.inv(K)
+    F = inverse_intrinsics(K_prime).T @ skew(t) @ R @ inverse_intrinsics(K)
     return F / np.linalg.norm(F)
 
 
@@ -90,8 +96,8 @@ def in_front(K: Array, K_prime: Array, R: Array, t: Array, x: Array, y: Array, s
     is the sine of the parallax angle below which a point counts as infinitely far, hence in front, if its rays agree in
     direction.
     """
-    ray = homogeneous(x) @ np.linalg.inv(K).T
-    ray_prime = homogeneous(y) @ np.linalg.inv(K_prime).T
+    ray = homogeneous(x) @ inverse_intrinsics(K).T
+    ray_prime = homogeneous(y) @ inverse_intrinsics(K_prime).T
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
     ray_prime /= np.linalg.norm(ray_prime, axis=1, keepdims=True)
     turned = ray @ R.T

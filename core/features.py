@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import sgemm
 
 # Above this a picture is shrunk for features only: SIFT's cost and memory grow with pixels, its useful points hardly
 # do.
@@ -48,6 +49,10 @@ class Matches:
     def subset(self, keep: NDArray) -> Matches:
         """The matches that a mask or index array selects."""
         return Matches(self.x[keep], self.y[keep], self.scale)
+
+    def thinned(self, most: int) -> Matches:
+        """At most so many of the matches, evenly through the list."""
+        return self if len(self) <= most else self.subset(np.linspace(0, len(self) - 1, most).astype(int))
 
 
 def detect(view: NDArray[np.uint8], alpha: NDArray[np.float32] | None = None, budget: int = FEATURE_BUDGET) -> Features:
@@ -119,7 +124,7 @@ def match(a: Features, b: Features, ratio: float = RATIO) -> Matches:
     back = np.zeros(len(b.points), np.intp)
     for start in range(0, len(a.points), 1024):  # in slabs, so that memory stays bounded
         rows = slice(start, start + 1024)
-        score = a.descriptors[rows] @ b.descriptors.T
+        score = _products(a.descriptors[rows], b.descriptors)
         best_row = score.argmax(axis=0)
         best = score[best_row, np.arange(score.shape[1])]
         better = best > back_score
@@ -137,3 +142,11 @@ def match(a: Features, b: Features, ratio: float = RATIO) -> Matches:
     _, first = np.unique(np.round(np.hstack([x, y]), 1), axis=0, return_index=True)
     first.sort()
     return Matches(x[first], y[first], scale)
+
+
+def _products(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
+    """a bᵀ (N, M) by SciPy's BLAS: a Blender may bring a NumPy whose own is thirty times slower (Debian's does).
+
+    Transposed views of row-major arrays are column-major, as BLAS wants them: nothing is copied.
+    """
+    return sgemm(1.0, b.T, a.T, trans_a=True).T

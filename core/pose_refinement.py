@@ -16,9 +16,11 @@ from .epipolar import (
     fundamental_from_pose,
     homogeneous,
     infinite_homography,
+    inverse_intrinsics,
     project,
     rotation_from_vector,
     sampson_residuals,
+    skew,
 )
 from .features import Matches
 
@@ -154,30 +156,52 @@ class _Problem:
     def normal_equations(self, pose: Pose) -> tuple[Array, Array]:
         """Gauss-Newton normal matrix and gradient (of half the cost), residuals reweighted by the Cauchy loss."""
         size = 5 + self.focal_free + self.zoom
-        residual, by_F = self._residuals_and_derivative(pose)
-        beyond = self._beyond_infinity(pose)
-        J, J_beyond = np.empty((len(residual), size)), np.empty((len(residual), size))
-        h = 1e-6
-        for k in range(size):
-            step = np.zeros(size)
-            step[k] = h
-            forward, backward = self.moved(pose, step), self.moved(pose, -step)
-            J[:, k] = by_F @ ((forward.F - backward.F) / (2 * h)).ravel()
-            J_beyond[:, k] = (self._beyond_infinity(forward) - self._beyond_infinity(backward)) / (2 * h)
+        F, by_unknowns = self._F_and_derivatives(pose)
+        residual, by_F = self._residuals_and_derivative(F)
         normal, gradient = np.zeros((size, size)), np.zeros(size)
-        for value, jacobian, sigma in ((residual, J, self.sigma), (beyond, J_beyond, self.sigma_beyond)):
-            r = value / sigma
-            w = self.weight / (1 + r * r) / sigma
-            normal += (jacobian * (w / sigma)[:, None]).T @ jacobian
-            gradient += jacobian.T @ (w * r)
+        self._add(normal, gradient, residual, by_F @ by_unknowns, self.sigma)
+        wrong_side = self._beyond_infinity(pose) < 0
+        if wrong_side.any():
+            few = _Problem(self.matches.subset(wrong_side), self.camera, self.camera_prime, self.sigma, self.zoom)
+            self._add(normal, gradient, few._beyond_infinity(pose), few._beyond_derivative(pose, size), self.sigma_beyond)
         for e, d in self._prior(pose):
             normal += np.outer(d, d)
             gradient += e * d
         return normal, gradient
 
-    def _residuals_and_derivative(self, pose: Pose) -> tuple[Array, Array]:
+    def _add(self, normal: Array, gradient: Array, values: Array, jacobian: Array, sigma: float) -> None:
+        r = values / sigma
+        w = self.weight / (1 + r * r) / sigma
+        normal += (jacobian * (w / sigma)[:, None]).T @ jacobian
+        gradient += jacobian.T @ (w * r)
+
+    def _beyond_derivative(self, pose: Pose, size: int) -> Array:
+        """Derivatives (N, size) of `_beyond_infinity` by the unknowns, by central differences: it seldom has rows."""
+        h = 1e-6
+        columns = [
+            (self._beyond_infinity(self.moved(pose, step)) - self._beyond_infinity(self.moved(pose, -step))) / (2 * h)
+            for step in h * np.eye(size)
+        ]
+        return np.column_stack(columns)
+
+    def _F_and_derivatives(self, pose: Pose) -> tuple[Array, Array]:
+        """F = K'⁻ᵀ [t]ₓ R K⁻¹ (not normalised) and the derivatives (9, size) of its entries by the unknowns."""
+        K_inv, K_prime_inv = inverse_intrinsics(pose.K), inverse_intrinsics(pose.K_prime)
+        left, right = K_prime_inv.T @ skew(pose.t), pose.R @ K_inv
+        derivatives = []
+        if self.focal_free:
+            # a focal length scales the first two rows of K⁻¹ by its inverse
+            shrink = np.diag([-1.0, -1.0, 0.0])
+            by_first = left @ pose.R @ shrink @ K_inv
+            by_second = K_prime_inv.T @ shrink @ skew(pose.t) @ right
+            derivatives = [by_first, by_second] if self.zoom else [by_first + by_second]
+        derivatives += [left @ skew(axis) @ right for axis in np.eye(3)]
+        derivatives += [K_prime_inv.T @ skew(tangent) @ right for tangent in _tangent_basis(pose.t).T]
+        return left @ right, np.column_stack([d.ravel() for d in derivatives])
+
+    def _residuals_and_derivative(self, F: Array) -> tuple[Array, Array]:
         """Sampson residuals (N,) and their derivatives by the nine entries of F (N, 9)."""
-        F, x, y = pose.F, self.x, self.y
+        x, y = self.x, self.y
         line_y, line_x = x @ F.T, y @ F
         algebraic = np.sum(y * line_y, axis=1)
         squared = line_y[:, 0] ** 2 + line_y[:, 1] ** 2 + line_x[:, 0] ** 2 + line_x[:, 1] ** 2
@@ -199,7 +223,7 @@ def _zoomed(K: Array, factor: float) -> Array:
 
 def _tangent_basis(t: Array) -> Array:
     """Two unit vectors (3, 2) perpendicular to t."""
-    axis = np.eye(3)[int(np.argmin(np.abs(t)))]
-    first = np.cross(t, axis)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(t, first)])
+    across = skew(t)
+    first = across[:, int(np.argmin(np.abs(t)))]  # t × the axis it is least along
+    first = first / np.linalg.norm(first)
+    return np.column_stack([first, across @ first])

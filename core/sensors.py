@@ -30,7 +30,7 @@ _MODELS: dict[float, str] = {
 }
 # Cameras whose names begin like those above.
 _EXCEPTIONS = {"nikon d3000": 28.2, "nikon d3100": 28.2, "nikon d3200": 28.2, "nikon d3300": 28.2, "nikon d3400": 28.2}
-_EXCEPTIONS |= {"nikon d3500": 28.2, "nikon d40": 28.2}
+_EXCEPTIONS |= {f"nikon d{number}": 28.2 for number in (40, 300, 3500, 7000, 7500)}
 _DIAGONALS = {part.lstrip(): mm for mm, parts in _MODELS.items() for part in parts.split(",")} | _EXCEPTIONS
 
 

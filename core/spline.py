@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from .epipolar import Array
@@ -61,7 +62,7 @@ class ThinPlateSpline:
 
 def kernel(points: Array, centres: Array) -> Array:
     """½ r² ln r² between points (N, 2) and centres (M, 2), zero at r = 0."""
-    r2 = ((points[:, None, :] - centres[None, :, :]) ** 2).sum(axis=2)
+    r2 = np.subtract.outer(points[:, 0], centres[:, 0]) ** 2 + np.subtract.outer(points[:, 1], centres[:, 1]) ** 2
     return 0.5 * r2 * np.log(np.maximum(r2, 1e-300))
 
 
@@ -95,7 +96,7 @@ class SmoothingProblem:
     def solve(self, values: Array, smoothing: float) -> tuple[ThinPlateSpline, Array]:
         """The spline of values (N,) at λ = smoothing, and its residuals g − f = 8πλ D w (N,)."""
         n = len(values)
-        solution = np.linalg.solve(self.system(smoothing), np.concatenate([values, np.zeros(3)]))
+        solution = scipy.linalg.solve(self.system(smoothing), np.concatenate([values, np.zeros(3)]))
         spline = ThinPlateSpline(self.centres, solution[:n], solution[n:], self.centre, self.scale)
         return spline, 8 * np.pi * smoothing * self.noise**2 * solution[:n]
 
@@ -103,21 +104,27 @@ class SmoothingProblem:
         """Leave-one-out residuals (N,) at one λ: w_i / (S⁻¹)_ii with S the system (Dubrule 1983 for kriging, the same
         equations)."""
         n = len(values)
-        inverse = np.linalg.inv(self.system(smoothing))
+        inverse = scipy.linalg.inv(self.system(smoothing))
         return (inverse[:n, :n] @ values) / np.diag(inverse)[:n]
 
     def held_out(self, values: Array, ladder: Array) -> Array:
         """Leave-one-out residuals (len(ladder), N) of values (N,), one row for each λ.
 
         With v = √D w, on the complement Q of D^-½ M the system is (Qᵀ D^-½ Φ D^-½ Q + 8πλ I) z = …: one
-        eigen-decomposition serves every λ, and the residual at a point the spline never saw is √D_i v_i / G_ii with G =
-        Q (…)⁻¹ Qᵀ (Wahba eq. 4.2.8 in these coordinates).
+        eigen-decomposition serves every λ, and the residual at a point the spline never saw is √D_i v_i / G_ii with
+        G = Q (…)⁻¹ Qᵀ (Wahba eq. 4.2.8 in these coordinates). Q is not formed: D^-½ Φ D^-½ is projected, which takes
+        rank-3 updates only, and the three directions taken out get the lowest eigenvalues, to be dropped.
         """
         root = self.noise
         polynomial = np.column_stack([self.centres, np.ones(len(root))]) / root[:, None]
-        q = np.linalg.qr(polynomial, mode="complete")[0][:, 3:]
-        eigenvalues, vectors = np.linalg.eigh(q.T @ (kernel(self.centres, self.centres) / np.outer(root, root)) @ q)
-        basis = q @ vectors
+        out_of = np.linalg.qr(polynomial)[0]
+        matrix = kernel(self.centres, self.centres) / np.outer(root, root)
+        for _ in range(2):  # from the left, then from the right
+            matrix -= out_of @ (out_of.T @ matrix)
+            matrix = matrix.T
+        matrix -= (1 + np.abs(matrix).sum(axis=1).max()) * (out_of @ out_of.T)
+        eigenvalues, basis = scipy.linalg.eigh(matrix, driver="evd", overwrite_a=True, check_finite=False)
+        eigenvalues, basis = eigenvalues[3:], basis[:, 3:]
         projected, squared = basis.T @ (values / root), basis**2
         out = np.empty((len(ladder), len(values)))
         for i, smoothing in enumerate(ladder):

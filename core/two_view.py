@@ -34,6 +34,8 @@ RANSAC_PX = 1.5
 START_PX = 1.0
 INLIER_PX = 2.0
 ZOOM_GAIN = 0.75
+# Matches that choose among starts, and matches that refine: more cost time and change nothing.
+FIRST_LOOK, IN_EARNEST = 400, 1500
 # Focal lengths in units of the longer side, tried when nothing is known: 19 mm to 200 mm on a 36 mm frame.
 FOCAL_LADDER = (0.5, 0.7, 0.9, 1.2, 1.6, 2.2, 3.2, 5.0)
 # Parallax below this angle (radians) is rounding and keypoint noise: such a point may lie behind by accident.
@@ -81,16 +83,14 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
     candidates = fundamental_candidates(matches, seed)
     homography_share = homography_inliers(matches, seed)
     start = _best_start(matches, candidates, camera, camera_prime, seed)
-    pose, inliers, sigma = _refine_with_inliers(matches, start, camera, camera_prime, zoom=False)
+    zoom = _zoom_is_evident(matches, start, camera, camera_prime)
+    pose, inliers, sigma = _refine_with_inliers(matches, start, camera, camera_prime, zoom)
     warnings: list[str] = []
     why = (
         f"{int(inliers.sum())} of {len(matches)} matches on their epipolar lines, {homography_share} on one homography"
     )
-    if not (camera.fixed or camera_prime.fixed):
-        zoomed, zoomed_inliers, zoomed_sigma = _refine_with_inliers(matches, pose, camera, camera_prime, zoom=True)
-        if _zoom_is_evident(matches, inliers | zoomed_inliers, sigma, pose, zoomed):
-            pose, inliers, sigma = zoomed, zoomed_inliers, zoomed_sigma
-            why += "; the second focal length was freed: the matches contradict a common one"
+    if zoom:
+        why += "; the second focal length was freed: the matches contradict a common one"
     deviation = focal_deviation(matches.subset(inliers), pose, camera, camera_prime, sigma)
     warnings += _focal_warnings(pose, camera, camera_prime)
     front = in_front(pose.K, pose.K_prime, pose.R, pose.t, matches.x[inliers], matches.y[inliers], FAR_ANGLE)
@@ -155,7 +155,7 @@ def _best_start(matches: Matches, candidates: list[Array], camera: Camera, camer
     factors = [1.0]
     if not (camera.fixed or camera_prime.fixed) and camera.log_sigma > 0.1:
         factors += [rung * max(camera.size) / camera.focal for rung in FOCAL_LADDER]
-    few = matches.subset(np.linspace(0, len(matches) - 1, min(len(matches), 500)).astype(int))
+    few = matches.thinned(FIRST_LOOK)
     starts: list[Pose] = []
     for factor in factors:
         K, K_prime = camera.scaled(factor), camera_prime.scaled(factor)
@@ -193,7 +193,7 @@ def _refine_with_inliers(
         if np.array_equal(new, inliers):
             break
         inliers = new
-        pose, _ = refine_pose(matches.subset(inliers), pose, camera, camera_prime, sigma, zoom=zoom)
+        pose, _ = refine_pose(matches.subset(inliers).thinned(IN_EARNEST), pose, camera, camera_prime, sigma, zoom=zoom)
         residual = np.abs(sampson_residuals(pose.F, matches.x[inliers], matches.y[inliers]))
         # σ from the median absolute residual of a normal distribution
         sigma = float(np.clip(np.median(residual) / 0.6745, 0.1 * matches.scale, RANSAC_PX * matches.scale))
@@ -205,18 +205,19 @@ def _refine_with_inliers(
     return pose, inliers, sigma
 
 
-def _zoom_is_evident(matches: Matches, inliers: NDArray[np.bool_], sigma: float, pose: Pose, zoomed: Pose) -> bool:
+def _zoom_is_evident(matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera) -> bool:
     """Whether the pictures were clearly taken at two focal lengths.
 
     A second focal length also soaks up lens distortion, and then leads astray outside the overlap; so it must lower the
-    mean squared residual (in σ², each at most 9) by ZOOM_GAIN over everything that either pose explains, which a real
-    zoom does at once.
+    mean squared residual (in units of START_PX², each at most 9) by ZOOM_GAIN, which a real zoom does at once.
     """
-    few = matches.subset(inliers)
-    before, after = (
-        np.minimum((sampson_residuals(p.F, few.x, few.y) / sigma) ** 2, 9.0).mean() for p in (pose, zoomed)
-    )
-    return bool(before - after > ZOOM_GAIN)
+    if camera.fixed or camera_prime.fixed:
+        return False
+    few, sigma = matches.thinned(FIRST_LOOK), START_PX * matches.scale
+    zoomed, _ = refine_pose(few, pose, camera, camera_prime, sigma, zoom=True)
+    before, after = (np.minimum((sampson_residuals(p.F, few.x, few.y) / sigma) ** 2, 9.0) for p in (pose, zoomed))
+    explained = (before < 9.0) | (after < 9.0)
+    return bool(explained.any() and (before - after)[explained].mean() > ZOOM_GAIN)
 
 
 def _focal_warnings(pose: Pose, camera: Camera, camera_prime: Camera) -> list[str]:
@@ -240,7 +241,7 @@ def _from_known_cameras(
     (R1, t1), (R2, t2) = pose, pose_prime
     R = R2 @ R1.T
     t = t2 - R @ t1
-    if np.linalg.norm(t) < 1e-12:
+    if np.linalg.norm(t) <= 1e-9 * (np.linalg.norm(t1) + np.linalg.norm(t2)):  # rounding far from the origin
         raise DegenerateGeometry(
             "the two given cameras stand in the same place: without a baseline there is no depth to fit"
         )

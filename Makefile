@@ -1,0 +1,55 @@
+# `make demo`, `make test` and `make lint` set everything up by themselves; nothing after that needs a network.
+PYTHON ?= python3
+PLATFORM ?= linux-x64
+BLENDER_RUN ?=
+WORKERS ?= 2
+
+BIN := .venv/bin
+READY := .venv/.ready
+PYTEST := $(BIN)/python -m pytest
+
+# As the command itself does it: the bytes of a result must not depend on the number of cores.
+export OPENBLAS_NUM_THREADS := 1
+export BLENDER_RUN
+
+.PHONY: setup demo test slow end-to-end lint bench zip clean
+
+setup: $(READY)
+
+# The stamp is the last thing written. Without one, whatever lies in .venv is half a set-up and goes; with one, it is
+# taken away first, so that an update that breaks off counts as half a set-up too.
+$(READY): pyproject.toml setup.py blender_manifest.toml .ci/constraints.txt .ci/check_system.py
+	$(PYTHON) .ci/check_system.py
+	if [ -e $(READY) ]; then rm $(READY); else rm -rf .venv; fi
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --constraint .ci/constraints.txt --editable '.[dev,blender]'
+	touch $(READY)
+
+demo: setup
+	$(BIN)/edf demo -o demo_output --overwrite
+
+test: setup
+	$(PYTEST) -n $(WORKERS) -m "not slow and not blender"
+
+# pytest exits 5 where no test is marked so.
+slow: setup
+	$(PYTEST) -n $(WORKERS) -m "slow and not blender" || [ $$? -eq 5 ]
+
+end-to-end: setup
+	@[ -n "$$BLENDER_RUN" ] || { echo "say how Blender is run: make end-to-end BLENDER_RUN=blender" >&2; exit 2; }
+	$(PYTEST) tests/end_to_end
+
+# mypy takes a package's name from its folder, and a clone's folder may have any name: it gets a link with the right one.
+lint: setup
+	$(BIN)/ruff check .
+	mkdir -p .venv/types && ln -sfn ../.. .venv/types/edf_stitch
+	MYPYPATH=.venv/types $(BIN)/mypy -p edf_stitch.core -p edf_stitch.edf_addon -p edf_stitch.synthetic_scenes
+
+bench: setup
+	$(BIN)/python tests/benchmarks/bench.py
+
+zip: setup
+	$(BIN)/python .ci/build_extension.py --platform $(PLATFORM) --blender "$$BLENDER_RUN" --output-dir dist
+
+clean:
+	rm -rf .venv build dist wheels demo_output *.egg-info

@@ -1,0 +1,95 @@
+"""`blender -b --command edf …`: hands everything over to a worker process and returns its exit status.
+
+The work is not done inside Blender: NumPy is already loaded here, with as many BLAS threads as there are cores, and the
+results' bytes would depend on that. A worker also ends cleanly on Ctrl-C, which Blender swallows.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+PACKAGE = __name__.rsplit(".", 2)[0]
+# Not resolved: developers link a checkout into the extensions folder, and the wheels lie beside the link.
+FOLDER = Path(__file__).absolute().parent.parent
+# The signals that ask to stop, as far as this system has them.
+STOPPING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
+def run(argv: list[str]) -> int:
+    """What Blender calls, with everything that stands behind `--command edf`."""
+    return run_worker(*worker_command(argv))
+
+
+def worker_command(argv: list[str]) -> tuple[list[str], dict[str, str]]:
+    """The command line and the environment of a process that does what `edf ARGV…` does."""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    name = PACKAGE
+    if PACKAGE.startswith("bl_ext."):
+        # Inside Blender the package has a name that only Blender can import: name its folder instead. Blender ignores
+        # the user's Python variables, so they must not reach its Python here either.
+        name = FOLDER.name
+        environment = {key: value for key, value in environment.items() if not key.startswith("PYTHON")}
+        environment["PYTHONPATH"] = os.pathsep.join([str(FOLDER.parent), *_wheels_folders()])
+    return [sys.executable, "-s", "-P", "-m", name, *argv], environment
+
+
+def run_worker(command: list[str], environment: Mapping[str, str]) -> int:
+    """Run it to its end, pass on what asks it to stop, return its exit status (130 where Ctrl-C ended it)."""
+    sys.stdout.flush()
+    # In a process group of its own the worker gets a Ctrl-C from here, once, and not from the terminal as well: a
+    # second one would break into its tidying up.
+    own_group: dict[str, Any] = {"process_group": 0}
+    if sys.platform == "win32":
+        own_group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    with _signals_held() as forward_to:
+        worker = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, **own_group)
+        forward_to(worker)
+        status = worker.wait()
+    return 128 - status if status < 0 else status
+
+
+@contextmanager
+def _signals_held() -> Iterator[Callable[[subprocess.Popen], None]]:
+    """Signals that ask to stop go to the worker, also those that come before it is known."""
+    workers: list[subprocess.Popen] = []
+    asked: list[int] = []
+
+    def handle(number: int, _frame: FrameType | None) -> None:
+        asked.append(number)
+        for worker in workers:
+            _ask_to_stop(worker)
+
+    def forward_to(worker: subprocess.Popen) -> None:
+        workers.append(worker)
+        if asked:
+            _ask_to_stop(worker)
+
+    previous = {number: signal.signal(number, handle) for number in STOPPING}
+    try:
+        yield forward_to
+    finally:
+        for number, handler in previous.items():
+            # None stands for Blender's own handler, which Python cannot put back.
+            signal.signal(number, signal.default_int_handler if handler is None else handler)
+
+
+def _ask_to_stop(worker: subprocess.Popen) -> None:
+    """As Ctrl-C does, whatever came: that is what the worker tidies up after."""
+    if sys.platform == "win32":
+        worker.send_signal(signal.CTRL_BREAK_EVENT)
+    else:
+        worker.send_signal(signal.SIGINT)
+
+
+def _wheels_folders() -> list[str]:
+    """Where Blender has unpacked the wheels of the repository that this extension lies in."""
+    local = FOLDER.parent.parent / ".local"
+    return [entry for entry in sys.path if Path(entry).is_relative_to(local)]

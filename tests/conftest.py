@@ -1,0 +1,114 @@
+"""What the tests of several rooms share: a rendered pair, its files, finished stitches, geometry by hand, photographs.
+
+Everything of session scope is shared: read it, never write to it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from edf_stitch.core.camera import Camera, CameraRequest
+from edf_stitch.core.canvas import Grid
+from edf_stitch.core.epipolar import fundamental_from_pose, infinite_homography, rotation_from_vector
+from edf_stitch.core.images import encode_picture, picture_from_array
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
+from edf_stitch.core.two_view import TwoView
+from edf_stitch.synthetic_scenes.two_planes import Pair, make_pair
+
+
+@pytest.fixture(scope="session")
+def pair() -> Pair:
+    """Rendered with known cameras, 400 × 300."""
+    return make_pair(400, 300)
+
+
+@pytest.fixture(scope="session")
+def small_pair() -> Pair:
+    """As small as a pair can be and still give some 200 matches: half a second a stitch."""
+    return make_pair(240, 180)
+
+
+def true_focal(pair: Pair) -> StitchOptions:
+    return StitchOptions(camera=CameraRequest(focal_px=(pair.reference_camera.K[0, 0],)))
+
+
+@pytest.fixture(scope="session")
+def known(small_pair: Pair) -> StitchOptions:
+    """Options that give the small pair's true focal length."""
+    return true_focal(small_pair)
+
+
+@pytest.fixture(scope="session")
+def result(pair: Pair) -> StitchResult:
+    """The 400 × 300 pair, stitched from arrays with its true focal length."""
+    return stitch(pair.reference, pair.target, true_focal(pair))
+
+
+@pytest.fixture(scope="session")
+def small_result(small_pair: Pair, known: StitchOptions) -> StitchResult:
+    """The small pair, stitched from arrays with its true focal length."""
+    return stitch(small_pair.reference, small_pair.target, known)
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory, small_pair: Pair) -> Path:
+    """A folder with reference.png and target.png of the small pair. Nothing is to be written there."""
+    out = tmp_path_factory.mktemp("pair")
+    for name, array in (("reference", small_pair.reference), ("target", small_pair.target)):
+        (out / f"{name}.png").write_bytes(encode_picture(picture_from_array(array).pixels, None, 8, ".png")[0])
+    return out
+
+
+@dataclass(frozen=True)
+class GivenField:
+    """A displacement field that is a function of reference pixels (…, 2)."""
+
+    depth: Callable[[np.ndarray], np.ndarray]
+    plane: np.ndarray
+    name: str = "given"
+
+    def on_grid(self, grid: Grid) -> np.ndarray:
+        return self.depth(grid.points)
+
+
+def camera_of(size: tuple[int, int], focal: float, distortion: tuple[float, ...] = ()) -> Camera:
+    K = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1.0]])
+    return Camera(K, size, "test", 0.0, np.array([*distortion, *[0.0] * (5 - len(distortion))]))
+
+
+def view_of(camera: Camera, camera_prime: Camera, turn: tuple[float, ...], t: tuple[float, ...]) -> TwoView:
+    """turn: rotation vector in degrees; t: direction of the baseline in the target camera's frame."""
+    K, K_prime, R = camera.K, camera_prime.K, rotation_from_vector(np.radians(turn))
+    t_unit = np.array(t) / np.linalg.norm(t)
+    return TwoView(
+        K, K_prime, R, t_unit, fundamental_from_pose(K, K_prime, R, t_unit), infinite_homography(K, K_prime, R),
+        K_prime @ t_unit, np.ones(0, bool), 0.1, "general", "by hand", "test", 0.0,
+    )  # fmt: skip
+
+
+def plane_field(*plane: float) -> GivenField:
+    """The field of a plane m: d = m·(x, y, 1)."""
+    m = np.array(plane)
+    return GivenField(lambda points: points @ m[:2] + m[2], m)
+
+
+@pytest.fixture(scope="session")
+def by_hand() -> SimpleNamespace:
+    """Cameras, two-view geometry and displacement fields without any estimation: camera, view, plane_field, Field."""
+    return SimpleNamespace(camera=camera_of, view=view_of, plane_field=plane_field, Field=GivenField)
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """The folder of real photographs: EDF_DATA, or ../shared/data beside the checkout."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    found = Path(os.environ.get("EDF_DATA") or beside)
+    if not found.is_dir():
+        pytest.skip(f"no photographs in {found}; EDF_DATA names the folder")
+    return found

@@ -1,0 +1,124 @@
+"""How the house is built: one tree that pip, Blender and its worker all import, with arrows that run one way."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
+PACKAGES = ("core", "edf_addon", "synthetic_scenes")
+SOURCES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+SOURCES += [ROOT / "__init__.py", ROOT / "__main__.py"]
+
+
+def imports(path: Path) -> list[tuple[str, bool]]:
+    """Every import of a file: (dotted name, inside a function?). Our own: a dot, then the path from the root."""
+    tree = ast.parse(path.read_text("utf-8"))
+    functions = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+    lazy = {id(inner) for function in functions for inner in ast.walk(function)}
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [(alias.name, id(node) in lazy) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            found.append((str(node.module), id(node) in lazy))
+        elif isinstance(node, ast.ImportFrom):
+            folder = path.relative_to(ROOT).parts[: -node.level]
+            for alias in node.names:
+                found.append(("." + ".".join([*folder, *filter(None, [node.module]), alias.name]), id(node) in lazy))
+    return found
+
+
+def run_python(code: str) -> str:
+    """Outside the checkout, so that only the installed package answers."""
+    return subprocess.run(
+        [sys.executable, "-P", "-c", code], check=True, capture_output=True, text=True, cwd=ROOT.parent, timeout=120
+    ).stdout.strip()
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_imports_between_our_own_files_are_relative(path):
+    absolute = {name.split(".")[0] for name, _ in imports(path) if not name.startswith(".")}
+    assert not absolute & {"edf_stitch", "main", *PACKAGES}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_arrows_run_one_way(path):
+    """core knows neither of the others, and they do not know each other.
+
+    One door is open: a sub-command of core/cli.py may reach for synthetic_scenes when it is called (`edf demo`,
+    `edf validate`), so that there is one command behind all doors.
+    """
+    home = path.relative_to(ROOT).parts[0]
+    for name, is_lazy in imports(path):
+        assert home != "core" or name.split(".")[0] != "bpy", "core works without Blender"
+        target = name.split(".")[1] if name.startswith(".") else None
+        if home in PACKAGES and target in PACKAGES and target not in (home, "core"):
+            assert is_lazy and (path, target) == (ROOT / "core" / "cli.py", "synthetic_scenes"), f"{home} -> {target}"
+
+
+def test_core_works_where_bpy_cannot_be_imported():
+    code = "import sys; sys.modules['bpy'] = None; import edf_stitch.core.pipeline; print(edf_stitch.stitch)"
+    assert "stitch" in run_python(code)
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    code = "import edf_stitch, sys; print(*sys.modules)"
+    assert not {"numpy", "cv2", "scipy", "bpy", "tomllib"} & set(run_python(code).split())
+
+
+def test_the_package_offers_what_it_promises():
+    code = (
+        "import edf_stitch as e; from edf_stitch import StitchError, StitchOptions, stitch\n"
+        "assert issubclass(StitchError, Exception) and callable(stitch) and StitchOptions()\n"
+        "try: e.nonsense\n"
+        "except AttributeError as error: print(error)"
+    )
+    assert "nonsense" in run_python(code)
+
+
+def test_the_version_stands_in_one_place():
+    version = MANIFEST["version"]
+    assert metadata.version("edf-stitch") == version
+    assert run_python("import edf_stitch; print(edf_stitch.__version__)") == version
+    for door in ([Path(sys.executable).with_name("edf")], [sys.executable, "-m", "edf_stitch"]):
+        said = subprocess.run([*door, "--version"], check=True, capture_output=True, text=True, cwd=ROOT.parent).stdout
+        assert said.split()[-1] == version
+
+
+def test_the_manifest_keeps_within_blenders_limits():
+    required = "schema_version id name tagline version type maintainer license blender_version_min"
+    assert not set(required.split()) - set(MANIFEST)
+    for text in (MANIFEST["tagline"], *MANIFEST["permissions"].values()):
+        assert len(text) <= 64 and not text.endswith(".")
+    assert set(MANIFEST["permissions"]) == {"files"}
+    assert {"__pycache__/", ".*", "/*.zip"} <= set(MANIFEST["build"]["paths_exclude_pattern"])
+    assert re.fullmatch(r"\d+\.\d+\.\d+", MANIFEST["version"])
+
+
+def test_nothing_names_a_registrys_host_or_a_place_on_somebodys_machine():
+    try:
+        listed = subprocess.run(
+            ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+            check=True,
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
+        ).stdout
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("not a git checkout")
+    # In pieces, so that this file does not name them itself.
+    hosts = [("pypi", "org"), ("pythonhosted", "org"), ("deb", "debian", "org"), ("npmjs", "org"), ("crates", "io")]
+    places = [("", "work", ""), ("", "root", ""), ("", "home", ""), ("C:", "Users", "")]
+    words = [".".join(host) for host in hosts] + ["/".join(place) for place in places]
+    pattern = re.compile("|".join(map(re.escape, words)).encode())
+    for name in filter(None, listed.split("\0")):
+        path = ROOT / name
+        if path.is_file():
+            assert not pattern.search(path.read_bytes().replace(b"\\", b"/")), name

@@ -1,0 +1,147 @@
+"""What stands in .ci: the check of the system before set-up, the lock of the wheels, the extension's zip."""
+
+import importlib.util
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
+
+
+def load(name: str):
+    """A script of .ci, which is no package."""
+    spec = importlib.util.spec_from_file_location(f"ci_{name}", ROOT / ".ci" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+check_system = load("check_system")
+build_extension = load("build_extension")
+wheels = build_extension.wheels
+
+
+def without(*absent: str):
+    def load_library(name: str) -> None:
+        if name in absent:
+            raise OSError(f"{name}: cannot open shared object file")
+
+    return load_library
+
+
+def test_a_complete_system_misses_nothing():
+    assert check_system.missing_packages(without(), lambda name: name, wants_bpy=True) == []
+
+
+def test_exactly_what_is_missing_is_named():
+    found = check_system.missing_packages(without("libGL.so.1", "libX11.so.6"), lambda name: name, wants_bpy=True)
+    assert found == ["libx11-6", "libgl1"]
+
+
+def test_debians_venv_without_ensurepip_is_recognised():
+    absent = {"ensurepip"}
+    find = lambda name: None if name in absent else name  # noqa: E731
+    assert check_system.missing_packages(without(), find, wants_bpy=True) == ["python3-venv"]
+
+
+def test_where_bpy_is_not_installed_its_libraries_are_not_asked_for():
+    assert check_system.missing_packages(without(*check_system.LIBRARIES), lambda name: name, wants_bpy=False) == []
+
+
+def test_one_apt_line_and_a_failing_exit_status(monkeypatch, capsys):
+    monkeypatch.setattr(check_system, "missing_packages", lambda: ["python3-venv", "libgl1"])
+    assert check_system.main() == 1
+    assert capsys.readouterr().out == "apt-get install -y python3-venv libgl1\n"
+    monkeypatch.setattr(check_system, "missing_packages", lambda: [])
+    assert check_system.main() == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_the_manifest_lists_the_locks_wheels_and_no_numpy():
+    locked = [wheel.filename for wheel in wheels.read_lock()]
+    assert MANIFEST["wheels"] == [f"./wheels/{name}" for name in locked]
+    assert locked and not any(name.startswith("numpy") for name in locked)
+
+
+@pytest.mark.parametrize(("platform", "python"), [(p, v) for p, versions in wheels.PYTHONS.items() for v in versions])
+def test_every_platform_and_python_has_one_wheel_of_each_kind(platform, python):
+    names = [wheel.filename.split("-")[0] for wheel in wheels.wheels_for(platform, [python])]
+    assert sorted(names) == ["exifread", "opencv_python_headless", "openexr", "poselib", "scipy", "tqdm"]
+
+
+def test_a_wheel_that_is_there_needs_no_network(tmp_path, monkeypatch):
+    content = b"a wheel"
+    wheel = wheels.Wheel("tool-1.0-py3-none-any.whl", __import__("hashlib").sha256(content).hexdigest())
+    monkeypatch.setattr(wheels, "read_lock", lambda: [wheel])
+    asked = []
+
+    def download(platform, python, requirements, folder, *options):
+        asked.append((requirements, options))
+        (folder / wheel.filename).write_bytes(content)
+        return []
+
+    monkeypatch.setattr(wheels, "_download", download)
+    (tmp_path / wheel.filename).write_bytes(b"half a wh")
+    assert wheels.fetch("linux-x64", ["3.13"], tmp_path) == [tmp_path / wheel.filename]
+    assert wheels.fetch("linux-x64", ["3.13"], tmp_path) == [tmp_path / wheel.filename]
+    assert asked == [([wheel.requirement], ("--require-hashes",))]
+
+
+def test_a_wheel_with_another_content_than_locked_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(wheels, "read_lock", lambda: [wheels.Wheel("tool-1.0-py3-none-any.whl", "0" * 64)])
+    monkeypatch.setattr(wheels, "_download", lambda *_: (tmp_path / "tool-1.0-py3-none-any.whl").write_bytes(b"x"))
+    with pytest.raises(SystemExit, match="tool-1.0"):
+        wheels.fetch("linux-x64", ["3.13"], tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "excluded"),
+    [
+        ("core/cli.py", False),
+        ("README.md", False),
+        ("synthetic_scenes/tests/scene.py", False),
+        ("tests/core/test_warp.py", True),
+        (".ci/run", True),
+        ("core/.cache/x", True),
+        ("core/__pycache__/cli.pyc", True),
+        ("edf_stitch.egg-info/PKG-INFO", True),
+        ("old.zip", True),
+        ("synthetic_scenes/old.zip", False),
+        ("wheels/x.whl", True),
+        ("setup.py", True),
+        ("core/setup.py", False),
+        ("build", False),
+    ],
+)
+def test_what_ships(name, excluded):
+    assert build_extension.is_excluded(name, MANIFEST["build"]["paths_exclude_pattern"]) is excluded
+
+
+def test_a_pattern_that_only_blender_understands_is_refused():
+    with pytest.raises(ValueError, match="a/b"):
+        build_extension.is_excluded("x", ["/a/b"])
+
+
+def test_a_zip_is_of_one_platform_and_twice_the_same(tmp_path, monkeypatch):
+    if not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout")
+    carried = [tmp_path / wheel.filename for wheel in wheels.wheels_for("windows-x64", ["3.11"])]
+    for path in carried:
+        path.write_bytes(b"stands for a wheel")
+    monkeypatch.setattr(wheels, "fetch", lambda *_: carried)
+    first = build_extension.build("windows-x64", ["3.11"], [], tmp_path / "a")
+    second = build_extension.build("windows-x64", ["3.11"], [], tmp_path / "b")
+    assert first.read_bytes() == second.read_bytes()
+    assert list(first.parent.iterdir()) == [first], "nothing stays behind"
+    with zipfile.ZipFile(first) as archive:
+        names = set(archive.namelist())
+        manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+    assert manifest["platforms"] == ["windows-x64"]
+    assert {f"./{name}" for name in names if name.endswith(".whl")} == set(manifest["wheels"])
+    assert {"LICENSE", "__init__.py", "__main__.py", "core/errors.py", "edf_addon/command.py"} <= names
+    assert not [name for name in names if name.startswith((".", "tests/")) or name in ("setup.py", "pyproject.toml")]
