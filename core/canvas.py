@@ -103,7 +103,7 @@ def bounding_canvas(
     left, top, right, bottom = reach
     cropped = False
     for _ in range(2):  # the second pass looks closer at what the first found
-        grid = Grid.over(int(left), int(top), max(1, int(right - left)), max(1, int(bottom - top)), nodes=NODES // 4)
+        grid = Grid.over(int(left), int(top), max(1, int(right - left)), max(1, int(bottom - top)), nodes=NODES // 10)
         target = target_at(grid)
         seen = _inside(target, target_size)
         stretched = seen & (_area_ratio(target, grid.step) < 1 / MAX_STRETCH**2)

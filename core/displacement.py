@@ -74,7 +74,9 @@ class StrictField:
             return np.zeros(unfaded.shape)
         # a node beside the last inside one may touch the overlap: distances count from one cell on
         steps = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        u = np.clip((steps.astype(np.float64) - 1) * grid.step / self.fade_px, 0.0, 1.0)
+        # OpenCV's root has other last bits from call to call; squared distances are whole numbers
+        steps = np.sqrt(np.rint(np.square(steps, dtype=np.float64)))
+        u = np.clip((steps - 1) * grid.step / self.fade_px, 0.0, 1.0)
         return 1 - u * u * (3 - 2 * u)
 
 
@@ -185,28 +187,32 @@ def _prune_and_smooth(
 
     floor = PRUNE_FLOOR_PX * noise_scale
 
-    def problem(index: NDArray[np.intp]) -> SmoothingProblem:
-        s = sensitivity[index]
-        return SmoothingProblem.build(x[index], np.median(s) / s, unit)
+    s = sensitivity[index]
+    problem = SmoothingProblem.build(x[index], np.median(s) / s, unit)
+
+    supported = _supported(x[index], g[index], s, floor)
+
+    def drop(keep: NDArray[np.bool_]) -> bool:
+        """Take out what neither the threshold nor its neighbours keep; says whether anything went."""
+        nonlocal index, problem, supported
+        keep = keep | supported
+        if keep.all() or keep.sum() < MIN_CENTRES:
+            return False
+        index, problem, supported = index[keep], problem.subset(keep), supported[keep]
+        return True
 
     # gross errors first: they would bend the spline towards themselves, so each is judged by the spline without it
     while True:
-        error = np.abs(sensitivity[index] * problem(index).held_out_at(g[index], SMOOTHING_START))
-        keep = error <= max(GROSS_DEVIATIONS * np.median(error) / 0.6745, floor)
-        keep |= _supported(x[index], g[index], sensitivity[index], floor)
-        if keep.all() or keep.sum() < MIN_CENTRES:
+        error = np.abs(sensitivity[index] * problem.held_out_at(g[index], SMOOTHING_START))
+        if not drop(error <= max(GROSS_DEVIATIONS * np.median(error) / 0.6745, floor)):
             break
-        index = index[keep]
-    smoothing = _best_smoothing(problem(index), g[index], sensitivity[index])
+    smoothing = _best_smoothing(problem, g[index], sensitivity[index])
     while True:
-        spline, residual = problem(index).solve(g[index], smoothing)
+        spline, residual = problem.solve(g[index], smoothing)
         error = np.abs(sensitivity[index] * residual)
-        keep = error <= max(PRUNE_SIGMAS * np.sqrt(np.mean(error**2)), floor)
-        keep |= _supported(x[index], g[index], sensitivity[index], floor)
-        if keep.all() or keep.sum() < MIN_CENTRES:
+        if not drop(error <= max(PRUNE_SIGMAS * np.sqrt(np.mean(error**2)), floor)):
             break
-        index = index[keep]
-    held_out = sensitivity[index] * problem(index).held_out_at(g[index], smoothing)
+    held_out = sensitivity[index] * problem.held_out_at(g[index], smoothing)
     return index, spline, residual, smoothing, float(np.sqrt(np.mean(held_out**2)))
 
 

@@ -163,7 +163,8 @@ class _Problem:
         wrong_side = self._beyond_infinity(pose) < 0
         if wrong_side.any():
             few = _Problem(self.matches.subset(wrong_side), self.camera, self.camera_prime, self.sigma, self.zoom)
-            self._add(normal, gradient, few._beyond_infinity(pose), few._beyond_derivative(pose, size), self.sigma_beyond)
+            beyond, derivative = few._beyond_infinity(pose), few._beyond_derivative(pose, size)
+            self._add(normal, gradient, beyond, derivative, self.sigma_beyond)
         for e, d in self._prior(pose):
             normal += np.outer(d, d)
             gradient += e * d
@@ -176,13 +177,10 @@ class _Problem:
         gradient += jacobian.T @ (w * r)
 
     def _beyond_derivative(self, pose: Pose, size: int) -> Array:
-        """Derivatives (N, size) of `_beyond_infinity` by the unknowns, by central differences: it seldom has rows."""
-        h = 1e-6
-        columns = [
-            (self._beyond_infinity(self.moved(pose, step)) - self._beyond_infinity(self.moved(pose, -step))) / (2 * h)
-            for step in h * np.eye(size)
-        ]
-        return np.column_stack(columns)
+        """Derivatives (N, size) of `_beyond_infinity` by the unknowns, by differences: it seldom has rows."""
+        h, here = 1e-7, self._beyond_infinity(pose)
+        moved = (self._beyond_infinity(self.moved(pose, step)) for step in h * np.eye(size))
+        return np.column_stack([(there - here) / h for there in moved])
 
     def _F_and_derivatives(self, pose: Pose) -> tuple[Array, Array]:
         """F = K'⁻ᵀ [t]ₓ R K⁻¹ (not normalised) and the derivatives (9, size) of its entries by the unknowns."""

@@ -75,19 +75,25 @@ class SmoothingProblem:
     noise: Array
     centre: Array
     scale: float
+    phi: Array
 
     @staticmethod
     def build(points: Array, noise: Array, scale: float) -> SmoothingProblem:
-        """Points moved to their centroid and divided by `scale`, the unit in which λ is meant; both leave the solution
-        alone."""
+        """Points moved to their centroid and divided by `scale`, the unit in which λ is meant."""
         centre = points.mean(axis=0)
-        return SmoothingProblem((points - centre) / scale, noise, centre, scale)
+        centres = (points - centre) / scale
+        return SmoothingProblem(centres, noise, centre, scale, kernel(centres, centres))
+
+    def subset(self, keep: NDArray[np.bool_]) -> SmoothingProblem:
+        """The same problem without some of its points."""
+        phi = self.phi[np.ix_(keep, keep)]
+        return SmoothingProblem(self.centres[keep], self.noise[keep], self.centre, self.scale, phi)
 
     def system(self, smoothing: float) -> Array:
         """The bordered matrix [[Φ + 8πλ D, M], [Mᵀ, 0]] (N + 3, N + 3)."""
         n = len(self.noise)
         system = np.zeros((n + 3, n + 3))
-        system[:n, :n] = kernel(self.centres, self.centres)
+        system[:n, :n] = self.phi
         system[np.arange(n), np.arange(n)] += 8 * np.pi * smoothing * self.noise**2
         system[:n, n:] = np.column_stack([self.centres, np.ones(n)])
         system[n:, :n] = system[:n, n:].T
@@ -118,7 +124,7 @@ class SmoothingProblem:
         root = self.noise
         polynomial = np.column_stack([self.centres, np.ones(len(root))]) / root[:, None]
         out_of = np.linalg.qr(polynomial)[0]
-        matrix = kernel(self.centres, self.centres) / np.outer(root, root)
+        matrix = self.phi / np.outer(root, root)
         for _ in range(2):  # from the left, then from the right
             matrix -= out_of @ (out_of.T @ matrix)
             matrix = matrix.T

@@ -34,6 +34,7 @@ RANSAC_PX = 1.5
 START_PX = 1.0
 INLIER_PX = 2.0
 ZOOM_GAIN = 0.75
+PLANE_SHARE = 0.5
 # Matches that choose among starts, and matches that refine: more cost time and change nothing.
 FIRST_LOOK, IN_EARNEST = 400, 1500
 # Focal lengths in units of the longer side, tried when nothing is known: 19 mm to 200 mm on a 36 mm frame.
@@ -81,13 +82,13 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
     if camera.pose is not None and camera_prime.pose is not None:
         return _from_known_cameras(matches, camera, camera_prime, camera.pose, camera_prime.pose)
     candidates = fundamental_candidates(matches, seed)
-    homography_share = homography_inliers(matches, seed)
-    start = _best_start(matches, candidates, camera, camera_prime, seed)
+    on_homography = homography_inliers(matches, seed)
+    start = _best_start(matches, candidates, on_homography, camera, camera_prime, seed)
     zoom = _zoom_is_evident(matches, start, camera, camera_prime)
     pose, inliers, sigma = _refine_with_inliers(matches, start, camera, camera_prime, zoom)
     warnings: list[str] = []
     why = (
-        f"{int(inliers.sum())} of {len(matches)} matches on their epipolar lines, {homography_share} on one homography"
+        f"{int(inliers.sum())} of {len(matches)} matches on their epipolar lines, {on_homography} on one homography"
     )
     if zoom:
         why += "; the second focal length was freed: the matches contradict a common one"
@@ -147,8 +148,11 @@ def homography_inliers(matches: Matches, seed: int) -> int:
     return int(np.sum(info["inliers"]))
 
 
-def _best_start(matches: Matches, candidates: list[Array], camera: Camera, camera_prime: Camera, seed: int) -> Pose:
-    """The pose to refine from: every F at a ladder of focal lengths, and calibrated RANSAC, which a plane cannot fool.
+def _best_start(
+    matches: Matches, candidates: list[Array], on_homography: int, camera: Camera, camera_prime: Camera, seed: int
+) -> Pose:
+    """The pose to refine from: every F at a ladder of focal lengths, and, where most points lie on a plane, which makes
+    F meaningless, calibrated RANSAC, which a plane cannot fool.
 
     All are compared by one robust cost with a wide scale over all matches: the landscape has several valleys.
     """
@@ -164,18 +168,20 @@ def _best_start(matches: Matches, candidates: list[Array], camera: Camera, camer
             poses = poses_from_fundamental(F, K, K_prime)
             front = [in_front(K, K_prime, R, t, near.x, near.y, FAR_ANGLE).sum() for R, t in poses]
             starts.append(Pose(K, K_prime, *poses[int(np.argmax(front))]))
-    options = {"max_epipolar_error": RANSAC_PX * matches.scale, "seed": seed, "max_iterations": 2000}
-    pose, _ = poselib.estimate_relative_pose(
-        matches.x, matches.y, camera.as_poselib(), camera_prime.as_poselib(), options, {}
-    )
-    if np.isfinite(pose.R).all() and np.linalg.norm(pose.t) > 0:
-        starts.append(Pose(camera.K, camera_prime.K, np.asarray(pose.R), pose.t / np.linalg.norm(pose.t)))
+    if on_homography > PLANE_SHARE * len(matches):
+        options = {"max_epipolar_error": RANSAC_PX * matches.scale, "seed": seed, "max_iterations": 2000}
+        pose, _ = poselib.estimate_relative_pose(
+            matches.x, matches.y, camera.as_poselib(), camera_prime.as_poselib(), options, {}
+        )
+        if np.isfinite(pose.R).all() and np.linalg.norm(pose.t) > 0:
+            starts.append(Pose(camera.K, camera_prime.K, np.asarray(pose.R), pose.t / np.linalg.norm(pose.t)))
     # a first look at all, then the best few in earnest
     sigma = START_PX * matches.scale
+    glance = few.thinned(FIRST_LOOK // 2)
     rough = sorted(
-        (refine_pose(few, p, camera, camera_prime, sigma, iterations=3) for p in starts), key=lambda item: item[1]
+        (refine_pose(glance, p, camera, camera_prime, sigma, iterations=3) for p in starts), key=lambda item: item[1]
     )
-    fine = (refine_pose(few, p, camera, camera_prime, sigma) for p, _ in rough[:3])
+    fine = (refine_pose(few, p, camera, camera_prime, sigma, iterations=10) for p, _ in rough[:3])
     return min(fine, key=lambda item: item[1])[0]
 
 

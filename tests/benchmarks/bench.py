@@ -2,10 +2,10 @@
 
     bench.py [--sizes 0.3,1,3] [--runs 3] [--pairs DIR]
 
-Prints wall and CPU seconds (medians) of whole processes, from start to written file, and their ratios: seconds differ between
-machines, ratios hardly. Pairs: the folders of two pictures under --pairs ($EDF_DATA/pairs, else ../shared/data/pairs
-beside the checkout), resized; without any, a generated pair. OpenCV's Stitcher stands there for information: it
-registers at 0.6 MP.
+Prints wall and CPU seconds (medians) of whole processes, from start to written file, and their ratios: seconds differ
+between machines, ratios hardly. Pairs: the folders of two pictures under --pairs ($EDF_DATA/pairs, else
+../shared/data/pairs beside the checkout), resized; without any, a generated pair. OpenCV's Stitcher stands there for
+information: it registers at 0.6 MP.
 """
 
 from __future__ import annotations
@@ -75,10 +75,10 @@ def programs(reference: Path, target: Path, folder: Path) -> dict[str, list[str]
     """The command lines, each writing a PNG."""
     pair = [str(reference), str(target)]
     files = ["--overwrite", "--quiet"]
-    edf = ["-m", "edf_stitch", "stitch", *pair, "-o", str(folder / "out.png"), "--field", "strict", "--no-dense", *files]
+    edf = ["-m", "edf_stitch", "stitch", *pair, "-o", str(folder / "out.png"), "--field", "strict", "--no-dense"]
     here = [sys.executable, str(Path(__file__).with_name("homography_stitch.py"))]
     return {
-        EDF: [sys.executable, *edf],
+        EDF: [sys.executable, *edf, *files],
         HOMOGRAPHY: [*here, *pair, str(folder / "homography.png")],
         STITCHER: [*here, "--opencv-stitcher", *pair, str(folder / "stitcher.png")],
     }
@@ -100,7 +100,6 @@ def run(command: list[str]) -> tuple[float, float] | None:
 def prepare(folder: Path, size: float, out: Path) -> list[tuple[Path, Path]]:
     """Pairs of about `size` megapixels as PNG files."""
     import cv2
-
     from edf_stitch.synthetic_scenes.two_planes import make_pair
 
     found = [sorted(p for p in pair.iterdir() if p.is_file())[:2] for pair in sorted(folder.glob("*/"))]
