@@ -19,8 +19,8 @@ def blend(reference: Layer, target: Layer, mode: str) -> Layer:
     other is taken as it is.
     """
     shows, shows_too = reference.alpha > 0, target.alpha > 0
-    pixels = np.where(shows[..., None], reference.pixels, target.pixels)
-    alpha = np.where(shows, reference.alpha, target.alpha)
+    pixels, alpha = target.pixels.copy(), np.where(shows, reference.alpha, target.alpha)
+    np.copyto(pixels, reference.pixels, where=shows[..., None])
     box = _bounds(shows & shows_too)
     if box is not None:
         both = (shows & shows_too)[box]
@@ -29,8 +29,9 @@ def blend(reference: Layer, target: Layer, mode: str) -> Layer:
         total = weight + weight_too
         mixed = reference.pixels[box] * weight[..., None] + target.pixels[box] * weight_too[..., None]
         mixed /= np.maximum(total, 1e-12)[..., None]
-        pixels[box][both] = mixed[both]
-        alpha[box][both] = total[both]
+        np.copyto(pixels[box], mixed, where=both[..., None])
+        # what one picture shows whole is not seen through, however soft the other's edge
+        np.maximum(alpha[box], target.alpha[box], out=alpha[box], where=both)
     return Layer(pixels, alpha)
 
 

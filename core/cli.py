@@ -50,6 +50,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except MemoryError:
         print("edf: not enough memory for pictures of this size; use smaller ones", file=sys.stderr)
         return 3
+    except Exception as error:  # a bug or a library's refusal: the user gets a sentence all the same
+        print(f"edf: internal error, please report it: {type(error).__name__}: {error}", file=sys.stderr)
+        return StitchError.exit_code
     finally:
         if main_thread:
             signal.signal(signal.SIGTERM, previous if previous is not None else signal.SIG_DFL)
@@ -227,7 +230,7 @@ def _stitch(args: argparse.Namespace) -> int:
         check(outputs, files)
         with _progress_shown(args.quiet) as show:
             result = stitch(args.reference, args.target[0], options, progress=show)
-            show("write", 0.0)
+            show("write", 0.95)
             warnings = [*result.warnings, *write(result, outputs, files)]
     for warning in warnings:
         print(f"edf: warning: {warning}", file=sys.stderr)

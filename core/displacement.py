@@ -53,20 +53,26 @@ class StrictField:
 
     name = "strict"
 
-    def on_grid(self, grid: Grid) -> Array:
-        """Inverse depth (rows, columns), float64, at a grid's nodes."""
-        points = grid.points
+    def on_grid(self, grid: Grid, ideal: Array | None = None) -> Array:
+        """Inverse depth (rows, columns), float64, at a grid's nodes.
+
+        ideal (rows, columns, 2): the nodes' ideal pixels, where the reference's lens bends its picture.
+        """
+        points = grid.points if ideal is None else ideal
         plane = points @ self.plane[:2] + self.plane[2]
-        bend = self.spline.on_axes(grid.xs, grid.ys)
-        return plane + self._fade(grid, plane + bend) * bend
+        if ideal is None:
+            bend = self.spline.on_axes(grid.xs, grid.ys)
+        else:
+            bend = self.spline.at(ideal.reshape(-1, 2)).reshape(plane.shape)
+        return plane + self._fade(grid, points, plane + bend) * bend
 
     def at(self, points: Array) -> Array:
         """Inverse depth (N,) at points (N, 2) of the overlap, where nothing fades."""
         return points @ self.plane[:2] + self.plane[2] + self.spline.at(points)
 
-    def _fade(self, grid: Grid, unfaded: Array) -> Array:
+    def _fade(self, grid: Grid, points: Array, unfaded: Array) -> Array:
         """α (rows, columns): 1 in the overlap, smoothly to 0 over fade_px outside it."""
-        target = target_points(self.two_view, grid.points, unfaded)
+        target = target_points(self.two_view, points, unfaded)
         inside = (grid.points >= 0).all(axis=-1) & (grid.points <= np.array(self.size) - 1).all(axis=-1)
         with np.errstate(invalid="ignore"):
             inside &= (target >= 0).all(axis=-1) & (target <= np.array(self.target_size) - 1).all(axis=-1)

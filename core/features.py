@@ -15,6 +15,7 @@ from scipy.linalg.blas import sgemm
 # Above this a picture is shrunk for features only: SIFT's cost and memory grow with pixels, its useful points hardly
 # do.
 FEATURE_PIXELS = 3_200_000
+FEATURE_SIDE = 16_000  # SIFT doubles it, and OpenCV's pictures end at 32767
 FEATURE_BUDGET = 8000
 # Contrast thresholds in OpenCV's unit. Faint points (clouds, noise) mislead where there are better ones, but a small or
 # flat picture cannot do without: they are taken only until ENOUGH points are there.
@@ -63,7 +64,7 @@ def detect(view: NDArray[np.uint8], alpha: NDArray[np.float32] | None = None, bu
     """
     gray = cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else np.ascontiguousarray(view[..., 0])
     height, width = gray.shape
-    shrink = max(1.0, np.sqrt(height * width / FEATURE_PIXELS))
+    shrink = max(1.0, np.sqrt(height * width / FEATURE_PIXELS), max(height, width) / FEATURE_SIDE)
     small = (max(1, round(width / shrink)), max(1, round(height / shrink)))
     if shrink > 1:
         gray = cv2.resize(gray, small, interpolation=cv2.INTER_AREA)

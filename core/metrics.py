@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .epipolar import Array, distance_to_line
 from .images import Picture
-from .warp import Warp
+from .warp import Warp, fetch
 
 # Constants of the structural similarity index for 8 bit (Wang et al., IEEE TIP 2004, section III-B).
 SSIM_C1, SSIM_C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
@@ -55,10 +55,12 @@ def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str
     inside = warp.inside((target.view.shape[1], target.view.shape[0]))[box]
     if reference.alpha is not None:
         inside = inside & (reference.alpha > 0)
+    if target.alpha is not None:
+        inside = inside & (fetch(target.alpha[..., None], warp.map_x[box], warp.map_y[box])[..., 0] > 0.5)
     if not inside.any():
         return {"overlap_px": 0, "overlap_psnr_db": float("nan"), "overlap_ssim": float("nan")}
     map_x, map_y = (np.where(inside, m[box], -1).astype(np.float32) for m in (warp.map_x, warp.map_y))
-    fetched = cv2.remap(target.view, map_x, map_y, cv2.INTER_LINEAR).reshape(height, width, -1)
+    fetched = fetch(target.view, map_x, map_y, cv2.INTER_LINEAR)
     return {
         "overlap_px": int(inside.sum()),
         "overlap_psnr_db": psnr(reference.view, fetched, inside),
@@ -68,12 +70,18 @@ def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str
 
 def look_up(warp: Warp, x: Array) -> Array:
     """The map (N, 2) at points (N, 2) of the reference, bilinear between canvas pixels; NaN outside."""
-    at = (x + np.array(warp.canvas.offset)).astype(np.float32)
-    columns = [
-        cv2.remap(m, at[:, :1].copy(), at[:, 1:].copy(), cv2.INTER_LINEAR, borderValue=float("nan")).ravel()
-        for m in (warp.map_x, warp.map_y)
-    ]
-    return np.column_stack(columns).astype(np.float64)
+    at = x + np.array(warp.canvas.offset, np.float64)
+    limit = np.array([warp.canvas.width, warp.canvas.height]) - 1
+    outside = ((at < 0) | (at > limit)).any(axis=1)
+    corner = np.clip(np.floor(at).astype(int), 0, np.maximum(limit - 1, 0))
+    (u, v), (column, row) = (at - corner).T, corner.T
+    next_column, next_row = np.minimum(column + 1, limit[0]), np.minimum(row + 1, limit[1])
+    out = []
+    for values in (warp.map_x, warp.map_y):
+        upper = values[row, column] * (1 - u) + values[row, next_column] * u
+        lower = values[next_row, column] * (1 - u) + values[next_row, next_column] * u
+        out.append(np.where(outside, np.nan, upper * (1 - v) + lower * v))
+    return np.column_stack(out)
 
 
 def folds(warp: Warp, target_size: tuple[int, int]) -> float:

@@ -39,10 +39,15 @@ def check(request: OutputRequest, files: OutputFiles) -> None:
     output_bits((8,), request.panorama.suffix)
     if request.warp is not None and request.warp.suffix.lower() != ".npz":
         raise BadRequest(f"the warp is written as .npz, not {request.warp.suffix or 'a file of no kind'}")
-    files.check(*(p for p in (request.panorama, request.report, request.timing, request.warp) if p is not None))
+    single = [p for p in (request.panorama, request.report, request.timing, request.warp) if p is not None]
+    files.check(*single)
     if request.layers is not None:
         names = [f"{layer}{suffix}" for layer in ("reference", "target") for suffix in (".png", ".exr")]
         files.check_folder(request.layers, names)
+        taken = {(request.layers / name).resolve() for name in names}
+        for path in single:
+            if path.resolve() in taken:
+                raise BadRequest(f"{path}: named for two outputs, a layer is one; give each its own name")
 
 
 def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> list[str]:

@@ -97,12 +97,13 @@ class _Problem:
 
     def __init__(self, matches: Matches, camera: Camera, camera_prime: Camera, sigma: float, zoom: bool) -> None:
         self.matches, self.camera, self.camera_prime = matches, camera, camera_prime
-        # below this, what is left is the lens, not the points: it must not overrule a prior
-        self.sigma = max(sigma, SYSTEMATIC_PX * matches.scale)
+        self.sigma = sigma
         self.sigma_beyond = BEYOND_PX * matches.scale
         self.focal_free = not (camera.fixed or camera_prime.fixed)
         self.zoom = zoom and self.focal_free
-        self.weight = min(1.0, EFFECTIVE_MATCHES / max(1, len(matches)))
+        # against the prior, residuals count as if none were smaller than what a lens leaves in them
+        believed = max(sigma, SYSTEMATIC_PX * matches.scale)
+        self.weight = min(1.0, EFFECTIVE_MATCHES / max(1, len(matches))) * (sigma / believed) ** 2
         self.x, self.y = homogeneous(matches.x), homogeneous(matches.y)
 
     def moved(self, pose: Pose, step: Array) -> Pose:

@@ -35,6 +35,8 @@ START_PX = 1.0
 INLIER_PX = 2.0
 ZOOM_GAIN = 0.75
 PLANE_SHARE = 0.5
+REFINEMENTS = 8
+LEAST_PX = 0.05  # no keypoint is placed better
 # Matches that choose among starts, and matches that refine: more cost time and change nothing.
 FIRST_LOOK, IN_EARNEST = 400, 1500
 # Focal lengths in units of the longer side, tried when nothing is known: 19 mm to 200 mm on a 36 mm frame.
@@ -83,9 +85,16 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
         return _from_known_cameras(matches, camera, camera_prime, camera.pose, camera_prime.pose)
     candidates = fundamental_candidates(matches, seed)
     on_homography = homography_inliers(matches, seed)
-    start = _best_start(matches, candidates, on_homography, camera, camera_prime, seed)
-    zoom = _zoom_is_evident(matches, start, camera, camera_prime)
-    pose, inliers, sigma = _refine_with_inliers(matches, start, camera, camera_prime, zoom)
+    starts = _best_starts(matches, candidates, on_homography, camera, camera_prime, seed)
+    zoom = _zoom_is_evident(matches, starts[0], camera, camera_prime)
+    known = camera.fixed and camera_prime.fixed
+    refined = [_refine_with_inliers(matches, p, camera, camera_prime, zoom) for p in (starts if known else starts[:1])]
+    pose, inliers, sigma = _least_truncated(matches, refined)
+    if inliers.sum() < MIN_INLIERS:
+        raise DegenerateGeometry(
+            f"no pair of cameras explains more than {int(inliers.sum())} of {len(matches)} matches: the pictures "
+            "seem to have no content in common, or the focal length that was given is not theirs"
+        )
     warnings: list[str] = []
     why = (
         f"{int(inliers.sum())} of {len(matches)} matches on their epipolar lines, {on_homography} on one homography"
@@ -148,11 +157,11 @@ def homography_inliers(matches: Matches, seed: int) -> int:
     return int(np.sum(info["inliers"]))
 
 
-def _best_start(
+def _best_starts(
     matches: Matches, candidates: list[Array], on_homography: int, camera: Camera, camera_prime: Camera, seed: int
-) -> Pose:
-    """The pose to refine from: every F at a ladder of focal lengths, and, where most points lie on a plane, which makes
-    F meaningless, calibrated RANSAC, which a plane cannot fool.
+) -> list[Pose]:
+    """The poses to refine from, best first: every F at a ladder of focal lengths, and, where most points lie on a
+    plane, which makes F meaningless, calibrated RANSAC, which a plane cannot fool.
 
     All are compared by one robust cost with a wide scale over all matches: the landscape has several valleys.
     """
@@ -182,7 +191,7 @@ def _best_start(
         (refine_pose(glance, p, camera, camera_prime, sigma, iterations=3) for p in starts), key=lambda item: item[1]
     )
     fine = (refine_pose(few, p, camera, camera_prime, sigma, iterations=10) for p, _ in rough[:3])
-    return min(fine, key=lambda item: item[1])[0]
+    return [pose for pose, _ in sorted(fine, key=lambda item: item[1])]
 
 
 def _refine_with_inliers(
@@ -191,24 +200,34 @@ def _refine_with_inliers(
     """Refine on the matches near their lines, let the noise scale follow, until the inliers stand still."""
     sigma = RANSAC_PX * matches.scale / 2
     inliers = np.zeros(len(matches), bool)
-    for _ in range(5):
+    for _ in range(REFINEMENTS):
         residual = np.abs(sampson_residuals(pose.F, matches.x, matches.y))
         new = residual < np.clip(3 * sigma, INLIER_PX * matches.scale, 1.5 * INLIER_PX * matches.scale)
         if new.sum() < MIN_INLIERS:
             break
-        if np.array_equal(new, inliers):
-            break
-        inliers = new
+        settled = np.array_equal(new, inliers)
+        inliers, previous = new, sigma
         pose, _ = refine_pose(matches.subset(inliers).thinned(IN_EARNEST), pose, camera, camera_prime, sigma, zoom=zoom)
         residual = np.abs(sampson_residuals(pose.F, matches.x[inliers], matches.y[inliers]))
         # σ from the median absolute residual of a normal distribution
-        sigma = float(np.clip(np.median(residual) / 0.6745, 0.1 * matches.scale, RANSAC_PX * matches.scale))
-    if inliers.sum() < MIN_INLIERS:
-        raise DegenerateGeometry(
-            f"no pair of cameras with this focal length explains more than {int(inliers.sum())} of {len(matches)} "
-            "matches: check the focal length that was given, or leave it out"
-        )
+        sigma = float(np.clip(np.median(residual) / 0.6745, LEAST_PX * matches.scale, RANSAC_PX * matches.scale))
+        if settled and abs(sigma / previous - 1) < 0.05:
+            break
     return pose, inliers, sigma
+
+
+def _least_truncated(
+    matches: Matches, refined: list[tuple[Pose, NDArray[np.bool_], float]]
+) -> tuple[Pose, NDArray[np.bool_], float]:
+    """The refinement with the least truncated squared residual over all matches, in the sharpest one's σ."""
+    if len(refined) == 1:
+        return refined[0]
+    sharpest = min(sigma for _, _, sigma in refined)
+
+    def cost(pose: Pose) -> float:
+        return float(np.minimum((sampson_residuals(pose.F, matches.x, matches.y) / sharpest) ** 2, 9.0).sum())
+
+    return min(refined, key=lambda item: cost(item[0]))
 
 
 def _zoom_is_evident(matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera) -> bool:

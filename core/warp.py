@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from .images import Picture
 
 # cv2.remap wants every side below 32767; tiles also keep its working memory small.
-TILE = 4096
+TILE = 1024
 REMAP_LIMIT = 32000
+# Where less than this of a pixel is shown, its colour is rounding.
+LEAST_ALPHA = 1e-2
 
 
 class Field(Protocol):
@@ -42,8 +44,8 @@ class Field(Protocol):
         """m (3,): the affine part, which it fades to far from the overlap."""
         ...
 
-    def on_grid(self, grid: Grid) -> Array:
-        """Inverse depth (rows, columns)."""
+    def on_grid(self, grid: Grid, ideal: Array | None = None) -> Array:
+        """Inverse depth (rows, columns); ideal: the nodes' ideal pixels, where they are not the canvas's."""
         ...
 
 
@@ -80,9 +82,11 @@ def build_warp(field: Field, two_view: TwoView, camera: Camera, camera_prime: Ca
     size, target_size = camera.size, camera_prime.size
 
     def target_at(grid: Grid) -> Array:
-        return distort(target_points(two_view, grid.points, field.on_grid(grid)), camera_prime)
+        ideal = _ideal_nodes(grid, camera)
+        points = grid.points if ideal is None else ideal
+        return distort(target_points(two_view, points, field.on_grid(grid, ideal)), camera_prime)
 
-    reach, cut = expected_reach(_outline(field, two_view, target_size), size, target_size)
+    reach, cut = expected_reach(_outline(field, two_view, camera_prime), size, target_size)
     canvas = bounding_canvas(target_at, size, target_size, reach)
     warp = build_map(field, two_view, replace(canvas, cropped=canvas.cropped or cut), camera, camera_prime)
     return _trimmed(warp, size, target_size)
@@ -92,7 +96,7 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
     """The map of a given canvas, evaluated in strips."""
     left, top = -canvas.offset[0], -canvas.offset[1]
     grid = Grid.over(left, top, canvas.width, canvas.height)
-    nodes = field.on_grid(grid)
+    nodes = field.on_grid(grid, _ideal_nodes(grid, camera))
     shape = (canvas.height, canvas.width)
     map_x, map_y, inverse_depth = (np.empty(shape, np.float32) for _ in range(3))
     xs = np.arange(left, left + canvas.width, dtype=np.float64)
@@ -100,7 +104,8 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
     rows = max(1, 1_000_000 // canvas.width)
     for start in range(0, canvas.height, rows):
         stop = min(canvas.height, start + rows)
-        d = grid.to_pixels(nodes, left, top + start, canvas.width, stop - start)
+        # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
+        d = grid.to_pixels(nodes, left, top + start, canvas.width, stop - start).astype(np.float64)
         ys = np.arange(top + start, top + stop, dtype=np.float64)[:, None]
         if camera.distortion.any():
             raw = np.stack(np.broadcast_arrays(xs[None, :], ys), axis=-1)
@@ -116,14 +121,19 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
     return Warp(canvas, map_x, map_y, inverse_depth)
 
 
-def _outline(field: Field, two_view: TwoView, target_size: tuple[int, int]) -> Array:
+def _ideal_nodes(grid: Grid, camera: Camera) -> Array | None:
+    return undistort(grid.points, camera) if camera.distortion.any() else None
+
+
+def _outline(field: Field, two_view: TwoView, camera_prime: Camera) -> Array:
     """The target's border (N, 2) in the reference's plane by the field's own plane, NaN where that lies behind the
     reference camera."""
-    width, height = target_size
+    width, height = camera_prime.size
     u = np.linspace(0, 1, 33)
     edges = np.concatenate([np.column_stack(p) for p in ((u, 0 * u), (u, 0 * u + 1), (0 * u, u), (0 * u + 1, u))])
     H_plane = two_view.H_inf + np.outer(two_view.e_prime, field.plane)
-    back = homogeneous(edges * (width - 1, height - 1)) @ np.linalg.inv(H_plane).T
+    ideal = undistort(edges * (width - 1, height - 1), camera_prime)
+    back = homogeneous(ideal) @ np.linalg.inv(H_plane).T
     back[back[:, 2] <= 1e-6 * np.abs(back[:, :2]).max(axis=1)] = np.nan
     return project(back)
 
@@ -171,27 +181,30 @@ def target_layer(picture: Picture, warp: Warp) -> Layer:
     pixels = fetch(source, warp.map_x, warp.map_y)
     alpha = warp.inside((width, height)).astype(np.float32)
     if picture.alpha is not None:
-        fetched = np.clip(fetch(picture.alpha[..., None], warp.map_x, warp.map_y)[..., 0], 0.0, 1.0)
-        pixels /= np.maximum(fetched, 1e-6)[..., None]
-        alpha *= np.where(fetched > 1e-3, fetched, 0)
+        # both overshoot alike: divided before alpha is clipped
+        fetched = fetch(picture.alpha[..., None], warp.map_x, warp.map_y)[..., 0]
+        pixels /= np.maximum(fetched, LEAST_ALPHA)[..., None]
+        alpha *= np.where(fetched > LEAST_ALPHA, np.minimum(fetched, 1.0), 0)
     np.clip(pixels, float(picture.pixels.min()), float(picture.pixels.max()), out=pixels)
-    pixels[alpha == 0] = 0
+    np.multiply(pixels, (alpha > 0)[..., None], out=pixels)
     return Layer(pixels, alpha)
 
 
-def fetch(source: NDArray[np.float32], map_x: NDArray[np.float32], map_y: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Bicubic samples (H, W, C) of a source (h, w, C) at map positions, in tiles; 0 where the map leaves the
-    picture."""
-    out = np.zeros((*map_x.shape, source.shape[2]), np.float32)
+def fetch(
+    source: NDArray, map_x: NDArray[np.float32], map_y: NDArray[np.float32], interpolation: int = cv2.INTER_CUBIC
+) -> NDArray:
+    """Samples (H, W, C) of a source (h, w, C) at map positions, in tiles, of the source's type; 0 where the map leaves
+    the picture."""
+    out = np.zeros((*map_x.shape, source.shape[2]), source.dtype)
     for top in range(0, map_x.shape[0], TILE):
         for left in range(0, map_x.shape[1], TILE):
             tile = (slice(top, top + TILE), slice(left, left + TILE))
-            _fetch_tile(source, map_x[tile], map_y[tile], out[tile])
+            _fetch_tile(source, map_x[tile], map_y[tile], out[tile], interpolation)
     return out
 
 
 def _fetch_tile(
-    source: NDArray[np.float32], x: NDArray[np.float32], y: NDArray[np.float32], out: NDArray[np.float32]
+    source: NDArray, x: NDArray[np.float32], y: NDArray[np.float32], out: NDArray, interpolation: int
 ) -> None:
     height, width = source.shape[:2]
     with np.errstate(invalid="ignore"):
@@ -205,7 +218,7 @@ def _fetch_tile(
         for rows in (slice(None, half[0]), slice(half[0], None)):
             for columns in (slice(None, half[1]), slice(half[1], None)):
                 if out[rows, columns].size:
-                    _fetch_tile(source, x[rows, columns], y[rows, columns], out[rows, columns])
+                    _fetch_tile(source, x[rows, columns], y[rows, columns], out[rows, columns], interpolation)
         return
     part = np.ascontiguousarray(source[y0:y1, x0:x1])
     # one picture's own border repeated: bicubic needs a pixel beyond the last
@@ -213,7 +226,7 @@ def _fetch_tile(
         part,
         np.where(inside, x - x0, -9),
         np.where(inside, y - y0, -9),
-        cv2.INTER_CUBIC,
+        interpolation,
         borderMode=cv2.BORDER_REPLICATE,
     )
-    out[inside] = sampled.reshape(*sampled.shape[:2], -1)[inside]
+    np.copyto(out, sampled.reshape(out.shape), where=inside[..., None])

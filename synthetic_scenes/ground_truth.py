@@ -71,11 +71,16 @@ def pose_errors(view: TwoView, truth: TrueGeometry, target_size: tuple[int, int]
     grid = np.stack([x.ravel(), y.ravel()], axis=-1)
     at_infinity = homogeneous(grid) @ np.linalg.inv(truth.H_inf).T
     there = project(at_infinity @ view.H_inf.T)
+    transfer = float(np.median(np.linalg.norm(there - grid, axis=1)))
+    # at infinity every baseline gives the same lines: one point in three at each of three depths
+    depth = truth.baseline * np.resize([3.0, 10.0, 30.0], len(grid))
+    seen = truth.target_pixels(grid, depth)
+    grid, seen = grid[np.isfinite(seen).all(axis=1)], seen[np.isfinite(seen).all(axis=1)]
     cosine = float(np.clip(view.t @ truth.t, -1, 1))
     return {
         "rotation_deg": rotation_angle(view.R, truth.R),
         "baseline_deg": float(np.degrees(np.arccos(cosine))),
         "focal_percent": 100 * float(view.K[0, 0] / truth.K[0, 0] - 1),
-        "h_inf_px": float(np.median(np.linalg.norm(there - grid, axis=1))),
-        "f_px": float(distance_to_line(view.F, project(at_infinity), grid).mean()),
+        "h_inf_px": transfer,
+        "f_px": float(distance_to_line(view.F, grid, seen).mean()),
     }

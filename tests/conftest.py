@@ -73,8 +73,8 @@ class GivenField:
     plane: np.ndarray
     name: str = "given"
 
-    def on_grid(self, grid: Grid) -> np.ndarray:
-        return self.depth(grid.points)
+    def on_grid(self, grid: Grid, ideal: np.ndarray | None = None) -> np.ndarray:
+        return self.depth(grid.points if ideal is None else ideal)
 
 
 def camera_of(size: tuple[int, int], focal: float, distortion: tuple[float, ...] = ()) -> Camera:

@@ -24,8 +24,8 @@ from scipy.spatial.transform import Rotation
 
 properties = settings(derandomize=True, deadline=None, max_examples=40)
 seeds = st.integers(0, 2**32 - 1)
-K = np.array([[900.0, 0, 500], [0, 880, 380], [0, 0, 1]])
-K_PRIME = np.array([[1100.0, 0, 480], [0, 1110, 400], [0, 0, 1]])
+K = np.array([[900.0, 25, 500], [0, 880, 380], [0, 0, 1]])
+K_PRIME = np.array([[1100.0, -18, 480], [0, 1110, 400], [0, 0, 1]])
 
 
 class Pair:

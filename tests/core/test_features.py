@@ -104,6 +104,14 @@ def test_tiny_or_flat_pictures_have_no_points(shape: tuple[int, int], channels: 
             assert len(none) == 0 and none.x.shape == none.y.shape == (0, 2)
 
 
+def test_a_very_long_picture_is_no_obstacle() -> None:
+    """SIFT doubles the picture, and OpenCV's pictures end at 32767 pixels."""
+    long = np.ascontiguousarray(np.tile(texture(40, 400, 1, 1), (1, 100, 1)))
+    found = detect(long, budget=300)
+    assert long.shape == (40, 40000, 1) and len(found.points) == 300 and found.points[:, 0].max() > 39000
+    assert found.scale > 1
+
+
 # --- transparent parts ---------------------------------------------------------------------------------------------
 
 
@@ -201,7 +209,8 @@ def test_matches_are_mutual_and_pass_the_ratio_test() -> None:
     random = np.random.default_rng(0)
     first = np.abs(random.normal(size=(1300, 128)))
     first[1100:] = first[:200] + 0.4 * random.normal(size=(200, 128))  # two that look like one there: not mutual
-    second = np.concatenate([first[:900] + 0.5 * random.normal(size=(900, 128)), np.abs(random.normal(size=(300, 128)))])
+    strangers = np.abs(random.normal(size=(300, 128)))
+    second = np.concatenate([first[:900] + 0.5 * random.normal(size=(900, 128)), strangers])
     a, b = described(np.abs(first)), described(np.abs(random.permutation(second)))
     distance = np.sqrt(np.maximum(2 - 2 * a.descriptors.astype(float) @ b.descriptors.astype(float).T, 0))
     order = np.sort(distance, axis=1)
@@ -235,7 +244,8 @@ def test_less_than_two_points_cannot_be_told_apart(count: int) -> None:
 
 def test_a_shifted_picture_matches_itself() -> None:
     whole = texture(340, 440, 5)
-    matches = match(detect(np.ascontiguousarray(whole[:300, :400])), detect(np.ascontiguousarray(whole[30:330, 25:425])))
+    one, other = (detect(np.ascontiguousarray(part)) for part in (whole[:300, :400], whole[30:330, 25:425]))
+    matches = match(one, other)
     error = np.linalg.norm(matches.y - matches.x + (25, 30), axis=1)
     assert len(matches) > 500 and np.mean(error < 0.5) > 0.97 and np.median(error) < 0.05
 

@@ -230,6 +230,14 @@ def test_values_stay_within_the_pictures_range(channels: int) -> None:
     assert raw.min() < -10 and raw.max() > 710, "there was something to hold"
 
 
+def test_no_value_is_darker_than_the_darkest_of_a_bright_picture() -> None:
+    random = np.random.default_rng(5)
+    picture = picture_from_array(np.where(random.random((50, 50, 3)) < 0.5, 20.0, 700.0).astype(np.float32))
+    x, y = (random.uniform(0, 49, (80, 80)).astype(np.float32) for _ in range(2))
+    layer = target_layer(picture, Warp(Canvas(80, 80, (0, 0)), x, y, x))
+    assert layer.alpha.all() and layer.pixels.min() >= 20 and layer.pixels.max() <= 700
+
+
 def test_behind_the_camera_there_is_nothing(by_hand: SimpleNamespace) -> None:
     camera = by_hand.camera((200, 150), 100.0)
     view = by_hand.view(camera, camera, (0, -60, 0), (-1, 0, 0))
@@ -256,6 +264,15 @@ def test_a_target_that_reaches_to_infinity_is_cropped_and_says_so(by_hand: Simpl
     area = np.diff(x[:-1], axis=1) * np.diff(y[:, :-1], axis=0) - np.diff(x[:, :-1], axis=0) * np.diff(y[:-1], axis=1)
     columns = np.where(warp.inside(camera.size)[:-1, :-1], area, np.nan)
     assert np.nanmedian(columns[:, -12:-2]) > 0.5 / 4**2
+
+
+def test_a_target_that_lies_too_far_away_is_cropped_and_says_so(by_hand: SimpleNamespace) -> None:
+    camera = by_hand.camera((200, 150), 100.0)
+    view = by_hand.view(camera, camera, (0, 0, 0), (1, 0, 0))
+    warp = build_warp(by_hand.plane_field(0, 0, 7.0), view, camera, camera)  # 700 px to the left: three widths are 600
+    assert warp.canvas.cropped and 600 <= warp.canvas.offset[0] < 690
+    whole = build_warp(by_hand.plane_field(0, 0, 5.0), view, camera, camera)
+    assert not whole.canvas.cropped and whole.canvas.offset == (500, 0) and whole.canvas.width == 700
 
 
 def test_a_warp_that_leads_nowhere_near_is_refused(by_hand: SimpleNamespace) -> None:

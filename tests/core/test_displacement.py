@@ -1,0 +1,492 @@
+"""The strict field: depths along epipolar lines, the plane, the spline on it, what it drops and how it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.canvas import Grid
+from edf_stitch.core.displacement import (
+    CENTRE_BUDGET,
+    MIN_CENTRES,
+    SMOOTHING_LADDER,
+    StrictField,
+    fit_plane,
+    fit_strict,
+    inverse_depths,
+    target_points,
+)
+from edf_stitch.core.epipolar import (
+    distance_to_line,
+    fundamental_from_pose,
+    homogeneous,
+    infinite_homography,
+    project,
+    rotation_from_vector,
+)
+from edf_stitch.core.errors import DegenerateGeometry
+from edf_stitch.core.spline import SmoothingProblem
+from edf_stitch.core.two_view import TwoView
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+SIZE = (1200, 900)
+Depths = Callable[[np.ndarray], np.ndarray]
+properties = settings(derandomize=True, deadline=None, max_examples=30)
+
+
+def view(R: np.ndarray, t: tuple[float, ...], focals: tuple[float, float] = (1000.0, 1000.0)) -> TwoView:
+    K, K_prime = (np.array([[f, 0, 599.5], [0, f, 449.5], [0, 0, 1]]) for f in focals)
+    direction = np.array(t) / np.linalg.norm(t)
+    return TwoView(
+        K, K_prime, R, direction, fundamental_from_pose(K, K_prime, R, direction),
+        infinite_homography(K, K_prime, R), K_prime @ direction, np.ones(0, bool), 0.5, "general", "", "", 0.0,
+    )  # fmt: skip
+
+
+VIEWS = {
+    "to the side, turned": view(rotation_from_vector(np.radians([2.0, -12, 3])), (1, 0.1, 0.15), (1000.0, 1100.0)),
+    "epipole at infinity": view(np.eye(3), (1, 0, 0)),
+    "epipole in the picture": view(rotation_from_vector(np.radians([0.5, -1, 0.5])), (0.05, 0.02, -1)),
+}
+every_view = pytest.mark.parametrize("two_view", VIEWS.values(), ids=VIEWS.keys())
+SIDE = VIEWS["to the side, turned"]
+PLANE = np.array([3e-5, -5e-5, 0.12])
+
+
+def planar(points: np.ndarray) -> np.ndarray:
+    return points @ PLANE[:2] + PLANE[2]
+
+
+def curved(points: np.ndarray) -> np.ndarray:
+    """A hill of some thirty pixels on a wall, in the middle of the overlap of SIDE."""
+    return 0.12 + 0.03 * np.exp(-((points - (700, 450)) ** 2).sum(axis=-1) / (2 * 200**2))
+
+
+def some_matches(
+    two_view: TwoView, depths: Depths, count: int = 400, noise: float = 0.0, seed: int = 0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x, y and true d of points seen in both pictures; noise in px of each coordinate of y."""
+    random = np.random.default_rng(seed)
+    x = random.uniform((0, 0), (SIZE[0] - 1, SIZE[1] - 1), (8 * count, 2))
+    d = depths(x)
+    y = target_points(two_view, x, d)
+    with np.errstate(invalid="ignore"):
+        ok = (y >= 0).all(axis=1) & (y <= np.array(SIZE) - 1).all(axis=1)
+    x, y, d = x[ok][:count], y[ok][:count], d[ok][:count]
+    assert len(x) == count
+    return x, y + random.normal(0, noise, y.shape), d
+
+
+def error_px(field: StrictField, x: np.ndarray, depths: Depths) -> np.ndarray:
+    """How far the field sends points of the overlap from their true target pixels."""
+    true = target_points(field.two_view, x, depths(x))
+    return np.linalg.norm(target_points(field.two_view, x, field.at(x)) - true, axis=1)
+
+
+# --- where a point goes --------------------------------------------------------------------------------------------
+
+
+@every_view
+def test_target_points_are_the_pictures_of_the_points(two_view: TwoView) -> None:
+    random = np.random.default_rng(0)
+    x = random.uniform((0, 0), SIZE, (30, 20, 2))
+    Z = random.uniform(0.4, 12, (30, 20))
+    there = homogeneous(x) @ np.linalg.inv(two_view.K).T * Z[..., None] @ two_view.R.T + two_view.t
+    expected = project(there @ two_view.K_prime.T)
+    expected[there[..., 2] <= 0] = np.nan
+    found = target_points(two_view, x, 1 / Z)
+    assert found.shape == (30, 20, 2)
+    assert np.allclose(found, expected, rtol=1e-9, atol=1e-6, equal_nan=True)
+    # whatever d is, a point stays on its epipolar line
+    moved = target_points(two_view, x, random.normal(size=Z.shape)).reshape(-1, 2)
+    seen = np.isfinite(moved).all(axis=1)
+    assert distance_to_line(two_view.F, x.reshape(-1, 2)[seen], moved[seen]).max() < 1e-4
+
+
+def test_behind_the_target_camera_there_is_no_pixel() -> None:
+    forward = view(np.eye(3), (0, 0, -1))
+    x = np.array([[300.0, 200], [900, 700]])
+    # the target stands one baseline ahead: what is nearer than that lies behind it
+    assert np.isfinite(target_points(forward, x, np.array([0.9, -5.0]))).all()
+    assert np.isnan(target_points(forward, x, np.array([1.1, 50.0]))).all()
+    assert np.isnan(target_points(forward, x, np.array([1.0, 1.0]))).all()
+
+
+# --- depths of matches ---------------------------------------------------------------------------------------------
+
+
+@every_view
+def test_depths_of_clean_matches_are_exact(two_view: TwoView) -> None:
+    random = np.random.default_rng(1)
+    x = random.uniform((0, 0), SIZE, (500, 2))
+    d = random.uniform(-0.1, 0.45, 500)  # also beyond infinity: nothing is clamped
+    y = target_points(two_view, x, d)
+    assert np.isfinite(y).all()
+    found, sensitivity = inverse_depths(two_view, x, y)
+    assert np.abs(sensitivity * (found - d)).max() < 1e-6
+    assert (found[d < 0] < 0).all()
+    h = 1e-6
+    numeric = np.linalg.norm(target_points(two_view, x, d + h) - target_points(two_view, x, d - h), axis=1) / (2 * h)
+    assert np.allclose(sensitivity, numeric, rtol=1e-6, atol=1e-6 * numeric.max())
+
+
+@every_view
+def test_depths_of_noisy_matches_are_the_nearest_on_the_line(two_view: TwoView) -> None:
+    x, y, _ = some_matches(two_view, lambda p: np.random.default_rng(5).uniform(0.02, 0.4, len(p)), 60, noise=1.5)
+    found, sensitivity = inverse_depths(two_view, x, y)
+    clear = sensitivity > 50  # beside the epipole a pixel of noise is any depth
+    assert clear.sum() > 40
+    x, y, found, sensitivity = x[clear], y[clear], found[clear], sensitivity[clear]
+    least = np.linalg.norm(target_points(two_view, x, found) - y, axis=1)
+    # no other depth is nearer: a fine comb of ± 20 px around
+    for px in np.linspace(-20, 20, 161):
+        there = np.linalg.norm(target_points(two_view, x, found + px / sensitivity) - y, axis=1)
+        assert (there >= least - 1e-9).all()
+    assert np.allclose(least, distance_to_line(two_view.F, x, y), atol=1e-9)
+
+
+def test_a_match_on_the_wrong_side_of_the_epipole_tells_no_depth() -> None:
+    """The target moved straight on: points flow away from the epipole and never to its other side."""
+    forward = view(np.eye(3), (0, 0, -1))
+    centre = np.array([599.5, 449.5])
+    x = centre + np.array([[100.0, 50], [100, 50]])
+    y = centre + np.array([[140.0, 70], [-140, -70]])
+    d, sensitivity = inverse_depths(forward, x, y)
+    # 140 / 100 = 1 / (1 − d)
+    assert d[0] == pytest.approx(1 - 100 / 140) and np.isfinite(sensitivity[0])
+    assert np.isnan(d[1]) and np.isnan(sensitivity[1])
+
+
+# --- the plane -----------------------------------------------------------------------------------------------------
+
+
+@properties
+@given(st.integers(0, 2**32 - 1))
+def test_a_plane_is_found_exactly(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    x = random.uniform((0, 0), SIZE, (40, 2))
+    m = np.array([*random.normal(0, 1e-4, 2), random.normal(0, 0.3)])
+    d = x @ m[:2] + m[2]
+    found = fit_plane(x, d, random.uniform(200, 2000, 40), 0.5)
+    assert np.abs(x @ found[:2] + found[2] - d).max() < 1e-10
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_third_of_wrong_depths_does_not_tilt_the_plane(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    x = random.uniform((0, 0), SIZE, (400, 2))
+    sensitivity = random.uniform(500, 1500, 400)
+    d = planar(x) + random.normal(0, 0.5, 400) / sensitivity
+    wrong = random.permutation(400)[:120]
+    d[wrong] += random.uniform(10, 300, 120) * random.choice([-1, 1], 120) / sensitivity[wrong]
+    found = fit_plane(x, d, sensitivity, 0.5)
+    corners = np.array([[0.0, 0], [1199, 0], [0, 899], [1199, 899]])
+    off = 1000 * np.abs(corners @ found[:2] + found[2] - planar(corners))
+    # what 280 measurements of 0.5 px allow at a corner: √(7 / 280) of it, times four; squared errors would be tens off
+    assert off.max() < 4 * 0.5 * np.sqrt(7 / 280)
+
+
+def test_sure_depths_count_for_more() -> None:
+    """Half the points say one depth, half another: the plane goes with those that see it ten times better."""
+    x = np.random.default_rng(0).uniform((0, 0), SIZE, (200, 2))
+    sensitivity = np.where(np.arange(200) % 2, 1000.0, 100.0)
+    d = np.where(np.arange(200) % 2, 0.1, 0.1 + 1e-3)
+    found = fit_plane(x, d, sensitivity, 10.0)
+    assert np.abs(x @ found[:2] + found[2] - 0.1).max() < 0.03e-3
+
+
+# --- a planar scene ------------------------------------------------------------------------------------------------
+
+
+@every_view
+def test_a_planar_scene_gives_its_plane_and_its_homography(two_view: TwoView) -> None:
+    x, y, _ = some_matches(two_view, planar)
+    field = fit_strict(two_view, x, y, SIZE, SIZE)
+    assert np.allclose(field.plane, PLANE, rtol=0, atol=(1e-11, 1e-11, 1e-8))
+    H = two_view.H_inf + np.outer(two_view.e_prime, PLANE)
+    grid = Grid.over(-300, -200, 1800, 1300)
+    rays = homogeneous(grid.points) @ H.T
+    found = target_points(two_view, grid.points, field.on_grid(grid))
+    seen = rays[..., 2] > 0.05
+    assert seen.mean() > 0.9
+    assert np.abs(found - project(rays))[seen].max() < 1e-4
+    assert field.residual_px < 1e-6 and field.held_out_px < 1e-5
+    assert field.negative_share == 0 and field.name == "strict"
+
+
+def test_a_noisy_planar_scene_stays_a_plane() -> None:
+    x, y, _ = some_matches(SIDE, planar, 400, 0.5)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    assert field.smoothing >= 1e-2  # cross-validation sees nothing to bend for
+    assert field.residual_px == pytest.approx(0.5, rel=0.15)
+    assert field.held_out_px == pytest.approx(0.5, rel=0.15)
+    # a plane of 400 matches is known to 0.5 √(3/400) = 0.04 px; a hardly bending spline to a few times that
+    assert np.sqrt((error_px(field, x, planar) ** 2).mean()) < 0.15
+
+
+# --- a curved scene ------------------------------------------------------------------------------------------------
+
+
+def test_a_curved_scene_is_followed() -> None:
+    x, y, _ = some_matches(SIDE, curved, 400)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    probe, _, _ = some_matches(SIDE, curved, 400, seed=9)
+    # 30 px of relief; between points some 40 px apart a hill 200 px wide is known to a hundredth of that
+    assert error_px(field, probe, curved).max() < 0.3
+    assert np.sqrt((error_px(field, probe, curved) ** 2).mean()) < 0.05
+    assert field.held_out_px < 0.3 and field.kept.mean() > 0.97
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.5, 1.0])
+def test_a_noisy_curved_scene_is_followed_within_its_noise(noise: float) -> None:
+    x, y, _ = some_matches(SIDE, curved, 500, noise, seed=1)
+    field = fit_strict(replace(SIDE, sigma=noise), x, y, SIZE, SIZE)
+    probe, _, _ = some_matches(SIDE, curved, 400, seed=9)
+    error = error_px(field, probe, curved)
+    # averaging helps: well below the noise of a single match
+    assert np.sqrt((error**2).mean()) < 0.5 * noise + 0.02
+    # what a match left out is missed by: its own noise and a little more
+    assert noise * 0.9 < field.held_out_px < 1.3 * noise
+    assert field.residual_px < field.held_out_px
+    assert field.kept.mean() > 0.97
+    assert field.smoothing in SMOOTHING_LADDER
+
+
+def test_what_is_said_of_the_fit_is_so() -> None:
+    """residual_px and held_out_px, recomputed from the matches kept."""
+    x, y, _ = some_matches(SIDE, curved, 60, 0.5, seed=2)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    x, y = x[field.kept], y[field.kept]
+    d, s = inverse_depths(SIDE, x, y)
+    assert field.residual_px == pytest.approx(np.sqrt(np.mean((s * (d - field.at(x))) ** 2)), rel=1e-6)
+    g = d - homogeneous(x) @ field.plane
+    left_out = []
+    for i in range(len(x)):
+        rest = np.arange(len(x)) != i
+        problem = SmoothingProblem.build(x[rest], np.median(s) / s[rest], float(np.sqrt(SIZE[0] * SIZE[1])))
+        left_out.append(s[i] * (g[i] - problem.solve(g[rest], field.smoothing)[0].at(x[i : i + 1])[0]))
+    assert field.held_out_px == pytest.approx(np.sqrt(np.mean(np.square(left_out))), rel=1e-4)
+
+
+def test_the_spline_bends_where_matches_ask_and_the_plane_is_what_is_left() -> None:
+    x, y, _ = some_matches(SIDE, curved, 400, 0.3)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    assert field.at(np.array([[700.0, 450]]))[0] == pytest.approx(0.15, abs=1e-3)
+    assert field.at(np.array([[1150.0, 60]]))[0] == pytest.approx(curved(np.array([1150.0, 60])), abs=1e-3)
+    assert field.fade_px == pytest.approx(5 * 1000 * np.percentile(np.abs(
+        curved(x) - homogeneous(x) @ field.plane), 98), rel=0.15)  # fmt: skip
+
+
+def test_at_most_a_thousand_centres_spread_over_the_picture() -> None:
+    x, y, _ = some_matches(SIDE, curved, 3000, 0.5)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    assert 0.4 * CENTRE_BUDGET < field.kept.sum() <= CENTRE_BUDGET and field.kept.shape == (3000,)
+    kept = x[field.kept]
+    counts = np.histogram2d(kept[:, 0], kept[:, 1], bins=(3, 3), range=((350, 1200), (0, 900)))[0]
+    assert counts.min() > 0.5 * counts.mean()
+
+
+# --- outliers along the lines --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("depths", [planar, curved])
+@pytest.mark.parametrize("share", [0.05, 0.15])
+def test_outliers_along_their_epipolar_lines_are_dropped(depths: Depths, share: float) -> None:
+    """They pass every test of the geometry; only their neighbours give them away."""
+    x, y, d = some_matches(SIDE, depths, 400, 0.5, seed=2)
+    clean = fit_strict(SIDE, x, y, SIZE, SIZE)
+    random = np.random.default_rng(5)
+    wrong = random.permutation(400)[: int(400 * share)]
+    _, s = inverse_depths(SIDE, x, y)
+    off = random.uniform(15, 80, len(wrong)) * random.choice([-1, 1], len(wrong)) / s[wrong]
+    y[wrong] = target_points(SIDE, x[wrong], d[wrong] + off)
+    assert distance_to_line(SIDE.F, x[wrong], y[wrong]).max() < 1e-4
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    assert field.kept[wrong].sum() == 0
+    assert np.delete(field.kept, wrong).mean() > 0.95
+    harm = 1000 * np.abs(field.at(x) - clean.at(x))
+    # losing a share of the matches is all that happened
+    assert np.sqrt((harm**2).mean()) < 0.2 and harm.max() < 1.0
+    assert np.sqrt((error_px(field, x, depths) ** 2).mean()) < 0.3
+
+
+def test_small_errors_along_the_lines_are_dropped_too() -> None:
+    """Six to nine times the noise: nothing gross, and yet no chance."""
+    x, y, d = some_matches(SIDE, planar, 400, 0.5, seed=2)
+    random = np.random.default_rng(6)
+    wrong = random.permutation(400)[:16]
+    _, s = inverse_depths(SIDE, x, y)
+    y[wrong] = target_points(SIDE, x[wrong], d[wrong] + random.uniform(3.0, 4.5, 16) / s[wrong])
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    assert field.kept[wrong].sum() == 0
+    assert np.delete(field.kept, wrong).mean() > 0.95
+
+
+def test_a_thing_in_front_of_the_wall_is_no_outlier() -> None:
+    """A box 20 px nearer by parallax with a thirtieth of the matches: it stands out, but not alone."""
+
+    def box(points: np.ndarray) -> np.ndarray:
+        return 0.12 + 0.02 * (np.abs(points - (700, 450)) < 110).all(axis=-1)
+
+    x, y, _ = some_matches(SIDE, box, 1500, 0.3, seed=3)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    inner = (np.abs(x - (700, 450)) < 70).all(axis=1)
+    assert inner.sum() > 20
+    assert field.kept[inner].mean() > 0.5
+    assert np.median(error_px(field, x[inner], box)) < 1.0
+    away = (np.abs(x - (700, 450)) > 250).any(axis=1)
+    assert np.sqrt((error_px(field, x[away], box) ** 2).mean()) < 0.3
+
+
+# --- outside the overlap -------------------------------------------------------------------------------------------
+
+
+def wide_grid(step: int = 16) -> Grid:
+    return Grid((-1600, -1200), step, 4400 // step, 3300 // step)
+
+
+def overlap(field: StrictField, points: np.ndarray) -> np.ndarray:
+    with np.errstate(invalid="ignore"):
+        target = target_points(field.two_view, points, field.at(points.reshape(-1, 2)).reshape(points.shape[:-1]))
+        inside = (target >= 0).all(axis=-1) & (target <= np.array(SIZE) - 1).all(axis=-1)
+    return inside & (points >= 0).all(axis=-1) & (points <= np.array(SIZE) - 1).all(axis=-1)
+
+
+def test_in_the_overlap_nothing_fades_and_far_away_only_the_plane_is_left() -> None:
+    x, y, _ = some_matches(SIDE, curved, 400, 0.3)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    grid = wide_grid()
+    d = field.on_grid(grid)
+    plane = homogeneous(grid.points) @ field.plane
+    inside = overlap(field, grid.points)
+    assert 0.03 < inside.mean() < 0.5
+    assert 1000 * np.abs(d - field.at(grid.points.reshape(-1, 2)).reshape(d.shape))[inside].max() < 1e-3
+    distance = grid.step * cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    far = distance > field.fade_px + 2 * grid.step
+    assert far.mean() > 0.1
+    assert np.array_equal(d[far], plane[far])
+    # in between it never leaves the range between plane and spline
+    share = (d - plane) / field.spline.on_axes(grid.xs, grid.ys)
+    assert share.min() > -1e-9 and share.max() < 1 + 1e-6
+    # and falls with the distance, which a grid knows to a cell or two
+    u = distance / field.fade_px
+    slack = 2 * grid.step / field.fade_px
+    least, most = (1 - v * v * (3 - 2 * v) for v in (np.clip(u + e, 0, 1) for e in (slack, -slack)))
+    assert (share >= least - 1e-6).all() and (share <= most + 1e-6).all()
+
+
+@pytest.mark.parametrize("two_view", [SIDE, VIEWS["epipole in the picture"]], ids=["side", "forward"])
+def test_the_fade_has_no_seam(two_view: TwoView) -> None:
+    """Between neighbours d changes by what plane, spline and the slope of the fade (3/2 over its width) allow."""
+    x, y, _ = some_matches(two_view, curved, 400, 0.3)
+    field = fit_strict(two_view, x, y, SIZE, SIZE)
+    grid = wide_grid(8)
+    d = field.on_grid(grid)
+    bend = field.spline.on_axes(grid.xs, grid.ys)
+    plane = homogeneous(grid.points) @ field.plane
+    for axis in (0, 1):
+        step = np.abs(np.diff(d - plane, axis=axis))
+        near = np.maximum(*(np.abs(np.take(bend, range(k, bend.shape[axis] - 1 + k), axis=axis)) for k in (0, 1)))
+        # the distance to a pixelated region may itself step by √2 cells where the fade moves by one
+        allowed = np.abs(np.diff(bend, axis=axis)) + 1.5 * np.sqrt(2) * grid.step / field.fade_px * near
+        assert (step <= allowed + 1e-9).all()
+
+
+def test_the_field_hardly_depends_on_the_grid() -> None:
+    x, y, _ = some_matches(SIDE, curved, 400, 0.3)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    coarse, fine = (Grid((-1600, -1200), step, 4400 // step, 3300 // step) for step in (16, 8))
+    rectangle = (-1200, -900, 3600, 2600)
+    a, b = (grid.to_pixels(field.on_grid(grid), *rectangle) for grid in (coarse, fine))
+    largest = 1000 * np.abs(field.spline.on_axes(fine.xs, fine.ys)).max()
+    assert 1000 * np.abs(a - b).max() < 1.5 * 2 * coarse.step / field.fade_px * largest
+
+
+def test_where_the_grid_misses_the_overlap_the_plane_is_all() -> None:
+    x, y, _ = some_matches(SIDE, curved, 400, 0.3)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    grid = Grid((-9000, -9000), 10, 30, 30)
+    assert np.array_equal(field.on_grid(grid), grid.points @ field.plane[:2] + field.plane[2])
+
+
+# --- odd cases -----------------------------------------------------------------------------------------------------
+
+
+def test_with_the_epipole_in_the_picture_the_field_is_whole() -> None:
+    forward = VIEWS["epipole in the picture"]
+    x, y, _ = some_matches(forward, curved, 500, 0.3, seed=4)
+    epipole = project(np.linalg.inv(forward.K_prime @ forward.R @ np.linalg.inv(forward.K)) @ forward.e_prime)
+    assert (0 < epipole).all() and (epipole < SIZE).all()
+    x = np.vstack([x, epipole, epipole + (0.01, 0)])  # matches that say nothing of depth
+    y = np.vstack([y, project(forward.e_prime), project(forward.e_prime)])
+    field = fit_strict(forward, x, y, SIZE, SIZE)
+    assert not field.kept[-2:].any()
+    grid = Grid.over(0, 0, *SIZE)
+    assert np.isfinite(field.on_grid(grid)).all()
+    inside = overlap(field, grid.points)
+    found, true = (target_points(forward, grid.points, d) for d in (field.on_grid(grid), curved(grid.points)))
+    error = np.linalg.norm(found - true, axis=-1)
+    assert inside.mean() > 0.5
+    assert np.sqrt((error[inside] ** 2).mean()) < 0.3
+    # beside the epipole a wrong depth moves nothing
+    near = np.linalg.norm(grid.points - epipole, axis=-1) < 40
+    assert near.sum() > 20 and error[near].max() < 0.3
+
+
+def test_depths_beyond_infinity_are_kept_as_they_are() -> None:
+    """An approximate focal length gives a few d < 0; clamped, straight lines would bend."""
+
+    def tilted(points: np.ndarray) -> np.ndarray:
+        return (points[..., 0] - 800) * 1e-4
+
+    x, y, d = some_matches(SIDE, tilted, 400, 0.3)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    assert field.negative_share == pytest.approx((d[field.kept] < 0).mean(), abs=0.02) and field.negative_share > 0.2
+    assert np.sqrt((error_px(field, x, tilted) ** 2).mean()) < 0.15
+    grid = Grid.over(0, 0, *SIZE)
+    assert field.on_grid(grid).min() < -0.04
+
+
+def test_the_same_matches_give_the_same_bytes() -> None:
+    x, y, _ = some_matches(SIDE, curved, 300, 0.5)
+    one, other = (fit_strict(SIDE, x.copy(), y.copy(), SIZE, SIZE) for _ in range(2))
+    grid = Grid.over(-200, -100, 1500, 1100)
+    assert one.on_grid(grid).tobytes() == other.on_grid(grid).tobytes()
+    assert one.kept.tobytes() == other.kept.tobytes()
+
+
+def test_coarser_pictures_are_judged_in_their_own_pixels() -> None:
+    """The same scene at twice the size, noise and all, keeps the same matches and the same depths."""
+    x, y, _ = some_matches(SIDE, curved, 300, 0.5)
+    one = fit_strict(SIDE, x, y, SIZE, SIZE)
+    twice = np.diag([2.0, 2, 1])
+    large = replace(
+        SIDE, K=twice @ SIDE.K, K_prime=twice @ SIDE.K_prime, H_inf=twice @ SIDE.H_inf @ np.linalg.inv(twice),
+        e_prime=twice @ SIDE.e_prime, sigma=1.0,
+    )  # fmt: skip
+    other = fit_strict(large, 2 * x, 2 * y, (2400, 1800), (2400, 1800), noise_scale=2.0)
+    assert np.array_equal(one.kept, other.kept) and one.smoothing == other.smoothing
+    assert np.allclose(other.at(2 * x), one.at(x), rtol=0, atol=1e-7)
+    assert other.fade_px == pytest.approx(2 * one.fade_px) and other.residual_px == pytest.approx(2 * one.residual_px)
+
+
+def test_too_few_depths_are_refused() -> None:
+    x, y, _ = some_matches(SIDE, planar, MIN_CENTRES - 1)
+    with pytest.raises(DegenerateGeometry, match=f"only {MIN_CENTRES - 1} of {MIN_CENTRES - 1}"):
+        fit_strict(SIDE, x, y, SIZE, SIZE)
+    forward = view(np.eye(3), (0, 0, -1))
+    centre = np.array([599.5, 449.5])
+    away = np.random.default_rng(0).uniform(50, 300, (30, 2))
+    with pytest.raises(DegenerateGeometry, match="only 0 of 30"):
+        fit_strict(forward, centre + away, centre - 1.5 * away, SIZE, SIZE)
+
+
+def test_a_handful_of_matches_makes_a_field() -> None:
+    x, y, _ = some_matches(SIDE, planar, MIN_CENTRES + 2, 0.2, seed=6)
+    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    assert np.isfinite(field.on_grid(Grid.over(0, 0, *SIZE))).all()
+    assert error_px(field, x, planar).max() < 1.5
