@@ -132,7 +132,7 @@ def _outline(field: Field, two_view: TwoView, camera_prime: Camera) -> Array:
     u = np.linspace(0, 1, 33)
     edges = np.concatenate([np.column_stack(p) for p in ((u, 0 * u), (u, 0 * u + 1), (0 * u, u), (0 * u + 1, u))])
     H_plane = two_view.H_inf + np.outer(two_view.e_prime, field.plane)
-    ideal = undistort(edges * (width - 1, height - 1), camera_prime)
+    ideal = undistort(edges * np.array([width - 1.0, height - 1.0]), camera_prime)
     back = homogeneous(ideal) @ np.linalg.inv(H_plane).T
     back[back[:, 2] <= 1e-6 * np.abs(back[:, :2]).max(axis=1)] = np.nan
     return project(back)
