@@ -7,6 +7,7 @@ e' are made from it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -84,6 +85,7 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
     if camera.pose is not None and camera_prime.pose is not None:
         return _from_known_cameras(matches, camera, camera_prime, camera.pose, camera_prime.pose)
     candidates = fundamental_candidates(matches, seed)
+    _refuse_chance(matches, candidates[0], camera_prime.size)
     on_homography = homography_inliers(matches, seed)
     starts = _best_starts(matches, candidates, on_homography, camera, camera_prime, seed)
     zoom = _zoom_is_evident(matches, starts[0], camera, camera_prime)
@@ -144,6 +146,28 @@ def fundamental_candidates(matches: Matches, seed: int) -> list[Array]:
             "the pictures seem to have no content in common"
         )
     return [F for _, F, _ in ranked]
+
+
+def _refuse_chance(matches: Matches, F: Array, size: tuple[int, int]) -> None:
+    """Raises NoOverlap where so many points on their lines would be found among matches drawn at random.
+
+    The expected number of such findings, a contrario (Moisan and Stival, IJCV 2004, eq. 10): (n − 7) C(n, k) C(k, 7)
+    α^(k − 7) with α the chance of a point lying within the threshold of a line.
+    """
+    threshold = RANSAC_PX * matches.scale
+    n = len(matches)
+    k = int((np.abs(sampson_residuals(F, matches.x, matches.y)) < threshold).sum())
+    alpha = min(1.0, 2 * threshold * math.hypot(*size) / (size[0] * size[1]))
+    findings = math.log(n - 7) + _log_choose(n, k) + _log_choose(k, 7) + (k - 7) * math.log(alpha)
+    if findings > 0:
+        raise NoOverlap(
+            f"{n} points look alike, but the {k} that agree on a camera motion could agree by chance: the pictures "
+            "seem to have no content in common"
+        )
+
+
+def _log_choose(n: int, k: int) -> float:
+    return math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
 
 
 def homography_inliers(matches: Matches, seed: int) -> int:
@@ -219,13 +243,18 @@ def _refine_with_inliers(
 def _least_truncated(
     matches: Matches, refined: list[tuple[Pose, NDArray[np.bool_], float]]
 ) -> tuple[Pose, NDArray[np.bool_], float]:
-    """The refinement with the least truncated squared residual over all matches, in the sharpest one's σ."""
+    """The refinement with the least truncated squared residual over all matches, in the sharpest one's σ.
+
+    A point behind a camera is as wrong as one off its line: that alone tells the poses of a plane apart.
+    """
     if len(refined) == 1:
         return refined[0]
     sharpest = min(sigma for _, _, sigma in refined)
 
     def cost(pose: Pose) -> float:
-        return float(np.minimum((sampson_residuals(pose.F, matches.x, matches.y) / sharpest) ** 2, 9.0).sum())
+        squared = (sampson_residuals(pose.F, matches.x, matches.y) / sharpest) ** 2
+        front = in_front(pose.K, pose.K_prime, pose.R, pose.t, matches.x, matches.y, FAR_ANGLE)
+        return float(np.where(front, np.minimum(squared, 9.0), 9.0).sum())
 
     return min(refined, key=lambda item: cost(item[0]))
 

@@ -357,7 +357,7 @@ def overlap(field: StrictField, points: np.ndarray) -> np.ndarray:
 
 
 def test_in_the_overlap_nothing_fades_and_far_away_only_the_plane_is_left() -> None:
-    x, y, _ = some_matches(SIDE, curved, 400, 0.3)
+    x, y, _ = some_matches(SIDE, curved, 200, 0.3)
     field = fit_strict(SIDE, x, y, SIZE, SIZE)
     grid = wide_grid()
     d = field.on_grid(grid)
@@ -382,7 +382,7 @@ def test_in_the_overlap_nothing_fades_and_far_away_only_the_plane_is_left() -> N
 @pytest.mark.parametrize("two_view", [SIDE, VIEWS["epipole in the picture"]], ids=["side", "forward"])
 def test_the_fade_has_no_seam(two_view: TwoView) -> None:
     """Between neighbours d changes by what plane, spline and the slope of the fade (3/2 over its width) allow."""
-    x, y, _ = some_matches(two_view, curved, 400, 0.3)
+    x, y, _ = some_matches(two_view, curved, 200, 0.3)
     field = fit_strict(two_view, x, y, SIZE, SIZE)
     grid = wide_grid(8)
     d = field.on_grid(grid)
@@ -397,7 +397,7 @@ def test_the_fade_has_no_seam(two_view: TwoView) -> None:
 
 
 def test_the_field_hardly_depends_on_the_grid() -> None:
-    x, y, _ = some_matches(SIDE, curved, 400, 0.3)
+    x, y, _ = some_matches(SIDE, curved, 200, 0.3)
     field = fit_strict(SIDE, x, y, SIZE, SIZE)
     coarse, fine = (Grid((-1600, -1200), step, 4400 // step, 3300 // step) for step in (16, 8))
     rectangle = (-1200, -900, 3600, 2600)
@@ -407,7 +407,7 @@ def test_the_field_hardly_depends_on_the_grid() -> None:
 
 
 def test_where_the_grid_misses_the_overlap_the_plane_is_all() -> None:
-    x, y, _ = some_matches(SIDE, curved, 400, 0.3)
+    x, y, _ = some_matches(SIDE, curved, 200, 0.3)
     field = fit_strict(SIDE, x, y, SIZE, SIZE)
     grid = Grid((-9000, -9000), 10, 30, 30)
     assert np.array_equal(field.on_grid(grid), grid.points @ field.plane[:2] + field.plane[2])

@@ -225,7 +225,7 @@ def nearest_correction(F: np.ndarray, x: np.ndarray, y: np.ndarray) -> float:
     return min(fits)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_sampson_is_the_distance_to_the_nearest_true_match_to_first_order(seed: int) -> None:
     pair = Pair(seed, 1)
     F = 1e3 * pair.F

