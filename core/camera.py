@@ -229,7 +229,10 @@ def _camera_from_entry(entry: dict[str, Any], name: str, size: tuple[int, int]) 
         raise BadRequest(f"the camera of {name}: K must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with fx, fy above 0")
     distortion = np.zeros(5)
     if entry.get("distortion") is not None:
-        values = np.asarray(entry["distortion"], np.float64).ravel()
+        try:
+            values = np.asarray(entry["distortion"], np.float64).ravel()
+        except (TypeError, ValueError):
+            values = np.full(1, np.nan)
         if len(values) > 5 or not np.isfinite(values).all():
             raise BadRequest(f"the camera of {name}: distortion is at most k1, k2, p1, p2, k3")
         distortion[: len(values)] = values

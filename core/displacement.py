@@ -163,6 +163,9 @@ def fit_strict(
     plane = fit_plane(x[index], d[index], sensitivity[index], noise_px)
     off_line = np.linalg.norm(target_points(two_view, x[index], d[index]) - y[index], axis=1)
     index = index[spread_points(x[index], off_line, CENTRE_BUDGET, np.sqrt(area) / 200)]
+    across = np.linalg.svd(x[index] - x[index].mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(index))
+    if len(index) < MIN_CENTRES or across < noise_scale:
+        raise DegenerateGeometry("the matches do not determine a displacement field: they lie in one spot or on a line")
     g = d - (x @ plane[:2] + plane[2])
     index, spline, residual, smoothing, held_out_px = _prune_and_smooth(
         x, g, sensitivity, index, np.sqrt(area), noise_scale

@@ -29,24 +29,35 @@ def undistort(points: Array, camera: Camera) -> Array:
     limit = _trusted_radius(camera)
     ideal = raw.copy()
     for _ in range(60):
-        step = raw - _distorted(ideal, camera.distortion, limit)
+        # where the lens stretches by more than 1, a full step would overshoot for ever
+        step = (raw - _distorted(ideal, camera.distortion, limit)) / np.maximum(1.0, _stretch(ideal, camera, limit))
         ideal += step
         if np.nanmax(np.abs(step), initial=0.0) < 1e-12:
             break
     return _pixels(ideal, camera)
 
 
+def _stretch(ideal: Array, camera: Camera, limit: float) -> Array:
+    """Derivative (…, 1) of the raw radius by the ideal one."""
+    k1, k2, _, _, k3 = camera.distortion
+    radius = np.sqrt((ideal**2).sum(axis=-1, keepdims=True))
+    r2 = np.minimum(radius, limit) ** 2
+    inner = 1 + 3 * k1 * r2 + 5 * k2 * r2**2 + 7 * k3 * r2**3
+    outer = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+    return np.where(radius < limit, inner, outer)
+
+
 def _trusted_radius(camera: Camera) -> float:
-    """The largest normalised radius where the radial polynomial still grows by half of an ideal lens, up to 1.2 × the
-    corner's."""
+    """The largest ideal normalised radius where the radial polynomial still grows by half of an ideal lens, up to where
+    its raw radius is 1.2 × the corner's."""
     width, height = camera.size
     corners = _normalised(np.array([[0.0, 0], [width, 0], [0, height], [width, height]]), camera)
     reach = 1.2 * float(np.hypot(corners[:, 0], corners[:, 1]).max())
-    r = np.linspace(0, reach, 400)
+    r = np.linspace(0, 3 * reach, 1200)  # while the slope is at least a half, twice `reach` is as far as it takes
     k1, k2, _, _, k3 = camera.distortion
     slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
-    bad = np.flatnonzero(slope < 0.5)
-    return float(r[bad[0]]) if bad.size else reach
+    raw = r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+    return float(r[int(np.argmax((slope < 0.5) | (raw > reach)))])
 
 
 def _distorted(ideal: Array, distortion: Array, limit: float) -> Array:

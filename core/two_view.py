@@ -302,7 +302,9 @@ def _from_known_cameras(
     relative = Pose(camera.K, camera_prime.K, R, t / np.linalg.norm(t))
     residual = np.abs(sampson_residuals(relative.F, matches.x, matches.y))
     inliers = residual < 3.0 * matches.scale
-    if inliers.sum() < MIN_INLIERS:
+    free = fundamental_candidates(matches, 0)[0]
+    agree = np.abs(sampson_residuals(free, matches.x, matches.y)) < 3.0 * matches.scale
+    if inliers.sum() < max(MIN_INLIERS, 0.5 * agree.sum()):
         raise DegenerateGeometry(
             f"the given cameras explain only {int(inliers.sum())} of {len(matches)} matches: check that K, R and "
             "t belong to these pictures, in this order, with R and t taking world points into the camera "
