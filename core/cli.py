@@ -36,6 +36,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     # a farm ends a job with SIGTERM: leave as cleanly as after Ctrl-C
     main_thread = threading.current_thread() is threading.main_thread()
     previous = signal.signal(signal.SIGTERM, _interrupt) if main_thread else None
+    # a shell starts background jobs with SIGINT ignored; whoever sends one to a stitch wants it to stop
+    previous_int = signal.signal(signal.SIGINT, signal.default_int_handler) if main_thread else None
     try:
         args = _parser().parse_args(argv)
         return args.run(args)
@@ -56,6 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     finally:
         if main_thread:
             signal.signal(signal.SIGTERM, previous if previous is not None else signal.SIG_DFL)
+            signal.signal(signal.SIGINT, previous_int if previous_int is not None else signal.SIG_DFL)
 
 
 def _interrupt(_number: int, _frame: object) -> NoReturn:
