@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .canvas import Grid
 from .epipolar import Array, homogeneous, project
-from .errors import DegenerateGeometry, NoOverlap
+from .errors import DegenerateGeometry
 from .spline import SmoothingProblem, ThinPlateSpline, spread_points
 from .two_view import TwoView
 
@@ -145,7 +145,7 @@ def fit_strict(
 ) -> StrictField:
     """The strict field of inlier matches x ↔ y (N, 2) px (DESIGN 1, "The strict field, in full").
 
-    size, target_size: (W, H) px; noise_scale: unit of the matches' noise in px. Raises NoOverlap or DegenerateGeometry.
+    size, target_size: (W, H) px; noise_scale: unit of the matches' noise in px. Raises DegenerateGeometry.
     """
     d, sensitivity = inverse_depths(two_view, x, y)
     usable = np.isfinite(d) & np.isfinite(sensitivity)
@@ -154,8 +154,7 @@ def fit_strict(
     if usable.sum() < MIN_CENTRES:
         raise DegenerateGeometry(
             f"only {int(usable.sum())} of {len(x)} matches tell a depth, at least {MIN_CENTRES} needed: "
-            "the camera moved too little, "
-            "or straight at what it saw"
+            "the camera moved too little, or straight at what it saw"
         )
     index = np.flatnonzero(usable)
     area = float(size[0] * size[1])
@@ -174,15 +173,12 @@ def fit_strict(
     bend_px = s * np.abs(spline.at(x[index]))
     kept = np.zeros(len(x), bool)
     kept[index] = True
-    field = StrictField(
+    return StrictField(
         two_view, size, target_size, plane, spline,
         fade_px=max(5 * float(np.percentile(bend_px, 98)), 8 * noise_scale), smoothing=smoothing, kept=kept,
         residual_px=float(np.sqrt(np.mean((s * residual) ** 2))), held_out_px=held_out_px,
         negative_share=float(np.mean(d[index] < 0)),
     )  # fmt: skip
-    if not np.isfinite(spline.weights).all():
-        raise NoOverlap("the matches do not determine a displacement field: they lie on a single line")
-    return field
 
 
 def _prune_and_smooth(
@@ -193,12 +189,9 @@ def _prune_and_smooth(
 
     Returns the kept indices, the spline, its residuals, λ and the leave-one-out RMS in px.
     """
-
     floor = PRUNE_FLOOR_PX * noise_scale
-
     s = sensitivity[index]
     problem = SmoothingProblem.build(x[index], np.median(s) / s, unit)
-
     supported = _supported(x[index], g[index], s, floor)
 
     def drop(keep: NDArray[np.bool_]) -> bool:
