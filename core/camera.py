@@ -59,10 +59,13 @@ class Camera:
         K[1, 1] *= factor
         return K
 
-    def as_poselib(self) -> dict[str, Any]:
-        """The camera as PoseLib wants it (it normalises points by it, with the same pixel convention)."""
-        params = [self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]]
-        return {"model": "PINHOLE", "width": self.size[0], "height": self.size[1], "params": params}
+    def resized(self, size: tuple[int, int]) -> Camera:
+        """The camera of its picture resized to (W, H) px."""
+        factor = np.array(size) / np.array(self.size)
+        K = self.K.copy()
+        K[:2] *= factor[:, None]
+        K[:2, 2] += (factor - 1) / 2  # pixel centres are integers: the corner lies at −½
+        return replace(self, K=K, size=size)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,9 @@ MAX_STRETCH = 4.0
 MAX_REACH = 3.0
 MAX_PIXELS = 1_000_000_000
 
+# left, top, width, height in px
+Box = tuple[int, int, int, int]
+
 
 @dataclass(frozen=True)
 class Canvas:

@@ -80,6 +80,7 @@ def read_structure(data: bytes) -> Structure | None:
 # Brands of the ISO base media container (bytes 8-12 of the file)
 _BRANDS = {b"crx ": "raw"} | dict.fromkeys((b"avif", b"avis"), "AVIF") | dict.fromkeys(
     (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"hevm", b"hevs", b"mif1", b"msf1"), "HEIC/HEIF")
+_HEIF_SUFFIXES = dict.fromkeys((".heic", ".heif", ".hif"), "HEIC/HEIF") | {".avif": "AVIF"}
 _RAW_STARTS = (b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"FUJIFILMCCD-RAW", b"FOVb")
 _RAW_SUFFIXES = frozenset(
     ".3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .iiq .kdc .mef .mrw .nef .nrw .orf .pef .raf .raw .rw2 .sr2 .srf .srw .x3f"
@@ -90,14 +91,15 @@ def foreign_kind(data: bytes, suffix: str) -> str:
     """Names a picture format that this program does not read ("camera RAW", "HEIC/HEIF", "AVIF"), "" for all others.
 
     suffix: the file's, lower case with its dot. RAW files are TIFF inside, so the name counts where the bytes look like
-    TIFF or like nothing known.
+    TIFF or like nothing known; those of HEIF only in the latter.
     """
     if data[4:8] == b"ftyp":
         # the general brands come first in some AVIF files, whose own brand then follows among the compatible ones
         brands = [data[8:12], *(data[at : at + 4] for at in range(16, min(64, _u32(data, 0)), 4))]
         kinds = [_BRANDS[brand] for brand in brands if brand in _BRANDS]
         kind = "AVIF" if "AVIF" in kinds else kinds[0] if kinds else ""
-        return "camera RAW" if kind == "raw" else kind
+        if kind:
+            return "camera RAW" if kind == "raw" else kind
     tiff = data[:4] in (b"II*\0", b"MM\0*")
     known = read_structure(data[:64]) is not None and not tiff
     if data.startswith(_RAW_STARTS) or (tiff and data[8:10] == b"CR") or (suffix in _RAW_SUFFIXES and not known):
@@ -106,7 +108,7 @@ def foreign_kind(data: bytes, suffix: str) -> str:
         directory = tiff_directory(data)
         if directory is not None and any(entry.tag == 50706 for entry in directory[0]):  # DNGVersion
             return "camera RAW"
-    return ""
+    return "" if known or tiff else _HEIF_SUFFIXES.get(suffix, "")
 
 
 def _u32(data: bytes, at: int) -> int:

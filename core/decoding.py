@@ -23,12 +23,13 @@ def read_file(path: Path) -> bytes:
         if path.is_dir():
             raise UnreadableImage("a folder, not a picture; name one file in it")
         if path.exists() and not path.is_file():
-            raise UnreadableImage("not a regular file")
+            raise UnreadableImage("not a regular file; copy the picture into one")
         data = path.read_bytes()
     except FileNotFoundError as error:
         raise UnreadableImage("no such file; check the name") from error
     except (OSError, ValueError) as error:
-        raise UnreadableImage(f"cannot be opened: {getattr(error, 'strerror', None) or error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise UnreadableImage(f"cannot be opened: {reason}; check its permissions and the disk, or copy it") from error
     if not data:
         raise UnreadableImage("the file is empty; copy or export it again")
     return data

@@ -78,7 +78,7 @@ def _load(path: Path) -> Picture:
         raise UnreadableImage(f"{foreign} pictures cannot be read; {_ADVICE[foreign]}")
     structure = read_structure(data)
     if structure is None:
-        raise UnreadableImage(f"not a picture of a known kind; {_READABLE} is needed")
+        raise UnreadableImage(f"not a picture of a known kind; export it as {_READABLE}")
     if structure.kind == "exr":
         raw, warnings = decode_exr(data)
         return _picture(raw, True, Exif(), None, path.name, warnings)
@@ -198,6 +198,23 @@ def _curves(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
     if channels == 1 and len(profile.curves) == 3:
         return profile.curves[1:2]
     return profile.curves
+
+
+def resized(picture: Picture, scale: float) -> Picture:
+    """The picture made smaller by `scale` (at most 1), each new pixel the mean light of what it covers."""
+    height, width = picture.pixels.shape[:2]
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    if size == (width, height):
+        return picture
+
+    def shrink(array: np.ndarray) -> np.ndarray:
+        return cv2.resize(array, size, interpolation=cv2.INTER_AREA).reshape(size[1], size[0], *array.shape[2:])
+
+    if picture.alpha is None:
+        return replace(picture, pixels=shrink(picture.pixels), view=shrink(picture.view))
+    alpha = shrink(picture.alpha)
+    pixels = shrink(picture.pixels * picture.alpha[..., None]) / np.maximum(alpha, 1e-6)[..., None]
+    return replace(picture, pixels=pixels, alpha=alpha, view=shrink(picture.view))
 
 
 def in_same_colour_space(a: Picture, b: Picture) -> tuple[Picture, Picture]:

@@ -15,13 +15,15 @@ from .errors import BadRequest, UnwritableOutput
 class OutputFiles:
     """The files of one piece of work. Leaving the `with` block puts all in place; an exception removes every trace.
 
-    overwrite: whether existing files may be replaced. All methods raise UnwritableOutput with the path and the reason.
-    A file that stood there before is replaced in one step and never half written; if putting several in place fails
-    midway, the new ones among them are taken away again.
+    overwrite: whether existing files may be replaced; inputs: files that the work reads, never replaced. All methods
+    raise UnwritableOutput with the path and the reason, and BadRequest where an output would replace an input. A file
+    that stood there before is replaced in one step and never half written; if putting several in place fails midway,
+    the new ones among them are taken away again.
     """
 
-    def __init__(self, overwrite: bool = False) -> None:
+    def __init__(self, overwrite: bool = False, inputs: Iterable[str | Path] = ()) -> None:
         self._overwrite = overwrite
+        self._inputs = tuple(Path(path) for path in inputs)
         self._staged: dict[Path, Path] = {}  # target: temporary file beside it
         self._made: list[Path] = []  # folders, outermost first
 
@@ -45,7 +47,10 @@ class OutputFiles:
         for target in targets:
             if targets.count(target) > 1:
                 raise BadRequest(f"{target}: named for two outputs; give each its own name")
-            if not target.parent.is_dir():
+            there = _existing(target.parent)
+            if not there.is_dir():
+                raise UnwritableOutput(f"{target}: {there} is a file, not a folder; choose another name")
+            if there != target.parent:
                 raise UnwritableOutput(f"{target}: no folder {target.parent}; create it or choose another")
             self._check_free(target)
             _probe(target.parent)
@@ -55,9 +60,7 @@ class OutputFiles:
         root = _real(folder)
         for name in names:
             self._check_free(root / name)
-        there = root
-        while not there.exists() and there != there.parent:
-            there = there.parent
+        there = _existing(root)
         if not there.is_dir():
             raise UnwritableOutput(f"{root}: {there} is a file, not a folder; choose another name")
         _probe(there)
@@ -80,7 +83,7 @@ class OutputFiles:
     def add_to_folder(self, folder: str | Path, name: str, data: bytes) -> None:
         """Stages a file in a folder that is made where it is missing."""
         root = _real(folder)
-        missing = [parent for parent in (root, *root.parents) if not parent.exists()]
+        missing = [parent for parent in (root, *root.parents) if not _exists(parent)]
         for one in reversed(missing):
             try:
                 one.mkdir()
@@ -122,12 +125,35 @@ class OutputFiles:
         self._made.clear()
 
     def _check_free(self, target: Path) -> None:
+        if not _exists(target):
+            return
         if target.is_dir():
             raise UnwritableOutput(f"{target}: a folder of this name exists; choose another name")
-        if target.exists() and not target.is_file():  # /dev/null would be replaced by a file
+        if not target.is_file():  # /dev/null would be replaced by a file
             raise UnwritableOutput(f"{target}: not a regular file; choose another name")
-        if target.exists() and not self._overwrite:
+        if any(_same_file(path, target) for path in self._inputs):
+            raise BadRequest(f"{target} is read by this work and would be replaced by it; choose another name")
+        if not self._overwrite:
             raise UnwritableOutput(f"{target} exists: use --overwrite or choose another name")
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError as error:  # a name too long, a folder that may not be looked into
+        raise _unwritable(path, error) from error
+
+
+def _same_file(path: Path, other: Path) -> bool:
+    try:
+        return path.samefile(other)
+    except (OSError, ValueError):  # one of them is not there
+        return False
+
+
+def _existing(path: Path) -> Path:
+    """The path itself or its nearest parent that is there."""
+    return next((one for one in (path, *path.parents) if _exists(one)), path)
 
 
 def _real(path: str | Path) -> Path:
@@ -154,5 +180,6 @@ def _quietly(remove: Callable[[], None]) -> None:
 
 def _unwritable(path: Path, error: OSError) -> UnwritableOutput:
     full = error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", None), errno.EFBIG)
-    advice = "free some space or choose another disk" if full else "choose another place"
+    other = "a shorter name" if error.errno == errno.ENAMETOOLONG else "another place"
+    advice = "free some space or choose another disk" if full else f"choose {other}"
     return UnwritableOutput(f"{path} cannot be written: {error.strerror or error}; {advice}")

@@ -250,14 +250,11 @@ def test_scaling_or_turning_a_picture_scales_its_focal_length(f35: float, w: int
 # --- the camera itself ---------------------------------------------------------------------------------------------
 
 
-def test_a_camera_can_be_scaled_and_handed_to_poselib() -> None:
+def test_a_camera_can_be_scaled() -> None:
     first, _ = read_camera_file({"cameras": {"reference": entry(K_RIGHT), "target": entry(K_LEFT)}}, NAMES,
                                 (LANDSCAPE, LANDSCAPE))  # fmt: skip
     assert np.array_equal(first.scaled(2.0), [[6600, 2.5, 1990], [0, 6620, 1500.25], [0, 0, 1]])
     assert first.focal == 3300 and first.K[0, 0] == 3300  # the camera itself stays
-    assert first.as_poselib() == {
-        "model": "PINHOLE", "width": 4000, "height": 3000, "params": [3300, 3310, 1990, 1500.25],
-    }  # fmt: skip
 
 
 # --- camera files --------------------------------------------------------------------------------------------------
@@ -381,3 +378,16 @@ def test_a_missing_camera_is_named_with_what_is_there() -> None:
 def test_a_pose_for_one_picture_only_is_refused() -> None:
     with pytest.raises(BadRequest, match="both or neither"):
         read({"cameras": {"reference": entry(K_LEFT, R=R_LEFT, t=[1, 2, 3]), "target": entry(K_RIGHT)}})
+
+
+@pytest.mark.parametrize("size", [(2000, 1500), (1333, 1000), (80, 61), (8000, 6000)])
+def test_a_resized_picture_is_seen_by_the_resized_camera(size: tuple[int, int]) -> None:
+    """Projecting and then scaling pixels about the picture's corner is projecting with the camera of the new size."""
+    _, camera = read({"reference": entry(K_LEFT), "target": entry(K_RIGHT, distortion=[0.1, -0.02])})
+    points = np.random.default_rng(0).normal((0, 0, 5), 1, (50, 3))
+    scale, other = np.array(size) / camera.size, camera.resized(size)
+    full, small = ((points @ one.K.T)[:, :2] / points[:, 2:] for one in (camera, other))
+    assert np.allclose(small, (full + 0.5) * scale - 0.5, rtol=0, atol=1e-9)
+    assert other.size == size and np.array_equal(other.distortion, camera.distortion) and other.distortion.any()
+    assert (other.source, other.log_sigma) == (camera.source, camera.log_sigma) and other.pose is camera.pose
+    assert camera.resized(camera.size).K.tolist() == camera.K.tolist()

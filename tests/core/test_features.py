@@ -298,3 +298,19 @@ def test_matching_in_slabs_changes_no_match() -> None:
     matches = match(a, b)
     assert len(matches) == 2100 and np.array_equal(matches.x, a.points)
     assert np.array_equal(matches.y, b.points[np.argsort(order)])
+
+
+# --- what matches carry --------------------------------------------------------------------------------------------
+
+
+def test_matches_carry_their_weights_and_whose_they_are() -> None:
+    x = np.arange(20.0).reshape(10, 2)
+    plain = Matches(x, x + 1, scale=2.0)
+    assert plain.weight is None and not plain.given and np.array_equal(plain.weights, np.ones(10))
+    ours = Matches(x, x + 1, 2.0, np.arange(10.0), given=True)
+    for keep in (np.arange(10) % 3 == 0, np.array([9, 0, 3])):
+        part = ours.subset(keep)
+        assert np.array_equal(part.weights, np.arange(10.0)[keep]) and np.array_equal(part.y, x[keep] + 1)
+        assert part.given and part.scale == 2.0 and plain.subset(keep).weight is None
+    few = ours.thinned(4)
+    assert few.weights.tolist() == [0, 3, 6, 9] and few.given and ours.thinned(10) is ours

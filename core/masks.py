@@ -1,0 +1,92 @@
+"""Masks of what is to be ignored in a picture: from a file or an array, and into the picture's alpha.
+
+What a picture does not show is in nobody's way: features, metrics, warp and blend all leave out what alpha hides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import BadRequest
+from .images import Picture, load_picture, picture_from_array
+
+# Less than this of a picture left is a mask that means something else.
+LEAST_LEFT = 0.01
+# Share of white by which a colour may differ and still be one: rounding, and compression that is not lossless.
+ONE_COLOUR = 8 / 255
+
+
+def read_mask(source: str | Path | np.ndarray, size: tuple[int, int], name: str) -> NDArray[np.bool_]:
+    """An ignore mask (H, W) for a picture of `size` (W, H) px, True where the picture is to be ignored.
+
+    source: any picture file that can be read, or an array as for `picture_from_array`, or of bool. White (brighter than
+    half) is ignored. Where there is alpha and what it shows has one colour, alpha decides; otherwise colour times
+    alpha does. Another size is stretched (nearest) where the shape is the picture's to within a pixel. name: of the
+    picture in messages, like "the reference".
+    Raises UnreadableImage (file), BadRequest (a mask of another shape, of labels instead of white, or of everything).
+    """
+    label = f"the mask of {name}" if isinstance(source, np.ndarray) else f"{source}: the mask of {name}"
+    picture = _picture(source, label)
+    _refuse_labels(picture, label)
+    mask = _stretched(_white(picture), size, label)
+    left = 1 - float(mask.mean())
+    if left < LEAST_LEFT:
+        raise BadRequest(
+            f"{label} leaves {left:.1%} of the picture, at least {LEAST_LEFT:.0%} is needed: white is ignored, black "
+            "is kept; invert the mask if it was painted the other way round"
+        )
+    return mask
+
+
+def without(picture: Picture, mask: NDArray[np.bool_]) -> Picture:
+    """The picture with alpha 0 where the mask (H, W) is True; the same picture where it is True nowhere."""
+    if not mask.any():
+        return picture
+    alpha = np.ones(mask.shape, np.float32) if picture.alpha is None else picture.alpha
+    return replace(picture, alpha=np.where(mask, np.float32(0), alpha))
+
+
+def _picture(source: str | Path | np.ndarray, label: str) -> Picture:
+    if not isinstance(source, np.ndarray):
+        return load_picture(source)
+    return picture_from_array(source.astype(np.uint8) * 255 if source.dtype == bool else source, label)
+
+
+def _refuse_labels(picture: Picture, label: str) -> None:
+    """Masks of 0 and 1 look black and would ignore nothing, without a word."""
+    if picture.bits < 32 and picture.alpha is None and picture.view.max() <= 1 and picture.pixels.max() > 0:
+        raise BadRequest(f"{label} holds nothing but black and almost black; save what is to be ignored as white (255)")
+
+
+def _white(picture: Picture) -> NDArray[np.bool_]:
+    """Where the mask says ignore (h, w), at its own size."""
+    # a float picture's view is exposed for the eye; its values themselves are the mask
+    values = picture.pixels if picture.bits == 32 else picture.view.astype(np.float32) / 255
+    gray = values[..., 0] if values.shape[2] == 1 else cv2.cvtColor(values, cv2.COLOR_RGB2GRAY)
+    if picture.alpha is None:
+        return gray > 0.5
+    shown = values[picture.alpha > 0.5]
+    one_colour = not len(shown) or np.ptp(shown, axis=0).max() <= ONE_COLOUR
+    return (picture.alpha if one_colour else gray * picture.alpha) > 0.5
+
+
+def _stretched(mask: NDArray[np.bool_], size: tuple[int, int], label: str) -> NDArray[np.bool_]:
+    width, height = size
+    own_height, own_width = mask.shape
+    if (own_width, own_height) == size:
+        return mask
+    # some scale brings both sides to within a pixel, of the smaller of the two
+    (w, h), (small_w, small_h) = sorted([(own_width, own_height), size], reverse=True, key=lambda s: s[0] * s[1])
+    if max((small_w - 1) / w, (small_h - 1) / h) > min((small_w + 1) / w, (small_h + 1) / h):
+        raise BadRequest(
+            f"{label} has {own_width}×{own_height} pixels, the picture has {width}×{height}: a mask needs the "
+            "picture's size, or its shape at another size, upright"
+        )
+    rows = (2 * np.arange(height) + 1) * own_height // (2 * height)
+    columns = (2 * np.arange(width) + 1) * own_width // (2 * width)
+    return mask[np.ix_(rows, columns)]

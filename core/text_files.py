@@ -1,0 +1,26 @@
+"""Text that users write: lists and tables, whatever their editor or spreadsheet made of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .errors import BadRequest, UnreadableImage
+
+
+def read_text(path: Path, what: str, layout: str) -> str:
+    """A file in UTF-8, with or without a byte order mark.
+
+    what: of the file, in messages, like "the list"; layout: what it should hold. Raises UnreadableImage where it cannot
+    be read, BadRequest where it is no text.
+    """
+    try:
+        data = path.read_bytes()
+    except (OSError, ValueError) as error:
+        raise UnreadableImage(f"{what} cannot be read: {error}") from error
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = "\0"
+    if "\0" in text:
+        raise BadRequest(f"{path}: not a text in UTF-8; {what} is a CSV file: {layout}")
+    return text
