@@ -15,11 +15,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
+from .arguments import add_options, options_from
 from .errors import BadRequest, Cancelled, StitchError
 
-# What DESIGN names and what is not there yet is refused by name, so that nobody takes silence for success.
-FIELD_CHOICES, FIELDS_TO_COME = ("strict",), ("slack", "paper", "rew", "apap", "homography")
-BLEND_CHOICES, BLENDS_TO_COME = ("feather", "linear"), ("multiband",)
+# Of one item; every frame of a clip may have its own.
+_MOST_WARNINGS = 5
 
 
 class _Parser(argparse.ArgumentParser):
@@ -73,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_stitch(commands.add_parser("stitch", help="stitch a pair into one panorama", description=_STITCH))
+    _add_batch(commands.add_parser("batch", help="stitch a list of pairs and clips", description=_BATCH))
     _add_demo(commands.add_parser("demo", help="make a pair, stitch it, say what was measured", description=_DEMO))
     return parser
 
@@ -89,6 +90,12 @@ _STITCH = """Stitch TARGET into the plane of REF. REF keeps every pixel it has; 
 to meet it. Messages go to stderr. Exit codes: 0 done, 2 the call is wrong, 3 the pictures can't be stitched, 4 a file
 can't be read or written, 130 interrupted."""
 
+_BATCH = """Stitch every line of LIST.csv: a pair of pictures, or a clip of two cameras that stand still (a_%04d.png or
+a_####.png), whose frames share one alignment. A line holds reference,target and, if wanted, a name; a header may name
+first, last, step, focal_px and focal35 as well. A bad pair is reported and the rest goes on; DIR/batch.json says what
+became of each. Exit codes: 0 all done, 2 the call is wrong, 3 a pair can't be stitched, 4 a file can't be read or
+written, 130 interrupted."""
+
 _DEMO = "Make two pictures of a small scene through known cameras, stitch them, and compare with the truth."
 
 
@@ -103,79 +110,41 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="OUT", help=".png, .jpg, .tif (8 or 16 bit) or .exr (float)"
     )
-
-    camera = parser.add_argument_group(
-        "cameras", "One value serves both pictures; two are for REF,TARGET. Without any: EXIF, or an estimate."
-    )
-    camera.add_argument("--focal-px", type=_numbers, default=(), metavar="F[,F2]", help="focal length in pixels")
-    camera.add_argument(
-        "--focal-mm", type=_numbers, default=(), metavar="F[,F2]", help="focal length in mm (with --sensor-mm)"
-    )
-    camera.add_argument(
-        "--sensor-mm",
-        type=_numbers,
-        default=(),
-        metavar="W[,W2]",
-        help="width of the sensor in mm, along the longer side",
-    )
-    camera.add_argument("--focal35", type=_numbers, default=(), metavar="F[,F2]", help="35 mm equivalent focal length")
-    camera.add_argument(
-        "--principal",
-        type=_numbers,
-        default=(),
-        metavar="X,Y[,X2,Y2]",
-        help="principal point in pixels (default: the middle)",
-    )
-    camera.add_argument(
-        "--cameras", type=Path, metavar="FILE.json", help="per picture K, optionally distortion, R and t"
-    )
-
-    how = parser.add_argument_group("how")
-    how.add_argument(
-        "--field",
-        default="strict",
-        type=_choice(FIELD_CHOICES, FIELDS_TO_COME),
-        metavar="FIELD",
-        help="displacement field: strict",
-    )
-    how.add_argument(
-        "--fade",
-        default="plane",
-        type=_choice(("plane",), ("infinity",)),
-        help="what it fades to outside the overlap: plane",
-    )
-    how.add_argument(
-        "--dense",
-        action=argparse.BooleanOptionalAction,
-        default=False,
-        help="dense refinement in the overlap (yet to come)",
-    )
-    how.add_argument(
-        "--projection",
-        default="perspective",
-        type=_choice(("perspective",), ("cylindrical", "equirectangular")),
-        help="perspective",
-    )
-    how.add_argument(
-        "--blend",
-        default="feather",
-        type=_choice(BLEND_CHOICES, BLENDS_TO_COME),
-        help="feather (default) or linear (plain average)",
-    )
-    how.add_argument("--seam", default="none", type=_choice(("none",), ("graphcut",)), help="none")
-    how.add_argument(
-        "--exposure", action=argparse.BooleanOptionalAction, default=False, help="exposure compensation (yet to come)"
-    )
-    how.add_argument("--seed", type=int, default=0, metavar="N", help="seed of every random choice (default 0)")
-
+    add_options(parser)
     files = parser.add_argument_group("files")
-    files.add_argument("--report", type=Path, metavar="FILE.json", help="everything that was measured and decided")
+    files.add_argument(
+        "--report", type=Path, metavar="FILE.json",
+        help="everything that was measured and decided; FILE.matches.csv: the matches, as --matches takes them",
+    )  # fmt: skip
     files.add_argument(
         "--layers", type=Path, metavar="DIR", help="both pictures on the canvas before blending, with alpha"
     )
     files.add_argument("--warp", type=Path, metavar="FILE.npz", help="the map, the inverse depth and the geometry")
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")
     _add_loudness(parser)
+
+
+def _add_batch(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_batch)
+    parser.add_argument("list", metavar="LIST.csv", type=Path, help="the pairs; relative paths start at its folder")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for all outputs")
+    add_options(parser)
+    files = parser.add_argument_group("files")
+    files.add_argument("--format", default=".png", metavar="SUFFIX", help=".png (default), .jpg, .tif or .exr")
+    files.add_argument("--layers", action="store_true", help="NAME.layers: both pictures on the canvas, with alpha")
+    files.add_argument("--warp", action="store_true", help="NAME.warp.npz: the map, the inverse depth and the geometry")
+    files.add_argument("--resume", action="store_true", help="make only what is missing, or was made otherwise")
+    files.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="the I-th of N runs that share LIST")
+    files.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    _add_loudness(parser)
+
+
+def _shard(text: str) -> tuple[int, int]:
+    try:
+        index, count = map(int, text.split("/"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not like 2/3: which of how many runs") from None
+    return index, count
 
 
 def _add_demo(parser: argparse.ArgumentParser) -> None:
@@ -198,38 +167,18 @@ def _add_loudness(parser: argparse.ArgumentParser) -> None:
     loudness.add_argument("--verbose", action="store_true", help="what was decided, measured and how long it took")
 
 
-def _numbers(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 1200 or 1200,1180") from None
-
-
-def _choice(known: tuple[str, ...], to_come: tuple[str, ...]) -> Callable[[str], str]:
-    def parse(text: str) -> str:
-        if text in to_come:
-            raise argparse.ArgumentTypeError(f"{text!r} is yet to come; for now: {', '.join(known)}")
-        if text not in known:
-            raise argparse.ArgumentTypeError(f"{text!r} is not known; choose from: {', '.join(known)}")
-        return text
-
-    return parse
-
-
 def _stitch(args: argparse.Namespace) -> int:
     if len(args.target) > 1:
         raise BadRequest(f"{1 + len(args.target)} pictures given: two at a time for now; stitch them pair by pair")
-    if args.dense or args.exposure:
-        raise BadRequest(f"--{'dense' if args.dense else 'exposure'} is yet to come")
-    from .camera import CameraRequest
     from .output_files import OutputFiles
     from .outputs import OutputRequest, check, write
-    from .pipeline import StitchOptions, stitch
+    from .pipeline import stitch
 
-    request = CameraRequest(args.focal_px, args.focal_mm, args.sensor_mm, args.focal35, args.principal, args.cameras)
-    options = StitchOptions(args.field, request, args.blend, args.seed, measure=bool(args.report or args.verbose))
+    options = options_from(args, measure=bool(args.report or args.verbose))
     outputs = OutputRequest(args.output, args.report, args.layers, args.warp)
-    with OutputFiles(args.overwrite) as files:
+    given = (args.cameras, args.matches, args.ignore_ref, args.ignore_target)
+    inputs = [args.reference, *args.target, *(path for path in given if path is not None)]
+    with OutputFiles(args.overwrite, inputs) as files:
         check(outputs, files)
         with _progress_shown(args.quiet) as show:
             result = stitch(args.reference, args.target[0], options, progress=show)
@@ -245,15 +194,66 @@ def _stitch(args: argparse.Namespace) -> int:
     return 0
 
 
+def _batch(args: argparse.Namespace) -> int:
+    from .batch import Outcome, run_batch
+    from .batch_list import read_list
+    from .batch_outputs import BatchRequest
+
+    suffix = args.format if args.format.startswith(".") else f".{args.format}"
+    request = BatchRequest(args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard)
+
+    def tell(outcome: Outcome, number: int, count: int) -> None:
+        more = len(outcome.warnings) - _MOST_WARNINGS
+        for warning in (*outcome.warnings[:_MOST_WARNINGS], *[f"{more} more in {request.summary}"] * (more > 0)):
+            _say(f"edf: warning: {outcome.name}: {warning}")
+        if outcome.exit_code or not args.quiet:
+            _say(f"edf: [{number}/{count}] {outcome.name}: {outcome.in_words(args.verbose)}")
+
+    try:
+        options = options_from(args, measure=True)
+        with _progress_shown(args.quiet or not sys.stderr.isatty()) as show:
+            summary = run_batch(
+                read_list(args.list), options, request, lambda what, share: show(f"{what:<18}", share), finished=tell
+            )
+    except KeyboardInterrupt:
+        print("edf: interrupted; what is finished is kept, and --resume goes on with the rest", file=sys.stderr)
+        return Cancelled.exit_code
+    if not args.quiet:
+        counts = ", ".join(f"{summary.count(status)} {status}" for status in ("done", "skipped", "failed"))
+        print(f"edf: {request.summary}: {counts}", file=sys.stderr)
+    return summary.exit_code
+
+
+def _say(line: str) -> None:
+    """A line on stderr, above the bar where there is one."""
+    if sys.stderr.isatty():
+        from tqdm import tqdm
+
+        tqdm.write(line, file=sys.stderr)
+    else:
+        print(line, file=sys.stderr, flush=True)
+
+
 def _tell(report: dict, seconds: dict[str, float]) -> None:
     view, field, measured = report["two_view"], report["field"], report["measured"]
     focal = ", ".join(f"{value:.1f}" for value in view["focal_px"])
+
+    def said(value: float | None, form: str) -> str:
+        return "-" if value is None else format(value, form)
+
     lines = [
         f"{view['model']}: {view['why']}",
-        f"focal length {focal} px ({view['focal_source']}; ± {view['focal_deviation']:.1%})",
+        f"focal length {focal} px ({view['focal_source']}; ± {said(view['focal_deviation'], '.1%')}, at infinity ± "
+        f"{said(view['h_inf_spread_px'], '.1f')} px)",
         f"field {field['kind']}: {field['centres']} points, {field['pruned']} left out, λ {field['smoothing']:.1e}",
-        f"alignment {measured['alignment_median_px']:.2f} px (median), {measured['alignment_p95_px']:.2f} px (95 %)",
-        f"overlap PSNR {measured['overlap_psnr_db']:.2f} dB, SSIM {measured['overlap_ssim']:.3f}",
+        f"alignment {said(measured['alignment_median_px'], '.2f')} px (median), "
+        f"{said(measured['alignment_p95_px'], '.2f')} px (95 %), {said(measured['off_line_mean_px'], '.2f')} px off "
+        "their lines (mean)",
+        f"held out: {said(measured['held_out_rms_px'], '.2f')} px (RMS of five folds), "
+        f"{said(measured['held_out_towards_rms_px'], '.2f')} px towards the part only the target shows",
+        f"projectivity {said(measured['projectivity_own_px'], '.2f')} px, by an independent F "
+        f"{said(measured['projectivity_independent_px'], '.2f')} px",
+        f"overlap PSNR {said(measured['overlap_psnr_db'], '.2f')} dB, SSIM {said(measured['overlap_ssim'], '.3f')}",
         "seconds: " + ", ".join(f"{stage} {value:.2f}" for stage, value in seconds.items()),
     ]
     print("\n".join(f"edf: {line}" for line in lines), file=sys.stderr)

@@ -7,7 +7,8 @@ matches ask for it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -16,9 +17,11 @@ from numpy.typing import NDArray
 from .canvas import Grid
 from .epipolar import Array, homogeneous, project
 from .errors import DegenerateGeometry
+from .features import Matches
 from .spline import SmoothingProblem, ThinPlateSpline, spread_points
 from .two_view import TwoView
 
+FADES = ("plane", "infinity")
 CENTRE_BUDGET = 1000
 # λ in units of W·H of the reference: where the search for the best one starts, and how far it goes.
 SMOOTHING_START = 1e-3
@@ -31,12 +34,73 @@ MIN_CENTRES = 8
 
 
 @dataclass(frozen=True)
+class FieldValues:
+    """A field at nodes: inverse_depth (rows, columns), and shift (rows, columns, 2) in target px that comes on top of
+    π(H_inf p + d e'), None where the field keeps to its epipolar lines."""
+
+    inverse_depth: Array
+    shift: Array | None = None
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How a field came about.
+
+    `kept` (N,): the matches (of those given) it stands on; smoothing: λ in units of W·H; fade_px: width of the fade
+    outside the overlap; residual_px: RMS along the lines; held_out_px: the same leave-one-out; negative_share: share of
+    its matches with d < 0.
+    """
+
+    kept: NDArray[np.bool_]
+    smoothing: float
+    fade_px: float
+    residual_px: float
+    held_out_px: float
+    negative_share: float
+
+
+class Field(Protocol):
+    """A displacement field: where canvas points are seen in the target, in ideal (undistorted) pixels of both."""
+
+    @property
+    def name(self) -> str:
+        """What `--field` calls it."""
+        ...
+
+    @property
+    def plane(self) -> Array:
+        """m (3,): the affine part, which it fades to far from the overlap."""
+        ...
+
+    @property
+    def fit(self) -> Fit:
+        """How it came about."""
+        ...
+
+    def on_grid(self, grid: Grid, ideal: Array | None = None) -> FieldValues:
+        """Its values at a grid's nodes; ideal (rows, columns, 2): the nodes' ideal pixels, where they are not the
+        canvas's."""
+        ...
+
+    def sends(self, points: Array) -> Array:
+        """Target pixels (N, 2) of points (N, 2) of the overlap, where nothing fades, ideal pixels both; NaN behind the
+        target camera."""
+        ...
+
+    def refitted(self, matches: Matches) -> Field:
+        """The same kind of field on other matches of the pair, all of them kept, at the λ that was found before.
+
+        Raises DegenerateGeometry.
+        """
+        ...
+
+
+@dataclass(frozen=True)
 class StrictField:
     """d(p) = m·p + α(p) g(p): a plane, and a spline of what the plane leaves, faded out beyond the overlap.
 
-    plane (3,): m on homogeneous reference pixels; spline: g; fade_px: width of the fade; smoothing: λ in units of W·H;
-    `kept` (N,): the matches (of those given) the spline stands on; residual_px: their RMS along the line; held_out_px:
-    RMS leave-one-out; negative_share: share of inliers with d < 0.
+    plane (3,): m on homogeneous reference pixels; spline: g; fade: to the plane, or to infinity (m fades too). Where
+    there is no parallax (e' = 0) d is 0 everywhere.
     """
 
     two_view: TwoView
@@ -44,46 +108,79 @@ class StrictField:
     target_size: tuple[int, int]
     plane: Array
     spline: ThinPlateSpline
-    fade_px: float
-    smoothing: float
-    kept: NDArray[np.bool_]
-    residual_px: float
-    held_out_px: float
-    negative_share: float
+    fit: Fit
+    fade: str = "plane"
 
     name = "strict"
 
-    def on_grid(self, grid: Grid, ideal: Array | None = None) -> Array:
-        """Inverse depth (rows, columns), float64, at a grid's nodes.
+    def on_grid(self, grid: Grid, ideal: Array | None = None) -> FieldValues:
+        """Inverse depth, float64, at a grid's nodes.
 
         ideal (rows, columns, 2): the nodes' ideal pixels, where the reference's lens bends its picture.
         """
+        return FieldValues(self.with_fade(grid, ideal)[0])
+
+    def with_fade(
+        self, grid: Grid, ideal: Array | None = None, bend: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Inverse depth and the fade α, each (rows, columns), at a grid's nodes; bend: the spline there, if known."""
         points = grid.points if ideal is None else ideal
         plane = points @ self.plane[:2] + self.plane[2]
-        if ideal is None:
-            bend = self.spline.on_axes(grid.xs, grid.ys)
-        else:
-            bend = self.spline.at(ideal.reshape(-1, 2)).reshape(plane.shape)
-        return plane + self._fade(grid, points, plane + bend) * bend
+        if bend is None:
+            bend = on_nodes(self.spline, grid, ideal)
+        target = target_points(self.two_view, points, plane + bend)
+        alpha = fade_share(grid, target, self.size, self.target_size, self.fit.fade_px)
+        return (alpha * (plane + bend) if self.fade == "infinity" else plane + alpha * bend), alpha
 
     def at(self, points: Array) -> Array:
         """Inverse depth (N,) at points (N, 2) of the overlap, where nothing fades."""
         return points @ self.plane[:2] + self.plane[2] + self.spline.at(points)
 
-    def _fade(self, grid: Grid, points: Array, unfaded: Array) -> Array:
-        """α (rows, columns): 1 in the overlap, smoothly to 0 over fade_px outside it."""
-        target = target_points(self.two_view, points, unfaded)
-        inside = (grid.points >= 0).all(axis=-1) & (grid.points <= np.array(self.size) - 1).all(axis=-1)
-        with np.errstate(invalid="ignore"):
-            inside &= (target >= 0).all(axis=-1) & (target <= np.array(self.target_size) - 1).all(axis=-1)
-        if not inside.any():
-            return np.zeros(unfaded.shape)
-        # a node beside the last inside one may touch the overlap: distances count from one cell on
-        steps = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        # OpenCV's root has other last bits from call to call; squared distances are whole numbers
-        steps = np.sqrt(np.rint(np.square(steps, dtype=np.float64)))
-        u = np.clip((steps - 1) * grid.step / self.fade_px, 0.0, 1.0)
-        return 1 - u * u * (3 - 2 * u)
+    def sends(self, points: Array) -> Array:
+        """Target pixels (N, 2) of points (N, 2) of the overlap, where nothing fades."""
+        return target_points(self.two_view, points, self.at(points))
+
+    def refitted(self, matches: Matches) -> StrictField:
+        """A spline on other matches of the pair, all kept, at the same λ; the plane stays, since whatever is affine in
+        d the spline takes up. Raises DegenerateGeometry."""
+        _refuse_no_spread(matches.x, matches.scale)
+        fit = replace(self.fit, kept=np.full(len(matches), True))
+        if not self.two_view.e_prime.any():
+            return replace(self, fit=fit)
+        d, sensitivity = inverse_depths(self.two_view, matches.x, matches.y)
+        noise = np.median(sensitivity) / sensitivity / np.sqrt(matches.weights)
+        problem = SmoothingProblem.build(matches.x, noise, float(np.sqrt(self.size[0] * self.size[1])))
+        g = d - (matches.x @ self.plane[:2] + self.plane[2])
+        return replace(self, spline=problem.solve(g, self.fit.smoothing)[0], fit=fit)
+
+
+def on_nodes(spline: ThinPlateSpline, grid: Grid, ideal: Array | None) -> Array:
+    """Values (rows, columns[, k]) of a spline at a grid's nodes, or at their ideal pixels."""
+    if ideal is None:
+        return spline.on_axes(grid.xs, grid.ys)
+    values = spline.at(ideal.reshape(-1, 2))
+    return values.reshape(*ideal.shape[:2], *values.shape[1:])
+
+
+def fade_share(
+    grid: Grid, target: Array, size: tuple[int, int], target_size: tuple[int, int], fade_px: float
+) -> Array:
+    """α (rows, columns): 1 in the overlap, smoothly to 0 over fade_px outside it.
+
+    target (rows, columns, 2): where the field, not faded, sends the nodes; a node belongs to the overlap when it lies
+    in the reference and that in the target.
+    """
+    inside = (grid.points >= 0).all(axis=-1) & (grid.points <= np.array(size) - 1).all(axis=-1)
+    with np.errstate(invalid="ignore"):
+        inside &= (target >= 0).all(axis=-1) & (target <= np.array(target_size) - 1).all(axis=-1)
+    if not inside.any():
+        return np.zeros(inside.shape)
+    # a node beside the last inside one may touch the overlap: distances count from one cell on
+    steps = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    # OpenCV's root has other last bits from call to call; squared distances are whole numbers
+    steps = np.sqrt(np.rint(np.square(steps, dtype=np.float64)))
+    u = np.clip((steps - 1) * grid.step / fade_px, 0.0, 1.0)
+    return 1 - u * u * (3 - 2 * u)
 
 
 def target_points(two_view: TwoView, points: Array, inverse_depth: Array) -> Array:
@@ -141,12 +238,15 @@ def fit_plane(x: Array, d: Array, sensitivity: Array, noise_px: float) -> Array:
 
 
 def fit_strict(
-    two_view: TwoView, x: Array, y: Array, size: tuple[int, int], target_size: tuple[int, int], noise_scale: float = 1.0
+    two_view: TwoView, matches: Matches, size: tuple[int, int], target_size: tuple[int, int], fade: str = "plane"
 ) -> StrictField:
-    """The strict field of inlier matches x ↔ y (N, 2) px (DESIGN 1, "The strict field, in full").
+    """The strict field of inlier matches (DESIGN 1, "The strict field, in full").
 
-    size, target_size: (W, H) px; noise_scale: unit of the matches' noise in px. Raises DegenerateGeometry.
+    size, target_size: (W, H) px; fade: one of FADES. Matches given by the user are all kept. Raises DegenerateGeometry.
     """
+    if not two_view.e_prime.any():
+        return _without_parallax(two_view, matches, size, target_size, fade)
+    x, y = matches.x, matches.y
     d, sensitivity = inverse_depths(two_view, x, y)
     usable = np.isfinite(d) & np.isfinite(sensitivity)
     # where the line is seen end-on (beside the epipole) a pixel says nothing about d
@@ -157,42 +257,68 @@ def fit_strict(
             "the camera moved too little, or straight at what it saw"
         )
     index = np.flatnonzero(usable)
-    area = float(size[0] * size[1])
-    noise_px = max(two_view.sigma, 0.1 * noise_scale)
-    plane = fit_plane(x[index], d[index], sensitivity[index], noise_px)
+    unit = float(np.sqrt(size[0] * size[1]))
+    noise_px = max(two_view.sigma, 0.1 * matches.scale)
+    plane = fit_plane(x[index], d[index], sensitivity[index] * np.sqrt(matches.weights[index]), noise_px)
     off_line = np.linalg.norm(target_points(two_view, x[index], d[index]) - y[index], axis=1)
-    index = index[spread_points(x[index], off_line, CENTRE_BUDGET, np.sqrt(area) / 200)]
-    across = np.linalg.svd(x[index] - x[index].mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(index))
-    if len(index) < MIN_CENTRES or across < noise_scale:
-        raise DegenerateGeometry("the matches do not determine a displacement field: they lie in one spot or on a line")
+    if not matches.given or len(index) > CENTRE_BUDGET:
+        index = index[spread_points(x[index], off_line / matches.weights[index], CENTRE_BUDGET, unit / 200)]
+    _refuse_no_spread(x[index], matches.scale)
     g = d - (x @ plane[:2] + plane[2])
-    index, spline, residual, smoothing, held_out_px = _prune_and_smooth(
-        x, g, sensitivity, index, np.sqrt(area), noise_scale
-    )
+    index, spline, residual, smoothing, held_out_px = _prune_and_smooth(matches, g, sensitivity, index, unit)
     s = sensitivity[index]
-    bend_px = s * np.abs(spline.at(x[index]))
+    # what fades: the bend, or all of d
+    fading = spline.at(x[index]) + (x[index] @ plane[:2] + plane[2] if fade == "infinity" else 0.0)
     kept = np.zeros(len(x), bool)
     kept[index] = True
-    return StrictField(
-        two_view, size, target_size, plane, spline,
-        fade_px=max(5 * float(np.percentile(bend_px, 98)), 8 * noise_scale), smoothing=smoothing, kept=kept,
+    fit = Fit(
+        kept, smoothing, fade_width(s * np.abs(fading), matches.scale),
         residual_px=float(np.sqrt(np.mean((s * residual) ** 2))), held_out_px=held_out_px,
         negative_share=float(np.mean(d[index] < 0)),
     )  # fmt: skip
+    return StrictField(two_view, size, target_size, plane, spline, fit, fade)
+
+
+def _refuse_no_spread(x: Array, scale: float) -> None:
+    """Raises DegenerateGeometry where points (N, 2) with noise of the unit `scale` px are too few for a spline, or lie
+    on a line."""
+    if len(x) < MIN_CENTRES or np.linalg.svd(x - x.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(x)) < scale:
+        raise DegenerateGeometry("the matches do not determine a displacement field: they lie in one spot or on a line")
+
+
+def fade_width(moved_px: Array, noise_scale: float) -> float:
+    """Width (px) over which a field fades that moves its matches by moved_px (N,): five times its robust maximum."""
+    return max(5 * float(np.percentile(moved_px, 98)), 8 * noise_scale)
+
+
+def _without_parallax(
+    two_view: TwoView, matches: Matches, size: tuple[int, int], target_size: tuple[int, int], fade: str
+) -> StrictField:
+    """d = 0 everywhere: the pictures differ by a homography alone."""
+    nothing = ThinPlateSpline(np.empty((0, 2)), np.empty(0), np.zeros(3), np.zeros(2), 1.0)
+    off = np.linalg.norm(target_points(two_view, matches.x, np.zeros(len(matches))) - matches.y, axis=1)
+    rms = float(np.sqrt(np.nanmean(off**2)))
+    kept = np.isfinite(off)
+    if not matches.given or len(matches) > CENTRE_BUDGET:
+        index, unit = np.flatnonzero(kept), float(np.sqrt(size[0] * size[1]))
+        kept = np.zeros(len(matches), bool)
+        kept[index[spread_points(matches.x[index], off[index], CENTRE_BUDGET, unit / 200)]] = True
+    fit = Fit(kept, SMOOTHING_START, 8 * matches.scale, rms, rms, 0.0)
+    return StrictField(two_view, size, target_size, np.zeros(3), nothing, fit, fade)
 
 
 def _prune_and_smooth(
-    x: Array, g: Array, sensitivity: Array, index: NDArray[np.intp], unit: float, noise_scale: float
+    matches: Matches, g: Array, sensitivity: Array, index: NDArray[np.intp], unit: float
 ) -> tuple[NDArray[np.intp], ThinPlateSpline, Array, float, float]:
     """Drop what lies beyond 3σ of the spline (outliers along the line pass every epipolar test), choose λ, drop again,
     until stable.
 
     Returns the kept indices, the spline, its residuals, λ and the leave-one-out RMS in px.
     """
-    floor = PRUNE_FLOOR_PX * noise_scale
+    floor = PRUNE_FLOOR_PX * matches.scale
     s = sensitivity[index]
-    problem = SmoothingProblem.build(x[index], np.median(s) / s, unit)
-    supported = _supported(x[index], g[index], s, floor)
+    problem = SmoothingProblem.build(matches.x[index], np.median(s) / s / np.sqrt(matches.weights[index]), unit)
+    supported = np.full(len(index), True) if matches.given else _supported(matches.x[index], g[index], s, floor)
 
     def drop(keep: NDArray[np.bool_]) -> bool:
         """Take out what neither the threshold nor its neighbours keep; says whether anything went."""
@@ -208,7 +334,7 @@ def _prune_and_smooth(
         error = np.abs(sensitivity[index] * problem.held_out_at(g[index], SMOOTHING_START))
         if not drop(error <= max(GROSS_DEVIATIONS * np.median(error) / 0.6745, floor)):
             break
-    smoothing = _best_smoothing(problem, g[index], sensitivity[index])
+    smoothing = best_smoothing(problem, g[index], sensitivity[index])
     while True:
         spline, residual = problem.solve(g[index], smoothing)
         error = np.abs(sensitivity[index] * residual)
@@ -233,7 +359,7 @@ def _supported(x: Array, g: Array, sensitivity: Array, tolerance: float) -> NDAr
     return agrees.sum(axis=1) >= SUPPORT
 
 
-def _best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> float:
+def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> float:
     """λ of the ladder with the least leave-one-out error in px.
 
     Large errors count in proportion, not squared: a few depth edges must not decide for the whole picture.

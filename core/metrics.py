@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .camera import Camera
 from .epipolar import Array, distance_to_line
 from .images import Picture
+from .lens import undistort
 from .warp import Warp, fetch
 
 # Constants of the structural similarity index for 8 bit (Wang et al., IEEE TIP 2004, section III-B).
 SSIM_C1, SSIM_C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+# A field is smooth: about this many canvas pixels, evenly spread, say how far a map leaves the epipolar lines.
+SAMPLES = 20_000
 
 
 def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
@@ -56,7 +62,9 @@ def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str
     if reference.alpha is not None:
         inside = inside & (reference.alpha > 0)
     if target.alpha is not None:
-        inside = inside & (fetch(target.alpha[..., None], warp.map_x[box], warp.map_y[box])[..., 0] > 0.5)
+        # whole, where the colours are fetched from: what is hidden has no colour to compare
+        alpha = fetch(target.alpha[..., None], warp.map_x[box], warp.map_y[box], cv2.INTER_LINEAR)
+        inside = inside & (alpha[..., 0] > 1 - 1 / 255)
     if not inside.any():
         return {"overlap_px": 0, "overlap_psnr_db": float("nan"), "overlap_ssim": float("nan")}
     map_x, map_y = (np.where(inside, m[box], -1).astype(np.float32) for m in (warp.map_x, warp.map_y))
@@ -96,8 +104,32 @@ def folds(warp: Warp, target_size: tuple[int, int]) -> float:
     return float(np.mean(np.sign(turn) != np.sign(np.median(turn))))
 
 
-def distances_off_line(F: Array, points: Array, mapped: Array) -> Array:
-    """Distance in px (N,) of mapped target points from the epipolar lines of their reference points, finite ones
-    only."""
-    finite = np.isfinite(mapped).all(axis=1)
-    return distance_to_line(F, points[finite], mapped[finite])
+@dataclass(frozen=True)
+class Shown:
+    """Canvas pixels that show the target, evenly spread, and where they show it, in ideal (undistorted) px of both.
+
+    points (N, 2) of the reference's plane; target (N, 2); overlap (N,): which of them lie in the reference.
+    """
+
+    points: Array
+    target: Array
+    overlap: NDArray[np.bool_]
+
+
+def shown_points(warp: Warp, cameras: tuple[Camera, Camera], samples: int = SAMPLES) -> Shown:
+    """What a warp shows of the target at about `samples` pixels of the whole canvas, on an even grid."""
+    canvas = warp.canvas
+    step = max(1, int(np.sqrt(canvas.width * canvas.height / samples)))
+    nodes = np.s_[step // 2 :: step, step // 2 :: step]
+    shows = warp.inside(cameras[1].size)[nodes]
+    raw = np.stack([warp.map_x[nodes][shows], warp.map_y[nodes][shows]], axis=-1).astype(np.float64)
+    points = np.argwhere(shows)[:, ::-1] * float(step) + step // 2 - np.array(canvas.offset)
+    overlap = (points >= 0).all(axis=1) & (points <= np.array(cameras[0].size) - 1).all(axis=1)
+    return Shown(undistort(points, cameras[0]), undistort(raw, cameras[1]), overlap)
+
+
+def off_line_mean(F: Array, shown: Shown) -> float:
+    """Mean distance in target px of the map from its epipolar lines over the overlap; NaN without overlap or F."""
+    if not (np.isfinite(F).all() and shown.overlap.any()):
+        return float("nan")
+    return float(distance_to_line(F, shown.points[shown.overlap], shown.target[shown.overlap]).mean())

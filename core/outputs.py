@@ -13,6 +13,7 @@ import numpy as np
 
 from .errors import BadRequest
 from .images import encode_picture, output_bits
+from .match_files import matches_csv
 from .output_files import OutputFiles
 from .pipeline import StitchResult
 from .report import plain
@@ -33,13 +34,19 @@ class OutputRequest:
         """Seconds stand in a file of their own beside the report, which is the same for the same input."""
         return None if self.report is None else self.report.with_name(self.report.stem + ".timing.json")
 
+    @property
+    def matches(self) -> Path | None:
+        """The matches stand beside the report, in the form that --matches takes."""
+        return None if self.report is None else self.report.with_name(self.report.stem + ".matches.csv")
+
 
 def check(request: OutputRequest, files: OutputFiles) -> None:
     """Asks before the work whether everything could be written. Raises BadRequest or UnwritableOutput."""
     output_bits((8,), request.panorama.suffix)
     if request.warp is not None and request.warp.suffix.lower() != ".npz":
         raise BadRequest(f"the warp is written as .npz, not {request.warp.suffix or 'a file of no kind'}")
-    single = [p for p in (request.panorama, request.report, request.timing, request.warp) if p is not None]
+    named = (request.panorama, request.report, request.timing, request.matches, request.warp)
+    single = [path for path in named if path is not None]
     files.check(*single)
     if request.layers is not None:
         names = [f"{layer}{suffix}" for layer in ("reference", "target") for suffix in (".png", ".exr")]
@@ -63,7 +70,8 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
             _add_layer(files, request.layers, name, layer, result)
     if request.warp is not None:
         files.add(request.warp, warp_bytes(result))
-    if request.report is not None and request.timing is not None:
+    if request.report is not None and request.timing is not None and request.matches is not None:
+        files.add(request.matches, matches_csv(result.used_matches))
         files.add(request.report, json_bytes({**result.report, "warnings": [*result.warnings, *warnings]}))
         files.add(request.timing, json_bytes({"seconds": result.seconds}))
     return warnings

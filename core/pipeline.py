@@ -10,42 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from . import features
-from .blend import BLENDS, blend
-from .camera import Camera, CameraRequest, cameras_for
-from .displacement import StrictField, fit_strict
-from .errors import BadRequest, NoOverlap
+from .alignment import Alignment, Frame, align, prepare, size_of
+from .blend import blend
+from .camera import Camera
+from .crop import crop_box
+from .displacement import Field
+from .errors import NoOverlap
 from .features import Matches
 from .images import Picture, in_same_colour_space, load_picture, picture_from_array
-from .lens import undistort
+from .options import StitchOptions
 from .progress import Progress
 from .report import make_report
-from .two_view import TwoView, estimate
-from .warp import Layer, Warp, build_warp, reference_layer, target_layer
-
-FIELDS = ("strict",)
-
-
-@dataclass(frozen=True)
-class StitchOptions:
-    """What a user may decide; the defaults are right for two photographs of one camera.
-
-    field: one of FIELDS; camera: what is known of the cameras; blend: one of BLENDS; seed: of every random choice;
-    measure: whether the report also compares the pictures in the overlap (PSNR, SSIM).
-    """
-
-    field: str = "strict"
-    camera: CameraRequest = CameraRequest()
-    blend: str = "feather"
-    seed: int = 0
-    measure: bool = True
-
-    def __post_init__(self) -> None:
-        for name, value, known in (("field", self.field, FIELDS), ("blend", self.blend, BLENDS)):
-            if value not in known:
-                raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")
-        if not 0 <= self.seed < 2**31:
-            raise BadRequest("the seed must be a whole number from 0 to 2147483647")
+from .two_view import TwoView
+from .warp import Layer, Warp, reference_layer, target_layer
 
 
 @dataclass(frozen=True)
@@ -54,7 +31,8 @@ class StitchResult:
 
     pixels (H, W, C) float32 scene-linear and alpha (H, W), straight; the two layers and the warp on the same canvas;
     the geometry, the field, the matches (all, before inlier choice), the cameras as known before; `report`: a
-    JSON-ready dict; `seconds` by stage.
+    JSON-ready dict; `seconds` by stage. Scale and crop are done: pixels are those of the panorama and of the pictures
+    as they were worked on; `full_sizes` (W, H): of the pictures as they came.
     """
 
     pixels: np.ndarray
@@ -65,12 +43,23 @@ class StitchResult:
     target_layer: Layer
     warp: Warp
     two_view: TwoView
-    field: StrictField
+    field: Field
     matches: Matches
     cameras: tuple[Camera, Camera]
     warnings: tuple[str, ...]
     report: dict[str, Any]
     seconds: dict[str, float]
+    full_sizes: tuple[tuple[int, int], tuple[int, int]]
+
+    @property
+    def used_matches(self) -> Matches:
+        """The matches that the field stands on, in px of the full pictures: given back, they make the same field."""
+        used = self.matches.subset(np.flatnonzero(self.two_view.inliers)[self.field.fit.kept])
+        x, y = (
+            (points + 0.5) * (np.array(full) / np.array(camera.size)) - 0.5
+            for points, full, camera in zip((used.x, used.y), self.full_sizes, self.cameras, strict=True)
+        )
+        return Matches(x, y, used.scale, used.weights)
 
     @property
     def bits(self) -> int:
@@ -92,51 +81,47 @@ def stitch(
     Raises StitchError and its kinds; Cancelled where asked to stop.
     """
     options = options or StitchOptions()
-    steps = _Steps(Progress(progress, cancelled))
+    steps = Stopwatch(Progress(progress, cancelled))
 
     steps("read")
+    frame = read_frame(reference, target, options)
+    return compose(frame, align([frame], options, steps), options, steps)
+
+
+def read_frame(reference: str | Path | np.ndarray, target: str | Path | np.ndarray, options: StitchOptions) -> Frame:
+    """Both pictures, in the same colour space. Raises UnreadableImage, BadRequest, NoOverlap (one picture twice)."""
     first, second = in_same_colour_space(_picture(reference), _picture(target))
-    cameras, warnings = cameras_for(
-        options.camera, (first.name, second.name), (_size(first), _size(second)), (first.exif, second.exif)
-    )
-    warnings = [*_named(first), *_named(second), *warnings]
-    _refuse_identical(first, second)
+    if first.view.shape == second.view.shape and np.array_equal(first.view, second.view):
+        raise NoOverlap("the two pictures are the same picture: choose two photographs taken from different places")
+    return prepare(first, second, options)
 
-    steps("features")
-    seen = features.detect(first.view, first.alpha)
-    steps("features", 0.45)
-    seen_too = features.detect(second.view, second.alpha)
-    steps("features", 0.9)
-    matches = features.match(seen, seen_too)
 
-    steps("geometry")
-    ideal = Matches(undistort(matches.x, cameras[0]), undistort(matches.y, cameras[1]), matches.scale)
-    two_view = estimate(ideal, *cameras, seed=options.seed)
-    warnings += two_view.warnings
-
-    steps("field")
-    inliers = ideal.subset(two_view.inliers)
-    displacement = fit_strict(two_view, inliers.x, inliers.y, cameras[0].size, cameras[1].size, matches.scale)
-
-    steps("warp")
-    warp = build_warp(displacement, two_view, *cameras)
+def compose(frame: Frame, alignment: Alignment, options: StitchOptions, steps: Stopwatch) -> StitchResult:
+    """The panorama of two pictures by an alignment, which may come from other frames of the same two cameras."""
+    first, second, whole = frame.reference, frame.target, alignment.warp
     steps("warp", 0.5)
-    base, layer = reference_layer(first, warp.canvas), target_layer(second, warp)
+    base, layer = reference_layer(first, whole.canvas), target_layer(second, whole)
 
-    steps("blend")
+    steps("blend", 0.0)
     panorama = blend(base, layer, options.blend)
+    shape = (whole.canvas.height, whole.canvas.width)
+    box = crop_box(options.crop, shape, panorama.alpha > 0, (*whole.canvas.offset, *size_of(first)))
+    panorama, base, layer = (part.within(box) for part in (panorama, base, layer))
+    warp = whole.within(box)
 
-    steps("write")
-    report, more = make_report(options, (first, second), cameras, matches, two_view, displacement, warp)
-    warnings += more
-    report["warnings"] = warnings
+    steps("write", 0.0)
+    report, more = make_report(options, (first, second), alignment, warp.canvas)
+    warnings = (*_named(first), *_named(second), *alignment.warnings, *more)
+    report["warnings"] = list(warnings)
+    steps("write", 0.5)
     return StitchResult(
-        panorama.pixels, panorama.alpha, first, second, base, layer, warp, two_view, displacement, matches, cameras,
-        tuple(warnings), report, steps.seconds,
+        panorama.pixels, panorama.alpha, first, second, base, layer, warp, alignment.two_view, alignment.field,
+        alignment.matches, alignment.cameras, warnings, report, steps.seconds,
+        frame.full_sizes,
     )  # fmt: skip
 
 
-class _Steps:
+class Stopwatch:
     """Reports each stage, lets it be cancelled, and keeps its seconds."""
 
     def __init__(self, progress: Progress) -> None:
@@ -156,15 +141,5 @@ def _picture(source: str | Path | np.ndarray) -> Picture:
     return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
 
 
-def _size(picture: Picture) -> tuple[int, int]:
-    height, width = picture.pixels.shape[:2]
-    return width, height
-
-
 def _named(picture: Picture) -> list[str]:
     return [f"{picture.name}: {warning}" for warning in picture.warnings]
-
-
-def _refuse_identical(a: Picture, b: Picture) -> None:
-    if a.view.shape == b.view.shape and np.array_equal(a.view, b.view):
-        raise NoOverlap("the two pictures are the same picture: choose two photographs taken from different places")

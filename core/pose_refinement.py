@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .camera import Camera
 from .epipolar import (
@@ -27,9 +28,14 @@ from .features import Matches
 # Errors of neighbouring matches go together (lens distortion, rolling shutter): more than this many are not more
 # evidence against a prior, however many there are.
 EFFECTIVE_MATCHES = 300
-SYSTEMATIC_PX = 0.5
+# What a lens leaves in residuals (px), where they speak against a known focal length, and against a mere guess.
+SYSTEMATIC_PX, SYSTEMATIC_GUESS_PX = 0.5, 0.15
 # Where infinity is seen depends on the whole calibration: distortion moves it by this much.
 BEYOND_PX = 2.0
+# Where the axis meets the sensor is not its middle: about so far off, in units of the longer side.
+PRINCIPAL_SIGMA = 0.01
+TAILS = 3.0
+NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -54,9 +60,11 @@ def refine_pose(
     camera_prime: Camera,
     sigma: float,
     zoom: bool = False,
-    iterations: int = 20,
+    iterations: int = 100,
 ) -> tuple[Pose, float]:
-    """The pose that minimises Σ log(1 + (r/σ)²) over Sampson distances r plus the focal prior; and that cost.
+    """The pose that minimises Σ log(1 + (r/σ)² + (c/σ')²) + priors of the calibration; and that cost.
+
+    r: Sampson distances, c: distances beyond infinity, px.
 
     sigma: noise of a Sampson distance in px. zoom: let the second focal length go its own way. A camera with a fixed
     focal length keeps it.
@@ -82,18 +90,46 @@ def refine_pose(
     return pose, cost
 
 
-def focal_deviation(matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, sigma: float) -> float:
-    """Standard deviation of log f given matches and prior (0 where it is fixed), from the normal matrix at the
-    optimum."""
-    problem = _Problem(matches, camera, camera_prime, sigma, False)
-    if not problem.focal_free:
-        return 0.0
+def focal_deviations(
+    matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, sigma: float, zoom: bool
+) -> tuple[float, float]:
+    """Standard deviations of log f at the optimum: by matches and prior, and by the matches alone.
+
+    From the normal matrix; infinite where nothing tells. Both cameras' focal lengths are free.
+    """
+    problem = _Problem(matches, camera, camera_prime, sigma, zoom)
     normal, _ = problem.normal_equations(pose)
-    return float(np.sqrt(max(np.linalg.pinv(normal)[0, 0], 0.0)))
+    by_prior = problem.priors(pose)[0][1][0] ** 2
+    with_prior = float(1 / np.sqrt(max(_left_of_first(normal), 1e-300)))
+    normal[0, 0] -= by_prior
+    left = _left_of_first(normal)
+    return with_prior, float(1 / np.sqrt(left)) if left > 1e-12 else float("inf")
+
+
+def _left_of_first(normal: Array) -> float:
+    """What the first unknown's diagonal has left when all others are solved for (a Schur complement)."""
+    rest = normal[1:, 1:] + 1e-12 * np.trace(normal[1:, 1:]) * np.eye(len(normal) - 1)
+    return float(normal[0, 0] - normal[0, 1:] @ np.linalg.solve(rest, normal[1:, 0]))
+
+
+def beyond_infinity(pose: Pose, x: Array, y: Array) -> Array:
+    """How far (N,) (px, along its line, negative) each match lies on the wrong side of its point at infinity; 0 for
+    those in front.
+
+    F alone trades focal length against rotation almost freely; that the world lies in front of the cameras decides it.
+    Without this term a pair of parallel-looking cameras can end with most of its points behind them.
+    """
+    q = homogeneous(x) @ infinite_homography(pose.K, pose.K_prime, pose.R).T
+    e = pose.K_prime @ pose.t
+    direction = (e[:2] * q[:, 2:] - q[:, :2] * e[2]) * np.sign(q[:, 2:])
+    length = np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-12)
+    along = np.sum((y - project(q)) * direction, axis=1) / length
+    return np.minimum(along, 0.0)
 
 
 class _Problem:
-    """The least-squares problem around a pose: unknowns [log f,] [log f',] rotation (3), direction of t (2)."""
+    """The least-squares problem around a pose: unknowns [log f,] [log f',] [principal point (2) in units of
+    its prior,] rotation (3), direction of t (2)."""
 
     def __init__(self, matches: Matches, camera: Camera, camera_prime: Camera, sigma: float, zoom: bool) -> None:
         self.matches, self.camera, self.camera_prime = matches, camera, camera_prime
@@ -101,9 +137,14 @@ class _Problem:
         self.sigma_beyond = BEYOND_PX * matches.scale
         self.focal_free = not (camera.fixed or camera_prime.fixed)
         self.zoom = zoom and self.focal_free
+        # for self-calibration only, and one sensor behind both pictures: where they differ in size, who knows
+        self.principal_free = self.focal_free and camera.assumed and camera.size == camera_prime.size
+        self.principal_sigma = PRINCIPAL_SIGMA * max(camera.size)
+        self.size = 5 + self.focal_free + self.zoom + 2 * self.principal_free
         # against the prior, residuals count as if none were smaller than what a lens leaves in them
-        believed = max(sigma, SYSTEMATIC_PX * matches.scale)
-        self.weight = min(1.0, EFFECTIVE_MATCHES / max(1, len(matches))) * (sigma / believed) ** 2
+        believed = max(sigma, (SYSTEMATIC_GUESS_PX if camera.assumed else SYSTEMATIC_PX) * matches.scale)
+        tempered = min(1.0, EFFECTIVE_MATCHES / max(1, len(matches))) * (sigma / believed) ** 2
+        self.weight = tempered * matches.weights / max(float(matches.weights.mean()), 1e-300)
         self.x, self.y = homogeneous(matches.x), homogeneous(matches.y)
 
     def moved(self, pose: Pose, step: Array) -> Pose:
@@ -113,74 +154,77 @@ class _Problem:
             K = _zoomed(K, np.exp(np.clip(step[0], -0.3, 0.3)))
             factor = step[1] if self.zoom else step[0]
             K_prime = _zoomed(K_prime, np.exp(np.clip(factor, -0.3, 0.3)))
+        if self.principal_free:
+            aside = np.zeros((3, 3))
+            aside[:2, 2] = self.principal_sigma * step[-7:-5]
+            K, K_prime = K + aside, K_prime + aside
         omega, tangent = step[-5:-2], step[-2:]
         t = pose.t + _tangent_basis(pose.t) @ tangent
         return Pose(K, K_prime, rotation_from_vector(omega) @ pose.R, t / np.linalg.norm(t))
 
     def cost(self, pose: Pose) -> float:
         r = sampson_residuals(pose.F, self.matches.x, self.matches.y) / self.sigma
-        c = self._beyond_infinity(pose) / self.sigma_beyond
-        evidence = np.log1p(r * r).sum() + np.log1p(c * c).sum()
-        return float(self.weight * evidence + sum(e * e for e, _ in self._prior(pose)))
+        c = beyond_infinity(pose, self.matches.x, self.matches.y) / self.sigma_beyond
+        # one loss for both: what is off its line anyway has no say about infinity
+        return float(self.weight @ np.log1p(r * r + c * c) + sum(e * e for e, _ in self.priors(pose)))
 
-    def _beyond_infinity(self, pose: Pose) -> Array:
-        """How far (px, along its line) each match lies on the wrong side of its point at infinity; 0 for those in
-        front.
+    def _focal_prior(self, off: float) -> tuple[float, float]:
+        """Residual of log f, `off` from what is known, and its derivative.
 
-        F alone trades focal length against rotation almost freely; that the world lies in front of the cameras decides
-        it. Without this term a pair of parallel-looking cameras can end with most of its points behind them.
+        A guess is no measurement: far from it, what is left of the pull is that of Student's tails (3 degrees of
+        freedom), so that matches that know better are not drawn back.
         """
-        q = self.x @ infinite_homography(pose.K, pose.K_prime, pose.R).T
-        e = pose.K_prime @ pose.t
-        direction = (e[:2] * q[:, 2:] - q[:, :2] * e[2]) * np.sign(q[:, 2:])
-        length = np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-12)
-        along = np.sum((self.matches.y - project(q)) * direction, axis=1) / length
-        return np.minimum(along, 0.0)
+        z = off / self.camera.log_sigma
+        if not self.camera.assumed or z == 0:
+            return z, 1 / self.camera.log_sigma
+        value = np.sign(z) * np.sqrt(TAILS * np.log1p(z * z / TAILS))
+        return float(value), float(z / (1 + z * z / TAILS) / value / self.camera.log_sigma)
 
-    def _prior(self, pose: Pose) -> list[tuple[float, Array]]:
+    def priors(self, pose: Pose) -> list[tuple[float, Array]]:
         """Residuals of the prior with their derivatives by the unknowns; the second focal's ratio to the first is kept
         near what the files say."""
         if not self.focal_free:
             return []
-        size = 7 if self.zoom else 6
+        size = self.size
         off = np.log(pose.K[0, 0] / self.camera.focal)
+        at, slope = self._focal_prior(off)
         d_first = np.zeros(size)
-        d_first[0] = 1 / self.camera.log_sigma
-        out = [(off / self.camera.log_sigma, d_first)]
+        d_first[0] = slope
+        out = [(at, d_first)]
         if self.zoom:
             ratio = np.log(pose.K_prime[0, 0] / self.camera_prime.focal) - off
             d_ratio = np.zeros(size)
             d_ratio[:2] = (-1 / 0.3, 1 / 0.3)
             out.append((ratio / 0.3, d_ratio))
+        if self.principal_free:
+            moved = (pose.K - self.camera.K)[:2, 2] / self.principal_sigma
+            out += [(float(moved[i]), np.eye(size)[size - 7 + i]) for i in (0, 1)]
         return out
 
     def normal_equations(self, pose: Pose) -> tuple[Array, Array]:
         """Gauss-Newton normal matrix and gradient (of half the cost), residuals reweighted by the Cauchy loss."""
-        size = 5 + self.focal_free + self.zoom
+        size = self.size
         F, by_unknowns = self._F_and_derivatives(pose)
         residual, by_F = self._residuals_and_derivative(F)
         normal, gradient = np.zeros((size, size)), np.zeros(size)
-        self._add(normal, gradient, residual, by_F @ by_unknowns, self.sigma)
-        wrong_side = self._beyond_infinity(pose) < 0
-        if wrong_side.any():
-            few = _Problem(self.matches.subset(wrong_side), self.camera, self.camera_prime, self.sigma, self.zoom)
-            beyond, derivative = few._beyond_infinity(pose), few._beyond_derivative(pose, size)
-            self._add(normal, gradient, beyond, derivative, self.sigma_beyond)
-        for e, d in self._prior(pose):
+        beyond = beyond_infinity(pose, self.matches.x, self.matches.y)
+        far = (beyond / self.sigma_beyond) ** 2
+        loss = self.weight / (1 + (residual / self.sigma) ** 2 + far)
+        _add(normal, gradient, residual, by_F @ by_unknowns, loss / self.sigma**2)
+        wrong = far * loss > NEGLIGIBLE * self.weight  # not those that are far off their lines anyway
+        if wrong.any():
+            derivative = self._beyond_derivative(pose, wrong, size)
+            _add(normal, gradient, beyond[wrong], derivative, loss[wrong] / self.sigma_beyond**2)
+        for e, d in self.priors(pose):
             normal += np.outer(d, d)
             gradient += e * d
         return normal, gradient
 
-    def _add(self, normal: Array, gradient: Array, values: Array, jacobian: Array, sigma: float) -> None:
-        r = values / sigma
-        w = self.weight / (1 + r * r) / sigma
-        normal += (jacobian * (w / sigma)[:, None]).T @ jacobian
-        gradient += jacobian.T @ (w * r)
-
-    def _beyond_derivative(self, pose: Pose, size: int) -> Array:
-        """Derivatives (N, size) of `_beyond_infinity` by the unknowns, by differences: it seldom has rows."""
-        h, here = 1e-7, self._beyond_infinity(pose)
-        moved = (self._beyond_infinity(self.moved(pose, step)) for step in h * np.eye(size))
+    def _beyond_derivative(self, pose: Pose, which: NDArray[np.bool_], size: int) -> Array:
+        """Derivatives (n, size) of `beyond_infinity` of some matches by the unknowns, by differences: it has few."""
+        x, y = self.matches.x[which], self.matches.y[which]
+        h, here = 1e-7, beyond_infinity(pose, x, y)
+        moved = (beyond_infinity(self.moved(pose, step), x, y) for step in h * np.eye(size))
         return np.column_stack([(there - here) / h for there in moved])
 
     def _F_and_derivatives(self, pose: Pose) -> tuple[Array, Array]:
@@ -194,6 +238,12 @@ class _Problem:
             by_first = left @ pose.R @ shrink @ K_inv
             by_second = K_prime_inv.T @ shrink @ skew(pose.t) @ right
             derivatives = [by_first, by_second] if self.zoom else [by_first + by_second]
+        if self.principal_free:
+            for i in (0, 1):
+                # the third column of K⁻¹ is −K⁻¹ times the principal point
+                aside, aside_prime = (_third_column(inverse[:, i]) for inverse in (K_inv, K_prime_inv))
+                by_both = left @ pose.R @ aside + aside_prime.T @ skew(pose.t) @ right
+                derivatives.append(self.principal_sigma * by_both)
         derivatives += [left @ skew(axis) @ right for axis in np.eye(3)]
         derivatives += [K_prime_inv.T @ skew(tangent) @ right for tangent in _tangent_basis(pose.t).T]
         return left @ right, np.column_stack([d.ravel() for d in derivatives])
@@ -213,10 +263,22 @@ class _Problem:
         return algebraic / root, derivative.reshape(len(x), 9)
 
 
+def _add(normal: Array, gradient: Array, values: Array, jacobian: Array, weight: Array) -> None:
+    normal += (jacobian * weight[:, None]).T @ jacobian
+    gradient += jacobian.T @ (weight * values)
+
+
 def _zoomed(K: Array, factor: float) -> Array:
     out = K.copy()
     out[0, 0] *= factor
     out[1, 1] *= factor
+    return out
+
+
+def _third_column(v: Array) -> Array:
+    """−[0 0 v] (3, 3)."""
+    out = np.zeros((3, 3))
+    out[:, 2] = -v
     return out
 
 

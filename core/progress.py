@@ -36,4 +36,4 @@ class Progress:
         if self.report is not None:
             names = list(STAGES)
             done = sum(STAGES[name] for name in names[: names.index(stage)])
-            self.report(stage, min(1.0, done + STAGES[stage] * fraction))
+            self.report(stage, min(1.0, round(done + STAGES[stage] * fraction, 6)))

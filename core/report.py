@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .metrics import distances_off_line, folds, look_up, overlap_quality
+from .held_out import held_out
+from .lens import undistort
+from .metrics import folds, look_up, off_line_mean, overlap_quality, shown_points
+from .projectivity import independent_fundamental, projectivity
 
 if TYPE_CHECKING:
+    from .alignment import Alignment
     from .camera import Camera
-    from .displacement import StrictField
-    from .features import Matches
+    from .canvas import Canvas
     from .images import Picture
-    from .pipeline import StitchOptions
-    from .two_view import TwoView
-    from .warp import Warp
+    from .options import StitchOptions
 
 SCHEMA = 1
 # More inliers than this behind infinity means that the focal length, hence H_inf, is doubtful.
@@ -24,63 +26,88 @@ NEGATIVE_SHARE = 0.02
 
 
 def make_report(
-    options: StitchOptions,
-    pictures: tuple[Picture, Picture],
-    cameras: tuple[Camera, Camera],
-    matches: Matches,
-    two_view: TwoView,
-    field: StrictField,
-    warp: Warp,
+    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment, canvas: Canvas
 ) -> tuple[dict[str, Any], list[str]]:
-    """The report of a stitch, and warnings in plain words drawn from it. No seconds, no dates: the same input gives the
-    same report."""
-    x, y = matches.x[two_view.inliers], matches.y[two_view.inliers]
-    mapped = look_up(warp, x)
-    error = np.linalg.norm(mapped - y, axis=1)
-    error = error[np.isfinite(error)]
-    undistorted = not any(camera.distortion.any() for camera in cameras)
-    off_line = distances_off_line(two_view.F, x, mapped) if undistorted else np.empty(0)
-    fold_share = folds(warp, cameras[1].size)
-    measured = {
-        "alignment_median_px": _median(error),
-        "alignment_p95_px": float(np.percentile(error, 95)) if error.size else math.nan,
-        "off_line_mean_px": float(off_line.mean()) if off_line.size else math.nan,
-        "folds": fold_share,
-    }
-    if options.measure:
-        measured |= overlap_quality(*pictures, warp)
+    """The report of a stitch that shows `canvas`, and warnings in plain words drawn from it.
+
+    No seconds, no dates: the same input gives the same report.
+    """
+    cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
+    field = alignment.field
+    measured = _measured(options, pictures, alignment)
     report = {
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
-        "options": {"field": options.field, "blend": options.blend, "seed": options.seed},
+        "options": {
+            "field": options.field, "fade": options.fade, "scale": options.scale, "crop": options.crop,
+            "blend": options.blend, "seed": options.seed,
+        },
         "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
         "two_view": {
             "model": two_view.model, "why": two_view.why, "focal_source": two_view.focal_source,
             "focal_px": [two_view.K[0, 0], two_view.K_prime[0, 0]], "focal_deviation": two_view.focal_deviation,
+            "h_inf_spread_px": two_view.h_inf_spread,
             "K": two_view.K, "K_prime": two_view.K_prime, "R": two_view.R, "t": two_view.t,
             "F": two_view.F, "H_inf": two_view.H_inf, "e_prime": two_view.e_prime,
         },
         "field": {
-            "kind": field.name, "smoothing": field.smoothing, "centres": int(field.kept.sum()),
-            "pruned": int(two_view.inliers.sum() - field.kept.sum()), "plane": field.plane, "fade_px": field.fade_px,
-            "residual_px": field.residual_px, "held_out_px": field.held_out_px, "negative_share": field.negative_share,
+            "kind": field.name, "smoothing": field.fit.smoothing, "centres": int(field.fit.kept.sum()),
+            "pruned": int(two_view.inliers.sum() - field.fit.kept.sum()), "plane": field.plane,
+            "fade_px": field.fit.fade_px, "residual_px": field.fit.residual_px, "held_out_px": field.fit.held_out_px,
+            "negative_share": field.fit.negative_share,
         },
         "canvas": {
-            "width": warp.canvas.width, "height": warp.canvas.height, "offset": warp.canvas.offset,
-            "cropped": warp.canvas.cropped,
+            "width": canvas.width, "height": canvas.height, "offset": canvas.offset, "cropped": canvas.cropped,
         },
         "measured": measured,
     }  # fmt: skip
-    return plain(report), _warnings(two_view, field, warp, fold_share)
+    return plain(report), _warnings(alignment, measured["folds"])
 
 
-def _warnings(two_view: TwoView, field: StrictField, warp: Warp, fold_share: float) -> list[str]:
+def _measured(
+    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment
+) -> dict[str, float]:
+    """The figures of an alignment; those that cost time only where options.measure asks for them. NaN: undefined."""
+    cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
+    field, warp = alignment.field, alignment.warp
+    inliers = matches.subset(two_view.inliers)
+    error = np.linalg.norm(look_up(warp, inliers.x) - inliers.y, axis=1)
+    error = error[np.isfinite(error)]
+    shown = shown_points(warp, cameras)
+    measured = {
+        "alignment_median_px": _median(error),
+        "alignment_p95_px": float(np.percentile(error, 95)) if error.size else math.nan,
+        "off_line_mean_px": off_line_mean(two_view.F, shown),
+        "negative_share": field.fit.negative_share,
+        "folds": folds(warp, cameras[1].size),
+    }
+    if not options.measure:
+        return measured
+    ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
+    # where the pair has no F of its own, none that matches give means anything
+    independent = independent_fundamental(ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
+    unseen = held_out(field, ideal.subset(two_view.inliers), shown, options.seed)
+    return measured | overlap_quality(*pictures, warp) | {
+        "projectivity_own_px": projectivity(two_view.F, shown),
+        "projectivity_independent_px": projectivity(independent, shown),
+        "projectivity_points": int((~shown.overlap).sum()),
+        "held_out_rms_px": unseen.rms_px,
+        "held_out_median_px": unseen.median_px,
+        "held_out_towards_rms_px": unseen.towards_rms_px,
+    }  # fmt: skip
+
+
+def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
+    two_view, field, warp = alignment.two_view, alignment.field, alignment.warp
     out = []
-    if field.negative_share > NEGATIVE_SHARE:
+    if field.fit.negative_share > NEGATIVE_SHARE:
         out.append(
-            f"{field.negative_share:.0%} of the points lie beyond infinity: the focal length ({two_view.K[0, 0]:.0f} "
-            "px) is doubtful, and with it depth and H_inf; the picture itself hardly depends on it"
+            f"{field.fit.negative_share:.0%} of the points lie beyond infinity: the focal length "
+            f"({two_view.K[0, 0]:.0f} px) is doubtful, and with it depth and H_inf; the picture itself hardly "
+            "depends on it"
         )
+    if (warp.canvas.width, warp.canvas.height) == alignment.cameras[0].size:
+        out.append("the target shows nothing beyond the reference's edges: the panorama is no larger than that")
     if warp.canvas.cropped:
         out.append(
             "the target reaches too far to the side to be shown whole in a flat picture: its far end was cropped"

@@ -21,7 +21,10 @@ SLAB = 2_000_000
 
 @dataclass(frozen=True)
 class ThinPlateSpline:
-    """f(p) = Σ w_i ½ r_i² ln r_i² + a·(p, 1) over centres in normalised coordinates (p − centre) / scale."""
+    """f(p) = Σ w_i ½ r_i² ln r_i² + a·(p, 1) over centres in normalised coordinates (p − centre) / scale.
+
+    weights (N,) and affine (3,), or (N, k) and (3, k) for k functions over the same centres at once.
+    """
 
     centres: Array
     weights: Array
@@ -30,7 +33,7 @@ class ThinPlateSpline:
     scale: float
 
     def at(self, points: Array) -> Array:
-        """Values at points (N, 2) px, float64."""
+        """Values (N,) or (N, k) at points (N, 2) px, float64."""
         p = (np.asarray(points, np.float64) - self.centre) / self.scale
         out = p @ self.affine[:2] + self.affine[2]
         rows = max(1, SLAB // max(1, len(self.centres)))
@@ -39,8 +42,8 @@ class ThinPlateSpline:
         return out
 
     def on_axes(self, xs: Array, ys: Array) -> Array:
-        """Values (len(ys), len(xs)) on the grid of two axes in px: the kernel in float32, squared distances added from
-        the axes.
+        """Values (len(ys), len(xs)), or with k behind, on the grid of two axes in px: the kernel in float32, squared
+        distances added from the axes.
 
         Adding dx² + dy² instead of expanding |p|² + |c|² − 2p·c keeps full relative precision close to a centre.
         """
@@ -49,7 +52,10 @@ class ThinPlateSpline:
         dx2 = ((x[:, None] - self.centres[:, 0]) ** 2).astype(np.float32)
         dy2 = ((y[:, None] - self.centres[:, 1]) ** 2).astype(np.float32)
         weights = (0.5 * self.weights).astype(np.float32)
-        out = (x * self.affine[0])[None, :] + (y * self.affine[1] + self.affine[2])[:, None]
+        across, down = np.multiply.outer(x, self.affine[0]), np.multiply.outer(y, self.affine[1]) + self.affine[2]
+        out = across[None] + down[:, None]
+        if not len(self.centres):
+            return out
         rows = max(1, SLAB // max(1, dx2.size))
         for start in range(0, len(y), rows):
             r2 = dy2[start : start + rows, None, :] + dx2[None, :, :]
@@ -100,11 +106,13 @@ class SmoothingProblem:
         return system
 
     def solve(self, values: Array, smoothing: float) -> tuple[ThinPlateSpline, Array]:
-        """The spline of values (N,) at λ = smoothing, and its residuals g − f = 8πλ D w (N,)."""
+        """The spline of values (N,) or (N, k) at λ = smoothing, and its residuals g − f = 8πλ D w of the same shape."""
         n = len(values)
-        solution = scipy.linalg.solve(self.system(smoothing), np.concatenate([values, np.zeros(3)]))
+        solution = scipy.linalg.solve(
+            self.system(smoothing), np.concatenate([values, np.zeros((3, *values.shape[1:]))])
+        )
         spline = ThinPlateSpline(self.centres, solution[:n], solution[n:], self.centre, self.scale)
-        return spline, 8 * np.pi * smoothing * self.noise**2 * solution[:n]
+        return spline, ((8 * np.pi * smoothing * self.noise**2) * solution[:n].T).T
 
     def held_out_at(self, values: Array, smoothing: float) -> Array:
         """Leave-one-out residuals (N,) at one λ: w_i / (S⁻¹)_ii with S the system (Dubrule 1983 for kriging, the same

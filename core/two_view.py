@@ -8,36 +8,52 @@ e' are made from it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-import poselib
 from numpy.typing import NDArray
 
 from .camera import Camera
 from .epipolar import (
     Array,
-    fundamental_from_pose,
     in_front,
     infinite_homography,
+    inverse_intrinsics,
     poses_from_fundamental,
     sampson_residuals,
 )
 from .errors import DegenerateGeometry, NoOverlap, TooFewMatches
 from .features import Matches
-from .pose_refinement import Pose, focal_deviation, refine_pose
+from .focal import focal_warnings, held_focal, known_focal
+from .fundamental import (
+    LEAST_PX,
+    MIN_INLIERS,
+    RANSAC_PX,
+    Homography,
+    fit_homography,
+    fundamental_candidates,
+    refuse_chance,
+    refuse_without_spread,
+    robust_fundamental,
+    shows_parallax,
+    transfer_error,
+)
+from .pose_refinement import Pose, refine_pose
+from .rotation import fit_rotation
 
 MIN_MATCHES = 16
-# A chance F gathers its 7 points and whatever lies within the threshold of its lines; this many is beyond chance.
-MIN_INLIERS = 15
-RANSAC_PX = 1.5
 START_PX = 1.0
 INLIER_PX = 2.0
 ZOOM_GAIN = 0.75
+# A second look at the matches with a threshold of so many σ, at most that share of the first.
+SHARP_SIGMAS, SHARP = 3.0, 0.4
+# A rotation may explain a homography's matches so much worse: lenses are not perfect.
+ROTATION_FACTOR, ROTATION_PX = 1.6, 0.75
+SAME_PX = 0.5
+PLANE_KEPT, GIVEN_KEPT, GIVEN_SIGMAS, GIVEN_OFF_PX = 0.8, 0.75, 1.6, 3.0
 PLANE_SHARE = 0.5
 REFINEMENTS = 8
-LEAST_PX = 0.05  # no keypoint is placed better
 # Matches that choose among starts, and matches that refine: more cost time and change nothing.
 FIRST_LOOK, IN_EARNEST = 400, 1500
 # Focal lengths in units of the longer side, tried when nothing is known: 19 mm to 200 mm on a 36 mm frame.
@@ -52,8 +68,10 @@ class TwoView:
 
     K, K_prime (3, 3) px; R (3, 3), t (3,), |t| = 1: target sees X at R X + t; F with x'ᵀ F x = 0; H_inf = K' R K⁻¹;
     e_prime = K' t. `inliers` (N,) marks the matches it explains, `sigma` is their Sampson noise in px.
-    `focal_deviation` is the standard deviation of log f left by matches and prior; `why` says in words how the model
-    was decided.
+    model: `general`; `rotation` (same place: t = e_prime = 0, F NaN); `plane` (no parallax off a plane; where nothing
+    tells the cameras, H_inf is the plane's homography, e_prime = 0 and F, R, t are NaN). `why` says in words how it was
+    decided. `focal_deviation` is the standard deviation of log f left by matches and prior, `h_inf_spread` how far (px,
+    median over the target) H_inf moves within two of them; NaN where the matches tell nothing of it.
     """
 
     K: Array
@@ -69,6 +87,7 @@ class TwoView:
     why: str
     focal_source: str
     focal_deviation: float
+    h_inf_spread: float
     warnings: tuple[str, ...] = ()
 
 
@@ -85,107 +104,170 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
     if camera.pose is not None and camera_prime.pose is not None:
         return _from_known_cameras(matches, camera, camera_prime, camera.pose, camera_prime.pose)
     candidates = fundamental_candidates(matches, seed)
-    _refuse_chance(matches, candidates[0], camera_prime.size)
-    on_homography = homography_inliers(matches, seed)
-    starts = _best_starts(matches, candidates, on_homography, camera, camera_prime, seed)
-    zoom = _zoom_is_evident(matches, starts[0], camera, camera_prime)
-    known = camera.fixed and camera_prime.fixed
-    refined = [_refine_with_inliers(matches, p, camera, camera_prime, zoom) for p in (starts if known else starts[:1])]
-    pose, inliers, sigma = _least_truncated(matches, refined)
+    F = candidates[0]
+    refuse_chance(matches, F, camera_prime.size)
+    refuse_without_spread(matches, F, camera.size, camera_prime.size)
+    homography = fit_homography(matches, seed)
+    parallax = shows_parallax(matches, F, homography, camera_prime.size)
+    if not parallax:
+        rotated = _same_viewpoint(matches, homography, camera, camera_prime)
+        if rotated is not None:
+            return rotated
+        if camera.assumed or camera_prime.assumed:
+            return _plane_without_pose(matches, homography, camera, camera_prime)
+    # on a plane, f and the plane trade freely: what is known of f stays
+    first, second = (camera, camera_prime) if parallax else (replace(c, log_sigma=0.0) for c in (camera, camera_prime))
+    pose, inliers, sigma, zoom = _fit_pose(matches, candidates, homography, first, second, seed)
+    if not parallax and inliers.sum() < PLANE_KEPT * homography.inliers.sum():
+        return _plane_without_pose(matches, homography, camera, camera_prime)
     if inliers.sum() < MIN_INLIERS:
         raise DegenerateGeometry(
             f"no pair of cameras explains more than {int(inliers.sum())} of {len(matches)} matches: the pictures "
             "seem to have no content in common, or the focal length that was given is not theirs"
         )
-    warnings: list[str] = []
-    why = (
-        f"{int(inliers.sum())} of {len(matches)} matches on their epipolar lines, {on_homography} on one homography"
-    )
-    if zoom:
-        why += "; the second focal length was freed: the matches contradict a common one"
-    deviation = focal_deviation(matches.subset(inliers), pose, camera, camera_prime, sigma)
-    warnings += _focal_warnings(pose, camera, camera_prime)
     front = in_front(pose.K, pose.K_prime, pose.R, pose.t, matches.x[inliers], matches.y[inliers], FAR_ANGLE)
+    if not parallax and front.mean() < 0.5:
+        return _plane_without_pose(matches, homography, camera, camera_prime)
     if front.mean() < 0.5:
         raise DegenerateGeometry(
             f"only {front.mean():.0%} of {len(front)} consistent points lie in front of both cameras: "
             "the pictures' geometry makes no sense; give the focal length (--focal-px, --focal35) "
             "or check that neither picture is mirrored"
         )
-    return _two_view(pose, inliers, sigma, why, camera.source, deviation, tuple(warnings))
-
-
-def fundamental_candidates(matches: Matches, seed: int) -> list[Array]:
-    """Fundamental matrices (3, 3) worth refining, best first.
-
-    PoseLib's LO-RANSAC and OpenCV's MAGSAC++, each with a sharp and a wide threshold: where a lens bends lines, a sharp
-    one locks on to a part of the picture. Raises NoOverlap when no more agree than chance would bring.
-    """
-    found: list[Array] = []
-    for factor in (1.0, 2.0):
-        threshold = factor * RANSAC_PX * matches.scale
-        options = {"max_epipolar_error": threshold, "seed": seed, "max_iterations": 20000}
-        found.append(np.asarray(poselib.estimate_fundamental(matches.x, matches.y, options, {})[0]))
-        cv2.setRNGSeed(seed)
-        F, _ = cv2.findFundamentalMat(matches.x, matches.y, cv2.USAC_MAGSAC, threshold, 0.9999, 20000)
-        if F is not None and F.shape == (3, 3):
-            found.append(F)
-    threshold = RANSAC_PX * matches.scale
-    ranked = []
-    for F in found:
-        if np.isfinite(F).all() and F.any():
-            residual = np.abs(sampson_residuals(F, matches.x, matches.y))
-            # linear within the threshold, so that one sharp and one wide F compare fairly
-            ranked.append((np.minimum(residual / threshold, 1.0).sum(), F, int((residual < threshold).sum())))
-    ranked.sort(key=lambda item: item[0])
-    agree = ranked[0][2] if ranked else 0
-    needed = max(MIN_INLIERS, int(np.ceil(0.08 * len(matches))))
-    if agree < needed:
-        raise NoOverlap(
-            f"{len(matches)} points look alike but only {agree} agree on a camera motion, at least {needed} needed: "
-            "the pictures seem to have no content in common"
-        )
-    return [F for _, F, _ in ranked]
-
-
-def _refuse_chance(matches: Matches, F: Array, size: tuple[int, int]) -> None:
-    """Raises NoOverlap where so many points on their lines would be found among matches drawn at random.
-
-    The expected number of such findings, a contrario (Moisan and Stival, IJCV 2004, eq. 10): (n − 7) C(n, k) C(k, 7)
-    α^(k − 7) with α the chance of a point lying within the threshold of a line.
-    """
-    threshold = RANSAC_PX * matches.scale
-    n = len(matches)
-    k = int((np.abs(sampson_residuals(F, matches.x, matches.y)) < threshold).sum())
-    alpha = min(1.0, 2 * threshold * math.hypot(*size) / (size[0] * size[1]))
-    findings = math.log(n - 7) + _log_choose(n, k) + _log_choose(k, 7) + (k - 7) * math.log(alpha)
-    if findings > 0:
-        raise NoOverlap(
-            f"{n} points look alike, but the {k} that agree on a camera motion could agree by chance: the pictures "
-            "seem to have no content in common"
-        )
-
-
-def _log_choose(n: int, k: int) -> float:
-    return math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
-
-
-def homography_inliers(matches: Matches, seed: int) -> int:
-    """How many matches one homography explains: the evidence for a plane or a pure rotation."""
-    _, info = poselib.estimate_homography(
-        matches.x,
-        matches.y,
-        {"max_reproj_error": 2 * RANSAC_PX * matches.scale, "seed": seed, "max_iterations": 10000},
-        {},
+    why = (
+        f"{int(inliers.sum())} of {len(matches)} matches on their epipolar lines, "
+        f"{int(homography.inliers.sum())} on one homography"
     )
-    return int(np.sum(info["inliers"]))
+    if not parallax:
+        why += "; nothing leaves that plane along its epipolar lines beyond noise and coincidence"
+    if zoom:
+        why += "; the second focal length was freed: the matches contradict a common one"
+    on_lines = matches.subset(inliers)
+    if parallax:
+        known = known_focal(on_lines, pose, camera, camera_prime, sigma, zoom)
+    else:
+        known = held_focal(on_lines, pose, camera, camera_prime, sigma)
+    warnings = [*focal_warnings(pose, camera, camera_prime), *known.warnings]
+    if camera.fixed and camera_prime.fixed:
+        warnings += _contradiction(matches, F, inliers, sigma)
+    warnings += _about_given(matches, np.abs(sampson_residuals(pose.F, matches.x, matches.y)))
+    return TwoView(
+        K=pose.K, K_prime=pose.K_prime, R=pose.R, t=pose.t, F=pose.F,
+        H_inf=infinite_homography(pose.K, pose.K_prime, pose.R), e_prime=pose.K_prime @ pose.t,
+        inliers=inliers | matches.given, sigma=sigma, model="general" if parallax else "plane", why=why,
+        focal_source=known.source, focal_deviation=known.deviation, h_inf_spread=known.h_inf_spread,
+        warnings=tuple(warnings),
+    )  # fmt: skip
+
+
+def _same_viewpoint(
+    matches: Matches, homography: Homography, camera: Camera, camera_prime: Camera
+) -> TwoView | None:
+    """The rotation model, where it explains the homography's matches about as well; else None.
+
+    Raises NoOverlap where the two pictures show the same to within half a pixel.
+    """
+    on = matches.subset(homography.inliers)
+    rotation = fit_rotation(on, homography.H, camera, camera_prime, homography.sigma)
+    error = transfer_error(rotation.H_inf, matches)
+    typical, found = (float(np.percentile(e[homography.inliers], 80)) for e in (homography.error, error))
+    allowed = max(ROTATION_FACTOR * typical, ROTATION_PX * matches.scale)
+    if found > allowed:
+        return None
+    if camera.size == camera_prime.size:
+        moved = np.linalg.norm(on.x - on.y, axis=1)
+        if np.percentile(moved, 95) < SAME_PX * matches.scale + 3 * homography.sigma:
+            raise NoOverlap(
+                "the two pictures show the same from the same place: there is nothing to stitch; choose two "
+                "photographs taken from different places"
+            )
+    inliers = error < max(2 * allowed, INLIER_PX * matches.scale)
+    why = (
+        f"one rotation explains {int(inliers.sum())} of {len(matches)} matches, and nothing leaves it along epipolar "
+        "lines beyond noise and coincidence: both pictures were taken from the same place"
+    )
+    none = np.zeros(3)
+    return TwoView(
+        K=rotation.K, K_prime=rotation.K_prime, R=rotation.R, t=none, F=np.full((3, 3), np.nan),
+        H_inf=rotation.H_inf, e_prime=none, inliers=inliers | matches.given, sigma=homography.sigma, model="rotation",
+        why=why, focal_source=f"the matches, from {camera.source}" if camera.assumed else camera.source,
+        focal_deviation=0.0 if camera.fixed else math.nan, h_inf_spread=math.nan,
+        warnings=(
+            "the pictures were taken from the same place: there is no depth in them", *_about_given(matches, error),
+        ),
+    )  # fmt: skip
+
+
+def _plane_without_pose(
+    matches: Matches, homography: Homography, camera: Camera, camera_prime: Camera
+) -> TwoView:
+    """The plane model where nothing usable is known of the cameras: the homography is all there is."""
+    unknown = np.full((3, 3), np.nan)
+    why = (
+        f"one homography explains {int(homography.inliers.sum())} of {len(matches)} matches, and nothing leaves it "
+        "along epipolar lines beyond noise and coincidence: one plane, or a scene too far away for the step between "
+        "the cameras"
+    )
+    return TwoView(
+        K=camera.K, K_prime=camera_prime.K, R=unknown, t=np.full(3, np.nan), F=unknown, H_inf=homography.H,
+        e_prime=np.zeros(3), inliers=homography.inliers | matches.given, sigma=homography.sigma, model="plane", why=why,
+        focal_source=camera.source, focal_deviation=math.nan, h_inf_spread=math.nan,
+        warnings=(
+            "all that matches lies on one plane: the cameras cannot be told from it, and depth is meaningless; give "
+            "the focal length if you need them",
+            *_about_given(matches, homography.error),
+        ),
+    )  # fmt: skip
+
+
+def _contradiction(matches: Matches, F: Array, inliers: NDArray[np.bool_], sigma: float) -> list[str]:
+    """A warning where cameras that were given explain clearly less than free ones would."""
+    free = np.abs(sampson_residuals(F, matches.x, matches.y))
+    agree = free < RANSAC_PX * matches.scale
+    noise = max(float(np.median(free[agree])) / 0.6745, LEAST_PX * matches.scale)
+    if inliers.sum() >= GIVEN_KEPT * agree.sum() and sigma <= GIVEN_SIGMAS * noise:
+        return []
+    return [
+        f"the matches contradict the given cameras: {int(inliers.sum())} matches lie within {sigma:.2f} px of their "
+        f"epipolar lines; with other focal lengths {int(agree.sum())} would, within {noise:.2f} px"
+    ]
+
+
+def _about_given(matches: Matches, off: Array) -> list[str]:
+    """A warning about matches that the user gave, hence all used, and that lie `off` (N,) px from where they should."""
+    wrong = off > GIVEN_OFF_PX * matches.scale
+    if not matches.given or not wrong.any():
+        return []
+    worst = int(np.argmax(off))
+    (x, y), (x2, y2) = matches.x[worst], matches.y[worst]
+    return [
+        f"{int(wrong.sum())} of the given matches contradict the rest by more than {GIVEN_OFF_PX:g} px (the worst, "
+        f"{x:.1f},{y:.1f} and {x2:.1f},{y2:.1f}: {off[worst]:.1f} px); they are used all the same"
+    ]
+
+
+def _fit_pose(
+    matches: Matches, candidates: list[Array], homography: Homography, camera: Camera, camera_prime: Camera, seed: int
+) -> tuple[Pose, NDArray[np.bool_], float, bool]:
+    """The pose, its inliers, their noise, and whether the second focal length was freed."""
+    starts = _best_starts(matches, candidates, homography, camera, camera_prime, seed)
+    refined = [_refine_with_inliers(matches, p, camera, camera_prime, False) for p in starts]
+    best = _least_truncated(matches, refined)
+    # a wide threshold lets in stray matches that the pose bends to; one as sharp as the noise turns out does not
+    sharp = min(SHARP_SIGMAS * best[2], SHARP * RANSAC_PX * matches.scale)
+    F = robust_fundamental(matches, sharp, seed)
+    again = _best_of_fundamental(matches, F, best[0].K, best[0].K_prime, sharp)
+    best = _least_truncated(matches, [best, _refine_with_inliers(matches, again, camera, camera_prime, False)])
+    if not _zoom_is_evident(matches, best[0], camera, camera_prime):
+        return *best, False
+    return *_refine_with_inliers(matches, best[0], camera, camera_prime, True), True
 
 
 def _best_starts(
-    matches: Matches, candidates: list[Array], on_homography: int, camera: Camera, camera_prime: Camera, seed: int
+    matches: Matches, candidates: list[Array], homography: Homography, camera: Camera, camera_prime: Camera, seed: int
 ) -> list[Pose]:
     """The poses to refine from, best first: every F at a ladder of focal lengths, and, where most points lie on a
-    plane, which makes F meaningless, calibrated RANSAC, which a plane cannot fool.
+    plane, which makes F meaningless, those that its homography allows.
 
     All are compared by one robust cost with a wide scale over all matches: the landscape has several valleys.
     """
@@ -197,25 +279,41 @@ def _best_starts(
     for factor in factors:
         K, K_prime = camera.scaled(factor), camera_prime.scaled(factor)
         for F in candidates if factor == 1.0 else candidates[:1]:
-            near = few.subset(np.abs(sampson_residuals(F, few.x, few.y)) < 2 * RANSAC_PX * matches.scale)
-            poses = poses_from_fundamental(F, K, K_prime)
-            front = [in_front(K, K_prime, R, t, near.x, near.y, FAR_ANGLE).sum() for R, t in poses]
-            starts.append(Pose(K, K_prime, *poses[int(np.argmax(front))]))
-    if on_homography > PLANE_SHARE * len(matches):
-        options = {"max_epipolar_error": RANSAC_PX * matches.scale, "seed": seed, "max_iterations": 2000}
-        pose, _ = poselib.estimate_relative_pose(
-            matches.x, matches.y, camera.as_poselib(), camera_prime.as_poselib(), options, {}
-        )
-        if np.isfinite(pose.R).all() and np.linalg.norm(pose.t) > 0:
-            starts.append(Pose(camera.K, camera_prime.K, np.asarray(pose.R), pose.t / np.linalg.norm(pose.t)))
+            starts.append(_best_of_fundamental(few, F, K, K_prime, 2 * RANSAC_PX * matches.scale))
+    if homography.inliers.sum() > PLANE_SHARE * len(matches):
+        on = few.subset(transfer_error(homography.H, few) < 2 * RANSAC_PX * matches.scale)
+        starts += _poses_of_plane(on, homography.H, camera, camera_prime)
     # a first look at all, then the best few in earnest
     sigma = START_PX * matches.scale
     glance = few.thinned(FIRST_LOOK // 2)
     rough = sorted(
         (refine_pose(glance, p, camera, camera_prime, sigma, iterations=3) for p in starts), key=lambda item: item[1]
     )
-    fine = (refine_pose(few, p, camera, camera_prime, sigma, iterations=10) for p, _ in rough[:3])
+    fine = (refine_pose(few, p, camera, camera_prime, sigma, iterations=30) for p, _ in rough[:3])
     return [pose for pose, _ in sorted(fine, key=lambda item: item[1])]
+
+
+def _best_of_fundamental(matches: Matches, F: Array, K: Array, K_prime: Array, threshold: float) -> Pose:
+    """The pose of F that has most of the matches within `threshold` px of their lines in front of both cameras."""
+    near = matches.subset(np.abs(sampson_residuals(F, matches.x, matches.y)) < threshold)
+    poses = poses_from_fundamental(F, K, K_prime)
+    front = [in_front(K, K_prime, R, t, near.x, near.y, FAR_ANGLE).sum() for R, t in poses]
+    return Pose(K, K_prime, *poses[int(np.argmax(front))])
+
+
+def _poses_of_plane(on: Matches, H: Array, camera: Camera, camera_prime: Camera) -> list[Pose]:
+    """The two poses, of those that a plane's homography allows, that have most of its matches in front."""
+    calibrated = inverse_intrinsics(camera_prime.K) @ H @ camera.K
+    count, rotations, translations, _ = cv2.decomposeHomographyMat(calibrated, np.eye(3))
+    found: list[tuple[int, Pose]] = []
+    for R, t in zip(rotations[:count], translations[:count], strict=True):
+        length = float(np.linalg.norm(t))
+        if length > 1e-9 and np.isfinite(R).all():
+            for pose in (Pose(camera.K, camera_prime.K, R, sign * t[:, 0] / length) for sign in (1, -1)):
+                front = in_front(pose.K, pose.K_prime, pose.R, pose.t, on.x, on.y, FAR_ANGLE)
+                found.append((int(front.sum()), pose))
+    found.sort(key=lambda item: -item[0])
+    return [pose for _, pose in found[:2]]
 
 
 def _refine_with_inliers(
@@ -268,24 +366,10 @@ def _zoom_is_evident(matches: Matches, pose: Pose, camera: Camera, camera_prime:
     if camera.fixed or camera_prime.fixed:
         return False
     few, sigma = matches.thinned(FIRST_LOOK), START_PX * matches.scale
-    zoomed, _ = refine_pose(few, pose, camera, camera_prime, sigma, zoom=True)
+    zoomed, _ = refine_pose(few, pose, camera, camera_prime, sigma, zoom=True, iterations=20)
     before, after = (np.minimum((sampson_residuals(p.F, few.x, few.y) / sigma) ** 2, 9.0) for p in (pose, zoomed))
     explained = (before < 9.0) | (after < 9.0)
     return bool(explained.any() and (before - after)[explained].mean() > ZOOM_GAIN)
-
-
-def _focal_warnings(pose: Pose, camera: Camera, camera_prime: Camera) -> list[str]:
-    """Say when the matches moved a focal length far from what the file claims."""
-    out = []
-    for name, K, cam in (("reference", pose.K, camera), ("target", pose.K_prime, camera_prime)):
-        moved = K[0, 0] / cam.focal - 1
-        if not cam.assumed and not cam.fixed and abs(moved) > 2 * cam.log_sigma:
-            out.append(
-                f"the matches contradict the {name}'s focal length: {cam.focal:.0f} px from {cam.source}, "
-                f"{K[0, 0]:.0f} px ({moved:+.0%}) from the matches; was the picture cropped? "
-                "give it with --focal-px if you know it"
-            )
-    return out
 
 
 def _from_known_cameras(
@@ -312,22 +396,11 @@ def _from_known_cameras(
         )
     sigma = float(max(np.median(residual[inliers]) / 0.6745, 0.1 * matches.scale))
     why = f"cameras given; they explain {int(inliers.sum())} of {len(matches)} matches"
-    return _two_view(relative, inliers, sigma, why, camera.source, 0.0, ())
-
-
-def _two_view(
-    pose: Pose,
-    inliers: NDArray[np.bool_],
-    sigma: float,
-    why: str,
-    source: str,
-    deviation: float,
-    warnings: tuple[str, ...],
-) -> TwoView:
     return TwoView(
-        K=pose.K, K_prime=pose.K_prime, R=pose.R, t=pose.t,
-        F=fundamental_from_pose(pose.K, pose.K_prime, pose.R, pose.t),
-        H_inf=infinite_homography(pose.K, pose.K_prime, pose.R), e_prime=pose.K_prime @ pose.t,
-        inliers=inliers, sigma=sigma, model="general", why=why, focal_source=source,
-        focal_deviation=deviation, warnings=warnings,
+        K=relative.K, K_prime=relative.K_prime, R=R, t=relative.t, F=relative.F,
+        H_inf=infinite_homography(relative.K, relative.K_prime, R), e_prime=relative.K_prime @ relative.t,
+        inliers=inliers | matches.given, sigma=sigma, model="general", why=why, focal_source=camera.source,
+        focal_deviation=0.0, h_inf_spread=0.0, warnings=tuple(_about_given(matches, residual)),
     )  # fmt: skip
+
+

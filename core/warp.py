@@ -1,21 +1,21 @@
 """The backward map: for every canvas pixel the target pixel to fetch; and fetching it.
 
-Between nodes only d is interpolated; H_inf p + d e' is evaluated at every pixel, so every pixel lies on its epipolar
-line exactly.
+Between nodes only d is interpolated (and slack, which is smoother still); H_inf p + d e' is evaluated at every pixel,
+so that a field without slack keeps every pixel on its epipolar line exactly.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
-from .canvas import Canvas, Grid, bounding_canvas, expected_reach
-from .displacement import target_points
+from .canvas import Box, Canvas, Grid, bounding_canvas, expected_reach
+from .displacement import Field, target_points
 from .epipolar import Array, homogeneous, project
 from .errors import NoOverlap
 from .lens import distort, undistort
@@ -31,24 +31,6 @@ REMAP_LIMIT = 32000
 LEAST_ALPHA = 1e-2
 
 
-class Field(Protocol):
-    """A displacement field: inverse depth at a grid's nodes, in ideal (undistorted) reference pixels."""
-
-    @property
-    def name(self) -> str:
-        """What `--field` calls it."""
-        ...
-
-    @property
-    def plane(self) -> Array:
-        """m (3,): the affine part, which it fades to far from the overlap."""
-        ...
-
-    def on_grid(self, grid: Grid, ideal: Array | None = None) -> Array:
-        """Inverse depth (rows, columns); ideal: the nodes' ideal pixels, where they are not the canvas's."""
-        ...
-
-
 @dataclass(frozen=True)
 class Warp:
     """map_x, map_y (H, W) float32: raw target pixel of each canvas pixel, NaN behind the camera; inverse_depth (H, W)
@@ -58,6 +40,13 @@ class Warp:
     map_x: NDArray[np.float32]
     map_y: NDArray[np.float32]
     inverse_depth: NDArray[np.float32]
+
+    def within(self, box: Box) -> Warp:
+        """The part in a box (left, top, width, height) of the canvas."""
+        left, top, width, height = box
+        offset = self.canvas.offset[0] - left, self.canvas.offset[1] - top
+        canvas = Canvas(width, height, offset, self.canvas.cropped)
+        return Warp(canvas, *(_cut(a, box) for a in (self.map_x, self.map_y, self.inverse_depth)))
 
     def inside(self, target_size: tuple[int, int]) -> NDArray[np.bool_]:
         """Where the map falls inside a target of (W, H) px."""
@@ -76,6 +65,15 @@ class Layer:
     pixels: NDArray[np.float32]
     alpha: NDArray[np.float32]
 
+    def within(self, box: Box) -> Layer:
+        """The part in a box (left, top, width, height) of the canvas."""
+        return Layer(_cut(self.pixels, box), _cut(self.alpha, box))
+
+
+def _cut(array: NDArray, box: Box) -> NDArray:
+    left, top, width, height = box
+    return np.ascontiguousarray(array[top : top + height, left : left + width])
+
 
 def build_warp(field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera) -> Warp:
     """The canvas that holds both pictures, and its map. Raises NoOverlap or OutputTooLarge."""
@@ -84,7 +82,9 @@ def build_warp(field: Field, two_view: TwoView, camera: Camera, camera_prime: Ca
     def target_at(grid: Grid) -> Array:
         ideal = _ideal_nodes(grid, camera)
         points = grid.points if ideal is None else ideal
-        return distort(target_points(two_view, points, field.on_grid(grid, ideal)), camera_prime)
+        values = field.on_grid(grid, ideal)
+        target = target_points(two_view, points, values.inverse_depth)
+        return distort(target if values.shift is None else target + values.shift, camera_prime)
 
     reach, cut = expected_reach(_outline(field, two_view, camera_prime), size, target_size)
     canvas = bounding_canvas(target_at, size, target_size, reach)
@@ -96,7 +96,7 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
     """The map of a given canvas, evaluated in strips."""
     left, top = -canvas.offset[0], -canvas.offset[1]
     grid = Grid.over(left, top, canvas.width, canvas.height)
-    nodes = field.on_grid(grid, _ideal_nodes(grid, camera))
+    values = field.on_grid(grid, _ideal_nodes(grid, camera))
     shape = (canvas.height, canvas.width)
     map_x, map_y, inverse_depth = (np.empty(shape, np.float32) for _ in range(3))
     xs = np.arange(left, left + canvas.width, dtype=np.float64)
@@ -105,7 +105,8 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
     for start in range(0, canvas.height, rows):
         stop = min(canvas.height, start + rows)
         # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
-        d = grid.to_pixels(nodes, left, top + start, canvas.width, stop - start).astype(np.float64)
+        strip = (left, top + start, canvas.width, stop - start)
+        d = grid.to_pixels(values.inverse_depth, *strip).astype(np.float64)
         ys = np.arange(top + start, top + stop, dtype=np.float64)[:, None]
         if camera.distortion.any():
             raw = np.stack(np.broadcast_arrays(xs[None, :], ys), axis=-1)
@@ -115,6 +116,9 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
             a, b, c = ((H[k, 0] * xs)[None, :] + (H[k, 1] * ys + H[k, 2]) + d * e[k] for k in range(3))
         c[c <= 1e-6 * np.maximum(np.abs(a), np.abs(b))] = np.nan
         x, y = a / c, b / c
+        if values.shift is not None:
+            x += grid.to_pixels(values.shift[..., 0], *strip)
+            y += grid.to_pixels(values.shift[..., 1], *strip)
         if camera_prime.distortion.any():
             x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), camera_prime), -1, 0)
         map_x[start:stop], map_y[start:stop], inverse_depth[start:stop] = x, y, d
@@ -141,21 +145,13 @@ def _outline(field: Field, two_view: TwoView, camera_prime: Camera) -> Array:
 def _trimmed(warp: Warp, size: tuple[int, int], target_size: tuple[int, int]) -> Warp:
     """Without rim lines that neither picture reaches."""
     seen = warp.inside(target_size)
-    canvas = warp.canvas
-    x, y = canvas.offset
+    x, y = warp.canvas.offset
     if not seen.any():
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
     seen[y : y + size[1], x : x + size[0]] = True
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
-    box = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
-    smaller = Canvas(
-        int(columns[-1] - columns[0]) + 1,
-        int(rows[-1] - rows[0]) + 1,
-        (x - int(columns[0]), y - int(rows[0])),
-        canvas.cropped,
-    )
-    arrays = (np.ascontiguousarray(a[box]) for a in (warp.map_x, warp.map_y, warp.inverse_depth))
-    return Warp(smaller, *arrays)
+    left, top = int(columns[0]), int(rows[0])
+    return warp.within((left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top))
 
 
 def reference_layer(picture: Picture, canvas: Canvas) -> Layer:

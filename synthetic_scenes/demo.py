@@ -31,6 +31,7 @@ def run_demo(folder: Path, overwrite: bool, progress: Callable[[str, float], Non
             "warp.npz",
             "report.json",
             "report.timing.json",
+            "report.matches.csv",
         )
         files.check_folder(folder, names)
         pair = make_pair()

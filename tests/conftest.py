@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.camera import Camera, CameraRequest
 from edf_stitch.core.canvas import Grid
+from edf_stitch.core.displacement import FieldValues
 from edf_stitch.core.epipolar import fundamental_from_pose, infinite_homography, rotation_from_vector
 from edf_stitch.core.images import encode_picture, picture_from_array
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
@@ -73,8 +74,8 @@ class GivenField:
     plane: np.ndarray
     name: str = "given"
 
-    def on_grid(self, grid: Grid, ideal: np.ndarray | None = None) -> np.ndarray:
-        return self.depth(grid.points if ideal is None else ideal)
+    def on_grid(self, grid: Grid, ideal: np.ndarray | None = None) -> FieldValues:
+        return FieldValues(self.depth(grid.points if ideal is None else ideal))
 
 
 def camera_of(size: tuple[int, int], focal: float, distortion: tuple[float, ...] = ()) -> Camera:
@@ -88,7 +89,7 @@ def view_of(camera: Camera, camera_prime: Camera, turn: tuple[float, ...], t: tu
     t_unit = np.array(t) / np.linalg.norm(t)
     return TwoView(
         K, K_prime, R, t_unit, fundamental_from_pose(K, K_prime, R, t_unit), infinite_homography(K, K_prime, R),
-        K_prime @ t_unit, np.ones(0, bool), 0.1, "general", "by hand", "test", 0.0,
+        K_prime @ t_unit, np.ones(0, bool), 0.1, "general", "by hand", "test", 0.0, 0.0,
     )  # fmt: skip
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.canvas import Grid
@@ -28,6 +27,7 @@ from edf_stitch.core.epipolar import (
     rotation_from_vector,
 )
 from edf_stitch.core.errors import DegenerateGeometry
+from edf_stitch.core.features import Matches
 from edf_stitch.core.spline import SmoothingProblem
 from edf_stitch.core.two_view import TwoView
 from hypothesis import given, settings
@@ -43,7 +43,7 @@ def view(R: np.ndarray, t: tuple[float, ...], focals: tuple[float, float] = (100
     direction = np.array(t) / np.linalg.norm(t)
     return TwoView(
         K, K_prime, R, direction, fundamental_from_pose(K, K_prime, R, direction),
-        infinite_homography(K, K_prime, R), K_prime @ direction, np.ones(0, bool), 0.5, "general", "", "", 0.0,
+        infinite_homography(K, K_prime, R), K_prime @ direction, np.ones(0, bool), 0.5, "general", "", "", 0.0, 0.0,
     )  # fmt: skip
 
 
@@ -79,6 +79,14 @@ def some_matches(
     x, y, d = x[ok][:count], y[ok][:count], d[ok][:count]
     assert len(x) == count
     return x, y + random.normal(0, noise, y.shape), d
+
+
+def overlap(field: StrictField, points: np.ndarray) -> np.ndarray:
+    """Which points (…, 2) lie in the reference and, where the field sends them, in the target."""
+    with np.errstate(invalid="ignore"):
+        target = field.sends(points.reshape(-1, 2)).reshape(points.shape)
+        inside = (target >= 0).all(axis=-1) & (target <= np.array(SIZE) - 1).all(axis=-1)
+    return inside & (points >= 0).all(axis=-1) & (points <= np.array(SIZE) - 1).all(axis=-1)
 
 
 def error_px(field: StrictField, x: np.ndarray, depths: Depths) -> np.ndarray:
@@ -205,25 +213,25 @@ def test_sure_depths_count_for_more() -> None:
 @every_view
 def test_a_planar_scene_gives_its_plane_and_its_homography(two_view: TwoView) -> None:
     x, y, _ = some_matches(two_view, planar)
-    field = fit_strict(two_view, x, y, SIZE, SIZE)
+    field = fit_strict(two_view, Matches(x, y), SIZE, SIZE)
     assert np.allclose(field.plane, PLANE, rtol=0, atol=(1e-11, 1e-11, 1e-8))
     H = two_view.H_inf + np.outer(two_view.e_prime, PLANE)
     grid = Grid.over(-300, -200, 1800, 1300)
     rays = homogeneous(grid.points) @ H.T
-    found = target_points(two_view, grid.points, field.on_grid(grid))
+    found = target_points(two_view, grid.points, field.on_grid(grid).inverse_depth)
     seen = rays[..., 2] > 0.05
     assert seen.mean() > 0.9
     assert np.abs(found - project(rays))[seen].max() < 1e-4
-    assert field.residual_px < 1e-6 and field.held_out_px < 1e-5
-    assert field.negative_share == 0 and field.name == "strict"
+    assert field.fit.residual_px < 1e-6 and field.fit.held_out_px < 1e-5
+    assert field.fit.negative_share == 0 and field.name == "strict"
 
 
 def test_a_noisy_planar_scene_stays_a_plane() -> None:
     x, y, _ = some_matches(SIDE, planar, 400, 0.5)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    assert field.smoothing >= 1e-2  # cross-validation sees nothing to bend for
-    assert field.residual_px == pytest.approx(0.5, rel=0.15)
-    assert field.held_out_px == pytest.approx(0.5, rel=0.15)
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
+    assert field.fit.smoothing >= 1e-2  # cross-validation sees nothing to bend for
+    assert field.fit.residual_px == pytest.approx(0.5, rel=0.15)
+    assert field.fit.held_out_px == pytest.approx(0.5, rel=0.15)
     # a plane of 400 matches is known to 0.5 √(3/400) = 0.04 px; a hardly bending spline to a few times that
     assert np.sqrt((error_px(field, x, planar) ** 2).mean()) < 0.15
 
@@ -233,59 +241,59 @@ def test_a_noisy_planar_scene_stays_a_plane() -> None:
 
 def test_a_curved_scene_is_followed() -> None:
     x, y, _ = some_matches(SIDE, curved, 400)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     probe, _, _ = some_matches(SIDE, curved, 400, seed=9)
     # 30 px of relief; between points some 40 px apart a hill 200 px wide is known to a hundredth of that
     assert error_px(field, probe, curved).max() < 0.3
     assert np.sqrt((error_px(field, probe, curved) ** 2).mean()) < 0.05
-    assert field.held_out_px < 0.3 and field.kept.mean() > 0.97
+    assert field.fit.held_out_px < 0.3 and field.fit.kept.mean() > 0.97
 
 
 @pytest.mark.parametrize("noise", [0.1, 0.5, 1.0])
 def test_a_noisy_curved_scene_is_followed_within_its_noise(noise: float) -> None:
     x, y, _ = some_matches(SIDE, curved, 500, noise, seed=1)
-    field = fit_strict(replace(SIDE, sigma=noise), x, y, SIZE, SIZE)
+    field = fit_strict(replace(SIDE, sigma=noise), Matches(x, y), SIZE, SIZE)
     probe, _, _ = some_matches(SIDE, curved, 400, seed=9)
     error = error_px(field, probe, curved)
     # averaging helps: well below the noise of a single match
     assert np.sqrt((error**2).mean()) < 0.5 * noise + 0.02
     # what a match left out is missed by: its own noise and a little more
-    assert noise * 0.9 < field.held_out_px < 1.3 * noise
-    assert field.residual_px < field.held_out_px
-    assert field.kept.mean() > 0.97
-    assert field.smoothing in SMOOTHING_LADDER
+    assert noise * 0.9 < field.fit.held_out_px < 1.3 * noise
+    assert field.fit.residual_px < field.fit.held_out_px
+    assert field.fit.kept.mean() > 0.97
+    assert field.fit.smoothing in SMOOTHING_LADDER
 
 
 def test_what_is_said_of_the_fit_is_so() -> None:
     """residual_px and held_out_px, recomputed from the matches kept."""
     x, y, _ = some_matches(SIDE, curved, 60, 0.5, seed=2)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    x, y = x[field.kept], y[field.kept]
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
+    x, y = x[field.fit.kept], y[field.fit.kept]
     d, s = inverse_depths(SIDE, x, y)
-    assert field.residual_px == pytest.approx(np.sqrt(np.mean((s * (d - field.at(x))) ** 2)), rel=1e-6)
+    assert field.fit.residual_px == pytest.approx(np.sqrt(np.mean((s * (d - field.at(x))) ** 2)), rel=1e-6)
     g = d - homogeneous(x) @ field.plane
     left_out = []
     for i in range(len(x)):
         rest = np.arange(len(x)) != i
         problem = SmoothingProblem.build(x[rest], np.median(s) / s[rest], float(np.sqrt(SIZE[0] * SIZE[1])))
-        left_out.append(s[i] * (g[i] - problem.solve(g[rest], field.smoothing)[0].at(x[i : i + 1])[0]))
-    assert field.held_out_px == pytest.approx(np.sqrt(np.mean(np.square(left_out))), rel=1e-4)
+        left_out.append(s[i] * (g[i] - problem.solve(g[rest], field.fit.smoothing)[0].at(x[i : i + 1])[0]))
+    assert field.fit.held_out_px == pytest.approx(np.sqrt(np.mean(np.square(left_out))), rel=1e-4)
 
 
 def test_the_spline_bends_where_matches_ask_and_the_plane_is_what_is_left() -> None:
     x, y, _ = some_matches(SIDE, curved, 400, 0.3)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     assert field.at(np.array([[700.0, 450]]))[0] == pytest.approx(0.15, abs=1e-3)
     assert field.at(np.array([[1150.0, 60]]))[0] == pytest.approx(curved(np.array([1150.0, 60])), abs=1e-3)
-    assert field.fade_px == pytest.approx(5 * 1000 * np.percentile(np.abs(
+    assert field.fit.fade_px == pytest.approx(5 * 1000 * np.percentile(np.abs(
         curved(x) - homogeneous(x) @ field.plane), 98), rel=0.15)  # fmt: skip
 
 
 def test_at_most_a_thousand_centres_spread_over_the_picture() -> None:
     x, y, _ = some_matches(SIDE, curved, 3000, 0.5)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    assert 0.4 * CENTRE_BUDGET < field.kept.sum() <= CENTRE_BUDGET and field.kept.shape == (3000,)
-    kept = x[field.kept]
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
+    assert 0.4 * CENTRE_BUDGET < field.fit.kept.sum() <= CENTRE_BUDGET and field.fit.kept.shape == (3000,)
+    kept = x[field.fit.kept]
     counts = np.histogram2d(kept[:, 0], kept[:, 1], bins=(3, 3), range=((350, 1200), (0, 900)))[0]
     assert counts.min() > 0.5 * counts.mean()
 
@@ -298,16 +306,16 @@ def test_at_most_a_thousand_centres_spread_over_the_picture() -> None:
 def test_outliers_along_their_epipolar_lines_are_dropped(depths: Depths, share: float) -> None:
     """They pass every test of the geometry; only their neighbours give them away."""
     x, y, d = some_matches(SIDE, depths, 400, 0.5, seed=2)
-    clean = fit_strict(SIDE, x, y, SIZE, SIZE)
+    clean = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     random = np.random.default_rng(5)
     wrong = random.permutation(400)[: int(400 * share)]
     _, s = inverse_depths(SIDE, x, y)
     off = random.uniform(15, 80, len(wrong)) * random.choice([-1, 1], len(wrong)) / s[wrong]
     y[wrong] = target_points(SIDE, x[wrong], d[wrong] + off)
     assert distance_to_line(SIDE.F, x[wrong], y[wrong]).max() < 1e-4
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    assert field.kept[wrong].sum() == 0
-    assert np.delete(field.kept, wrong).mean() > 0.95
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
+    assert field.fit.kept[wrong].sum() == 0
+    assert np.delete(field.fit.kept, wrong).mean() > 0.95
     harm = 1000 * np.abs(field.at(x) - clean.at(x))
     # losing a share of the matches is all that happened
     assert np.sqrt((harm**2).mean()) < 0.2 and harm.max() < 1.0
@@ -321,9 +329,9 @@ def test_small_errors_along_the_lines_are_dropped_too() -> None:
     wrong = random.permutation(400)[:16]
     _, s = inverse_depths(SIDE, x, y)
     y[wrong] = target_points(SIDE, x[wrong], d[wrong] + random.uniform(3.0, 4.5, 16) / s[wrong])
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    assert field.kept[wrong].sum() == 0
-    assert np.delete(field.kept, wrong).mean() > 0.95
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
+    assert field.fit.kept[wrong].sum() == 0
+    assert np.delete(field.fit.kept, wrong).mean() > 0.95
 
 
 def test_a_thing_in_front_of_the_wall_is_no_outlier() -> None:
@@ -333,84 +341,63 @@ def test_a_thing_in_front_of_the_wall_is_no_outlier() -> None:
         return 0.12 + 0.02 * (np.abs(points - (700, 450)) < 110).all(axis=-1)
 
     x, y, _ = some_matches(SIDE, box, 1500, 0.3, seed=3)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     inner = (np.abs(x - (700, 450)) < 70).all(axis=1)
     assert inner.sum() > 20
-    assert field.kept[inner].mean() > 0.5
+    assert field.fit.kept[inner].mean() > 0.5
     assert np.median(error_px(field, x[inner], box)) < 1.0
     away = (np.abs(x - (700, 450)) > 250).any(axis=1)
     assert np.sqrt((error_px(field, x[away], box) ** 2).mean()) < 0.3
 
 
-# --- outside the overlap -------------------------------------------------------------------------------------------
+# --- matches from the user -----------------------------------------------------------------------------------------
 
 
-def wide_grid(step: int = 16) -> Grid:
-    return Grid((-1600, -1200), step, 4400 // step, 3300 // step)
+def test_given_matches_are_all_kept_whatever_they_say() -> None:
+    """Outliers along their lines, a lone thing of one point, two points side by side: the user has decided."""
+    x, y, d = some_matches(SIDE, curved, 300)
+    x[:2] = (700.5, 450.5), (700.8, 450.8)
+    d[:2] = curved(x[:2])
+    wrong = np.arange(2, 300, 12)
+    d[wrong] += 0.05
+    y = target_points(SIDE, x, d)
+    found, given_ones = (fit_strict(SIDE, Matches(x, y, given=given), SIZE, SIZE) for given in (False, True))
+    assert given_ones.fit.kept.all()
+    assert not found.fit.kept[wrong].any() and not found.fit.kept[:2].all(), "others are chosen from"
+    # and what they say is done: 50 px off are followed by more than half
+    assert (given_ones.at(x[wrong]) - curved(x[wrong])).mean() > 0.5 * 0.05
 
 
-def overlap(field: StrictField, points: np.ndarray) -> np.ndarray:
-    with np.errstate(invalid="ignore"):
-        target = target_points(field.two_view, points, field.at(points.reshape(-1, 2)).reshape(points.shape[:-1]))
-        inside = (target >= 0).all(axis=-1) & (target <= np.array(SIZE) - 1).all(axis=-1)
-    return inside & (points >= 0).all(axis=-1) & (points <= np.array(SIZE) - 1).all(axis=-1)
+def test_more_given_matches_than_centres_are_thinned() -> None:
+    x, y, _ = some_matches(SIDE, curved, 1500)
+    kept = fit_strict(SIDE, Matches(x, y, given=True), SIZE, SIZE).fit.kept
+    assert 0.4 * CENTRE_BUDGET < kept.sum() <= CENTRE_BUDGET
 
 
-def test_in_the_overlap_nothing_fades_and_far_away_only_the_plane_is_left() -> None:
-    x, y, _ = some_matches(SIDE, curved, 200, 0.3)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    grid = wide_grid()
-    d = field.on_grid(grid)
-    plane = homogeneous(grid.points) @ field.plane
-    inside = overlap(field, grid.points)
-    assert 0.03 < inside.mean() < 0.5
-    assert 1000 * np.abs(d - field.at(grid.points.reshape(-1, 2)).reshape(d.shape))[inside].max() < 1e-3
-    distance = grid.step * cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    far = distance > field.fade_px + 2 * grid.step
-    assert far.mean() > 0.1
-    assert np.array_equal(d[far], plane[far])
-    # in between it never leaves the range between plane and spline
-    share = (d - plane) / field.spline.on_axes(grid.xs, grid.ys)
-    assert share.min() > -1e-9 and share.max() < 1 + 1e-6
-    # and falls with the distance, which a grid knows to a cell or two
-    u = distance / field.fade_px
-    slack = 2 * grid.step / field.fade_px
-    least, most = (1 - v * v * (3 - 2 * v) for v in (np.clip(u + e, 0, 1) for e in (slack, -slack)))
-    assert (share >= least - 1e-6).all() and (share <= most + 1e-6).all()
+def test_a_match_of_more_weight_pulls_harder() -> None:
+    x, y, d = some_matches(SIDE, planar, 200)
+    there = int(np.argmin(np.linalg.norm(x - (750, 450), axis=1)))
+    d[there] += 0.01
+    y = target_points(SIDE, x, d)
+    pulls = []
+    for heavy in (0.1, 1.0, 10.0):
+        weight = np.ones(len(x))
+        weight[there] = heavy
+        field = fit_strict(SIDE, Matches(x, y, weight=weight, given=True), SIZE, SIZE)
+        problem = replace(field, fit=replace(field.fit, smoothing=1e-2)).refitted(Matches(x, y, weight=weight))
+        pulls.append(problem.at(x[there : there + 1])[0] - planar(x[there]))
+    assert 0 < pulls[0] < pulls[1] / 3 and pulls[1] < pulls[2] < 0.0101
 
 
-@pytest.mark.parametrize("two_view", [SIDE, VIEWS["epipole in the picture"]], ids=["side", "forward"])
-def test_the_fade_has_no_seam(two_view: TwoView) -> None:
-    """Between neighbours d changes by what plane, spline and the slope of the fade (3/2 over its width) allow."""
-    x, y, _ = some_matches(two_view, curved, 200, 0.3)
-    field = fit_strict(two_view, x, y, SIZE, SIZE)
-    grid = wide_grid(8)
-    d = field.on_grid(grid)
-    bend = field.spline.on_axes(grid.xs, grid.ys)
-    plane = homogeneous(grid.points) @ field.plane
-    for axis in (0, 1):
-        step = np.abs(np.diff(d - plane, axis=axis))
-        near = np.maximum(*(np.abs(np.take(bend, range(k, bend.shape[axis] - 1 + k), axis=axis)) for k in (0, 1)))
-        # the distance to a pixelated region may itself step by √2 cells where the fade moves by one
-        allowed = np.abs(np.diff(bend, axis=axis)) + 1.5 * np.sqrt(2) * grid.step / field.fade_px * near
-        assert (step <= allowed + 1e-9).all()
-
-
-def test_the_field_hardly_depends_on_the_grid() -> None:
-    x, y, _ = some_matches(SIDE, curved, 200, 0.3)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    coarse, fine = (Grid((-1600, -1200), step, 4400 // step, 3300 // step) for step in (16, 8))
-    rectangle = (-1200, -900, 3600, 2600)
-    a, b = (grid.to_pixels(field.on_grid(grid), *rectangle) for grid in (coarse, fine))
-    largest = 1000 * np.abs(field.spline.on_axes(fine.xs, fine.ys)).max()
-    assert 1000 * np.abs(a - b).max() < 1.5 * 2 * coarse.step / field.fade_px * largest
-
-
-def test_where_the_grid_misses_the_overlap_the_plane_is_all() -> None:
-    x, y, _ = some_matches(SIDE, curved, 200, 0.3)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    grid = Grid((-9000, -9000), 10, 30, 30)
-    assert np.array_equal(field.on_grid(grid), grid.points @ field.plane[:2] + field.plane[2])
+def test_heavier_matches_decide_where_the_plane_lies() -> None:
+    """Two walls, one behind the other: the plane is that of the heavy matches."""
+    x, _, _ = some_matches(SIDE, planar, 200)
+    d = np.where(np.arange(200) % 2, 0.1, 0.14)
+    y = target_points(SIDE, x, d)
+    for heavy, expected in ((1, 0.1), (0, 0.14)):
+        weight = np.where(np.arange(200) % 2 == heavy, 100.0, 0.01)
+        plane = fit_strict(SIDE, Matches(x, y, weight=weight), SIZE, SIZE).plane
+        assert np.abs(x @ plane[:2] + plane[2] - expected).max() < 1e-3
 
 
 # --- odd cases -----------------------------------------------------------------------------------------------------
@@ -423,12 +410,13 @@ def test_with_the_epipole_in_the_picture_the_field_is_whole() -> None:
     assert (0 < epipole).all() and (epipole < SIZE).all()
     x = np.vstack([x, epipole, epipole + (0.01, 0)])  # matches that say nothing of depth
     y = np.vstack([y, project(forward.e_prime), project(forward.e_prime)])
-    field = fit_strict(forward, x, y, SIZE, SIZE)
-    assert not field.kept[-2:].any()
+    field = fit_strict(forward, Matches(x, y), SIZE, SIZE)
+    assert not field.fit.kept[-2:].any()
     grid = Grid.over(0, 0, *SIZE)
-    assert np.isfinite(field.on_grid(grid)).all()
+    assert np.isfinite(field.on_grid(grid).inverse_depth).all()
     inside = overlap(field, grid.points)
-    found, true = (target_points(forward, grid.points, d) for d in (field.on_grid(grid), curved(grid.points)))
+    depths = (field.on_grid(grid).inverse_depth, curved(grid.points))
+    found, true = (target_points(forward, grid.points, d) for d in depths)
     error = np.linalg.norm(found - true, axis=-1)
     assert inside.mean() > 0.5
     assert np.sqrt((error[inside] ** 2).mean()) < 0.3
@@ -444,49 +432,51 @@ def test_depths_beyond_infinity_are_kept_as_they_are() -> None:
         return (points[..., 0] - 800) * 1e-4
 
     x, y, d = some_matches(SIDE, tilted, 400, 0.3)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    assert field.negative_share == pytest.approx((d[field.kept] < 0).mean(), abs=0.02) and field.negative_share > 0.2
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
+    assert field.fit.negative_share == pytest.approx((d[field.fit.kept] < 0).mean(), abs=0.02)
+    assert field.fit.negative_share > 0.2
     assert np.sqrt((error_px(field, x, tilted) ** 2).mean()) < 0.15
     grid = Grid.over(0, 0, *SIZE)
-    assert field.on_grid(grid).min() < -0.04
+    assert field.on_grid(grid).inverse_depth.min() < -0.04
 
 
 def test_the_same_matches_give_the_same_bytes() -> None:
     x, y, _ = some_matches(SIDE, curved, 300, 0.5)
-    one, other = (fit_strict(SIDE, x.copy(), y.copy(), SIZE, SIZE) for _ in range(2))
+    one, other = (fit_strict(SIDE, Matches(x.copy(), y.copy()), SIZE, SIZE) for _ in range(2))
     grid = Grid.over(-200, -100, 1500, 1100)
-    assert one.on_grid(grid).tobytes() == other.on_grid(grid).tobytes()
-    assert one.kept.tobytes() == other.kept.tobytes()
+    assert one.on_grid(grid).inverse_depth.tobytes() == other.on_grid(grid).inverse_depth.tobytes()
+    assert one.fit.kept.tobytes() == other.fit.kept.tobytes()
 
 
 def test_coarser_pictures_are_judged_in_their_own_pixels() -> None:
     """The same scene at twice the size, noise and all, keeps the same matches and the same depths."""
     x, y, _ = some_matches(SIDE, curved, 300, 0.5)
-    one = fit_strict(SIDE, x, y, SIZE, SIZE)
+    one = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     twice = np.diag([2.0, 2, 1])
     large = replace(
         SIDE, K=twice @ SIDE.K, K_prime=twice @ SIDE.K_prime, H_inf=twice @ SIDE.H_inf @ np.linalg.inv(twice),
         e_prime=twice @ SIDE.e_prime, sigma=1.0,
     )  # fmt: skip
-    other = fit_strict(large, 2 * x, 2 * y, (2400, 1800), (2400, 1800), noise_scale=2.0)
-    assert np.array_equal(one.kept, other.kept) and one.smoothing == other.smoothing
+    other = fit_strict(large, Matches(2 * x, 2 * y, 2.0), (2400, 1800), (2400, 1800))
+    assert np.array_equal(one.fit.kept, other.fit.kept) and one.fit.smoothing == other.fit.smoothing
     assert np.allclose(other.at(2 * x), one.at(x), rtol=0, atol=1e-7)
-    assert other.fade_px == pytest.approx(2 * one.fade_px) and other.residual_px == pytest.approx(2 * one.residual_px)
+    assert other.fit.fade_px == pytest.approx(2 * one.fit.fade_px)
+    assert other.fit.residual_px == pytest.approx(2 * one.fit.residual_px)
 
 
 def test_too_few_depths_are_refused() -> None:
     x, y, _ = some_matches(SIDE, planar, MIN_CENTRES - 1)
     with pytest.raises(DegenerateGeometry, match=f"only {MIN_CENTRES - 1} of {MIN_CENTRES - 1}"):
-        fit_strict(SIDE, x, y, SIZE, SIZE)
+        fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     forward = view(np.eye(3), (0, 0, -1))
     centre = np.array([599.5, 449.5])
     away = np.random.default_rng(0).uniform(50, 300, (30, 2))
     with pytest.raises(DegenerateGeometry, match="only 0 of 30"):
-        fit_strict(forward, centre + away, centre - 1.5 * away, SIZE, SIZE)
+        fit_strict(forward, Matches(centre + away, centre - 1.5 * away), SIZE, SIZE)
 
 
 def test_a_handful_of_matches_makes_a_field() -> None:
     x, y, _ = some_matches(SIDE, planar, MIN_CENTRES + 2, 0.2, seed=6)
-    field = fit_strict(SIDE, x, y, SIZE, SIZE)
-    assert np.isfinite(field.on_grid(Grid.over(0, 0, *SIZE))).all()
+    field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
+    assert np.isfinite(field.on_grid(Grid.over(0, 0, *SIZE)).inverse_depth).all()
     assert error_px(field, x, planar).max() < 1.5

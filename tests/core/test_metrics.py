@@ -10,8 +10,18 @@ import numpy as np
 import pytest
 from edf_stitch.core.canvas import Canvas
 from edf_stitch.core.images import picture_from_array
-from edf_stitch.core.metrics import distances_off_line, folds, look_up, overlap_quality, psnr, ssim
-from edf_stitch.core.warp import Warp
+from edf_stitch.core.lens import distort
+from edf_stitch.core.metrics import (
+    Shown,
+    folds,
+    look_up,
+    off_line_mean,
+    overlap_quality,
+    psnr,
+    shown_points,
+    ssim,
+)
+from edf_stitch.core.warp import Warp, build_warp
 
 
 def two_pictures(channels: int = 3) -> tuple[np.ndarray, np.ndarray]:
@@ -182,9 +192,47 @@ def test_without_an_overlap_there_is_no_quality() -> None:
     assert found["overlap_px"] == 0 and np.isnan(found["overlap_psnr_db"]) and np.isnan(found["overlap_ssim"])
 
 
-def test_distances_off_the_lines_skip_what_has_no_target(by_hand: SimpleNamespace) -> None:
+def test_canvas_points_that_show_the_target(by_hand: SimpleNamespace) -> None:
+    cameras = (by_hand.camera((120, 90), 100.0), by_hand.camera((100, 80), 100.0))
+    warp = identity(200, 150, offset=(30, 20))
+    warp = replace(warp, map_x=warp.map_x - 50, map_y=warp.map_y + 5)  # reference columns 50-149, rows −5 to 74
+    warp.map_x[70:, :] = np.nan  # reference rows from 50 on
+    every = shown_points(warp, cameras, samples=10**6)
+    x, y = np.meshgrid(np.arange(50, 150), np.arange(-5, 50))
+    assert np.array_equal(every.points, np.column_stack([x.ravel(), y.ravel()]))
+    assert np.array_equal(every.target, every.points - (50, -5)) and every.points.dtype == every.target.dtype == float
+    assert np.array_equal(every.overlap, (every.points[:, 0] <= 119) & (every.points[:, 1] >= 0))
+    some = shown_points(warp, cameras, samples=200 * 150 // 16)
+    assert len(some.points) == pytest.approx(100 * 55 / 16, rel=0.06), "every fourth in both directions"
+    assert np.array_equal(some.target, some.points - (50, -5))
+    spread = (some.points[:, 0].min() - 50, 149 - some.points[:, 0].max())
+    assert max(spread) < 4 and set(np.diff(np.unique(some.points[:, 0]))) == {4}
+
+
+def test_canvas_points_are_told_in_ideal_pixels(by_hand: SimpleNamespace) -> None:
+    cameras = (by_hand.camera((120, 90), 100.0, (-0.1,)), by_hand.camera((120, 90), 100.0, (0.08,)))
+    shown = shown_points(identity(120, 90), cameras, samples=500)
+    assert np.abs(distort(shown.points, cameras[0]) - distort(shown.target, cameras[1])).max() < 1e-6
+    assert np.abs(shown.points - shown.target).max() > 3 and shown.overlap.all()
+
+
+def test_the_distance_off_the_lines_is_the_maps(by_hand: SimpleNamespace) -> None:
     camera = by_hand.camera((100, 80), 90.0)
     F = by_hand.view(camera, camera, (0, 0, 0), (1, 0, 0)).F  # level lines
-    points = np.array([[10.0, 20], [30, 40], [50, 60]])
-    mapped = points + [[5, 3], [np.nan, np.nan], [-7, -0.25]]
-    assert distances_off_line(F, points, mapped) == pytest.approx([3, 0.25])
+    points = np.array([[10.0, 20], [30, 40], [120, 60]])
+    shown = Shown(points, points + [[5, 3], [-7, -0.25], [0, 99]], np.array([True, True, False]))
+    assert off_line_mean(F, shown) == pytest.approx((3 + 0.25) / 2), "outside the overlap the target is not compared"
+    assert np.isnan(off_line_mean(np.full((3, 3), np.nan), shown))
+    assert np.isnan(off_line_mean(F, replace(shown, overlap=np.full(3, False))))
+
+
+@pytest.mark.parametrize("distortion", [(), (-0.15, 0.03)], ids=["ideal lens", "barrel"])
+def test_a_map_on_its_lines_is_off_by_nothing_also_through_a_lens(
+    by_hand: SimpleNamespace, distortion: tuple[float, ...]
+) -> None:
+    camera = by_hand.camera((400, 300), 380.0, distortion)
+    view = by_hand.view(camera, camera, (2.0, -14, 3), (1, 0.1, 0.15))
+    warp = build_warp(by_hand.plane_field(6e-5, -1e-4, 0.12), view, camera, camera)
+    assert off_line_mean(view.F, shown_points(warp, (camera, camera))) < 1e-3
+    aside = replace(warp, map_y=warp.map_y + np.float32(0.5))
+    assert off_line_mean(view.F, shown_points(aside, (camera, camera))) == pytest.approx(0.5, rel=0.25)

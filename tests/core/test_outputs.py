@@ -15,6 +15,7 @@ from edf_stitch.core import outputs
 from edf_stitch.core.colour import encode
 from edf_stitch.core.errors import BadRequest, UnwritableOutput
 from edf_stitch.core.images import load_picture
+from edf_stitch.core.match_files import read_matches
 from edf_stitch.core.output_files import OutputFiles
 from edf_stitch.core.outputs import OutputRequest, check, json_bytes, npz_bytes, warp_bytes, write
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
@@ -56,7 +57,8 @@ def raw(path: Path) -> np.ndarray:
 
 def test_all_files_and_no_others_are_there(written: Path) -> None:
     assert set(everything(written)) == {
-        "out.png", "report.json", "report.timing.json", "warp.npz", "layers/reference.png", "layers/target.png"}
+        "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
+        "layers/target.png"}
 
 
 def test_only_the_panorama_where_nothing_else_was_asked_for(small_result: StitchResult, tmp_path: Path) -> None:
@@ -101,10 +103,11 @@ def test_the_panorama_is_the_result(small_result: StitchResult, written: Path) -
     assert np.array_equal(image[..., 2::-1], encode(small_result.pixels, 8))
 
 
-def test_the_warp_file_holds_what_design_says(small_result: StitchResult, written: Path) -> None:
-    with np.load(written / "warp.npz", allow_pickle=False) as file:
+def test_the_warp_file_holds_what_design_says(small_pair: Pair, known: StitchOptions, written: Path) -> None:
+    strict = stitch(small_pair.reference, small_pair.target, replace(known, field="strict"))
+    with np.load(io.BytesIO(warp_bytes(strict)), allow_pickle=False) as file:
         found = dict(file)
-    height, width = small_result.alpha.shape
+    height, width = strict.alpha.shape
     assert set(found) == set(NPZ)
     for name, (kind, shape) in NPZ.items():
         assert found[name].dtype.str == kind and found[name].shape == (shape or (height, width)), name
@@ -175,8 +178,8 @@ def test_layers_of_float_pictures_have_exr_beside_them(small_result: StitchResul
     bright = as_float(small_result)
     assert write_all(bright, tmp_path, "out.exr") == []
     assert set(everything(tmp_path)) == {
-        "out.exr", "report.json", "report.timing.json", "warp.npz", "layers/reference.png", "layers/reference.exr",
-        "layers/target.png", "layers/target.exr"}
+        "out.exr", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
+        "layers/reference.exr", "layers/target.png", "layers/target.exr"}
     for name, layer in (("reference", bright.reference_layer), ("target", bright.target_layer)):
         back = load_picture(tmp_path / "layers" / f"{name}.exr")
         assert back.pixels.max() > 1 and back.bits == 32
@@ -224,8 +227,8 @@ def test_an_unknown_kind_of_warp_is_refused_before_the_work(tmp_path: Path, name
 
 
 @pytest.mark.parametrize("name", [
-    "out.png", "report.json", "report.timing.json", "warp.npz", "layers/reference.png", "layers/target.png",
-    "layers/target.exr",
+    "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
+    "layers/target.png", "layers/target.exr",
 ])  # fmt: skip
 def test_what_exists_is_refused_before_the_work_and_not_touched(
     small_result: StitchResult, tmp_path: Path, name: str
@@ -294,3 +297,13 @@ def test_trouble_while_the_files_are_put_in_place_leaves_nothing(
 def test_timing_stands_beside_the_report_and_only_then() -> None:
     assert OutputRequest(Path("out.png")).timing is None
     assert OutputRequest(Path("out.png"), report=Path("a/b.c.json")).timing == Path("a/b.c.timing.json")
+
+
+def test_the_matches_stand_beside_the_report_as_they_are_given(small_result: StitchResult, written: Path) -> None:
+    assert OutputRequest(Path("out.png")).matches is None
+    assert OutputRequest(Path("out.png"), report=Path("a/b.c.json")).matches == Path("a/b.c.matches.csv")
+    back, used = read_matches(written / "report.matches.csv", (240, 180), (240, 180)), small_result.used_matches
+    for ours, theirs in ((back.x, used.x), (back.y, used.y), (back.weights, used.weights)):
+        assert np.array_equal(ours, theirs)
+    report = json.loads((written / "report.json").read_text("utf-8"))
+    assert len(back) == report["field"]["centres"] <= report["matches"]["inliers"] <= report["matches"]["found"]

@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core import pipeline
+from edf_stitch.core import features
 from edf_stitch.core.camera import CameraRequest
 from edf_stitch.core.colour import decode
 from edf_stitch.core.epipolar import (
@@ -125,7 +125,8 @@ def test_given_cameras_are_taken_as_they_are(pair: Pair) -> None:
         return {"K": camera.K.tolist(), "R": camera.R.tolist(), "t": camera.t.tolist()}
 
     cameras = {"cameras": {"reference": entry(pair.reference_camera), "target": entry(pair.target_camera)}}
-    given = stitch(pair.reference, pair.target, StitchOptions(camera=CameraRequest(cameras=cameras), measure=False))
+    options = StitchOptions("strict", camera=CameraRequest(cameras=cameras), measure=False)
+    given = stitch(pair.reference, pair.target, options)
     truth, view = truth_of(pair), given.two_view
     assert rotation_angle(view.R, truth.R) < 1e-6 and np.allclose(view.t, truth.t) and np.allclose(view.F, truth.F)
     assert distance_to_line(truth.F, *shown(given)).max() < 1e-3
@@ -376,12 +377,16 @@ def clouds(seed: int) -> np.ndarray:
 
 REFUSED = {
     "the same picture twice": ((clouds(1), clouds(1)), NoOverlap, "same picture.*choose two"),
-    "a blank one": ((np.full((180, 240, 3), 99, np.uint8), clouds(1)), TooFewMatches, "only 0 .*at least 16.*try"),
+    "a blank one": (
+        (np.full((180, 240, 3), 99, np.uint8), clouds(1)), TooFewMatches,
+        r"only 0 .*at least 16.*the reference \(240×180 pixels\) shows only 0 points .*choose.*--matches"),
+    "a blank second": (
+        (clouds(1), np.full((180, 240, 3), 99, np.uint8)), TooFewMatches, "the target .*shows only 0 points .*choose"),
     "two blank ones": ((np.zeros((60, 80)), np.ones((60, 80))), StitchError, "at least 16 needed|same picture"),
-    "one pixel": ((noise(1, 1, 1), noise(2, 1, 1)), TooFewMatches, "only 0 .*try"),
+    "one pixel": ((noise(1, 1, 1), noise(2, 1, 1)), TooFewMatches, "only 0 .*choose a larger"),
     "a line": ((noise(1, 10, 20_000), noise(2, 10, 20_000)), TooFewMatches, "at least 16 needed.*try"),
-    "a thread": ((noise(1, 33_000, 12), noise(2, 33_000, 12)), TooFewMatches, "at least 16 needed.*try"),
-    "unrelated noise": ((noise(1, 180, 240), noise(2, 180, 240)), TooFewMatches, "at least 16 needed.*try"),
+    "a thread": ((noise(1, 33_000, 12), noise(2, 33_000, 12)), TooFewMatches, "at least 16 needed.*choose a larger"),
+    "unrelated noise": ((noise(1, 180, 240), noise(2, 180, 240)), TooFewMatches, "at least 16 needed.*choose"),
     "unrelated clouds": ((clouds(1), clouds(2)), (TooFewMatches, NoOverlap), "needed"),
     "a transparent one": ((np.dstack([clouds(1), np.zeros((300, 400), np.uint8)]), clouds(2)), TooFewMatches, "only 0"),
 }
@@ -397,8 +402,8 @@ def test_what_cannot_be_stitched_is_refused_with_advice(case: str) -> None:
 
 def test_chance_look_alikes_are_refused(small_pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(9)
-    chance = pipeline.Matches(random.uniform(0, 170, (50, 2)), random.uniform(0, 170, (50, 2)))
-    monkeypatch.setattr(pipeline.features, "match", lambda *_: chance)
+    chance = features.Matches(random.uniform(0, 170, (50, 2)), random.uniform(0, 170, (50, 2)))
+    monkeypatch.setattr(features, "match", lambda *_: chance)
     with pytest.raises((NoOverlap, DegenerateGeometry), match="of 50 matches|50 points look alike") as refused:
         stitch(small_pair.reference, small_pair.target)
     assert refused.value.exit_code == 3
@@ -414,7 +419,8 @@ def test_pictures_that_cannot_be_read(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("options", [
-    {"field": "slack"}, {"field": ""}, {"blend": "multiband"}, {"blend": "Feather"}, {"seed": -1}, {"seed": 2**31},
+    {"field": "rew"}, {"field": ""}, {"fade": "slowly"}, {"scale": 1.5}, {"crop": "tight"}, {"blend": "multiband"},
+    {"blend": "Feather"}, {"seed": -1}, {"seed": 2**31},
 ])  # fmt: skip
 def test_options_that_are_not_offered(options: dict) -> None:
     with pytest.raises(BadRequest) as refused:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.spline import SLAB, SmoothingProblem, kernel, spread_points
+from edf_stitch.core.spline import SLAB, SmoothingProblem, ThinPlateSpline, kernel, spread_points
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
@@ -251,3 +251,44 @@ def test_a_budget_that_is_too_small_coarsens_the_cells_but_not_too_much() -> Non
     # far more than were they drawn by lot, points keep their distance
     gap = cKDTree(chosen).query(chosen, 2)[0][:, 1]
     assert np.median(gap) > 0.5 * np.sqrt(WIDTH * HEIGHT / len(chosen))
+
+
+# --- several functions at once -------------------------------------------------------------------------------------
+
+
+def test_functions_solved_together_are_those_solved_alone() -> None:
+    points, noise = some_points(10, 60), some_noise(10, 60)
+    values = np.column_stack([wavy(points), points[:, 0] / 300, np.random.default_rng(1).normal(size=60)])
+    problem = SmoothingProblem.build(points, noise, UNIT)
+    together, left = problem.solve(values, 1e-3)
+    assert left.shape == (60, 3) and together.weights.shape == (60, 3) and together.affine.shape == (3, 3)
+    probe = some_points(11, 40) * 1.4 - 200
+    xs, ys = np.linspace(-100, 1300, 31), np.linspace(-50, 900, 23)
+    assert together.at(probe).shape == (40, 3) and together.on_axes(xs, ys).shape == (23, 31, 3)
+    for k in range(3):
+        alone, left_alone = problem.solve(values[:, k], 1e-3)
+        assert np.allclose(left[:, k], left_alone, atol=1e-10)
+        assert np.allclose(together.at(probe)[:, k], alone.at(probe), atol=1e-9)
+        assert np.allclose(together.on_axes(xs, ys)[..., k], alone.on_axes(xs, ys), atol=1e-4)
+    one, left = problem.solve(values[:, :1], 1e-3)
+    assert left.shape == (60, 1) and one.at(probe).shape == (40, 1) and one.on_axes(xs, ys).shape == (23, 31, 1)
+
+
+def test_slabs_make_no_difference_to_several_functions() -> None:
+    points = some_points(12, 1000)
+    values = np.column_stack([wavy(points), -points[:, 1] / 500])
+    spline, _ = SmoothingProblem.build(points, np.ones(1000), UNIT).solve(values, 1e-3)
+    xs, ys = np.linspace(0, WIDTH, 90), np.linspace(0, HEIGHT, 50)
+    assert len(xs) * len(ys) * 1000 > 2 * SLAB
+    grid = np.stack(np.meshgrid(xs, ys), axis=-1)
+    assert np.allclose(spline.on_axes(xs, ys), spline.at(grid.reshape(-1, 2)).reshape(50, 90, 2), atol=1e-4)
+
+
+def test_without_centres_it_is_affine() -> None:
+    for affine, shape in ((np.array([1.0, 2, 3]), (2, 3)), (np.arange(6.0).reshape(3, 2), (2, 3, 2))):
+        spline = ThinPlateSpline(np.empty((0, 2)), np.empty((0, *affine.shape[1:])), affine, np.zeros(2), 1.0)
+        xs, ys = np.arange(3.0), np.arange(2.0)
+        nodes = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
+        assert spline.on_axes(xs, ys).shape == shape
+        assert np.allclose(spline.at(nodes).reshape(shape), spline.on_axes(xs, ys))
+        assert np.allclose(spline.at(nodes), nodes @ affine[:2] + affine[2])

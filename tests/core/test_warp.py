@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import cv2
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from edf_stitch.core import warp as warp_module
 from edf_stitch.core.canvas import Canvas, Grid
+from edf_stitch.core.displacement import FieldValues
 from edf_stitch.core.epipolar import distance_to_line
 from edf_stitch.core.errors import NoOverlap
 from edf_stitch.core.images import Picture, picture_from_array
@@ -91,7 +93,7 @@ def test_strips_leave_no_trace(by_hand: SimpleNamespace) -> None:
     canvas = Canvas(1203, 1001, (17, -5))  # 1.2 million pixels: two strips
     warp = build_map(field, view, canvas, camera, camera)
     grid = Grid.over(-17, 5, 1203, 1001)
-    assert np.array_equal(warp.inverse_depth, grid.to_pixels(field.on_grid(grid), -17, 5, 1203, 1001))
+    assert np.array_equal(warp.inverse_depth, grid.to_pixels(field.on_grid(grid).inverse_depth, -17, 5, 1203, 1001))
     rows = np.abs(np.diff(warp.map_y, 2, axis=0))
     assert rows.max() < 3 * np.median(rows.max(axis=1)), "no line where two strips meet"
 
@@ -347,3 +349,52 @@ def test_a_distorted_pair_and_the_same_pair_undistorted_meet(by_hand: SimpleName
     shown = warp.inside(SIZE)[box]
     assert shown.sum() > 20_000
     assert np.abs(mapped - expected)[shown].max() < 0.02
+
+
+# --- a field that leaves its lines ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Shifted:
+    """Another field, and the same shift everywhere on top of it."""
+
+    base: object
+    by: tuple[float, float]
+
+    @property
+    def plane(self) -> np.ndarray:
+        return self.base.plane
+
+    def on_grid(self, grid: Grid, ideal: np.ndarray | None = None) -> FieldValues:
+        return FieldValues(self.base.on_grid(grid, ideal).inverse_depth, np.full((*grid.points.shape[:2], 2), self.by))
+
+
+def test_a_shift_comes_on_top_and_the_canvas_makes_room_for_it(by_hand: SimpleNamespace) -> None:
+    camera = by_hand.camera(SIZE, 300.0)
+    view, plane = by_hand.view(camera, camera, *STANDS["parallel"]), by_hand.plane_field(0, 0, 0.2)
+    theirs, ours = (build_warp(field, view, camera, camera) for field in (plane, Shifted(plane, (0, -12.0))))
+    a, b = theirs.canvas, ours.canvas
+    assert (b.width, b.height, b.offset) == (a.width, a.height + 12, a.offset)
+    for name, by in (("map_x", 0), ("map_y", -12), ("inverse_depth", 0)):
+        assert np.abs(getattr(ours, name)[: a.height] - getattr(theirs, name) - by).max() < 1e-4
+
+
+# --- a part of the canvas ------------------------------------------------------------------------------------------
+
+
+def test_a_part_of_a_warp_and_of_a_layer(by_hand: SimpleNamespace) -> None:
+    """Cut alike; the offset may leave the part: reference pixel (0, 0) then lies outside it."""
+    whole, _ = made(by_hand, "sideways")
+    box, cut = (20, 15, 90, 40), (slice(15, 55), slice(20, 110))
+    part = whole.within(box)
+    assert (part.canvas.width, part.canvas.height, part.canvas.cropped) == (90, 40, False)
+    assert np.array_equal(canvas_points(part), canvas_points(whole)[cut])
+    for name in ("map_x", "map_y", "inverse_depth"):
+        array = getattr(part, name)
+        assert np.array_equal(array, getattr(whole, name)[cut], equal_nan=True) and array.flags.c_contiguous
+    layer = target_layer(picture_from_array(noise(260, 300, 3)), whole)
+    again = target_layer(picture_from_array(noise(260, 300, 3)), part)
+    assert np.array_equal(layer.within(box).pixels, again.pixels)
+    assert np.array_equal(layer.within(box).alpha, again.alpha)
+    flagged = replace(whole, canvas=replace(whole.canvas, cropped=True))
+    assert flagged.within(box).canvas.cropped, "a part of what was cut off stays cut off"

@@ -18,7 +18,10 @@ from edf_stitch.synthetic_scenes import demo
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry, pose_errors
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at
 
-FILES = {"reference.png", "target.png", "panorama.png", "truth.png", "warp.npz", "report.json", "report.timing.json"}
+FILES = {
+    "reference.png", "target.png", "panorama.png", "truth.png", "warp.npz", "report.json", "report.timing.json",
+    "report.matches.csv",
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -46,7 +49,8 @@ def test_it_writes_its_files_and_says_what_it_measured(tmp_path: Path, small_pai
     figures = [re.fullmatch(r"(.*\S) +(-?\d+\.\d{3}) (degrees|px|dB)", line) for line in lines[: len(demo.MEASURES)]]
     assert all(figures) and [one[3] for one in figures] == [unit for _, _, unit in demo.MEASURES]
     assert [Path(line) for line in lines[len(figures) :]] == [folder / name for name in (
-        "reference.png", "target.png", "panorama.png", "truth.png", "warp.npz", "report.json", "report.timing.json")]
+        "reference.png", "target.png", "panorama.png", "truth.png", "warp.npz", "report.json", "report.timing.json",
+        "report.matches.csv")]
 
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     with pytest.raises(UnwritableOutput, match="reference.png exists"):

@@ -1,0 +1,158 @@
+"""How the target lies on the reference: from pictures to matches, geometry, field and map.
+
+Everything that is decided about a pair before a pixel of it is fetched. Several frames of two fixed cameras share one
+alignment: their matches are pooled, so that a clip does not swim.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import features
+from .camera import Camera, cameras_for
+from .displacement import Field
+from .errors import BadRequest, NoOverlap, TooFewMatches
+from .features import Matches
+from .fields import fit_field
+from .images import Picture, resized
+from .lens import undistort
+from .masks import read_mask, without
+from .match_files import read_matches
+from .options import StitchOptions
+from .two_view import MIN_MATCHES, TwoView, estimate
+from .warp import Warp, build_warp
+
+# With fewer points of detail than this a picture is to blame, not the pair.
+SCARCE = 100
+# Called with a stage's name and how much of it is done.
+Steps = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Where every canvas pixel is seen in the target, and why.
+
+    cameras: as known before; matches: all found or given, in px of the (raw) pictures; two_view: the geometry, its
+    inliers among them; field; warp; warnings in plain words.
+    """
+
+    cameras: tuple[Camera, Camera]
+    matches: Matches
+    two_view: TwoView
+    field: Field
+    warp: Warp
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Two pictures as they are worked on, without what is masked and at the scale asked for; and their full sizes."""
+
+    reference: Picture
+    target: Picture
+    full_sizes: tuple[tuple[int, int], tuple[int, int]]
+
+
+def prepare(reference: Picture, target: Picture, options: StitchOptions) -> Frame:
+    """A frame of two full pictures in one colour space. Raises BadRequest or UnreadableImage about a mask."""
+
+    def worked_on(picture: Picture, mask: Path | np.ndarray | None, name: str) -> Picture:
+        shown = picture if mask is None else without(picture, read_mask(mask, size_of(picture), name))
+        return resized(shown, options.scale)
+
+    return Frame(
+        worked_on(reference, options.ignore_reference, "the reference"),
+        worked_on(target, options.ignore_target, "the target"),
+        (size_of(reference), size_of(target)),
+    )
+
+
+def align(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> Alignment:
+    """Aligns the target of each frame with the reference; all frames share both cameras, hence one alignment.
+
+    Raises StitchError and its kinds.
+    """
+    first, second, sizes = frames[0].reference, frames[0].target, frames[0].full_sizes
+    if any(frame.full_sizes != sizes for frame in frames):
+        raise BadRequest("the frames of a clip differ in size: one alignment is for one camera each")
+    full, warnings = cameras_for(options.camera, (first.name, second.name), sizes, (first.exif, second.exif))
+    cameras = full[0].resized(size_of(first)), full[1].resized(size_of(second))
+    if options.matches is None:
+        steps("features", 0.0)
+        matches = _found_in(frames, steps)
+    else:
+        matches = _given(options.matches, frames[0], cameras)
+
+    steps("geometry", 0.0)
+    ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
+    two_view = estimate(ideal, *cameras, seed=options.seed)
+
+    steps("field", 0.0)
+    size, target_size = cameras[0].size, cameras[1].size
+    field = fit_field(options.field, options.fade, two_view, ideal.subset(two_view.inliers), size, target_size)
+
+    steps("warp", 0.0)
+    warp = build_warp(field, two_view, *cameras)
+    return Alignment(cameras, matches, two_view, field, warp, (*warnings, *two_view.warnings))
+
+
+def size_of(picture: Picture) -> tuple[int, int]:
+    """(W, H) px of a picture."""
+    height, width = picture.pixels.shape[:2]
+    return width, height
+
+
+def _found_in(frames: Sequence[Frame], steps: Steps) -> Matches:
+    found = []
+    for i, frame in enumerate(frames):
+        seen = features.detect(frame.reference.view, frame.reference.alpha)
+        steps("features", (i + 0.45) / len(frames))
+        seen_too = features.detect(frame.target.view, frame.target.alpha)
+        steps("features", (i + 0.9) / len(frames))
+        found.append(features.match(seen, seen_too))
+        if len(frames) == 1 and len(found[0]) < MIN_MATCHES:
+            raise TooFewMatches(_few(len(found[0]), frame, len(seen.points), len(seen_too.points)))
+    x, y = np.concatenate([m.x for m in found]), np.concatenate([m.y for m in found])
+    return Matches(x, y, max(m.scale for m in found))
+
+
+def _few(matches: int, frame: Frame, *details: int) -> str:
+    """Why there are too few matches, and what to do about it."""
+    found = f"only {matches} matching points found, at least {MIN_MATCHES} needed"
+    for name, picture, count in zip(("reference", "target"), (frame.reference, frame.target), details, strict=True):
+        if count < SCARCE:
+            width, height = size_of(picture)
+            return (
+                f"{found}: the {name} ({width}×{height} pixels) shows only {count} points of detail; choose a larger "
+                "or sharper picture of something with texture, or give matches by hand (--matches)"
+            )
+    return (
+        f"{found}: the pictures must show the same things over about a quarter of their area; try pictures taken "
+        "closer together, or sharper ones, or give matches by hand (--matches)"
+    )
+
+
+def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, Camera]) -> Matches:
+    """Matches from a file or array, moved to the scale of the work, without those in masked parts."""
+    sizes = frame.full_sizes
+    matches = read_matches(source, *sizes)
+    x, y = (
+        (points + 0.5) * (np.array(camera.size) / np.array(size)) - 0.5
+        for points, camera, size in zip((matches.x, matches.y), cameras, sizes, strict=True)
+    )
+    seen = _shown(frame.reference, x) & _shown(frame.target, y)
+    if not seen.any():
+        raise NoOverlap("all the given matches lie in parts of the pictures that are masked or transparent")
+    return replace(matches, x=x, y=y).subset(seen)
+
+
+def _shown(picture: Picture, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    if picture.alpha is None:
+        return np.ones(len(points), bool)
+    column, row = np.clip(np.rint(points).astype(int), 0, np.array(size_of(picture)) - 1).T
+    return picture.alpha[row, column] > 0

@@ -1,0 +1,145 @@
+"""The options of the command line that say how a pair is stitched, and what they become."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import BadRequest
+
+if TYPE_CHECKING:
+    from .options import StitchOptions
+
+# What DESIGN names and what is not there yet is refused by name, so that nobody takes silence for success.
+FADE_CHOICES = ("plane", "infinity")
+FIELD_CHOICES, FIELDS_TO_COME = ("slack", "strict", "paper"), ("rew", "apap", "homography")
+BLEND_CHOICES, BLENDS_TO_COME = ("feather", "linear"), ("multiband",)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Adds everything that decides about a panorama; where files go is each command's own."""
+    camera = parser.add_argument_group(
+        "cameras", "One value serves both pictures; two are for REF,TARGET. Without any: EXIF, or an estimate."
+    )
+    camera.add_argument("--focal-px", type=_numbers, default=(), metavar="F[,F2]", help="focal length in pixels")
+    camera.add_argument(
+        "--focal-mm", type=_numbers, default=(), metavar="F[,F2]", help="focal length in mm (with --sensor-mm)"
+    )
+    camera.add_argument(
+        "--sensor-mm",
+        type=_numbers,
+        default=(),
+        metavar="W[,W2]",
+        help="width of the sensor in mm, along the longer side",
+    )
+    camera.add_argument("--focal35", type=_numbers, default=(), metavar="F[,F2]", help="35 mm equivalent focal length")
+    camera.add_argument(
+        "--principal",
+        type=_numbers,
+        default=(),
+        metavar="X,Y[,X2,Y2]",
+        help="principal point in pixels (default: the middle)",
+    )
+    camera.add_argument(
+        "--cameras", type=Path, metavar="FILE.json", help="per picture K, optionally distortion, R and t"
+    )
+
+    control = parser.add_argument_group("control")
+    control.add_argument(
+        "--matches", type=Path, metavar="FILE.csv", help="x,y,x2,y2[,weight] in px: used as given, nothing is searched"
+    )
+    control.add_argument(
+        "--ignore-ref", type=Path, metavar="MASK", help="a picture, white where REF is to be ignored altogether"
+    )
+    control.add_argument("--ignore-target", type=Path, metavar="MASK", help="the same for TARGET")
+    control.add_argument(
+        "--scale", type=float, default=1.0, metavar="S", help="resize both pictures by S ≤ 1 first, for a fast preview"
+    )
+    control.add_argument(
+        "--crop", default="full", metavar="CROP",
+        help="full (default), inscribed (the largest full rectangle), reference (its frame), or X,Y,W,H in px",
+    )  # fmt: skip
+
+    how = parser.add_argument_group("how")
+    how.add_argument(
+        "--field",
+        default="slack",
+        type=_choice(FIELD_CHOICES, FIELDS_TO_COME),
+        metavar="FIELD",
+        help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), paper",
+    )
+    how.add_argument(
+        "--fade",
+        default="plane",
+        type=_choice(FADE_CHOICES, ()),
+        metavar="FADE",
+        help="what it fades to outside the overlap: plane (default: the scene's mean plane) or infinity",
+    )
+    how.add_argument(
+        "--dense",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="dense refinement in the overlap (yet to come)",
+    )
+    how.add_argument(
+        "--projection",
+        default="perspective",
+        type=_choice(("perspective",), ("cylindrical", "equirectangular")),
+        help="perspective",
+    )
+    how.add_argument(
+        "--blend",
+        default="feather",
+        type=_choice(BLEND_CHOICES, BLENDS_TO_COME),
+        help="feather (default) or linear (plain average)",
+    )
+    how.add_argument("--seam", default="none", type=_choice(("none",), ("graphcut",)), help="none")
+    how.add_argument(
+        "--exposure", action=argparse.BooleanOptionalAction, default=False, help="exposure compensation (yet to come)"
+    )
+    how.add_argument("--seed", type=int, default=0, metavar="N", help="seed of every random choice (default 0)")
+
+
+def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
+    """What the parsed arguments ask for. Raises BadRequest."""
+    if args.dense or args.exposure:
+        raise BadRequest(f"--{'dense' if args.dense else 'exposure'} is yet to come")
+    from .camera import CameraRequest
+    from .crop import parse_crop
+    from .options import StitchOptions
+
+    return StitchOptions(
+        field=args.field,
+        fade=args.fade,
+        camera=CameraRequest(
+            args.focal_px, args.focal_mm, args.sensor_mm, args.focal35, args.principal, args.cameras
+        ),
+        matches=args.matches,
+        ignore_reference=args.ignore_ref,
+        ignore_target=args.ignore_target,
+        scale=args.scale,
+        crop=parse_crop(args.crop),
+        blend=args.blend,
+        seed=args.seed,
+        measure=measure,
+    )
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 1200 or 1200,1180") from None
+
+
+def _choice(known: tuple[str, ...], to_come: tuple[str, ...]) -> Callable[[str], str]:
+    def parse(text: str) -> str:
+        if text in to_come:
+            raise argparse.ArgumentTypeError(f"{text!r} is yet to come; for now: {', '.join(known)}")
+        if text not in known:
+            raise argparse.ArgumentTypeError(f"{text!r} is not known; choose from: {', '.join(known)}")
+        return text
+
+    return parse

@@ -1,0 +1,59 @@
+"""What a user may decide about a stitch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .blend import BLENDS
+from .camera import CameraRequest
+from .crop import CROPS, Crop
+from .displacement import FADES
+from .errors import BadRequest
+from .fields import FIELDS
+
+LEAST_SCALE = 0.02
+
+
+@dataclass(frozen=True)
+class StitchOptions:
+    """The defaults are right for two photographs of one camera.
+
+    field: one of FIELDS; fade: what it ends in outside the overlap, one of FADES; camera: what is known of the cameras;
+    matches: to be used as given instead of searched for, a file or (N, 4 or 5) rows x, y, x2, y2[, weight] in px of the
+    full pictures; ignore_reference, ignore_target: masks of what is to be kept out, files or arrays, white = ignored;
+    scale: both pictures are resized by this first, at most 1; crop: what of the panorama is kept (see `crop_box`);
+    blend: one of BLENDS; seed: of every random choice; measure: whether the report also compares the pictures in the
+    overlap and holds matches back to see how far the field can be trusted.
+    """
+
+    field: str = "slack"
+    fade: str = "plane"
+    camera: CameraRequest = CameraRequest()
+    matches: Path | np.ndarray | None = None
+    ignore_reference: Path | np.ndarray | None = None
+    ignore_target: Path | np.ndarray | None = None
+    scale: float = 1.0
+    crop: Crop = "full"
+    blend: str = "feather"
+    seed: int = 0
+    measure: bool = True
+
+    def __post_init__(self) -> None:
+        for name, value, known in (
+            ("field", self.field, FIELDS), ("fade", self.fade, FADES), ("blend", self.blend, BLENDS),
+        ):  # fmt: skip
+            if value not in known:
+                raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")
+        if not LEAST_SCALE <= self.scale <= 1.0:  # NaN too
+            raise BadRequest(f"a scale of {self.scale:g}: it must lie between {LEAST_SCALE:g} and 1 (the full size)")
+        if not 0 <= self.seed < 2**31:
+            raise BadRequest("the seed must be a whole number from 0 to 2147483647")
+        if isinstance(self.crop, str) and self.crop not in CROPS:
+            raise BadRequest(f"the crop {self.crop!r} is not known; choose from: {', '.join(CROPS)}, or X, Y, W, H")
+        if not isinstance(self.crop, str) and (len(self.crop) != 4 or min(self.crop[:2]) < 0 or min(self.crop[2:]) < 1):
+            raise BadRequest(
+                f"the crop {self.crop} is no box: X, Y, W, H in px are needed, X and Y from 0, W and H at least 1"
+            )

@@ -1,0 +1,68 @@
+"""What a user may decide: the defaults, and everything that is refused before any work is done."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError, fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from edf_stitch.core.blend import BLENDS
+from edf_stitch.core.camera import CameraRequest
+from edf_stitch.core.crop import CROPS
+from edf_stitch.core.displacement import FADES
+from edf_stitch.core.errors import BadRequest
+from edf_stitch.core.fields import FIELDS
+from edf_stitch.core.options import LEAST_SCALE, StitchOptions
+
+
+def test_the_defaults_are_the_designs() -> None:
+    options = StitchOptions()
+    assert {one.name: getattr(options, one.name) for one in fields(options)} == {
+        "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore_reference": None,
+        "ignore_target": None, "scale": 1.0, "crop": "full", "blend": "feather", "seed": 0, "measure": True,
+    }  # fmt: skip
+
+
+def test_nothing_changes_them_afterwards() -> None:
+    with pytest.raises(FrozenInstanceError):
+        StitchOptions().seed = 3  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("asked", [
+    *({"field": name} for name in FIELDS), *({"fade": name} for name in FADES), *({"blend": name} for name in BLENDS),
+    *({"crop": name} for name in CROPS), {"crop": (0, 0, 1, 1)}, {"crop": (3, 4, 500, 600)}, {"scale": 1},
+    {"scale": LEAST_SCALE}, {"scale": 0.5}, {"seed": 0}, {"seed": 2**31 - 1}, {"matches": Path("m.csv")},
+    {"matches": np.zeros((20, 4))}, {"ignore_reference": Path("a.png")}, {"ignore_target": np.zeros((4, 4), bool)},
+])  # fmt: skip
+def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
+    options = StitchOptions(**asked)
+    for name, value in asked.items():
+        assert getattr(options, name) is value
+
+
+@pytest.mark.parametrize(("asked", "words"), [
+    *(({"field": name}, ("field", repr(name), "choose from: slack, strict, paper"))
+      for name in ("rew", "apap", "homography", "", "Slack", "slack ")),
+    *(({"fade": name}, ("fade", repr(name), "choose from: plane, infinity")) for name in ("none", "", "Plane")),
+    *(({"blend": name}, ("blend", repr(name), "choose from: feather, linear")) for name in ("multiband", "", "Linear")),
+    *(({"crop": name}, ("crop", repr(name), "choose from: full, inscribed, reference, or X, Y, W, H"))
+      for name in ("tight", "", "1,2,3,4", "Full")),
+    *(({"scale": scale}, ("scale", "between 0.02 and 1"))
+      for scale in (0, 0.0199, 1.001, -1, 2, math.nan, math.inf, -math.inf)),
+    *(({"seed": seed}, ("seed", "from 0 to 2147483647")) for seed in (-1, 2**31, 2**63)),
+])  # fmt: skip
+def test_what_is_not_offered_is_refused_with_what_is(asked: dict, words: tuple[str, ...]) -> None:
+    with pytest.raises(BadRequest) as refused:
+        StitchOptions(**asked)
+    assert refused.value.exit_code == 2
+    for word in words:
+        assert word in str(refused.value)
+
+
+@pytest.mark.parametrize("crop", [(1, 2, 3), (0, 0, 0, 5), (0, 0, 5, -1), (-1, 0, 5, 5), (0, -1, 5, 5)])
+def test_a_crop_that_no_panorama_has_is_refused_before_the_work(crop: tuple) -> None:
+    """Whatever the panorama's size: nobody should wait for the end to hear of it."""
+    with pytest.raises(BadRequest):
+        StitchOptions(crop=crop)
