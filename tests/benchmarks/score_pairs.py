@@ -1,6 +1,6 @@
 """The README's table: `edf stitch` on every pair of a folder, judged by an outside program.
 
-    score_pairs.py [--pairs DIR] [--score SCORE.py] [-o OUTDIR]
+    score_pairs.py [--pairs DIR] [--score SCORE.py] [--field FIELD] [-o OUTDIR]
 
 Every folder of two pictures under --pairs ($EDF_DATA/pairs, else ../shared/data/pairs beside the checkout) is stitched
 with the defaults; --score (default ../shared/tools/score.py) gets the pictures and the warp, and nothing else of ours.
@@ -26,16 +26,17 @@ def main() -> None:
     data = Path(os.environ.get("EDF_DATA", ROOT.parent / "shared" / "data"))
     parser.add_argument("--pairs", type=Path, default=data / "pairs")
     parser.add_argument("--score", type=Path, default=ROOT.parent / "shared" / "tools" / "score.py")
+    parser.add_argument("--field", default="slack")
     parser.add_argument("-o", "--output", type=Path, default=Path("scored"))
     args = parser.parse_args()
     args.output.mkdir(parents=True, exist_ok=True)
-    print("| pair (size) | PSNR dB / SSIM | projectivity px (floor) | reached | overlap | folds | CPU s |")
-    print("|---|---|---|---|---|---|---|")
+    print("| pair (size) | PSNR dB / SSIM | off lines | projectivity px (floor) | reached | overlap | folds | CPU s |")
+    print("|---|---|---|---|---|---|---|---|")
     for folder in sorted(args.pairs.glob("*/")):
         pictures = [str(p) for p in sorted(folder.iterdir())[:2]]
         out = args.output / folder.name
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        edf = [sys.executable, "-m", "edf_stitch", "stitch", *pictures, "-o", f"{out}.png"]
+        edf = [sys.executable, "-m", "edf_stitch", "stitch", *pictures, "-o", f"{out}.png", "--field", args.field]
         files = ["--warp", f"{out}.npz", "--report", f"{out}.json"]
         subprocess.run([*edf, *files, "--overwrite", "--quiet"], check=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -43,10 +44,12 @@ def main() -> None:
         scored = subprocess.run([sys.executable, args.score, *pictures, f"{out}.npz"], check=True, capture_output=True)
         value = json.loads(scored.stdout)
         psnr, ssim, line, floor, reached, overlap, folds = (value[name] for name in COLUMNS)
-        size = "{width}×{height}".format(**json.loads(Path(f"{out}.json").read_text())["pictures"][0])
+        report = json.loads(Path(f"{out}.json").read_text())
+        size = "{width}×{height}".format(**report["pictures"][0])
+        off = report["measured"]["off_line_mean_px"]
         print(
-            f"| {folder.name} ({size}) | {psnr:.2f} / {ssim:.3f} | {line:.2f} ({floor:.2f}) | {reached:.3f} "
-            f"| {overlap:.2f} | {folds:.2%} | {cpu:.1f} |",
+            f"| {folder.name} ({size}) | {psnr:.2f} / {ssim:.3f} | {off:.2f} | {line:.2f} ({floor:.2f}) "
+            f"| {reached:.3f} | {overlap:.2f} | {folds:.2%} | {cpu:.1f} |",
             flush=True,
         )
 

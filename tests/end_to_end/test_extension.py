@@ -5,6 +5,7 @@ BLENDER_RUN says how that Blender is started. Every run has a home of its own, s
 
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -142,6 +143,23 @@ def test_the_demo(home, tmp_path):
     assert {"reference", "target", "panorama"} <= set(pictures)
     assert pictures["panorama"].shape[1] > pictures["reference"].shape[1]
     assert np.isfinite(np.load(tmp_path / "out" / "warp.npz")["map_x"]).any()
+
+
+def test_a_batch_goes_on_after_a_bad_pair(home, pair, tmp_path):
+    """A pair, one that is no pair, and a clip of two frames; then the same call again, which makes nothing anew."""
+    left, right = pair
+    for frame in (1, 2):
+        shutil.copy(left, tmp_path / f"l_{frame:04d}.png")
+        shutil.copy(right, tmp_path / f"r_{frame:04d}.png")
+    rows = ["reference,target,name", f"{left},{right},good", f"{left},{left},bad", "l_####.png,r_####.png,clip"]
+    (tmp_path / "list.csv").write_text("\n".join(rows), "utf-8")
+    call = ("batch", tmp_path / "list.csv", "-o", tmp_path / "out", "--resume")
+    done = home.edf(*call)
+    assert done.returncode == 3 and "Traceback" not in done.stderr, done.stderr
+    made = {str(path.relative_to(tmp_path / "out")): path.stat().st_mtime_ns for path in tmp_path.rglob("out/**/*.png")}
+    assert set(made) == {"good.png", "clip/clip_0001.png", "clip/clip_0002.png"}
+    assert home.edf(*call).returncode == 3
+    assert made == {name: (tmp_path / "out" / name).stat().st_mtime_ns for name in made}
 
 
 def test_blenders_worker_stitches_as_the_checkout_does(home, pair, tmp_path):
