@@ -213,19 +213,50 @@ class _Problem:
         _add(normal, gradient, residual, by_F @ by_unknowns, loss / self.sigma**2)
         wrong = far * loss > NEGLIGIBLE * self.weight  # not those that are far off their lines anyway
         if wrong.any():
-            derivative = self._beyond_derivative(pose, wrong, size)
+            derivative = self._beyond_derivative(pose, wrong)
             _add(normal, gradient, beyond[wrong], derivative, loss[wrong] / self.sigma_beyond**2)
         for e, d in self.priors(pose):
             normal += np.outer(d, d)
             gradient += e * d
         return normal, gradient
 
-    def _beyond_derivative(self, pose: Pose, which: NDArray[np.bool_], size: int) -> Array:
-        """Derivatives (n, size) of `beyond_infinity` of some matches by the unknowns, by differences: it has few."""
-        x, y = self.matches.x[which], self.matches.y[which]
-        h, here = 1e-7, beyond_infinity(pose, x, y)
-        moved = (beyond_infinity(self.moved(pose, step), x, y) for step in h * np.eye(size))
-        return np.column_stack([(there - here) / h for there in moved])
+    def _beyond_derivative(self, pose: Pose, which: NDArray[np.bool_]) -> Array:
+        """Derivatives (n, size) of `beyond_infinity` of some matches on the wrong side by the unknowns."""
+        dH, de = self._infinity_derivatives(pose)
+        x, y = self.x[which], self.matches.y[which]
+        q, e = x @ infinite_homography(pose.K, pose.K_prime, pose.R).T, pose.K_prime @ pose.t
+        side = np.sign(q[:, 2:])
+        direction = (e[:2] * q[:, 2:] - q[:, :2] * e[2]) * side
+        length = np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-12)
+        away = y - project(q)
+        along = np.sum(away * direction, axis=1) / length
+        dq, de = x @ dH.transpose(0, 2, 1), de[:, None, :]  # (size, n, 3), (size, 1, 3)
+        d_point = (dq[..., :2] - project(q) * dq[..., 2:]) / q[:, 2:]
+        d_direction = e[:2] * dq[..., 2:] + de[..., :2] * q[:, 2:] - dq[..., :2] * e[2] - q[:, :2] * de[..., 2:]
+        d_direction *= side
+        moved = np.sum(away * d_direction - d_point * direction, axis=-1) / length
+        return (moved - along * np.sum(direction * d_direction, axis=-1) / length**2).T
+
+    def _infinity_derivatives(self, pose: Pose) -> tuple[Array, Array]:
+        """Derivatives of H_inf (size, 3, 3) and e' (size, 3) by the unknowns."""
+        K_inv, K_prime, R, t = inverse_intrinsics(pose.K), pose.K_prime, pose.R, pose.t
+        right, nothing = R @ K_inv, np.zeros(3)
+        found: list[tuple[Array, Array]] = []
+        if self.focal_free:
+            keep = np.diag([1.0, 1.0, 0.0])
+            by_first = -K_prime @ R @ keep @ K_inv, nothing
+            by_second = K_prime @ keep @ right, K_prime @ keep @ t
+            both = (by_first[0] + by_second[0], by_second[1])
+            found = [by_first, by_second] if self.zoom else [both]
+        if self.principal_free:
+            for i in (0, 1):
+                shift = np.zeros((3, 3))
+                shift[i, 2] = self.principal_sigma
+                back = self.principal_sigma * _third_column(K_inv[:, i])
+                found.append((K_prime @ R @ back + shift @ right, shift @ t))
+        found += [(K_prime @ skew(axis) @ right, nothing) for axis in np.eye(3)]
+        found += [(np.zeros((3, 3)), K_prime @ tangent) for tangent in _tangent_basis(t).T]
+        return np.array([dH for dH, _ in found]), np.array([de for _, de in found])
 
     def _F_and_derivatives(self, pose: Pose) -> tuple[Array, Array]:
         """F = K'⁻ᵀ [t]ₓ R K⁻¹ (not normalised) and the derivatives (9, size) of its entries by the unknowns."""
