@@ -68,7 +68,7 @@ def measure_size(size: float, runs: int, pairs: list[tuple[Path, Path]], folder:
     print(f"     ratio pair by pair: {spread}; edf's wall by stage: {by_stage}", flush=True)
 
 
-EDF, HOMOGRAPHY, STITCHER = "edf stitch", "SIFT + homography", "OpenCV Stitcher"
+EDF, HOMOGRAPHY, STITCHER = "edf stitch (strict)", "SIFT + homography", "OpenCV Stitcher"
 
 
 def programs(reference: Path, target: Path, folder: Path) -> dict[str, list[str]]:
