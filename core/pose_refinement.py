@@ -250,10 +250,10 @@ class _Problem:
             found = [by_first, by_second] if self.zoom else [both]
         if self.principal_free:
             for i in (0, 1):
-                shift = self.principal_sigma * np.outer(np.eye(3)[i], (0.0, 0.0, 1.0))
-                back = self.principal_sigma * _third_column(K_inv[:, i])
-                by_both: Array = K_prime @ R @ back + shift @ right
-                found.append((by_both, shift @ t))
+                shift: Array = np.outer(np.eye(3)[i], np.eye(3)[2])
+                back: Array = R @ _third_column(K_inv[:, i])
+                by_both = self.principal_sigma * (K_prime @ back + shift @ right)
+                found.append((by_both, self.principal_sigma * shift @ t))
         found += [(K_prime @ skew(axis) @ right, nothing) for axis in np.eye(3)]
         found += [(np.zeros((3, 3)), K_prime @ tangent) for tangent in _tangent_basis(t).T]
         return np.array([dH for dH, _ in found]), np.array([de for _, de in found])
