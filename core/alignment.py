@@ -116,25 +116,22 @@ def _found_in(frames: Sequence[Frame], steps: Steps) -> Matches:
         steps("features", (i + 0.9) / len(frames))
         found.append(features.match(seen, seen_too))
         if len(frames) == 1 and len(found[0]) < MIN_MATCHES:
-            raise TooFewMatches(_few(len(found[0]), frame, len(seen.points), len(seen_too.points)))
+            _refuse_scarce(len(found[0]), frame, len(seen.points), len(seen_too.points))
     x, y = np.concatenate([m.x for m in found]), np.concatenate([m.y for m in found])
     return Matches(x, y, max(m.scale for m in found))
 
 
-def _few(matches: int, frame: Frame, *details: int) -> str:
-    """Why there are too few matches, and what to do about it."""
-    found = f"only {matches} matching points found, at least {MIN_MATCHES} needed"
+def _refuse_scarce(matches: int, frame: Frame, *details: int) -> None:
+    """Raises TooFewMatches where there are few because one picture has hardly any points of detail; else it is the
+    pair's fault, which `estimate` says."""
     for name, picture, count in zip(("reference", "target"), (frame.reference, frame.target), details, strict=True):
         if count < SCARCE:
             width, height = size_of(picture)
-            return (
-                f"{found}: the {name} ({width}×{height} pixels) shows only {count} points of detail; choose a larger "
-                "or sharper picture of something with texture, or give matches by hand (--matches)"
+            raise TooFewMatches(
+                f"only {matches} matching points found, at least {MIN_MATCHES} needed: the {name} ({width}×{height} "
+                f"pixels) shows only {count} points of detail; choose a larger or sharper picture of something with "
+                "texture, or give matches by hand (--matches)"
             )
-    return (
-        f"{found}: the pictures must show the same things over about a quarter of their area; try pictures taken "
-        "closer together, or sharper ones, or give matches by hand (--matches)"
-    )
 
 
 def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, Camera]) -> Matches:

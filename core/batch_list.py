@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from .camera import CameraRequest
 from .errors import BadRequest
-from .text_files import read_text
+from .text_files import read_lines
 
 COLUMNS = ("reference", "target", "name", "first", "last", "step", "focal_px", "focal35")
 MOST_FRAMES = 1_000_000
@@ -232,9 +232,7 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     """The named cells of each line that holds some, with its number as editors count, from 1."""
     separator = ""
     columns: tuple[str, ...] = ()
-    for number, line in enumerate(re.split("\r\n|\r|\n", read_text(path, "the list", _LAYOUT)), 1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
+    for number, line in read_lines(path, "the list", _LAYOUT):
         if not separator:
             bare = re.sub(r'"[^"]*"', "", line)
             separator = next((mark for mark in ",;\t" if mark in bare), ",")

@@ -22,10 +22,9 @@ import numpy as np
 from .batch_list import BatchItem, same_name
 from .errors import BadRequest, UnreadableImage, UnwritableOutput
 from .images import output_bits
-from .match_files import matches_csv
 from .options import StitchOptions
 from .output_files import OutputFiles
-from .outputs import OutputRequest, json_bytes, warp_bytes, write
+from .outputs import OutputRequest, add_report, json_bytes, warp_bytes, write
 from .pipeline import StitchResult
 
 STAMPS = ".edf"
@@ -109,14 +108,13 @@ class Unit:
         """Puts everything in place, or nothing; returns all warnings. Raises UnwritableOutput and BadRequest."""
         warnings = list(result.warnings)
         may_replace = self.request.overwrite or self.request.resume
-        files = UnitFiles(may_replace, (*self.pictures, *files_read(self.options)))
+        files = UnitFiles(may_replace, (*self.pictures, *self.options.files_read))
         with files:
             if self.panorama:
                 warnings += write(result, OutputRequest(self.panorama, layers=self._layers), files)
             if self.report:
-                files.add(self.report, json_bytes({**result.report, "warnings": warnings}))
-                files.add(self._named(".matches.csv"), matches_csv(result.used_matches))
-                files.add(self._named(".timing.json"), json_bytes({"seconds": result.seconds}))
+                matches, timing = self._named(".matches.csv"), self._named(".timing.json")
+                add_report(result, warnings, self.report, matches, timing, files)
                 if self.request.warp:
                     files.add(self._named(".warp.npz"), warp_bytes(result))
             made = files.prints[_real(self.panorama)] if self.panorama else None
@@ -223,12 +221,6 @@ def plan(items: Sequence[BatchItem], options: StitchOptions, request: BatchReque
     return jobs
 
 
-def files_read(options: StitchOptions) -> list[Path]:
-    """The files that options name."""
-    named = (options.matches, options.ignore_reference, options.ignore_target, options.camera.cameras)
-    return [Path(one) for one in named if isinstance(one, (str, Path))]
-
-
 def fingerprint_of_bytes(data: bytes) -> list[int | str]:
     """Their number and their SHA-256."""
     return [len(data), hashlib.sha256(data).hexdigest()]
@@ -252,7 +244,7 @@ def _options_for(item: BatchItem, options: StitchOptions) -> StitchOptions:
 def _units(item: BatchItem, options: StitchOptions, request: BatchRequest, version: str) -> Iterator[Unit]:
     decided = [version, asdict(options), request.suffix.lower(), request.warp, request.layers]
     shared = [path for frame in item.aligned_on for path in item.pair(frame)]
-    known = [*decided, *(_identity(path) for path in (*files_read(options), *shared))]
+    known = [*decided, *(_identity(path) for path in (*options.files_read, *shared))]
     frames: Sequence[int | None] = (None,) if item.frames is None else (None, *item.frames)
     for frame in frames:
         unit = Unit(item, frame, options, request)
@@ -278,10 +270,10 @@ def _plain(value: Any) -> Any:
 
 def _check(units: Sequence[Unit], request: BatchRequest) -> None:
     """Asks before the work whether options and outputs will do. Raises StitchError's kinds as `plan` does."""
-    for path in {path for unit in units for path in files_read(unit.options)}:
+    for path in {path for unit in units for path in unit.options.files_read}:
         if not path.is_file():
             raise UnreadableImage(f"{path}: no such file; every pair of the batch would need it")
-    inputs = {_real(path) for unit in units for path in (*unit.pictures, *files_read(unit.options))}
+    inputs = {_real(path) for unit in units for path in (*unit.pictures, *unit.options.files_read)}
     names: dict[Path, list[str]] = defaultdict(list, {request.folder: [request.summary.name]})
     for unit in units:
         for path in (*unit.outputs, unit.stamp):

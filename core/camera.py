@@ -54,10 +54,7 @@ class Camera:
 
     def scaled(self, factor: float) -> NDArray[np.float64]:
         """K with its focal length times `factor`."""
-        K = self.K.copy()
-        K[0, 0] *= factor
-        K[1, 1] *= factor
-        return K
+        return zoomed(self.K, factor)
 
     def resized(self, size: tuple[int, int]) -> Camera:
         """The camera of its picture resized to (W, H) px."""
@@ -66,6 +63,14 @@ class Camera:
         K[:2] *= factor[:, None]
         K[:2, 2] += (factor - 1) / 2  # pixel centres are integers: the corner lies at −½
         return replace(self, K=K, size=size)
+
+
+def zoomed(K: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+    """K (3, 3) with its focal length times `factor`."""
+    out = K.copy()
+    out[0, 0] *= factor
+    out[1, 1] *= factor
+    return out
 
 
 @dataclass(frozen=True)

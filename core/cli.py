@@ -176,9 +176,7 @@ def _stitch(args: argparse.Namespace) -> int:
 
     options = options_from(args, measure=bool(args.report or args.verbose))
     outputs = OutputRequest(args.output, args.report, args.layers, args.warp)
-    given = (args.cameras, args.matches, args.ignore_ref, args.ignore_target)
-    inputs = [args.reference, *args.target, *(path for path in given if path is not None)]
-    with OutputFiles(args.overwrite, inputs) as files:
+    with OutputFiles(args.overwrite, [args.reference, *args.target, *options.files_read]) as files:
         check(outputs, files)
         with _progress_shown(args.quiet) as show:
             result = stitch(args.reference, args.target[0], options, progress=show)
@@ -272,8 +270,12 @@ def _progress_shown(quiet: bool) -> Iterator[Callable[[str, float], None]]:
         ) as bar:
 
             def move(stage: str, total: float) -> None:
+                # tqdm draws ten times a second at most: a new stage is shown all the same
+                changed = bar.desc != stage
                 bar.set_description_str(stage, refresh=False)
                 bar.update(round(100 * total) - bar.n)
+                if changed:
+                    bar.refresh()
 
             yield move
     else:

@@ -261,8 +261,7 @@ def fit_strict(
     noise_px = max(two_view.sigma, 0.1 * matches.scale)
     plane = fit_plane(x[index], d[index], sensitivity[index] * np.sqrt(matches.weights[index]), noise_px)
     off_line = np.linalg.norm(target_points(two_view, x[index], d[index]) - y[index], axis=1)
-    if not matches.given or len(index) > CENTRE_BUDGET:
-        index = index[spread_points(x[index], off_line / matches.weights[index], CENTRE_BUDGET, unit / 200)]
+    index = _thinned(matches, index, off_line, unit)
     _refuse_no_spread(x[index], matches.scale)
     g = d - (x @ plane[:2] + plane[2])
     index, spline, residual, smoothing, held_out_px = _prune_and_smooth(matches, g, sensitivity, index, unit)
@@ -277,6 +276,14 @@ def fit_strict(
         negative_share=float(np.mean(d[index] < 0)),
     )  # fmt: skip
     return StrictField(two_view, size, target_size, plane, spline, fit, fade)
+
+
+def _thinned(matches: Matches, index: NDArray[np.intp], off: Array, unit: float) -> NDArray[np.intp]:
+    """As many of the matches `index` (n,), off (n,) px where they should be, as a spline can bear; of those the user
+    gave all, up to that."""
+    if matches.given and len(index) <= CENTRE_BUDGET:
+        return index
+    return index[spread_points(matches.x[index], off / matches.weights[index], CENTRE_BUDGET, unit / 200)]
 
 
 def _refuse_no_spread(x: Array, scale: float) -> None:
@@ -298,11 +305,9 @@ def _without_parallax(
     nothing = ThinPlateSpline(np.empty((0, 2)), np.empty(0), np.zeros(3), np.zeros(2), 1.0)
     off = np.linalg.norm(target_points(two_view, matches.x, np.zeros(len(matches))) - matches.y, axis=1)
     rms = float(np.sqrt(np.nanmean(off**2)))
-    kept = np.isfinite(off)
-    if not matches.given or len(matches) > CENTRE_BUDGET:
-        index, unit = np.flatnonzero(kept), float(np.sqrt(size[0] * size[1]))
-        kept = np.zeros(len(matches), bool)
-        kept[index[spread_points(matches.x[index], off[index], CENTRE_BUDGET, unit / 200)]] = True
+    index = np.flatnonzero(np.isfinite(off))
+    kept = np.zeros(len(matches), bool)
+    kept[_thinned(matches, index, off[index], float(np.sqrt(size[0] * size[1])))] = True
     fit = Fit(kept, SMOOTHING_START, 8 * matches.scale, rms, rms, 0.0)
     return StrictField(two_view, size, target_size, np.zeros(3), nothing, fit, fade)
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .camera import Camera
-from .epipolar import Array, homogeneous, infinite_homography, project
+from .camera import Camera, zoomed
+from .epipolar import homogeneous, infinite_homography, project
 from .features import Matches
 from .pose_refinement import Pose, focal_deviations, refine_pose
 
@@ -69,17 +69,13 @@ def _spread(
     back = there @ np.linalg.inv(infinite_homography(pose.K, pose.K_prime, pose.R)).T
     moved = []
     for factor in (math.exp(-change), math.exp(change)):
-        first, second = (replace(c, K=_scaled(K, factor), log_sigma=0.0) for c, K in (
+        first, second = (replace(c, K=zoomed(K, factor), log_sigma=0.0) for c, K in (
             (camera, pose.K), (camera_prime, pose.K_prime)
         ))  # fmt: skip
         other, _ = refine_pose(matches, Pose(first.K, second.K, pose.R, pose.t), first, second, sigma)
         away = project(back @ infinite_homography(other.K, other.K_prime, other.R).T) - there[:, :2]
         moved.append(float(np.median(np.linalg.norm(away, axis=1))))
     return max(moved)
-
-
-def _scaled(K: Array, factor: float) -> Array:
-    return K * np.array([[factor, factor, 1.0], [1.0, factor, 1.0], [1.0, 1.0, 1.0]])
 
 
 def focal_warnings(pose: Pose, camera: Camera, camera_prime: Camera) -> list[str]:

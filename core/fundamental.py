@@ -64,6 +64,15 @@ def fundamental_candidates(matches: Matches, seed: int) -> list[Array]:
     return [F for _, F, _ in ranked]
 
 
+def explained_by(F: Array, matches: Matches) -> tuple[NDArray[np.bool_], float]:
+    """Which matches (N,) lie on the lines of F, and the noise of a Sampson distance among them in px."""
+    residual = np.abs(sampson_residuals(F, matches.x, matches.y))
+    on = residual < RANSAC_PX * matches.scale
+    # σ from the median absolute residual of a normal distribution
+    sigma = float(np.median(residual[on])) / 0.6745 if on.any() else 0.0
+    return on, max(sigma, LEAST_PX * matches.scale)
+
+
 def robust_fundamental(matches: Matches, threshold: float, seed: int) -> Array:
     """The fundamental matrix (3, 3) with most matches within `threshold` px, by PoseLib's LO-RANSAC."""
     options = {"max_epipolar_error": threshold, "seed": seed, "max_iterations": 20000}
@@ -77,8 +86,7 @@ def refuse_chance(matches: Matches, F: Array, size: tuple[int, int]) -> None:
     α^(k − 7) with α the chance of a point lying within the threshold of a line.
     """
     threshold = RANSAC_PX * matches.scale
-    n = len(matches)
-    k = int((np.abs(sampson_residuals(F, matches.x, matches.y)) < threshold).sum())
+    n, k = len(matches), int(explained_by(F, matches)[0].sum())
     alpha = min(1.0, 2 * threshold * math.hypot(*size) / (size[0] * size[1]))
     findings = math.log(n - 7) + _log_choose(n, k) + _log_choose(k, 7) + (k - 7) * math.log(alpha)
     if findings > 0:
@@ -129,7 +137,7 @@ def transfer_error(H: Array, matches: Matches) -> Array:
 
 def refuse_without_spread(matches: Matches, F: Array, size: tuple[int, int], target_size: tuple[int, int]) -> None:
     """Raises DegenerateGeometry where the matches that F explains lie in one spot or on one line of a picture."""
-    agree = np.abs(sampson_residuals(F, matches.x, matches.y)) < RANSAC_PX * matches.scale
+    agree, _ = explained_by(F, matches)
     for points, picture_size in ((matches.x[agree], size), (matches.y[agree], target_size)):
         centred = points - np.median(points, axis=0)
         # nine in ten, and a direction that few strays cannot turn: they span no area
@@ -159,9 +167,7 @@ def shows_parallax(matches: Matches, F: Array, homography: Homography, target_si
     front = ray[:, 2] > 0
     with np.errstate(divide="ignore", invalid="ignore"):
         moved = np.where(front[:, None], matches.y - project(ray), np.inf)
-    agree = np.abs(sampson_residuals(F, matches.x, matches.y))
-    explained = agree < RANSAC_PX * matches.scale
-    sigma = max(float(np.median(agree[explained])) / 0.6745, LEAST_PX * matches.scale)
+    explained, sigma = explained_by(F, matches)
     on, off = ON_SIGMAS * sigma, max(OFF_SIGMAS * sigma, OFF_PX * matches.scale)
     with np.errstate(invalid="ignore"):
         along = np.abs(moved[:, 1] * normal[:, 0] - moved[:, 0] * normal[:, 1])

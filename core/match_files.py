@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .errors import BadRequest
 from .features import Matches
-from .text_files import read_text
+from .text_files import read_lines
 
 COLUMNS = ("x", "y", "x2", "y2")
 WEIGHT = "weight"
@@ -92,10 +92,7 @@ def _from_file(path: Path) -> tuple[NDArray[np.float64], list[str]]:
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     """The cells of each line that holds some, with its number as editors count, from 1."""
-    text = read_text(path, "the file of matches", _LAYOUT)
-    for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
+    for number, line in read_lines(path, "the file of matches", _LAYOUT):
         # a semicolon first: where it separates, commas are decimal
         separator = next((mark for mark in ";," if mark in line), None)
         try:

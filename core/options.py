@@ -41,6 +41,12 @@ class StitchOptions:
     seed: int = 0
     measure: bool = True
 
+    @property
+    def files_read(self) -> list[Path]:
+        """The files that these options name."""
+        named = (self.camera.cameras, self.matches, self.ignore_reference, self.ignore_target)
+        return [Path(one) for one in named if isinstance(one, (str, Path))]
+
     def __post_init__(self) -> None:
         for name, value, known in (
             ("field", self.field, FIELDS), ("fade", self.fade, FADES), ("blend", self.blend, BLENDS),

@@ -71,10 +71,17 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     if request.warp is not None:
         files.add(request.warp, warp_bytes(result))
     if request.report is not None and request.timing is not None and request.matches is not None:
-        files.add(request.matches, matches_csv(result.used_matches))
-        files.add(request.report, json_bytes({**result.report, "warnings": [*result.warnings, *warnings]}))
-        files.add(request.timing, json_bytes({"seconds": result.seconds}))
+        add_report(result, [*result.warnings, *warnings], request.report, request.matches, request.timing, files)
     return warnings
+
+
+def add_report(
+    result: StitchResult, warnings: list[str], report: Path, matches: Path, timing: Path, files: OutputFiles
+) -> None:
+    """Stages the report with these warnings, the matches that were used, and the seconds."""
+    files.add(report, json_bytes({**result.report, "warnings": warnings}))
+    files.add(matches, matches_csv(result.used_matches))
+    files.add(timing, json_bytes({"seconds": result.seconds}))
 
 
 def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result: StitchResult) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .camera import Camera
+from .camera import Camera, zoomed
 from .epipolar import (
     Array,
     fundamental_from_pose,
@@ -151,9 +151,9 @@ class _Problem:
         """The pose after a step in the unknowns."""
         K, K_prime = pose.K, pose.K_prime
         if self.focal_free:
-            K = _zoomed(K, np.exp(np.clip(step[0], -0.3, 0.3)))
+            K = zoomed(K, np.exp(np.clip(step[0], -0.3, 0.3)))
             factor = step[1] if self.zoom else step[0]
-            K_prime = _zoomed(K_prime, np.exp(np.clip(factor, -0.3, 0.3)))
+            K_prime = zoomed(K_prime, np.exp(np.clip(factor, -0.3, 0.3)))
         if self.principal_free:
             aside = np.zeros((3, 3))
             aside[:2, 2] = self.principal_sigma * step[-7:-5]
@@ -297,13 +297,6 @@ class _Problem:
 def _add(normal: Array, gradient: Array, values: Array, jacobian: Array, weight: Array) -> None:
     normal += (jacobian * weight[:, None]).T @ jacobian
     gradient += jacobian.T @ (weight * values)
-
-
-def _zoomed(K: Array, factor: float) -> Array:
-    out = K.copy()
-    out[0, 0] *= factor
-    out[1, 1] *= factor
-    return out
 
 
 def _third_column(v: Array) -> Array:

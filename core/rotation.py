@@ -60,25 +60,21 @@ def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camer
             prior.append((p[3] - p[-1]) / ALIKE_SIGMA)
         return np.concatenate([away.ravel(), prior])
 
-    best, least = None, np.inf
     factors = [1.0]
     if free and camera.assumed:
         factors += [share * max(camera.size) / camera.focal for share in FOCAL_STARTS]
+    found: list[tuple[float, Rotation]] = []
     for factor in factors:
         K, K_prime = camera.scaled(factor if free else 1.0), camera_prime.scaled(factor if free_prime else 1.0)
         start = _nearest_rotation(inverse_intrinsics(K_prime) @ H @ K)
         p = np.zeros(3 + free + free_prime)
         p[3:] = np.log(factor)
-        found = least_squares(residuals, p, loss="cauchy", max_nfev=100)
-        if found.cost < least:
-            best, least = unpack(found.x), float(found.cost)
-    if best is None:
-        raise AssertionError("there is always a start")
-    return best
+        solution = least_squares(residuals, p, loss="cauchy", max_nfev=100)
+        found.append((float(solution.cost), unpack(solution.x)))
+    return min(found, key=lambda item: item[0])[1]
 
 
 def _nearest_rotation(M: Array) -> Array:
     """The rotation nearest to a multiple of M (orthogonal Procrustes)."""
     U, _, Vt = np.linalg.svd(M)
-    R = U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt
-    return R if np.trace(R @ M.T) > 0 else _nearest_rotation(-M)
+    return U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt

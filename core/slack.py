@@ -45,11 +45,8 @@ class SlackField:
         if not len(bend.centres):
             slack, bent = on_nodes(mine, grid, ideal), None
         else:  # both stand on the same centres: their kernel, which is what costs time, is worked out once
-            # pruning left the strict field's coordinates where they were: its affine part is moved to ours
-            moved = bend.affine.copy()
-            moved[2] += bend.affine[:2] @ (mine.centre - bend.centre) / bend.scale
             weights, affine = (
-                np.column_stack(both) for both in ((mine.weights, bend.weights), (mine.affine, moved))
+                np.column_stack(both) for both in ((mine.weights, bend.weights), (mine.affine, bend.affine))
             )
             values = on_nodes(replace(mine, weights=weights, affine=affine), grid, ideal)
             slack, bent = values[..., :2], values[..., 2]
@@ -71,5 +68,7 @@ def fit_slack(strict: StrictField, matches: Matches) -> SlackField:
     left = kept.y - strict.sends(kept.x)
     left = np.where(np.isfinite(left), left, 0.0)  # bent behind the camera: nothing to say
     unit = float(np.sqrt(strict.size[0] * strict.size[1]))
-    problem = SmoothingProblem.build(kept.x, 1 / np.sqrt(kept.weights), unit)
+    # in the strict field's own coordinates, so that one kernel serves both
+    centre = strict.spline.centre if len(strict.spline.centres) else None
+    problem = SmoothingProblem.build(kept.x, 1 / np.sqrt(kept.weights), unit, centre)
     return SlackField(strict, problem.solve(left, STIFFER * strict.fit.smoothing)[0])

@@ -84,9 +84,9 @@ class SmoothingProblem:
     phi: Array
 
     @staticmethod
-    def build(points: Array, noise: Array, scale: float) -> SmoothingProblem:
-        """Points moved to their centroid and divided by `scale`, the unit in which λ is meant."""
-        centre = points.mean(axis=0)
+    def build(points: Array, noise: Array, scale: float, centre: Array | None = None) -> SmoothingProblem:
+        """Points moved to `centre`, their centroid if none is given, and divided by `scale`, the unit of λ."""
+        centre = points.mean(axis=0) if centre is None else centre
         centres = (points - centre) / scale
         return SmoothingProblem(centres, noise, centre, scale, kernel(centres, centres))
 

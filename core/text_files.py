@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import BadRequest, UnreadableImage
@@ -24,3 +26,10 @@ def read_text(path: Path, what: str, layout: str) -> str:
     if "\0" in text:
         raise BadRequest(f"{path}: not a text in UTF-8; {what} is a CSV file: {layout}")
     return text
+
+
+def read_lines(path: Path, what: str, layout: str) -> Iterator[tuple[int, str]]:
+    """Lines that are neither blank nor comments (#), with their numbers as editors count, from 1; see `read_text`."""
+    for number, line in enumerate(re.split("\r\n|\r|\n", read_text(path, what, layout)), 1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            yield number, line

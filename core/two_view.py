@@ -31,6 +31,7 @@ from .fundamental import (
     MIN_INLIERS,
     RANSAC_PX,
     Homography,
+    explained_by,
     fit_homography,
     fundamental_candidates,
     refuse_chance,
@@ -99,7 +100,8 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
     if len(matches) < MIN_MATCHES:
         raise TooFewMatches(
             f"only {len(matches)} matching points found, at least {MIN_MATCHES} needed: the pictures must show the "
-            "same things over about a quarter of their area; try pictures taken closer together, or sharper ones"
+            "same things over about a quarter of their area; try pictures taken closer together, or sharper "
+            "ones, or give matches by hand (--matches)"
         )
     if camera.pose is not None and camera_prime.pose is not None:
         return _from_known_cameras(matches, camera, camera_prime, camera.pose, camera_prime.pose)
@@ -222,9 +224,7 @@ def _plane_without_pose(
 
 def _contradiction(matches: Matches, F: Array, inliers: NDArray[np.bool_], sigma: float) -> list[str]:
     """A warning where cameras that were given explain clearly less than free ones would."""
-    free = np.abs(sampson_residuals(F, matches.x, matches.y))
-    agree = free < RANSAC_PX * matches.scale
-    noise = max(float(np.median(free[agree])) / 0.6745, LEAST_PX * matches.scale)
+    agree, noise = explained_by(F, matches)
     if inliers.sum() >= GIVEN_KEPT * agree.sum() and sigma <= GIVEN_SIGMAS * noise:
         return []
     return [
@@ -250,7 +250,7 @@ def _fit_pose(
     matches: Matches, candidates: list[Array], homography: Homography, camera: Camera, camera_prime: Camera, seed: int
 ) -> tuple[Pose, NDArray[np.bool_], float, bool]:
     """The pose, its inliers, their noise, and whether the second focal length was freed."""
-    starts = _best_starts(matches, candidates, homography, camera, camera_prime, seed)
+    starts = _best_starts(matches, candidates, homography, camera, camera_prime)
     refined = [_refine_with_inliers(matches, p, camera, camera_prime, False) for p in starts]
     best = _least_truncated(matches, refined)
     # a wide threshold lets in stray matches that the pose bends to; one as sharp as the noise turns out does not
@@ -264,7 +264,7 @@ def _fit_pose(
 
 
 def _best_starts(
-    matches: Matches, candidates: list[Array], homography: Homography, camera: Camera, camera_prime: Camera, seed: int
+    matches: Matches, candidates: list[Array], homography: Homography, camera: Camera, camera_prime: Camera
 ) -> list[Pose]:
     """The poses to refine from, best first: every F at a ladder of focal lengths, and, where most points lie on a
     plane, which makes F meaningless, those that its homography allows.
@@ -402,5 +402,3 @@ def _from_known_cameras(
         inliers=inliers | matches.given, sigma=sigma, model="general", why=why, focal_source=camera.source,
         focal_deviation=0.0, h_inf_spread=0.0, warnings=tuple(_about_given(matches, residual)),
     )  # fmt: skip
-
-

@@ -196,7 +196,7 @@ def stop_at(number: int, original: Callable, trouble: type[BaseException]) -> Ca
 
 
 @pytest.mark.parametrize("trouble", [KeyboardInterrupt, Cancelled])
-@pytest.mark.parametrize("where", ["stitch", "edf_stitch.core.batch_outputs.matches_csv"])
+@pytest.mark.parametrize("where", ["stitch", "edf_stitch.core.outputs.matches_csv"])
 def test_an_interrupted_batch_is_resumed(
     work: Path, said: Callable, quick: list, monkeypatch: pytest.MonkeyPatch, trouble: type[BaseException], where: str
 ) -> None:

@@ -7,22 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera
-from edf_stitch.core.epipolar import homogeneous, infinite_homography, project, rotation_from_vector
+from edf_stitch.core.epipolar import homogeneous, infinite_homography, project
 from edf_stitch.core.features import Matches
 from edf_stitch.core.focal import KnownFocal, focal_warnings, known_focal
 from edf_stitch.core.pose_refinement import Pose, focal_deviations, refine_pose
 
-SIZE = (1200, 900)
-FOCAL = 1000.0
-
-
-def unit(*v: float) -> np.ndarray:
-    return np.array(v) / np.linalg.norm(v)
-
-
-def turned_by(*degrees: float) -> np.ndarray:
-    return rotation_from_vector(np.radians(degrees))
-
+from .point_scenes import FOCAL, SIZE, turned_by, unit
 
 # R and t of target cameras, each half a unit or more away: what they tell of the focal length follows from DESIGN 4
 CONVERGING = (turned_by(8, -15, 5), 0.8 * unit(1, -0.4, 0.3))

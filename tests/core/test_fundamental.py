@@ -33,7 +33,8 @@ from edf_stitch.core.fundamental import (
     transfer_error,
 )
 
-SIZE = (1200, 900)
+from .point_scenes import SIZE, spoiled
+
 K = np.array([[1000.0, 0, 599.5], [0, 1000.0, 449.5], [0, 0, 1]])
 R = rotation_from_vector(np.radians([2.0, -12, 3]))
 T = np.array([1, 0.1, 0.15]) / np.linalg.norm([1, 0.1, 0.15])
@@ -68,10 +69,7 @@ def scene(
     ok = (y >= 0).all(axis=1) & (y <= np.array(SIZE) - 1).all(axis=1)
     x, y = x[ok][:count], y[ok][:count]
     assert len(x) == count
-    x, y = x + random.normal(0, noise, x.shape), y + random.normal(0, noise, y.shape)
-    wrong = np.zeros(count, bool)
-    wrong[random.permutation(count)[: round(outliers * count)]] = True
-    y[wrong] = random.uniform((0, 0), (SIZE[0] - 1, SIZE[1] - 1), (int(wrong.sum()), 2))
+    x, y, wrong = spoiled(x, y, noise, outliers, random)
     return Scene(Matches(x, y), wrong)
 
 

@@ -23,16 +23,7 @@ from edf_stitch.core.features import Matches
 from edf_stitch.core.lens import distort
 from edf_stitch.core.two_view import MIN_MATCHES, TwoView, estimate
 
-SIZE = (1200, 900)
-FOCAL = 1000.0
-
-
-def unit(*v: float) -> np.ndarray:
-    return np.array(v) / np.linalg.norm(v)
-
-
-def turned_by(*degrees: float) -> np.ndarray:
-    return rotation_from_vector(np.radians(degrees))
+from .point_scenes import FOCAL, SIZE, spoiled, turned_by, unit
 
 
 @dataclass(frozen=True)
@@ -107,10 +98,7 @@ def scene(
     ok = (there[:, 2] > 0) & (y >= 0).all(axis=1) & (y <= np.array(SIZE) - 1).all(axis=1)
     x, y = x[ok][:count], y[ok][:count]
     assert len(x) == count
-    x, y = x + random.normal(0, noise, x.shape), y + random.normal(0, noise, y.shape)
-    wrong = np.zeros(count, bool)
-    wrong[random.permutation(count)[: round(outliers * count)]] = True
-    y[wrong] = random.uniform((0, 0), (SIZE[0] - 1, SIZE[1] - 1), (int(wrong.sum()), 2))
+    x, y, wrong = spoiled(x, y, noise, outliers, random)
     return Scene(Matches(x, y), K, K_prime, layout.R, layout.t, wrong, noise)
 
 

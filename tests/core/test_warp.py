@@ -93,7 +93,9 @@ def test_strips_leave_no_trace(by_hand: SimpleNamespace) -> None:
     canvas = Canvas(1203, 1001, (17, -5))  # 1.2 million pixels: two strips
     warp = build_map(field, view, canvas, camera, camera)
     grid = Grid.over(-17, 5, 1203, 1001)
-    assert np.array_equal(warp.inverse_depth, grid.to_pixels(field.on_grid(grid).inverse_depth, -17, 5, 1203, 1001))
+    whole = grid.to_pixels(field.on_grid(grid).inverse_depth, -17, 5, 1203, 1001)
+    # BLAS sums a strip of another height in another order on some processors: the last float32 digit is its own
+    assert np.allclose(warp.inverse_depth, whole, rtol=2**-21, atol=0)
     rows = np.abs(np.diff(warp.map_y, 2, axis=0))
     assert rows.max() < 3 * np.median(rows.max(axis=1)), "no line where two strips meet"
 
