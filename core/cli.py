@@ -74,6 +74,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_stitch(commands.add_parser("stitch", help="stitch a pair into one panorama", description=_STITCH))
     _add_batch(commands.add_parser("batch", help="stitch a list of pairs and clips", description=_BATCH))
+    _add_validate(
+        commands.add_parser("validate", help="render scenes with known cameras and measure", description=_VALIDATE)
+    )
     _add_demo(commands.add_parser("demo", help="make a pair, stitch it, say what was measured", description=_DEMO))
     return parser
 
@@ -96,7 +99,12 @@ first, last, step, focal_px and focal35 as well. A bad pair is reported and the 
 became of each. Exit codes: 0 all done, 2 the call is wrong, 3 a pair can't be stitched, 4 a file can't be read or
 written, 130 interrupted."""
 
-_DEMO = "Make two pictures of a small scene through known cameras, stitch them, and compare with the truth."
+_VALIDATE = """Render scenes with known cameras in Blender, stitch them, and hold all of it against the truth: OUTDIR
+gets report.html, report.json and report.csv. Pictures are kept in OUTDIR/pictures and made only once. Exit codes: 0 all
+thresholds held, 1 some did not, 2 the call is wrong, 3 nothing can render, 4 a file can't be read or written, 130
+interrupted (--resume goes on)."""
+
+_DEMO = "Render two pictures of a small scene through known cameras, stitch them, and compare with the truth."
 
 
 def _add_stitch(parser: argparse.ArgumentParser) -> None:
@@ -145,6 +153,22 @@ def _shard(text: str) -> tuple[int, int]:
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not like 2/3: which of how many runs") from None
     return index, count
+
+
+def _add_validate(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_validate)
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUTDIR", help="folder for everything")
+    parser.add_argument(
+        "--suite", default="quick", metavar="SUITE", help="quick (default: 4 scenes, 640×480) or full (all, 1280×960)"
+    )
+    parser.add_argument(
+        "--scene", nargs="+", default=[], metavar="NAME",
+        help="these scenes only; NAME:baseline=2,turn=1.5,overlap=0.4,noise=3 makes one harder",
+    )  # fmt: skip
+    parser.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="the I-th of N runs sharing OUTDIR")
+    parser.add_argument("--resume", action="store_true", help="measure only what is missing or was measured otherwise")
+    parser.add_argument("--overwrite", action="store_true", help="measure everything again")
+    _add_loudness(parser)
 
 
 def _add_demo(parser: argparse.ArgumentParser) -> None:
@@ -288,6 +312,25 @@ def _progress_shown(quiet: bool) -> Iterator[Callable[[str, float], None]]:
                 last = stage
 
         yield tell
+
+
+def _validate(args: argparse.Namespace) -> int:
+    from ..synthetic_scenes.validation import ValidationRequest, run_validation
+    from ..synthetic_scenes.validation_report import summary_lines
+
+    request = ValidationRequest(
+        args.output, args.suite, tuple(args.scene), args.shard, args.resume, args.overwrite
+    )  # fmt: skip
+    try:
+        done = run_validation(request, lambda line: None if args.quiet else _say(f"edf: {line}"))
+    except KeyboardInterrupt:
+        print("edf: interrupted; finished scenes are kept, and --resume goes on with the rest", file=sys.stderr)
+        return Cancelled.exit_code
+    if done.verdict is None:
+        _say(f"edf: still to be measured: {', '.join(done.missing)}; --resume without --shard puts all together")
+    else:
+        print("\n".join([*summary_lines(done.verdict, done.results), *map(str, done.files)]))
+    return done.exit_code
 
 
 def _demo(args: argparse.Namespace) -> int:

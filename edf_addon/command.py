@@ -16,9 +16,13 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import bpy
+
 PACKAGE = __name__.rsplit(".", 2)[0]
 # Not resolved: developers link a checkout into the extensions folder, and the wheels lie beside the link.
 FOLDER = Path(__file__).absolute().parent.parent
+# Tells the worker with which Blender to render; synthetic_scenes reads it.
+BLENDER_VARIABLE = "EDF_BLENDER"
 # The signals that ask to stop, as far as this system has them.
 STOPPING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
@@ -32,12 +36,14 @@ def worker_command(argv: list[str]) -> tuple[list[str], dict[str, str]]:
     """The command line and the environment of a process that does what `edf ARGV…` does."""
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     name = PACKAGE
-    if PACKAGE.startswith("bl_ext."):
+    if PACKAGE.startswith("bl_ext.") or bpy.app.binary_path:
         # Inside Blender the package has a name that only Blender can import: name its folder instead. Blender ignores
         # the user's Python variables, so they must not reach its Python here either.
         name = FOLDER.name
         environment = {key: value for key, value in environment.items() if not key.startswith("PYTHON")}
         environment["PYTHONPATH"] = os.pathsep.join([str(FOLDER.parent), *_wheels_folders()])
+    if bpy.app.binary_path:  # empty where bpy is a module
+        environment[BLENDER_VARIABLE] = bpy.app.binary_path
     return [sys.executable, "-s", "-P", "-m", name, *argv], environment
 
 
@@ -90,6 +96,7 @@ def _ask_to_stop(worker: subprocess.Popen) -> None:
 
 
 def _wheels_folders() -> list[str]:
-    """Where Blender has unpacked the wheels of the repository that this extension lies in."""
-    local = FOLDER.parent.parent / ".local"
-    return [entry for entry in sys.path if Path(entry).is_relative_to(local)]
+    """Where Blender has unpacked the wheels: beside the repository that this extension lies in, or, where this is a
+    checkout, beside the user's, which holds the installed one."""
+    places = FOLDER.parent.parent / ".local", Path(bpy.utils.user_resource("EXTENSIONS"), ".local")
+    return [entry for entry in sys.path if any(Path(entry).is_relative_to(place) for place in places)]

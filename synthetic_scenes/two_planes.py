@@ -12,32 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.epipolar import Array, homogeneous, rotation_from_vector
+from .scene_camera import SceneCamera
 
 Points = NDArray[np.float32]
 
 WALL_Z, FLOOR_Y = 6.0, 1.3
 SAMPLES = 3  # rays per pixel and direction: no aliasing to mislead features
-
-
-@dataclass(frozen=True)
-class SceneCamera:
-    """K (3, 3) px, R, t: a world point X is seen at K (R X + t); size (W, H) px."""
-
-    K: Array
-    R: Array
-    t: Array
-    size: tuple[int, int]
-
-    @property
-    def place(self) -> Array:
-        """Where the camera stands in the world (3,)."""
-        return -self.R.T @ self.t
-
-    def widened(self, left: int, top: int, width: int, height: int) -> SceneCamera:
-        """The same camera with a larger sensor whose first pixel lies at (left, top) of this one's picture."""
-        K = self.K.copy()
-        K[:2, 2] -= (left, top)
-        return SceneCamera(K, self.R, self.t, (width, height))
 
 
 @dataclass(frozen=True)

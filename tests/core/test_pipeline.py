@@ -35,7 +35,8 @@ from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.progress import STAGES
 from edf_stitch.core.warp import build_map
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry, pose_errors
-from edf_stitch.synthetic_scenes.two_planes import Pair, SceneCamera, depth_at, make_pair
+from edf_stitch.synthetic_scenes.scene_camera import SceneCamera
+from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at, make_pair
 
 # --- against the truth ---------------------------------------------------------------------------------------------
 

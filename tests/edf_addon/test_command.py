@@ -7,8 +7,10 @@ import sys
 import time
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from edf_stitch.synthetic_scenes import blender_process
 
 pytest.importorskip("bpy")
 
@@ -65,6 +67,15 @@ def test_inside_blender_the_worker_finds_the_folder_and_the_wheels(monkeypatch, 
     assert environment["PYTHONPATH"].split(os.pathsep) == [str(folder.parent), str(site_packages)]
     assert environment["OPENBLAS_NUM_THREADS"] == "1"
     assert "PYTHONHOME" not in environment
+
+
+def test_the_worker_learns_which_blender_started_it(monkeypatch):
+    assert command.BLENDER_VARIABLE == blender_process.BLENDER_VARIABLE
+    monkeypatch.delenv(command.BLENDER_VARIABLE, raising=False)
+    assert command.BLENDER_VARIABLE not in command.worker_command(["validate"])[1], "bpy as a module is no program"
+    app = SimpleNamespace(binary_path="/opt/blender/blender")
+    monkeypatch.setattr(command, "bpy", SimpleNamespace(app=app, utils=command.bpy.utils))
+    assert command.worker_command(["validate"])[1][command.BLENDER_VARIABLE] == app.binary_path
 
 
 def test_a_worker_that_dies_of_a_signal_has_a_shells_exit_status():

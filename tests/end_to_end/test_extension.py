@@ -3,6 +3,7 @@
 BLENDER_RUN says how that Blender is started. Every run has a home of its own, so nothing on the machine is touched.
 """
 
+import json
 import os
 import shlex
 import shutil
@@ -34,7 +35,7 @@ class Home:
 
     def run(self, *arguments: str | Path) -> subprocess.CompletedProcess:
         command = [*BLENDER, "-b", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=self.environment, timeout=300)
+        return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=self.environment, timeout=600)
 
     def edf(self, *arguments: str | Path) -> subprocess.CompletedProcess:
         return self.run("--command", "edf", *arguments)
@@ -139,10 +140,30 @@ def test_a_pair_without_content_gives_3_and_no_traceback(home, tmp_path):
 def test_the_demo(home, tmp_path):
     done = home.edf("demo", "-o", tmp_path / "out")
     assert done.returncode == 0, done.stdout + done.stderr
-    pictures = {path.stem: cv2.imread(str(path)) for path in (tmp_path / "out").glob("*.png")}
-    assert {"reference", "target", "panorama"} <= set(pictures)
+    pictures = {path.stem: cv2.imread(str(path)) for path in (tmp_path / "out").rglob("*.png")}
+    assert {"reference", "target", "panorama", "truth"} <= set(pictures)
     assert pictures["panorama"].shape[1] > pictures["reference"].shape[1]
     assert np.isfinite(np.load(tmp_path / "out" / "warp.npz")["map_x"]).any()
+    rotation = next(line for line in done.stdout.splitlines() if line.startswith("rotation error"))
+    assert float(rotation.split()[2]) < 0.1
+
+
+def test_the_quick_validation_passes_in_blender(home, tmp_path):
+    """Door one of three: the installed extension renders with the Blender that it lives in."""
+    done = home.edf("validate", "-o", tmp_path / "out")
+    assert (tmp_path / "out" / "report.html").exists(), done.stdout + done.stderr
+    assert done.returncode == 0, done.stdout + done.stderr
+    report = json.loads((tmp_path / "out" / "report.json").read_text("utf-8"))
+    assert report["passed"] and {scene["blender"] for scene in report["scenes"]} != {""}
+
+
+def test_a_checkout_validates_with_the_installed_wheels(home, tmp_path):
+    """Door two: `blender -b --python` from a checkout."""
+    script = ROOT / "synthetic_scenes" / "in_blender.py"
+    call = ["validate", "-o", tmp_path / "out", "--scene", "pure_rotation"]
+    done = home.run("--python-exit-code", "9", "--python", script, "--", *call)
+    assert "PASSED" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_a_batch_goes_on_after_a_bad_pair(home, pair, tmp_path):

@@ -1,0 +1,129 @@
+"""What a stitch of a rendered pair is worth, figure by figure, against the truth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.colour import encode
+from ..core.epipolar import Array, distance_to_line
+from ..core.metrics import overlap_quality, psnr, shown_points, ssim
+from ..core.pipeline import StitchResult
+from .ground_truth import TrueGeometry, pose_errors, seen_from, visible
+from .rendered import RenderedPair
+
+# True matches that judge an estimated F.
+MATCHES = 5000
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Of every pixel of the wide canvas (H, W): where the target camera sees it (…, 2), NaN behind it; whether it
+    really does; whether the reference or the target sees it at all; and what it looks like, uint8 RGB."""
+
+    geometry: TrueGeometry
+    target: Array
+    in_target: NDArray[np.bool_]
+    in_reference: NDArray[np.bool_]
+    picture: NDArray[np.uint8]
+    corner: tuple[int, int]
+
+    @property
+    def overlap(self) -> NDArray[np.bool_]:
+        """What both cameras see."""
+        return self.in_target & self.in_reference
+
+
+def truth_of(pair: RenderedPair) -> Truth:
+    """The truth of a rendered pair, from its cameras and depths alone."""
+    pixels, there = seen_from(pair.cameras["wide"], pair.wide_depth, pair.cameras["target"])
+    inside = np.zeros(pair.wide_depth.shape, bool)
+    inside[pair.frame] = True
+    seen = visible(pixels, there, pair.target_depth)
+    return Truth(pair.geometry, pixels, seen, inside, encode(pair.wide, 8), pair.corner)
+
+
+def figures(result: StitchResult, truth: Truth) -> dict[str, float]:
+    """All figures of a stitch; NaN where one has no meaning.
+
+    rotation_deg, focal_percent, epipole_deg (direction of the baseline), h_inf_px and h_inf_p95_px (transfer error,
+    median and 95th percentile), f_px (mean distance of true matches from the estimated lines); projectivity_px and
+    projectivity_p95_px (what the map shows outside the reference, from the true lines: mean, 95th percentile);
+    alignment_px, alignment_p95_px (map against the true map where both cameras see the same: median, 95th percentile),
+    beyond_px (the same outside the reference: median); overlap_psnr_db, overlap_ssim; covered (share of what the target
+    alone shows that the panorama holds).
+    """
+    geometry, view = truth.geometry, result.two_view
+    width, height = result.cameras[1].size
+    known = {"rotation_deg": math.nan, "focal_percent": math.nan, "epipole_deg": math.nan, "h_inf_px": math.nan,
+             "h_inf_p95_px": math.nan, "f_px": math.nan}  # fmt: skip
+    if np.isfinite(view.R).all():
+        pose = pose_errors(view, geometry, (width, height))
+        known |= {name: pose[name] for name in known if name in pose}
+        known["epipole_deg"] = pose["baseline_deg"]
+    if np.isfinite(view.F).all() and geometry.baseline:
+        rows, columns = np.nonzero(truth.overlap)
+        some = slice(None, None, max(1, len(rows) // MATCHES))
+        points = np.column_stack([columns[some], rows[some]]) + np.array(truth.corner, float)
+        true_matches = truth.target[rows[some], columns[some]]
+        known["f_px"] = float(distance_to_line(view.F, points, true_matches).mean())
+    else:
+        known["f_px"] = known["epipole_deg"] = math.nan
+    shown = shown_points(result.warp, result.cameras)
+    beyond = ~shown.overlap
+    off = np.full(1, np.nan)
+    if geometry.baseline and beyond.any():
+        off = distance_to_line(geometry.F.T, shown.target[beyond], shown.points[beyond])
+    here, there = _common(result, truth)
+    apart = np.hypot(
+        result.warp.map_x[here] - truth.target[there][..., 0], result.warp.map_y[here] - truth.target[there][..., 1]
+    )
+    only = truth.in_target & ~truth.in_reference
+    both, alone = (part[there] & np.isfinite(apart) for part in (truth.overlap, only))
+    quality = overlap_quality(result.reference, result.target, result.warp)
+    return {
+        **known,
+        "projectivity_px": float(off.mean()), "projectivity_p95_px": _percentile(off, 95),
+        "alignment_px": _percentile(apart[both], 50), "alignment_p95_px": _percentile(apart[both], 95),
+        "beyond_px": _percentile(apart[alone], 50),
+        "overlap_psnr_db": quality["overlap_psnr_db"], "overlap_ssim": quality["overlap_ssim"],
+        "covered": float((only[there] & (result.alpha[here] > 0.5)).sum() / only.sum()) if only.any() else math.nan,
+    }  # fmt: skip
+
+
+def on_the_wide_canvas(result: StitchResult, truth: Truth) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """The panorama (H, W, 3) as the true panorama lies, uint8, and where (H, W) it shows something that either camera
+    really saw: what no picture shows cannot be asked for."""
+    here, there = _common(result, truth)
+    picture = np.zeros(truth.picture.shape, np.uint8)
+    picture[there] = encode(result.pixels[here], 8)
+    shown = np.zeros(truth.in_target.shape, bool)
+    shown[there] = result.alpha[here] > 0.5
+    return picture, shown & (truth.in_target | truth.in_reference)
+
+
+def whole_picture(picture: NDArray[np.uint8], shown: NDArray[np.bool_], truth: Truth) -> dict[str, float]:
+    """whole_psnr_db and whole_ssim of a panorama on the wide canvas against the true one, over a mask (H, W)."""
+    return {
+        "whole_psnr_db": psnr(picture, truth.picture, shown), "whole_ssim": ssim(picture, truth.picture, shown),
+    }  # fmt: skip
+
+
+def _common(result: StitchResult, truth: Truth) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Rows and columns of the part that panorama and true panorama share, in either."""
+    first = -np.array(result.warp.canvas.offset)
+    sizes = np.array(result.alpha.shape[::-1]), np.array(truth.in_target.shape[::-1])
+    low = np.maximum(first, truth.corner)
+    high = np.minimum(first + sizes[0], np.array(truth.corner) + sizes[1])
+    here, there = (
+        (slice(low[1] - corner[1], high[1] - corner[1]), slice(low[0] - corner[0], high[0] - corner[0]))
+        for corner in (first, np.array(truth.corner))
+    )
+    return here, there
+
+
+def _percentile(values: Array, share: float) -> float:
+    return float(np.percentile(values, share)) if values.size and np.isfinite(values).all() else math.nan

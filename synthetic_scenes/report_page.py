@@ -1,0 +1,308 @@
+"""report.html: one page that opens offline, without scripts; pictures lie beside it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import Any
+from urllib.parse import quote
+
+from .thresholds import LEAD, SAYING_RUN, Check, Median, Result, Verdict
+
+# Figures of a run: what people call them, their unit, digits after the point.
+MEASURES = {
+    "rotation_deg": ("rotation", "°", 3), "focal_percent": ("focal length", "%", 2),
+    "epipole_deg": ("baseline's direction", "°", 2), "h_inf_px": ("H∞ transfer, median", "px", 3),
+    "h_inf_p95_px": ("H∞ transfer, 95th", "px", 3), "f_px": ("F: true matches off their lines", "px", 3),
+    "projectivity_px": ("projectivity, mean", "px", 3), "projectivity_p95_px": ("projectivity, 95th", "px", 3),
+    "alignment_px": ("alignment, median", "px", 3), "alignment_p95_px": ("alignment, 95th", "px", 3),
+    "beyond_px": ("outside the overlap, median", "px", 3), "overlap_psnr_db": ("overlap PSNR", "dB", 2),
+    "overlap_ssim": ("overlap SSIM", "", 4), "covered": ("share of the target's own part shown", "", 3),
+    "whole_psnr_db": ("whole picture PSNR", "dB", 2), "whole_ssim": ("whole picture SSIM", "", 4),
+}  # fmt: skip
+OTHER_NAMES = {
+    "lead_db": "whole picture's lead over the best rival", "model": "model", "status": "status",
+    "undetermined_said": "undetermined focal length said", "position_px": "Position pass from pixel centres",
+    "depth_relative": "Position against Depth, relative", "ray_cast_relative": "ray casts against Depth, relative",
+    "warp_psnr_db": "target by the true map: PSNR", "half_pixel_psnr_db": "the same, half a pixel off: PSNR",
+    "half_pixel_loss_db": "what half a pixel costs", "wide_psnr_db": "wide render against reference: PSNR",
+}  # fmt: skip
+PICTURES = {
+    "reference": "Reference", "target": "Target", "stitch": "Stitch (K known, strict)",
+    "truth": "True panorama (dim: seen by neither)", "difference": "Difference × 4",
+    "lines": "Epipolar lines in the target: true green, estimated pink",
+    "error_map": "Error of the map: black 0, yellow ≥ 4 px; gray: nothing to compare",
+}  # fmt: skip
+# The overview's columns for each of the two ways; a model is a word, the rest are figures.
+OVERVIEW = (
+    ("known/strict", "K known, strict", ("model", "rotation_deg", "h_inf_px", "projectivity_px", "alignment_px",
+                                         "overlap_psnr_db", "whole_psnr_db")),
+    ("unknown/strict", "K unknown, strict", ("model", "focal_percent", "rotation_deg", "h_inf_px", "projectivity_px",
+                                             "alignment_px", "overlap_psnr_db", "whole_psnr_db")),
+)  # fmt: skip
+HEADS = {
+    "model": "model", "focal_percent": "focal<br>%", "rotation_deg": "rotation<br>°", "h_inf_px": "H∞<br>px",
+    "projectivity_px": "projectivity<br>px", "alignment_px": "alignment<br>px", "overlap_psnr_db": "overlap<br>dB",
+    "whole_psnr_db": "whole<br>dB",
+}  # fmt: skip
+GOOD, BAD = '<b class="mark">✓</b>', '<b class="mark">✗</b>'
+
+STYLE = """
+:root { color-scheme: light dark; --ink: #1d2126; --quiet: #656d78; --paper: #fff; --line: #e2e5e9; --soft: #f5f6f8;
+  --good: #1a7041; --good-soft: #e9f5ee; --bad: #b3261e; --bad-soft: #fdecea; --link: #1f5fbf; }
+@media (prefers-color-scheme: dark) { :root { --ink: #dfe3e8; --quiet: #98a1ad; --paper: #15181c; --line: #2d333b;
+  --soft: #1d2127; --good: #6fcf97; --good-soft: #16281e; --bad: #ff8a80; --bad-soft: #361b1a; --link: #86b4ff; } }
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--paper); color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }
+main { max-width: 1560px; margin: 0 auto; padding: 1rem clamp(0.75rem, 2vw, 2rem) 4rem; }
+header { padding: 1rem 1.25rem; border-radius: 8px; border-left: 6px solid; }
+header.good, header.bad { font-weight: 400; } header p { margin: 0.2rem 0 0; color: var(--ink); }
+h1 { margin: 0; font-size: 1.7rem; line-height: 1.2; } h2 { margin: 2rem 0 0.6rem; font-size: 1.2rem; }
+h2.good, h2.bad { background: none; color: var(--ink); } h2.good .mark { color: var(--good); }
+h2.bad .mark { color: var(--bad); } a { color: var(--link); text-decoration: none; }
+a:hover { text-decoration: underline; }
+p { margin: 0.3rem 0; max-width: 60rem; } .quiet, header .quiet { color: var(--quiet); font-size: 0.87rem; }
+.good { background: var(--good-soft); color: var(--good); } .bad { background: var(--bad-soft); color: var(--bad); }
+.scroll { overflow-x: auto; max-width: 100%; }
+table { border-collapse: collapse; font-size: 0.87rem; font-variant-numeric: tabular-nums; }
+th, td { padding: 0.28rem 0.6rem; border-bottom: 1px solid var(--line); text-align: left; white-space: nowrap; }
+th { font-weight: 600; } thead th { color: var(--quiet); line-height: 1.25; vertical-align: bottom; }
+.n { text-align: right; } .first { border-left: 1px solid var(--line); }
+.mark { display: inline-block; width: 1em; text-align: center; font-weight: 600; }
+section { margin-top: 2.5rem; border-top: 1px solid var(--line); } section h2 { margin-top: 1.2rem; }
+.failures { margin: 0.6rem 0; padding: 0.5rem 1rem; border-radius: 6px; list-style: none; }
+.pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 340px), 1fr)); gap: 0.8rem;
+  margin: 0.8rem 0; }
+figure { margin: 0; } figcaption { color: var(--quiet); font-size: 0.82rem; padding-top: 0.2rem; }
+img { display: block; width: 100%; aspect-ratio: 4 / 3; object-fit: contain; background: var(--soft);
+  border-radius: 4px; }
+details { margin: 0.5rem 0; } summary { cursor: pointer; color: var(--link); }
+pre { background: var(--soft); padding: 0.6rem 0.8rem; border-radius: 6px; overflow-x: auto; white-space: pre-wrap; }
+"""
+
+
+def page(results: Sequence[Result], suite: str, version: str, verdict: Verdict, middles: Sequence[Median]) -> str:
+    """The whole page. middles: the suite's medians, shown also where they are not judged."""
+    failed = {check.scene for check in verdict.failed if check.scene is not None}
+    word = "passed" if verdict.passed else "failed"
+    counts = (
+        f"{len(results) - len(failed)} of {len(results)} scenes and "
+        f"{len(verdict.checks) - len(verdict.failed)} of {len(verdict.checks)} checks passed"
+    )
+    about = f"EDF Stitch {version}, suite {suite}{'' if verdict.complete else ', not whole: no medians judged'}"
+    general = [check for check in verdict.failed if check.scene is None]
+    return "\n".join([
+        '<!doctype html>', '<html lang="en">', "<head>", '<meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>Validation {word}: {escape(suite)}</title>", f"<style>{STYLE}</style>", "</head>", "<body>", "<main>",
+        f'<header class="{_class(verdict.passed)}"><h1>{"✓" if verdict.passed else "✗"} Validation {word}</h1>',
+        f"<p>{escape(counts)}</p>", f'<p class="quiet">{escape(about)}</p></header>',
+        _bars(middles, verdict.complete), _failures(general),
+        "<h2>Scenes</h2>", _overview(results, verdict),
+        "<h2>Whole picture against the true panorama</h2>", _rivals(results),
+        *(_section(result, [c for c in verdict.checks if c.scene == result["scene"]]) for result in results),
+        "</main>", "</body>", "</html>", "",
+    ])  # fmt: skip
+
+
+def named(measure: str) -> str:
+    """A figure as people call it."""
+    figure, _, rival = measure.partition(" over ")
+    name = MEASURES[figure][0] if figure in MEASURES else OTHER_NAMES.get(figure, figure)
+    return f"{name}, lead over {rival}" if rival else name
+
+
+def check_value(value: object, measure: str) -> str:
+    """A value with the digits that its measure is worth; – for none."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, (int, float)):
+        return str(value)
+    if measure.endswith("_relative"):
+        return f"{value:.1e}"
+    digits = MEASURES[measure][2] if measure in MEASURES else 2 if "_db" in measure else 0 if measure == "scenes" else 4
+    return f"{value:.{digits}f}"
+
+
+def _bars(middles: Sequence[Median], judged: bool) -> str:
+    rows = []
+    for middle in middles:
+        limit = middle.limit
+        lacking = f", {middle.missing} of them without" if middle.missing else ""
+        rows.append(
+            f"<tr><td>{escape(limit.run)}</td><td>{escape(named(limit.measure))}</td>"
+            + _cell(middle.value, limit.measure, middle.passed if judged else None, f" {limit.unit}")
+            + f"<td class=n>{escape(f'{limit.text} {limit.unit}')}</td><td class=n>{middle.scenes}{lacking}</td></tr>"
+        )
+    head = "<tr><th>run</th><th>median of</th><th class=n>value</th><th class=n>limit</th><th class=n>scenes</th></tr>"
+    return f"<h2>The suite’s bars</h2>{_table(head, rows)}"
+
+
+def _overview(results: Sequence[Result], verdict: Verdict) -> str:
+    groups = "".join(f'<th colspan="{len(columns)}" class=first>{title}</th>' for _, title, columns in OVERVIEW)
+    columns = "".join(
+        f"<th class='{'t' if name == 'model' else 'n'}{' first' if name == 'model' else ''}'>{HEADS[name]}</th>"
+        for _, _, names in OVERVIEW for name in names
+    )  # fmt: skip
+    head = f"<tr><th rowspan=2>scene</th><th rowspan=2>truth<br>proved</th>{groups}</tr><tr>{columns}</tr>"
+    rows = []
+    for result in results:
+        checks = [check for check in verdict.checks if check.scene == result["scene"]]
+        passed = all(check.passed for check in checks)
+        name = f'<a href="#{_slug(result)}">{escape(result["scene"])}</a>'
+        row = f'<tr><th class="{_class(passed)}">{GOOD if passed else BAD} {name}</th>'
+        if result["status"] != "done":
+            width = 1 + sum(len(names) for _, _, names in OVERVIEW)
+            why = escape(f"no figures: {_last(result['message'])}")
+            rows.append(f'{row}<td colspan="{width}" class=bad>{why}</td></tr>')
+            continue
+        proved = all(check.passed for check in checks if check.run == "proof")
+        row += f'<td class="{_class(proved)}">{GOOD if proved else BAD}</td>'
+        for way, _, names in OVERVIEW:
+            run = result["runs"].get(way) or {"figures": {}, "model": None, "refused": ""}
+            for measure in names:
+                mine = [c.passed for c in checks if c.run == way and _column(c) == measure]
+                value = run["figures"].get(measure)
+                if measure == "model":
+                    value = "refused" if run["refused"] else run["model"]
+                row += _cell(value, measure, all(mine) if mine else None, first=measure == "model")
+        rows.append(row + "</tr>")
+    note = (
+        "Coloured and marked: judged. Overlap and whole: PSNR. Of the whole picture it is judged that no rival is "
+        "better by more than 0.2 dB; where the focal length is not determined, that this is said."
+    )
+    return _table(head, rows) + f'<p class="quiet">{note}</p>'
+
+
+def _column(check: Check) -> str:
+    """The overview's column that shows a check."""
+    figure = check.measure.partition(" over ")[0]
+    return "focal_percent" if (check.run, figure) == (SAYING_RUN, "undetermined_said") else figure
+
+
+def _rivals(results: Sequence[Result]) -> str:
+    ways: list[str] = []
+    for result in results:
+        ways += [way for way in result["runs"] if way not in ways]
+    head = f"<tr><th>scene</th>{''.join(f'<th class=n>{escape(way)}</th>' for way in ways)}</tr>"
+    rows = []
+    for result in results:
+        runs = result["runs"]
+        values = [runs[way]["figures"].get(LEAD.measure) if way in runs else None for way in ways]
+        best = max((value for value in values if value is not None), default=None)
+        cells = ""
+        for value in values:
+            text = check_value(value, LEAD.measure)
+            cells += f"<td class=n>{f'<b>{text}</b>' if value is not None and value == best else text}</td>"
+        rows.append(f'<tr><th><a href="#{_slug(result)}">{escape(result["scene"])}</a></th>{cells}</tr>')
+    return _table(head, rows) + '<p class="quiet">PSNR in dB over the pixels that all of them show; best: bold.</p>'
+
+
+def _section(result: Result, checks: Sequence[Check]) -> str:
+    passed = all(check.passed for check in checks)
+    facts = [
+        f"{result['size'][0]} × {result['size'][1]}" if result.get("size") else "",
+        f"right model: {result['expected_model']}", "" if result["parallax"] else "no parallax",
+        "" if result["focal_determined"] else "focal length not determined by two pictures",
+    ]  # fmt: skip
+    parts = [
+        f'<section id="{_slug(result)}"><h2 class="{_class(passed)}">{GOOD if passed else BAD} '
+        f"{escape(result['scene'])}</h2>",
+        f"<p>{escape(result['title'])}</p>", f'<p class="quiet">{escape("; ".join(f for f in facts if f))}</p>',
+    ]  # fmt: skip
+    if result["message"]:
+        parts.append(f"<pre>{escape(result['message'])}</pre>")
+    parts.append(_failures([check for check in checks if not check.passed]))
+    if result["pictures"]:
+        parts.append(f'<div class="pictures">{"".join(_pictures(result))}</div>')
+    said = _warnings(result["runs"])
+    if said:
+        parts.append(f"<details><summary>Refusals and warnings</summary>{said}</details>")
+    if result["runs"]:
+        parts.append(f"<details><summary>All figures</summary>{_figures(result['runs'])}</details>")
+    if result["proof"]:
+        rows = [f"<tr><th>{escape(named(name))}</th>{_cell(value, name, None)}<td>{escape(_unit(name))}</td></tr>"
+                for name, value in result["proof"].items()]  # fmt: skip
+        title = "Proof of the ground truth: worst distances, px and relative, and PSNR"
+        parts.append(f"<details><summary>{title}</summary>{_table('', rows)}</details>")
+    return "\n".join([*parts, '<p class="quiet"><a href="#">to the top</a></p></section>'])
+
+
+def _failures(failed: Sequence[Check]) -> str:
+    items = []
+    for check in failed:
+        value = f"{check_value(check.value, check.measure)} {check.unit}".strip()
+        text = f"{check.run} {named(check.measure)}: {value} (limit {check.limit})".strip()
+        items.append(f"<li>{BAD} {escape(text)}</li>")
+    return f'<ul class="failures bad">{"".join(items)}</ul>' if items else ""
+
+
+def _pictures(result: Result) -> Iterable[str]:
+    kinds = [kind for kind in PICTURES if kind in result["pictures"]]
+    kinds += [kind for kind in result["pictures"] if kind not in PICTURES]
+    for kind in kinds:
+        path, caption = escape(quote(result["pictures"][kind], safe="/=")), escape(PICTURES.get(kind, kind))
+        alt = escape(f"{result['scene']}: {PICTURES.get(kind, kind)}")
+        yield (
+            f'<figure><a href="{path}"><img loading="lazy" src="{path}" alt="{alt}"></a>'
+            f"<figcaption>{caption}</figcaption></figure>"
+        )
+
+
+def _figures(runs: dict[str, dict[str, Any]]) -> str:
+    names = list(MEASURES)
+    names += [name for run in runs.values() for name in run["figures"] if name not in MEASURES]
+    head = f"<tr><th></th><th></th>{''.join(f'<th class=n>{escape(way)}</th>' for way in runs)}</tr>"
+    models = ("refused" if run["refused"] else run["model"] for run in runs.values())
+    rows = [f"<tr><th>model</th><td></td>{''.join(_cell(model, 'run', None) for model in models)}</tr>"]
+    for name in dict.fromkeys(names):
+        cells = "".join(_cell(run["figures"].get(name), name, None) for run in runs.values())
+        rows.append(f"<tr><th>{escape(named(name))}</th><td>{escape(_unit(name))}</td>{cells}</tr>")
+    said = "".join(_cell(run["undetermined_said"], "undetermined_said", None) for run in runs.values())
+    rows.append(f"<tr><th>{escape(named('undetermined_said'))}</th><td></td>{said}</tr>")
+    return _table(head, rows)
+
+
+def _warnings(runs: dict[str, dict[str, Any]]) -> str:
+    """Each text once, with the runs that gave it: most runs say the same."""
+    texts: dict[str, list[str]] = {}
+    for way, run in runs.items():
+        for text in ([f"refused: {run['refused']}"] if run["refused"] else []) + list(run["warnings"]):
+            texts.setdefault(text, []).append(way)
+    items = [f"<li><b>{escape(', '.join(ways))}</b>: {escape(text)}</li>" for text, ways in texts.items()]
+    return f"<ul>{''.join(items)}</ul>" if items else ""
+
+
+def _cell(value: object, measure: str, passed: bool | None, unit: str = "", first: bool = False) -> str:
+    """A table's cell; passed: None where nothing is asked."""
+    kinds = [kind for kind, wanted in (("n", measure != "model"), ("first", first)) if wanted]
+    kinds += [] if passed is None else [_class(passed)]
+    mark = "" if passed is None else f" {GOOD if passed else BAD}"
+    return f'<td class="{" ".join(kinds)}">{escape(check_value(value, measure) + unit)}{mark}</td>'
+
+
+def _table(head: str, rows: Iterable[str]) -> str:
+    top = f"<thead>{head}</thead>" if head else ""
+    return f'<div class="scroll"><table>{top}<tbody>{"".join(rows)}</tbody></table></div>'
+
+
+def _unit(measure: str) -> str:
+    if measure in MEASURES:
+        return MEASURES[measure][1]
+    return "dB" if measure.endswith("_db") else "px" if measure.endswith("_px") else ""
+
+
+def _slug(result: Result) -> str:
+    return "scene-" + re.sub(r"[^A-Za-z0-9_.=-]", "_", result["scene"])
+
+
+def _last(message: str) -> str:
+    lines = message.strip().splitlines()
+    return lines[-1] if lines else "no reason given"
+
+
+def _class(passed: bool) -> str:
+    return "good" if passed else "bad"

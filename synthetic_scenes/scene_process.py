@@ -1,0 +1,103 @@
+"""One scene, from rendering to figures, in a process of its own: `python -m ….scene_process SCENE WIDTH HEIGHT FOLDER`.
+
+It leaves FOLDER/scenes/NAME.json, last, and the scene's pictures; `validation` reads them. A crash in a native library
+ends this process and no other.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import StitchError
+from ..core.output_files import OutputFiles
+from ..core.outputs import json_bytes
+from ..core.report import plain
+from .measures import figures, on_the_wide_canvas, truth_of, whole_picture
+from .recipes import parse_scene
+from .rendered import rendered_pair
+from .scene_pictures import scene_pictures
+from .stitches import WAYS, stitched
+
+SCHEMA = 1
+# The stitch that the report shows.
+SHOWN = "known/strict"
+
+
+def file_name(scene: str) -> str:
+    """A scene's name for files: `street:noise=2` has a sign that some systems refuse."""
+    return re.sub(r"[^A-Za-z0-9_.=-]", "_", scene)
+
+
+def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: str) -> dict[str, float]:
+    """Renders (or finds) a scene, stitches it every way, writes its figures and pictures; returns seconds by stage.
+
+    size: (W, H) px of landscape pictures; made_from: a mark to be kept with the figures. Raises StitchError.
+    """
+    recipe, difficulty = parse_scene(scene)
+    pair = rendered_pair(recipe, difficulty, recipe.size(*size), folder / "pictures")
+    truth = truth_of(pair)
+    results, runs = {}, {}
+    for way in WAYS:
+        try:
+            results[way] = stitched(pair, way)
+        except StitchError as refusal:
+            runs[way] = _run(refused=str(refusal))
+    placed = {way: on_the_wide_canvas(result, truth) for way, result in results.items()}
+    # the same pixels for all: whoever shows less must not gain by it
+    common = None
+    for _, shown in placed.values():
+        common = shown if common is None else common & shown
+    seconds: dict[str, float] = {}
+    for way, result in results.items():
+        view = result.two_view
+        measured = figures(result, truth)
+        if common is not None:
+            measured |= whole_picture(placed[way][0], common, truth)
+        said = any("not determined" in text for text in (view.focal_source, *result.warnings))
+        # in the rival's hands the model is no decision
+        model = None if way.endswith("homography") else view.model
+        runs[way] = _run(model=model, undetermined_said=said, warnings=list(result.warnings), figures=measured)
+        seconds |= {f"{way} {stage}": value for stage, value in result.seconds.items()}
+    name = file_name(scene)
+    pictures = scene_pictures(pair, truth, results[SHOWN], placed[SHOWN][0]) if SHOWN in results else {}
+    entry = {
+        "schema": SCHEMA, "scene": scene, "title": recipe.title, "size": list(recipe.size(*size)),
+        "expected_model": recipe.model, "parallax": recipe.parallax, "focal_determined": recipe.focal_determined,
+        "status": "done", "message": "", "blender": pair.blender, "made_from": made_from, "proof": pair.proof,
+        "runs": {way: runs[way] for way in WAYS},
+        "pictures": {kind: f"scenes/{name}/{kind}.jpg" for kind in pictures},
+    }  # fmt: skip
+    with OutputFiles(overwrite=True) as files:
+        for kind, data in pictures.items():
+            files.add_to_folder(folder / "scenes" / name, f"{kind}.jpg", data)
+        files.add_to_folder(folder / "scenes", f"{name}.timing.json", json_bytes(seconds))
+        files.add_to_folder(folder / "scenes", f"{name}.json", json_bytes(plain(entry)))
+    return seconds
+
+
+def _run(
+    model: str | None = None, undetermined_said: bool = False, refused: str = "", warnings: list[str] | None = None,
+    figures: dict[str, float] | None = None,
+) -> dict[str, Any]:
+    return {
+        "model": model, "undetermined_said": undetermined_said, "refused": refused, "warnings": warnings or [],
+        "figures": figures or {},
+    }  # fmt: skip
+
+
+def main(arguments: list[str]) -> int:
+    """Exit code: 0, or the error's; its message goes to stderr."""
+    scene, width, height, folder, made_from = arguments
+    try:
+        measure_scene(scene, (int(width), int(height)), Path(folder), made_from)
+    except StitchError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

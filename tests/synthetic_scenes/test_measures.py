@@ -1,0 +1,119 @@
+"""What a stitch is worth: a perfect map scores nothing off, and every figure sees the fault it is named after."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edf_stitch.core.epipolar import infinite_homography, rotation_from_vector
+from edf_stitch.core.pipeline import StitchResult
+from edf_stitch.synthetic_scenes.measures import Truth, figures, on_the_wide_canvas, truth_of, whole_picture
+from edf_stitch.synthetic_scenes.rendered import RenderedPair
+from edf_stitch.synthetic_scenes.scene_pictures import scene_pictures
+from edf_stitch.synthetic_scenes.stitches import WAYS, stitched
+
+
+@pytest.fixture(scope="module")
+def truth(rendered: RenderedPair) -> Truth:
+    return truth_of(rendered)
+
+
+@pytest.fixture(scope="module")
+def result(rendered: RenderedPair) -> StitchResult:
+    return stitched(rendered, "known/strict")
+
+
+@pytest.fixture(scope="module")
+def perfect(result: StitchResult, truth: Truth) -> StitchResult:
+    """The same with the true cameras, and the true map on the canvas of the true panorama."""
+    g = truth.geometry
+    height, width = truth.in_target.shape
+    x, y = (np.where(truth.in_target, truth.target[..., k], -9).astype(np.float32) for k in range(2))
+    canvas = replace(result.warp.canvas, width=width, height=height, offset=(-truth.corner[0], -truth.corner[1]))
+    view = replace(result.two_view, K=g.K, K_prime=g.K_prime, R=g.R, t=g.t, F=g.F, H_inf=g.H_inf, e_prime=g.e_prime)
+    warp = replace(result.warp, canvas=canvas, map_x=x, map_y=y, inverse_depth=np.zeros_like(x))
+    alpha = (truth.in_target | truth.in_reference).astype(np.float32)
+    pixels = np.zeros((height, width, 3), np.float32)
+    return replace(result, two_view=view, warp=warp, alpha=alpha, pixels=pixels)
+
+
+def test_the_truth_scores_nothing_off(perfect: StitchResult, truth: Truth) -> None:
+    found = figures(perfect, truth)
+    for name in ("rotation_deg", "focal_percent", "h_inf_px", "h_inf_p95_px", "f_px"):
+        assert abs(found[name]) < 1e-3, name
+    assert found["epipole_deg"] < 1e-3
+    for name in ("projectivity_p95_px", "alignment_p95_px", "beyond_px"):
+        assert found[name] < 1e-3, name
+    assert found["covered"] == 1 and found["overlap_psnr_db"] > 30
+
+
+def moved(result: StitchResult, dx: float, dy: float) -> StitchResult:
+    warp = replace(result.warp, map_x=result.warp.map_x + np.float32(dx), map_y=result.warp.map_y + np.float32(dy))
+    return replace(result, warp=warp)
+
+
+def test_a_map_that_is_off_is_off_by_as_much(perfect: StitchResult, truth: Truth) -> None:
+    found, better = figures(moved(perfect, 3, 4), truth), figures(perfect, truth)
+    assert found["alignment_px"] == pytest.approx(5, abs=0.01)
+    assert found["alignment_p95_px"] == pytest.approx(5, abs=0.01)
+    assert found["beyond_px"] == pytest.approx(5, abs=0.01)
+    assert found["projectivity_px"] > 1 and found["overlap_psnr_db"] < better["overlap_psnr_db"] - 5
+    assert found["rotation_deg"] < 1e-3, "the cameras are as good as before"
+
+
+def test_cameras_that_are_off_are_told(perfect: StitchResult, truth: Truth) -> None:
+    view = perfect.two_view
+    R = rotation_from_vector(np.radians([0, 0.5, 0])) @ view.R
+    turned = replace(view, R=R, H_inf=infinite_homography(view.K, view.K_prime, R))
+    found = figures(replace(perfect, two_view=turned), truth)
+    assert found["rotation_deg"] == pytest.approx(0.5, abs=1e-6)
+    focal = view.K_prime[0, 0]
+    # half a degree moves the picture's middle by f tan 0.5°, and more towards its sides
+    assert 1 < found["h_inf_px"] / (focal * np.tan(np.radians(0.5))) < 1.3 and found["alignment_px"] < 1e-3
+    zoomed = replace(view, K=view.K * np.array([[1.03, 1, 1], [1, 1.03, 1], [1, 1, 1]]))
+    assert figures(replace(perfect, two_view=zoomed), truth)["focal_percent"] == pytest.approx(3)
+    t = rotation_from_vector(np.radians([0, 0, 2.0])) @ view.t
+    assert 0.1 < figures(replace(perfect, two_view=replace(view, t=t)), truth)["epipole_deg"] <= 2.0 + 1e-9
+    F = view.F.copy()
+    F[2, 2] += 2 * np.hypot(*(F @ [150, 100, 1])[:2])
+    assert figures(replace(perfect, two_view=replace(view, F=F)), truth)["f_px"] == pytest.approx(2, rel=0.3)
+
+
+def test_what_is_not_covered_is_missed(perfect: StitchResult, truth: Truth) -> None:
+    alpha = perfect.alpha.copy()
+    only = truth.in_target & ~truth.in_reference
+    rows, columns = np.nonzero(only)
+    alpha[rows[::2], columns[::2]] = 0
+    assert figures(replace(perfect, alpha=alpha), truth)["covered"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_real_stitch_is_close(result: StitchResult, truth: Truth) -> None:
+    found = figures(result, truth)
+    assert found["rotation_deg"] < 0.1 and found["h_inf_px"] < 1 and found["projectivity_px"] < 0.3
+    assert found["alignment_px"] < 0.6 and found["covered"] > 0.9
+    picture, shown = on_the_wide_canvas(result, truth)
+    assert shown.mean() > 0.5 and whole_picture(picture, shown, truth)["whole_psnr_db"] > 22
+    shifted = np.roll(picture, 3, axis=1)
+    assert whole_picture(shifted, shown, truth)["whole_psnr_db"] < 0.9 * whole_picture(picture, shown, truth)[
+        "whole_psnr_db"]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_every_way_stitches(way: str, rendered: RenderedPair, truth: Truth) -> None:
+    result = stitched(rendered, way)
+    found = figures(result, truth)
+    assert found["alignment_px"] < 3 and found["covered"] > 0.7
+    if way == "known/homography":
+        assert np.isnan(found["rotation_deg"]) and np.isnan(found["f_px"]) and not result.warp.inverse_depth.any()
+    if way.startswith("unknown"):
+        assert found["focal_percent"] != 0
+    elif way != "known/homography":
+        assert found["focal_percent"] == pytest.approx(0, abs=1e-4)
+
+
+def test_the_report_has_every_picture(rendered: RenderedPair, truth: Truth, result: StitchResult) -> None:
+    picture, _ = on_the_wide_canvas(result, truth)
+    made = scene_pictures(rendered, truth, result, picture)
+    assert set(made) == {"reference", "target", "stitch", "truth", "difference", "lines", "error_map"}
+    assert all(data[:3] == b"\xff\xd8\xff" for data in made.values())

@@ -1,0 +1,203 @@
+"""Every limit of the validation flips where it says, and nothing that is missing passes."""
+
+from __future__ import annotations
+
+import math
+from copy import deepcopy
+from typing import Any
+
+import pytest
+from edf_stitch.synthetic_scenes.thresholds import MODEL_RUNS, Check, judge, medians
+
+WAYS = ("known/strict", "known/slack", "known/paper", "known/homography", "unknown/strict", "unknown/slack")
+FIGURES = {
+    "rotation_deg": 0.01, "focal_percent": -0.5, "h_inf_px": 0.2, "projectivity_px": 0.05, "alignment_px": 0.2,
+    "whole_psnr_db": 30.0, "whole_ssim": 0.9,
+}  # fmt: skip
+PROOF = {
+    "position_px": 0.001, "depth_relative": 1e-7, "ray_cast_relative": 1e-6, "f_px": 0.001, "warp_psnr_db": 40.0,
+    "half_pixel_psnr_db": 30.0, "wide_psnr_db": 50.0,
+}  # fmt: skip
+
+
+def good(name: str = "street", model: str = "general", determined: bool = True) -> dict[str, Any]:
+    """A scene's result as a perfect program leaves it."""
+    runs = {
+        way: {"model": None if way.endswith("homography") else model, "undetermined_said": not determined,
+              "refused": "", "warnings": [], "figures": dict(FIGURES)}
+        for way in WAYS
+    }  # fmt: skip
+    for rival in ("known/paper", "known/homography"):
+        runs[rival]["figures"]["whole_psnr_db"] = 28.0
+    return {
+        "schema": 1, "scene": name, "title": "A street", "size": [640, 480], "expected_model": model,
+        "parallax": model == "general", "focal_determined": determined, "status": "done", "message": "",
+        "proof": dict(PROOF), "runs": runs, "pictures": {},
+    }  # fmt: skip
+
+
+def crashed(name: str = "foliage") -> dict[str, Any]:
+    return {**good(name), "status": "failed", "message": "Segmentation fault", "proof": {}, "runs": {}}
+
+
+def failures(*results: dict[str, Any], complete: bool = False) -> list[tuple[str | None, str, str]]:
+    return [(check.scene, check.run, check.measure) for check in judge(results, complete).failed]
+
+
+def with_figure(run: str, measure: str, value: float | None) -> dict[str, Any]:
+    result = good()
+    (result["proof"] if run == "proof" else result["runs"][run]["figures"])[measure] = value
+    return result
+
+
+SCENE_LIMITS = [
+    ("proof", "position_px", 0.01, 1), ("proof", "depth_relative", 1e-5, 1), ("proof", "ray_cast_relative", 1e-5, 1),
+    ("proof", "f_px", 0.01, 1), ("proof", "warp_psnr_db", 35.0, -1), ("proof", "wide_psnr_db", 35.0, -1),
+    ("known/strict", "rotation_deg", 0.15, 1), ("known/strict", "h_inf_px", 5.0, 1),
+    ("known/strict", "projectivity_px", 1.5, 1), ("known/strict", "alignment_px", 2.0, 1),
+]  # fmt: skip
+SUITE_LIMITS = [
+    ("known/strict", "rotation_deg", 0.03), ("known/strict", "h_inf_px", 1.0), ("known/strict", "projectivity_px", 0.3),
+    ("known/strict", "alignment_px", 0.4), ("unknown/strict", "focal_percent", 3.0),
+    ("unknown/strict", "focal_percent", -3.0), ("unknown/strict", "projectivity_px", 0.3),
+]  # fmt: skip
+
+
+def test_good_scenes_pass() -> None:
+    scenes = [good(), good("toe_in", determined=False), good("turn", "rotation"), good("wall", "plane", False)]
+    for complete in (False, True):
+        verdict = judge(scenes, complete)
+        assert verdict.passed and not verdict.failed and verdict.complete == complete
+
+
+@pytest.mark.parametrize(("run", "measure", "limit", "worse"), SCENE_LIMITS)
+def test_a_scenes_limits_flip_where_they_stand(run: str, measure: str, limit: float, worse: int) -> None:
+    assert not failures(with_figure(run, measure, limit))
+    beyond = math.nextafter(limit, worse * math.inf)
+    assert failures(with_figure(run, measure, beyond)) == [("street", run, measure)]
+    (check,) = judge([with_figure(run, measure, beyond)], False).failed
+    assert check.value == beyond and f"{limit:g}" in check.limit and check.limit[0] == ("≤" if worse > 0 else "≥")
+
+
+def test_half_a_pixel_must_cost_a_decibel() -> None:
+    assert not failures(with_figure("proof", "half_pixel_psnr_db", 39.0))
+    assert failures(with_figure("proof", "half_pixel_psnr_db", 39.001)) == [("street", "proof", "half_pixel_loss_db")]
+
+
+@pytest.mark.parametrize(("run", "measure", "limit"), SUITE_LIMITS)
+def test_the_suites_limits_flip_where_they_stand_and_are_of_medians(run: str, measure: str, limit: float) -> None:
+    beyond = limit * (1 + 1e-9)
+    for value, expected in ((limit, []), (beyond, [(None, run, measure)])):
+        scenes = [with_figure(run, measure, each) for each in (0.0, value, 5 * value)]
+        failed = [failure for failure in failures(*scenes, complete=True) if failure[0] is None]
+        assert failed == expected
+        assert not [failure for failure in failures(*scenes) if failure[0] is None], "no suite, no medians"
+
+
+@pytest.mark.parametrize("run_and_measure", [limit[:2] for limit in SCENE_LIMITS + SUITE_LIMITS]
+                         + [("proof", "half_pixel_psnr_db")], ids="-".join)  # fmt: skip
+@pytest.mark.parametrize("gone", [None, math.nan, "absent"])
+def test_a_value_that_is_missing_where_one_is_due_fails(run_and_measure: tuple[str, str], gone: Any) -> None:
+    result = with_figure(*run_and_measure, gone)
+    if gone == "absent":
+        del (result["proof"] if run_and_measure[0] == "proof" else result["runs"][run_and_measure[0]]["figures"])[
+            run_and_measure[1]
+        ]
+    assert failures(result)
+
+
+def test_a_missing_value_counts_as_the_worst_in_a_median() -> None:
+    scenes = [good(), with_figure("known/strict", "rotation_deg", None)]
+    middle = medians(scenes)[0]
+    assert (middle.value, middle.scenes, middle.missing, middle.passed) == (None, 2, 1, False)
+    middle = medians([*scenes, with_figure("known/strict", "rotation_deg", 0.02)])[0]
+    assert (middle.value, middle.scenes, middle.missing, middle.passed) == (0.02, 3, 1, True)
+
+
+def test_medians_are_of_scenes_with_parallax_the_focal_lengths_of_those_that_determine_it() -> None:
+    bad = {"rotation_deg": 9.0, "focal_percent": 50.0, "projectivity_px": None, "whole_psnr_db": 1.0}
+    others = [good("turn", "rotation"), good("wall", "plane"), good("toe_in", determined=False)]
+    for result in others:
+        for way in ("known/strict", "unknown/strict"):
+            result["runs"][way]["figures"].update(bad if not result["parallax"] else {"focal_percent": 50.0})
+    assert judge([good(), *others], True).passed
+    assert [middle.scenes for middle in medians([good(), *others])] == [2, 2, 2, 2, 1, 2, 2]
+
+
+@pytest.mark.parametrize("model", ["general", "rotation", "plane"])
+@pytest.mark.parametrize("way", MODEL_RUNS)
+def test_the_model_must_be_right_in_every_run(way: str, model: str) -> None:
+    for changed in ({"model": "rotation" if model != "rotation" else "general"}, {"model": None}, {"refused": "no"}):
+        result = good(model=model)
+        result["runs"][way].update(changed)
+        assert ("street", way, "model") in failures(result), changed
+    result = good(model=model)
+    del result["runs"][way]
+    assert ("street", way, "model") in failures(result)
+
+
+def test_an_undetermined_focal_length_must_be_said_where_it_shows() -> None:
+    result = good("toe_in", determined=False)
+    result["runs"]["unknown/slack"]["undetermined_said"] = False
+    assert not failures(result)
+    result["runs"]["unknown/strict"]["undetermined_said"] = False
+    assert failures(result) == [("toe_in", "unknown/strict", "undetermined_said")]
+    plane = good("wall", "plane", determined=False)
+    plane["runs"]["unknown/strict"]["undetermined_said"] = False
+    assert not failures(plane)
+
+
+@pytest.mark.parametrize("rival", ["known/paper", "known/homography"])
+def test_no_rival_is_better_by_more_than_a_fifth_of_a_decibel(rival: str) -> None:
+    assert not failures(with_figure(rival, "whole_psnr_db", 30.2))
+    worse = ("street", "known/strict", f"whole_psnr_db over {rival}")
+    assert failures(with_figure(rival, "whole_psnr_db", 30.201)) == [worse]
+    assert failures(with_figure(rival, "whole_psnr_db", None)) == [worse]
+    flat = good(model="plane")
+    flat["runs"][rival]["figures"]["whole_psnr_db"] = 40.0
+    assert not failures(flat), "without parallax nobody competes"
+    for gone in ("refused", "absent"):
+        result = with_figure(rival, "whole_psnr_db", 40.0)
+        if gone == "refused":
+            result["runs"][rival].update(refused="too few matches", figures={})
+        else:
+            del result["runs"][rival]
+        assert not failures(result)
+
+
+def test_with_no_rival_at_all_nothing_is_shown() -> None:
+    result = good()
+    del result["runs"]["known/paper"], result["runs"]["known/homography"]
+    assert failures(result) == [("street", "known/strict", "whole_psnr_db over any rival")]
+
+
+def test_the_median_lead_is_over_the_best_rival_of_each_scene() -> None:
+    assert not failures(with_figure("known/paper", "whole_psnr_db", 29.0), complete=True)
+    for rival in ("known/paper", "known/homography"):
+        failed = failures(with_figure(rival, "whole_psnr_db", 29.001), complete=True)
+        assert failed == [(None, "known/strict", "lead_db")]
+
+
+def test_a_failed_scene_fails_the_verdict() -> None:
+    assert failures(good(), crashed()) == [("foliage", "", "status")]
+    verdict = judge([good(), good("relief"), crashed()], True)
+    assert not verdict.passed and [check.scene for check in verdict.failed] == ["foliage"]
+    assert all(middle.missing == 1 for middle in medians([good(), crashed()]))
+
+
+def test_an_empty_list_fails() -> None:
+    for complete in (False, True):
+        assert not judge([], complete).passed
+    assert Check(None, "", "scenes", 0.0, "≥ 1", "", False) in judge([], True).checks
+
+
+def test_a_suite_without_parallax_has_no_medians_to_pass() -> None:
+    assert judge([good(model="rotation")], False).passed
+    assert len(failures(good(model="rotation"), complete=True)) == 7
+
+
+def test_judging_changes_nothing() -> None:
+    result = good()
+    before = deepcopy(result)
+    judge([result], True)
+    assert result == before
