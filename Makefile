@@ -3,6 +3,7 @@ PYTHON ?= python3
 PLATFORM ?= linux-x64
 BLENDER_RUN ?=
 WORKERS ?= 2
+SUITE ?= quick
 
 BIN := .venv/bin
 READY := .venv/.ready
@@ -12,7 +13,7 @@ PYTEST := $(BIN)/python -m pytest
 export OPENBLAS_NUM_THREADS := 1
 export BLENDER_RUN
 
-.PHONY: setup demo test slow end-to-end lint bench zip clean
+.PHONY: setup demo test slow validate end-to-end lint bench zip clean
 
 setup: $(READY)
 
@@ -35,6 +36,10 @@ test: setup
 slow: setup
 	$(PYTEST) -n $(WORKERS) -m "slow and not blender" || [ $$? -eq 5 ]
 
+# SUITE=full: all scenes at 1280×960, 25 minutes from empty on two cores. Pictures are kept and made only once.
+validate: setup
+	$(BIN)/edf validate --suite $(SUITE) -o validation_$(SUITE) --overwrite
+
 end-to-end: setup
 	@[ -n "$$BLENDER_RUN" ] || { echo "say how Blender is run: make end-to-end BLENDER_RUN=blender" >&2; exit 2; }
 	$(PYTEST) tests/end_to_end
@@ -52,4 +57,4 @@ zip: setup
 	$(BIN)/python .ci/build_extension.py --platform $(PLATFORM) --blender "$$BLENDER_RUN" --output-dir dist
 
 clean:
-	rm -rf .venv build dist wheels demo_output *.egg-info
+	rm -rf .venv build dist wheels demo_output validation_quick validation_full *.egg-info

@@ -18,6 +18,7 @@ from .canvas import Grid
 from .epipolar import Array, homogeneous, project
 from .errors import DegenerateGeometry
 from .features import Matches
+from .plane import beyond_reference, continued_plane, fit_plane
 from .spline import SmoothingProblem, ThinPlateSpline, spread_points
 from .two_view import TwoView
 
@@ -31,6 +32,8 @@ GROSS_DEVIATIONS = 10.0
 # Whatever σ says, an error this small (px) is no outlier; and so much agreement among the nearest makes a thing.
 PRUNE_FLOOR_PX, NEIGHBOURS, SUPPORT = 1.0, 8, 3
 MIN_CENTRES = 8
+# Flat things are flat to this much at least, in units of the matches' scale.
+PLANE_PX = 0.3
 
 
 @dataclass(frozen=True)
@@ -219,24 +222,6 @@ def _slope(ray: Array, e: Array) -> Array:
         return (e[:2] * ray[:, 2:] - ray[:, :2] * e[2]) / ray[:, 2:] ** 2
 
 
-def fit_plane(x: Array, d: Array, sensitivity: Array, noise_px: float) -> Array:
-    """m (3,) that minimises Σ ρ(s_i (d_i − m·x_i)) robustly (Cauchy, scale from the residuals, at least noise_px)."""
-    centre, scale = x.mean(axis=0), max(float(x.std()), 1e-9)
-    design = np.column_stack([(x - centre) / scale, np.ones(len(x))])
-    weight = sensitivity.copy()
-    coefficients = np.zeros(3)
-    for _ in range(50):
-        previous = coefficients
-        coefficients = np.linalg.lstsq(design * weight[:, None], d * weight, rcond=None)[0]
-        residual = sensitivity * (d - design @ coefficients)
-        scale_px = max(noise_px, float(np.median(np.abs(residual))) / 0.6745)
-        weight = sensitivity / np.sqrt(1 + (residual / (2.385 * scale_px)) ** 2)
-        if np.abs(coefficients - previous).max() < 1e-10 * np.abs(coefficients).max():
-            break
-    a, b = coefficients[:2] / scale
-    return np.array([a, b, coefficients[2] - a * centre[0] - b * centre[1]])
-
-
 def fit_strict(
     two_view: TwoView, matches: Matches, size: tuple[int, int], target_size: tuple[int, int], fade: str = "plane"
 ) -> StrictField:
@@ -259,7 +244,12 @@ def fit_strict(
     index = np.flatnonzero(usable)
     unit = float(np.sqrt(size[0] * size[1]))
     noise_px = max(two_view.sigma, 0.1 * matches.scale)
-    plane = fit_plane(x[index], d[index], sensitivity[index] * np.sqrt(matches.weights[index]), noise_px)
+    weight = matches.weights[index]
+    plane = fit_plane(x[index], d[index], sensitivity[index] * np.sqrt(weight), noise_px)
+    beyond = beyond_reference(two_view.H_inf + np.outer(two_view.e_prime, plane), size, target_size)
+    if len(beyond):
+        tolerance = 3 * max(noise_px, PLANE_PX * matches.scale)
+        plane = continued_plane(x[index], d[index], sensitivity[index], weight, beyond, unit, tolerance, noise_px)
     off_line = np.linalg.norm(target_points(two_view, x[index], d[index]) - y[index], axis=1)
     index = _thinned(matches, index, off_line, unit)
     _refuse_no_spread(x[index], matches.scale)

@@ -66,8 +66,10 @@ p { margin: 0.3rem 0; max-width: 60rem; } .quiet, header .quiet { color: var(--q
 .good { background: var(--good-soft); color: var(--good); } .bad { background: var(--bad-soft); color: var(--bad); }
 .scroll { overflow-x: auto; max-width: 100%; }
 table { border-collapse: collapse; font-size: 0.87rem; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.28rem 0.6rem; border-bottom: 1px solid var(--line); text-align: left; white-space: nowrap; }
-th { font-weight: 600; } thead th { color: var(--quiet); line-height: 1.25; vertical-align: bottom; }
+th, td { padding: 0.28rem 0.45rem; border-bottom: 1px solid var(--line); text-align: left; white-space: nowrap; }
+th { font-weight: 600; } tbody th { position: sticky; left: 0; background: var(--paper); }
+tbody th.good { background: var(--good-soft); } tbody th.bad { background: var(--bad-soft); }
+thead th { color: var(--quiet); line-height: 1.25; vertical-align: bottom; }
 .n { text-align: right; } .first { border-left: 1px solid var(--line); }
 .mark { display: inline-block; width: 1em; text-align: center; font-weight: 600; }
 section { margin-top: 2.5rem; border-top: 1px solid var(--line); } section h2 { margin-top: 1.2rem; }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -234,7 +235,7 @@ def test_a_wrong_call_gives_2(
 
 @pytest.mark.parametrize("arguments", [
     [], ["nonsense"], ["stitch"], ["stitch", "a.png"], ["stitch", "a.png", "b.png"], ["batch"], ["batch", "list.csv"],
-    ["compare", "x", "-o", "y"], ["validate"], ["validate", "-o", "x", "--suite", "huge"], ["demo", "what"],
+    ["compare", "x", "-o", "y"], ["validate"], ["demo", "what"],
     ["--quiet"],
 ])  # fmt: skip
 def test_a_call_without_what_it_needs_gives_2(said: Callable, arguments: list[str]) -> None:
@@ -452,4 +453,4 @@ def test_on_a_terminal_there_is_a_bar(folder: Path, tmp_path: Path) -> None:
     os.close(ours)
     text = shown.decode("utf-8")
     assert "features" in text and " %" in text and "\r" in text and "edf: features" not in text
-    assert text.rstrip().splitlines()[-1].rstrip().endswith("×205"), "the last line is the panorama's"
+    assert re.search(r"out\.png: \d+×\d+$", text.rstrip()), "the last line is the panorama's"

@@ -13,7 +13,6 @@ from edf_stitch.core.displacement import (
     MIN_CENTRES,
     SMOOTHING_LADDER,
     StrictField,
-    fit_plane,
     fit_strict,
     inverse_depths,
     target_points,
@@ -28,6 +27,7 @@ from edf_stitch.core.epipolar import (
 )
 from edf_stitch.core.errors import DegenerateGeometry
 from edf_stitch.core.features import Matches
+from edf_stitch.core.plane import fit_plane
 from edf_stitch.core.spline import SmoothingProblem
 from edf_stitch.core.two_view import TwoView
 from hypothesis import given, settings
@@ -460,7 +460,8 @@ def test_coarser_pictures_are_judged_in_their_own_pixels() -> None:
     other = fit_strict(large, Matches(2 * x, 2 * y, 2.0), (2400, 1800), (2400, 1800))
     assert np.array_equal(one.fit.kept, other.fit.kept) and one.fit.smoothing == other.fit.smoothing
     assert np.allclose(other.at(2 * x), one.at(x), rtol=0, atol=1e-7)
-    assert other.fit.fade_px == pytest.approx(2 * one.fit.fade_px)
+    # the target's outermost pixel centres do not scale along, and with them the matches' weights for the plane
+    assert other.fit.fade_px == pytest.approx(2 * one.fit.fade_px, rel=1e-4)
     assert other.fit.residual_px == pytest.approx(2 * one.fit.residual_px)
 
 
