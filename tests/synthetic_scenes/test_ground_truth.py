@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from edf_stitch.core.epipolar import fundamental_from_pose, infinite_homography, rotation_from_vector
 from edf_stitch.core.two_view import TwoView
-from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry, pose_errors
+from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry, flat, pose_errors, seen_from, steepness, visible
 from edf_stitch.synthetic_scenes.scene_camera import SceneCamera
-from edf_stitch.synthetic_scenes.two_planes import Pair
+from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at
 
 SIZE = (400, 300)
 
@@ -102,3 +102,57 @@ def test_the_line_distance_sees_a_wrong_baseline(truth: TrueGeometry, by_hand: S
     across = np.linalg.svd(truth.t[None])[2][1]
     leaning = np.cos(np.radians(3)) * truth.t + np.sin(np.radians(3)) * across
     assert pose_errors(view_of(truth, by_hand, t=leaning), truth, SIZE)["f_px"] > 0.1
+
+
+# --- what is seen from elsewhere -----------------------------------------------------------------------------------
+
+
+def test_another_camera_sees_pixels_where_the_geometry_says(pair: Pair, truth: TrueGeometry) -> None:
+    x, y = np.meshgrid(np.arange(400.0), np.arange(300.0))
+    points = np.stack([x, y], axis=-1)
+    depth = depth_at(pair.reference_camera, points)
+    pixels, there = seen_from(pair.reference_camera, depth, pair.target_camera)
+    assert np.nanmax(np.abs(pixels - truth.target_pixels(points, depth))) < 1e-9
+    inside = (pixels >= 0).all(axis=-1) & (pixels <= (399, 299)).all(axis=-1)
+    assert np.abs(there[inside] / depth_at(pair.target_camera, pixels[inside]) - 1).max() < 0.3, "both see two planes"
+
+
+def test_what_is_infinitely_far_is_seen_through_h_inf(pair: Pair, truth: TrueGeometry) -> None:
+    far = np.full((300, 400), np.inf, np.float32)
+    pixels, there = seen_from(pair.reference_camera, far, pair.target_camera)
+    ray = truth.H_inf @ [120, 80, 1]
+    assert np.allclose(pixels[80, 120], ray[:2] / ray[2]) and np.isinf(there).all()
+    assert visible(pixels, there, far)[80, 120]
+
+
+def test_a_square_hides_a_strip_of_the_wall_behind_it() -> None:
+    """Square at 2 m before a wall at 4 m, step 0.2 m aside, f = 100: the square moves by 10 px, the wall by 5."""
+    K = np.array([[100, 0, 49.5], [0, 100, 49.5], [0, 0, 1.0]])
+    first = SceneCamera(K, np.eye(3), np.zeros(3), (100, 100))
+    second = SceneCamera(K, np.eye(3), np.array([-0.2, 0, 0]), (100, 100))
+    depth, other = np.full((100, 100), 4.0, np.float32), np.full((100, 100), 4.0, np.float32)
+    depth[40:60, 40:60], other[40:60, 30:50] = 2.0, 2.0
+    pixels, there = seen_from(first, depth, second)
+    seen = visible(pixels, there, other)
+    assert np.allclose(pixels[50, 50], [40, 50]) and np.allclose(pixels[50, 70], [65, 50])
+    assert seen[40:60, 40:60].all(), "what is in front is never hidden"
+    row = seen[50]
+    assert not row[36:40].any() and row[8:34].all() and row[61:].all(), "wall at 35 to 39 shows at 30 to 34: behind it"
+    assert not row[:5].any(), "beyond the other picture's edge"
+    assert seen[20, 36:40].all()
+
+
+def test_edges_are_not_flat_and_slopes_are() -> None:
+    x = np.arange(100.0)
+    slope = np.broadcast_to(1 / (0.2 + 0.002 * x), (60, 100)).astype(np.float32)
+    assert flat(slope).all() and np.allclose(steepness(slope)[30, 50], 0.002 / 0.3, rtol=1e-3)
+    step = slope.copy()
+    step[:, 50:] *= 1.3
+    assert not flat(step, 2)[:, 47:53].any() and flat(step, 2)[:, 54:].all() and flat(step, 2)[:, :46].all()
+
+
+def test_on_the_spot_there_are_no_lines_but_a_rotation(truth: TrueGeometry, by_hand: SimpleNamespace) -> None:
+    still = TrueGeometry(truth.K, truth.K_prime, truth.R, np.zeros(3), 0.0)
+    assert np.isnan(still.F).all() and not still.e_prime.any()
+    errors = pose_errors(view_of(truth, by_hand), still, SIZE)
+    assert errors["rotation_deg"] < 1e-5 and errors["h_inf_px"] < 1e-5 and np.isnan(errors["f_px"])
