@@ -73,8 +73,8 @@ SCENE = (
     Limit("unknown/strict", "focal_percent", "%", at_most=math.inf, absolute=True, determined=True),
     Limit("unknown/strict", "projectivity_px", "px", at_most=math.inf),
 )
-# Every scene with parallax: no worse than any rival by more than this, whole picture against the true panorama (issue
-# 4, "What it must reach"). A rival that refused the scene, or that does not exist yet, is none.
+# Every scene with parallax: no worse than any rival by more than this, whole picture against the true panorama. A rival
+# that refused the scene, or that does not exist yet, is none.
 OURS, RIVALS = "known/strict", ("known/paper", "known/homography")
 LEAD = Limit(OURS, "whole_psnr_db", "dB", at_least=-0.2)
 # The whole suite: medians over its scenes with parallax.
