@@ -1,0 +1,148 @@
+"""What lies over a picture: coordinates that come back, lines that hold both ends of a match, colours that tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from edf_stitch.core.camera import Camera
+from edf_stitch.core.epipolar import homogeneous, project
+from edf_stitch.core.lens import distort
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+pytest.importorskip("bpy")
+
+from edf_stitch.edf_addon import overlay_geometry as og  # noqa: E402
+
+SIZE, SIZE_PRIME = (400, 300), (320, 480)
+sides = st.sampled_from(("reference", "target"))
+
+
+@pytest.fixture(scope="module")
+def geometry(by_hand):
+    """Two cameras of different sizes, turned and apart, as a result has them."""
+    view = by_hand.view(by_hand.camera(SIZE, 350.0), by_hand.camera(SIZE_PRIME, 410.0), (3, -8, 2), (1, 0.1, 0.2))
+    return {
+        "full_sizes": [list(SIZE), list(SIZE_PRIME)], "F": view.F.tolist(), "K": view.K.tolist(),
+        "K_prime": view.K_prime.tolist(), "R": view.R.tolist(), "t": view.t.tolist(),
+        "S": [[0.5, 0, 70.25], [0, 0.5, 11.75], [0, 0, 1]],
+    }  # fmt: skip
+
+
+def seen_by_both(geometry, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """A world point's px in the reference and in the target."""
+    random = np.random.default_rng(seed)
+    ray = np.linalg.inv(np.array(geometry["K"])) @ [*random.uniform((60, 60), (340, 240)), 1]
+    X = ray * random.uniform(3, 30)
+    x = project(np.array(geometry["K"]) @ X)
+    return x, project(np.array(geometry["K_prime"]) @ (np.array(geometry["R"]) @ X + np.array(geometry["t"])))
+
+
+def distance(polyline: np.ndarray, point: np.ndarray) -> float:
+    """Of a point from a polyline."""
+    starts, ends = polyline[:-1], polyline[1:]
+    along = ends - starts
+    share = np.clip(((point - starts) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
+    return float(np.linalg.norm(starts + share[:, None] * along - point, axis=1).min())
+
+
+def test_the_corners_of_a_picture_are_those_of_the_view():
+    corners = np.array([[-0.5, -0.5], [SIZE[0] - 0.5, SIZE[1] - 0.5]])
+    np.testing.assert_allclose(og.to_view(corners, SIZE), [[0, 1], [1, 0]])
+
+
+@given(x=st.floats(-50, 500), y=st.floats(-50, 500))
+def test_px_come_back_from_the_view(x, y):
+    points = np.array([[x, y]])
+    np.testing.assert_allclose(og.from_view(og.to_view(points, SIZE), SIZE), points, atol=1e-9)
+
+
+def test_a_region_that_shows_the_upper_right_quarter_puts_its_middle_in_the_middle():
+    seen = np.array([[0.5, 0.5], [1.0, 1.0]])
+    at = og.to_region(np.array([[0.75 * SIZE[0] - 0.5, 0.25 * SIZE[1] - 0.5]]), SIZE, seen, (800, 600))
+    np.testing.assert_allclose(at, [[400, 300]])
+
+
+def test_points_go_to_the_panorama_and_back(geometry):
+    points = np.array([[0.0, 0], [399, 299], [17.5, 200]])
+    there = og.on_panorama(geometry, points)
+    np.testing.assert_allclose(there[0], [70.25, 11.75])
+    np.testing.assert_allclose(og.from_panorama(geometry, there), points, atol=1e-9)
+
+
+@given(seed=st.integers(0, 10_000), side=sides)
+@settings(max_examples=60)
+def test_both_ends_of_a_match_lie_on_the_lines_of_either(geometry, seed, side):
+    x, y = seen_by_both(geometry, seed)
+    assume((y > 1).all() and (y < np.array(SIZE_PRIME) - 2).all())
+    lines = og.epipolar_lines(geometry, x if side == "reference" else y, side)
+    assert distance(lines["reference"], x) < 1e-6
+    assert distance(lines["target"], y) < 1e-6
+
+
+@given(seed=st.integers(0, 10_000), side=sides)
+@settings(max_examples=30)
+def test_where_lenses_bend_the_lines_bend_along(geometry, seed, side):
+    bend, bend_prime = [-0.12, 0.02, 0.001, 0, 0], [0.1, 0, 0, 0.002, 0]
+    bent = {**geometry, "distortion": bend, "distortion_prime": bend_prime}
+    x, y = seen_by_both(geometry, seed)
+    raw = distort(x, Camera(np.array(geometry["K"]), SIZE, "", 0.0, np.array(bend)))
+    raw_prime = distort(y, Camera(np.array(geometry["K_prime"]), SIZE_PRIME, "", 0.0, np.array(bend_prime)))
+    assume((raw_prime > 12).all() and (raw_prime < np.array(SIZE_PRIME) - 13).all())
+    lines = og.epipolar_lines(bent, raw if side == "reference" else raw_prime, side)
+    # a polyline of 48 points cuts corners a little
+    assert distance(lines["reference"], raw) < 0.05
+    assert distance(lines["target"], raw_prime) < 0.05
+
+
+@pytest.mark.parametrize("F", [None, 0.0], ids=["a plane without a pose", "a rotation"])
+def test_a_model_without_epipolar_lines_draws_none(geometry, F):
+    assert og.epipolar_lines({**geometry, "F": [[F] * 3] * 3}, np.array([100.0, 100]), "reference") == {}
+
+
+@given(a=st.floats(-1, 1), b=st.floats(-1, 1), x=st.floats(0, 399), y=st.floats(0, 299))
+def test_a_line_through_a_point_of_the_picture_is_clipped_to_its_border(a, b, x, y):
+    assume(np.hypot(a, b) > 1e-3)
+    line = np.array([a, b, -a * x - b * y])
+    ends = og.clipped(line, SIZE)
+    assert ends is not None
+    assert np.abs(homogeneous(ends) @ line).max() < 1e-6
+    low, high = np.array([-0.5, -0.5]), np.array(SIZE) - 0.5
+    assert ((ends > low - 1e-6) & (ends < high + 1e-6)).all()
+    on_border = np.isclose(ends, low, atol=1e-6) | np.isclose(ends, high, atol=1e-6)
+    assert on_border.any(axis=1).all()
+
+
+@pytest.mark.parametrize("line", [(0, 1, 40), (1, 0, -400), (1, 1, 30), (0, 0, 1), (np.nan, 1, 0)])
+def test_a_line_that_misses_the_picture_is_not_drawn(line):
+    assert og.clipped(np.array(line, float), SIZE) is None
+
+
+def test_colours_tell_good_from_bad_and_from_unknown():
+    colours = og.residual_colours(np.array([0.0, og.WORST, 50.0, np.nan]))
+    np.testing.assert_allclose(colours[0], og.RAMP[0], atol=1e-6)
+    np.testing.assert_allclose(colours[1], og.RAMP[-1], atol=1e-6)
+    np.testing.assert_array_equal(colours[1], colours[2])
+    np.testing.assert_allclose(colours[3], og.GRAY, atol=1e-6)
+
+
+def test_discs_are_round_and_each_has_its_colour():
+    centres, colours = np.array([[10.0, 20], [50, 60]]), np.array([[1, 0, 0, 1], [0, 1, 0, 1]], np.float32)
+    corners, each = og.discs(centres, 4.0, colours)
+    assert len(corners) == len(each)
+    half = len(corners) // 2
+    radius = np.linalg.norm(corners[half:] - centres[1], axis=1)
+    np.testing.assert_allclose(np.unique(radius.round(4)), [0, 4])
+    np.testing.assert_array_equal(np.unique(each[half:], axis=0), [colours[1]])
+
+
+def test_rings_and_polylines_are_pairs_of_ends():
+    assert np.allclose(np.linalg.norm(og.rings(np.zeros((1, 2)), 3.0), axis=1), 3.0)
+    np.testing.assert_array_equal(og.segments(np.array([[0.0, 0], [1, 0], [1, 1]])), [[0, 0], [1, 0], [1, 0], [1, 1]])
+
+
+def test_the_nearest_point_within_reach():
+    points = np.array([[0.0, 0], [np.nan, 0], [10, 0]])
+    assert og.nearest(points, np.array([8.0, 1]), 5) == 2
+    assert og.nearest(points, np.array([5.0, 30]), 5) is None
+    assert og.nearest(np.zeros((0, 2)), np.zeros(2), 5) is None
