@@ -24,7 +24,7 @@ from .errors import BadRequest, UnreadableImage, UnwritableOutput
 from .images import output_bits
 from .options import StitchOptions
 from .output_files import OutputFiles
-from .outputs import OutputRequest, add_report, json_bytes, warp_bytes, write
+from .outputs import MASKS, OutputRequest, add_report, json_bytes, warp_bytes, write
 from .pipeline import StitchResult
 
 STAMPS = ".edf"
@@ -92,7 +92,7 @@ class Unit:
         """All that will be there, apart from what float pictures add."""
         out = [self.panorama] if self.panorama else []
         if self._layers:
-            out += [self._layers / "reference.png", self._layers / "target.png"]
+            out += [self._layers / f"{name}.png" for name in ("reference", "target", *MASKS)]
         if self.report:
             out += [self.report, self._named(".matches.csv"), self._named(".timing.json")]
             out += [self._named(".warp.npz")] if self.request.warp else []

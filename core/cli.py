@@ -125,7 +125,8 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
         help="everything that was measured and decided; FILE.matches.csv: the matches, as --matches takes them",
     )  # fmt: skip
     files.add_argument(
-        "--layers", type=Path, metavar="DIR", help="both pictures on the canvas before blending, with alpha"
+        "--layers", type=Path, metavar="DIR",
+        help="both pictures on the canvas before blending, with alpha, and a mask of what the target cannot see",
     )
     files.add_argument("--warp", type=Path, metavar="FILE.npz", help="the map, the inverse depth and the geometry")
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")

@@ -19,6 +19,9 @@ from .pipeline import StitchResult
 from .report import plain
 from .warp import Layer
 
+# What lies beside the layers, white where it holds, by its name in the result.
+MASKS = ("occluded",)
+
 
 @dataclass(frozen=True)
 class OutputRequest:
@@ -50,6 +53,7 @@ def check(request: OutputRequest, files: OutputFiles) -> None:
     files.check(*single)
     if request.layers is not None:
         names = [f"{layer}{suffix}" for layer in ("reference", "target") for suffix in (".png", ".exr")]
+        names += [f"{mask}.png" for mask in MASKS]
         files.check_folder(request.layers, names)
         taken = {(request.layers / name).resolve() for name in names}
         for path in single:
@@ -68,6 +72,8 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     if request.layers is not None:
         for name, layer in (("reference", result.reference_layer), ("target", result.target_layer)):
             _add_layer(files, request.layers, name, layer, result)
+        for name in MASKS:
+            files.add_to_folder(request.layers, f"{name}.png", _mask_bytes(getattr(result, name)))
     if request.warp is not None:
         files.add(request.warp, warp_bytes(result))
     if request.report is not None and request.timing is not None and request.matches is not None:
@@ -91,6 +97,11 @@ def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result
     )
     if result.bits == 32:
         files.add_to_folder(folder, f"{name}.exr", encode_picture(layer.pixels, layer.alpha, 32, ".exr", icc, exif)[0])
+
+
+def _mask_bytes(mask: np.ndarray) -> bytes:
+    """A PNG of a mask (H, W), white where it is True."""
+    return encode_picture(mask[..., None].astype(np.float32), None, 8, ".png")[0]
 
 
 def warp_bytes(result: StitchResult) -> bytes:

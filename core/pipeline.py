@@ -18,11 +18,12 @@ from .displacement import Field
 from .errors import NoOverlap
 from .features import Matches
 from .images import Picture, in_same_colour_space, load_picture, picture_from_array
+from .occlusion import occluded
 from .options import StitchOptions
 from .progress import Progress
 from .report import make_report
 from .two_view import TwoView
-from .warp import Layer, Warp, reference_layer, target_layer
+from .warp import Layer, Warp, cut, reference_layer, target_layer
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,10 @@ class StitchResult:
     """A finished panorama and everything it was made of.
 
     pixels (H, W, C) float32 scene-linear and alpha (H, W), straight; the two layers and the warp on the same canvas;
-    the geometry, the field, the matches (all, before inlier choice), the cameras as known before; `report`: a
-    JSON-ready dict; `seconds` by stage. Scale and crop are done: pixels are those of the panorama and of the pictures
-    as they were worked on; `full_sizes` (W, H): of the pictures as they came.
+    occluded (H, W) bool: what the target cannot see though the map falls inside it; the geometry, the field, the
+    matches (all, before inlier choice), the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage.
+    Scale and crop are done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes`
+    (W, H): of the pictures as they came.
     """
 
     pixels: np.ndarray
@@ -42,6 +44,7 @@ class StitchResult:
     reference_layer: Layer
     target_layer: Layer
     warp: Warp
+    occluded: np.ndarray
     two_view: TwoView
     field: Field
     matches: Matches
@@ -102,12 +105,15 @@ def compose(frame: Frame, alignment: Alignment, options: StitchOptions, steps: S
     steps("warp", 0.5)
     base, layer = reference_layer(first, whole.canvas), target_layer(second, whole)
 
+    steps("occlusion", 0.0)
+    hidden = occluded(whole, alignment.two_view, size_of(second))
+
     steps("blend", 0.0)
     panorama = blend(base, layer, options.blend)
     shape = (whole.canvas.height, whole.canvas.width)
     box = crop_box(options.crop, shape, panorama.alpha > 0, (*whole.canvas.offset, *size_of(first)))
     panorama, base, layer = (part.within(box) for part in (panorama, base, layer))
-    warp = whole.within(box)
+    warp, hidden = whole.within(box), cut(hidden, box)
 
     steps("write", 0.0)
     report, more = make_report(options, (first, second), alignment, warp.canvas)
@@ -115,8 +121,8 @@ def compose(frame: Frame, alignment: Alignment, options: StitchOptions, steps: S
     report["warnings"] = list(warnings)
     steps("write", 0.5)
     return StitchResult(
-        panorama.pixels, panorama.alpha, first, second, base, layer, warp, alignment.two_view, alignment.field,
-        alignment.matches, alignment.cameras, warnings, report, steps.seconds,
+        panorama.pixels, panorama.alpha, first, second, base, layer, warp, hidden, alignment.two_view,
+        alignment.field, alignment.matches, alignment.cameras, warnings, report, steps.seconds,
         frame.full_sizes,
     )  # fmt: skip
 

@@ -14,7 +14,8 @@ STAGES: dict[str, float] = {
     "geometry": 0.06,
     "field": 0.12,
     "warp": 0.14,
-    "blend": 0.07,
+    "occlusion": 0.03,
+    "blend": 0.04,
     "write": 0.10,
 }
 

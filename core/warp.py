@@ -46,7 +46,7 @@ class Warp:
         left, top, width, height = box
         offset = self.canvas.offset[0] - left, self.canvas.offset[1] - top
         canvas = Canvas(width, height, offset, self.canvas.cropped)
-        return Warp(canvas, *(_cut(a, box) for a in (self.map_x, self.map_y, self.inverse_depth)))
+        return Warp(canvas, *(cut(a, box) for a in (self.map_x, self.map_y, self.inverse_depth)))
 
     def inside(self, target_size: tuple[int, int]) -> NDArray[np.bool_]:
         """Where the map falls inside a target of (W, H) px."""
@@ -67,10 +67,11 @@ class Layer:
 
     def within(self, box: Box) -> Layer:
         """The part in a box (left, top, width, height) of the canvas."""
-        return Layer(_cut(self.pixels, box), _cut(self.alpha, box))
+        return Layer(cut(self.pixels, box), cut(self.alpha, box))
 
 
-def _cut(array: NDArray, box: Box) -> NDArray:
+def cut(array: NDArray, box: Box) -> NDArray:
+    """The part of an array (H, W, …) in a box (left, top, width, height)."""
     left, top, width, height = box
     return np.ascontiguousarray(array[top : top + height, left : left + width])
 

@@ -80,7 +80,7 @@ def test_a_stitch_from_files_to_files(
     assert err.splitlines()[-1] == f"edf: {tmp_path / 'out.png'}: {width}×{height}"
     assert set(files(tmp_path)) == {
         "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-        "layers/target.png"}
+        "layers/target.png", "layers/occluded.png"}
     # the same as stitch() from Python gives
     expected, _ = encode_picture(small_result.pixels, small_result.alpha, 8, ".png")
     assert (tmp_path / "out.png").read_bytes() == expected
