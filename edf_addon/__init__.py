@@ -1,4 +1,8 @@
-"""All that Blender sees. For now the command: `blender -b --command edf …`."""
+"""All that Blender sees: the command `blender -b --command edf …`, the scene's properties, operators and panels.
+
+Nothing of the engine is imported here, nor by what is registered: the work is done in a process of its own, and Blender
+starts no slower for it.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +11,30 @@ from typing import Any
 
 import bpy
 
-from . import command
+from . import command, operators, properties
 
+# Registered in this order, unregistered in the opposite one; each has register() and unregister().
+ROOMS = (properties, operators)
+_commands: list[Any] = []
 _registered: list[Any] = []
 
 
 def register() -> None:
-    """Offer `--command edf`. Blender warns about a command that is registered twice, so a second call does nothing."""
-    if not _registered:
-        _registered.append(bpy.utils.register_cli_command("edf", command.run))
-        # bpy as a Python module crashes on its way out when a command is still registered by then.
-        atexit.register(unregister)
+    """Switch everything on. Blender warns about what is registered twice, so a second call does nothing."""
+    if _registered:
+        return
+    for room in ROOMS:
+        room.register()
+        _registered.append(room)
+    _commands.append(bpy.utils.register_cli_command("edf", command.run))
+    # bpy as a Python module crashes on its way out when a command is still registered by then.
+    atexit.register(unregister)
 
 
 def unregister() -> None:
-    """Withdraw the command; harmless when it is not offered."""
+    """Switch everything off; harmless when it is not on."""
+    while _commands:
+        bpy.utils.unregister_cli_command(_commands.pop())
     while _registered:
-        bpy.utils.unregister_cli_command(_registered.pop())
+        _registered.pop().unregister()
     atexit.unregister(unregister)

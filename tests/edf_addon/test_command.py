@@ -14,28 +14,20 @@ from edf_stitch.synthetic_scenes import blender_process
 
 pytest.importorskip("bpy")
 
-from edf_stitch.edf_addon import _registered, command, register, unregister  # noqa: E402
+from edf_stitch.edf_addon import _commands, command, register, unregister  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_switching_on_and_off_twice_leaves_nothing_behind():
+def test_the_command_is_offered_once_and_withdrawn():
+    unregister()
     for _ in range(2):
         register()
         register()
-        assert len(_registered) == 1
+        assert len(_commands) == 1
         unregister()
         unregister()
-        assert not _registered
-
-
-def test_the_whole_package_switches_on_and_off():
-    import edf_stitch
-
-    edf_stitch.register()
-    assert len(_registered) == 1
-    edf_stitch.unregister()
-    assert not _registered
+        assert not _commands
 
 
 def test_bpy_as_a_module_ends_well_when_nobody_switched_the_extension_off():

@@ -1,0 +1,268 @@
+"""What an artist decides about a stitch, kept in the scene; and what becomes of it in the engine's words."""
+
+# No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
+from typing import Any
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    IntVectorProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from . import idnames, status
+
+CAMERA_SOURCES = (
+    ("AUTOMATIC", "Automatic", "From the photographs' EXIF; without it, estimated from the matches"),
+    ("FOCAL", "Focal Length", "The lens's focal length in millimetres, with the width of the sensor"),
+    ("FOCAL35", "35 mm Equivalent", "The focal length that would show as much on a 36 × 24 mm frame"),
+    ("FOCAL_PX", "Pixels", "The focal length in pixels of the full picture, as calibration tools give it"),
+    ("CAMERAS", "Scene Cameras", "Two cameras of the scene give lens, shift and place; only the field is fitted"),
+)
+FIELDS = (
+    ("SLACK", "Slack", "Along the epipolar lines, with a little slack for what lens distortion does"),
+    ("STRICT", "Strict", "Exactly along the epipolar lines: every point of the panorama is geometrically right"),
+    ("PAPER", "Paper", "As published: free to leave the epipolar lines"),
+)
+FADES = (
+    ("PLANE", "Plane", "Outside the overlap the scene carries on as the plane that fits it best"),
+    ("INFINITY", "Infinity", "Outside the overlap the scene is taken as infinitely far"),
+)
+BLENDS = (
+    ("FEATHER", "Feather", "A soft change from one picture to the other, across the whole overlap"),
+    ("LINEAR", "Average", "The plain average of both: doubled edges show where they do not fit"),
+)
+CROPS = (
+    ("FULL", "Full", "All that either picture shows; transparent elsewhere"),
+    ("INSCRIBED", "Inscribed", "The largest rectangle without transparent parts"),
+    ("REFERENCE", "Reference", "Only the reference's own frame"),
+    ("BOX", "Box", "A rectangle in pixels of the full panorama"),
+)
+MATCH_STATES = (
+    ("USED", "Used", "The field stands on it"),
+    ("LEFT_OUT", "Left Out", "It contradicts the others and was not used"),
+    ("ADDED", "Added", "Set by hand since the last stitch"),
+)
+OVERLAYS = (
+    ("NONE", "None", "The picture alone"),
+    ("DIFFERENCE", "Difference", "How much the two pictures differ where both show something; black is the same"),
+    ("DISPLACEMENT", "Displacement", "How far each point slides because it is near: blue little, red much"),
+)
+
+
+def is_camera(_settings: Any, object_: bpy.types.Object) -> bool:
+    """What the pointers to camera objects offer."""
+    return object_.type == "CAMERA"
+
+
+class EDF_PG_match(bpy.types.PropertyGroup):  # noqa: N801 (Blender's own form)
+    """A point of the reference and where the target shows the same, px of the full upright pictures: pixel centres are
+    integers, (0, 0) at the top left."""
+
+    x: FloatProperty(name="X", description="Column in the reference, from the left", precision=2)
+    y: FloatProperty(name="Y", description="Row in the reference, from the top", precision=2)
+    x2: FloatProperty(name="X", description="Column in the target, from the left", precision=2)
+    y2: FloatProperty(name="Y", description="Row in the target, from the top", precision=2)
+    weight: FloatProperty(
+        name="Weight", description="How much this match counts beside the others; 1 is usual", default=1.0, min=0.001,
+        soft_max=100.0,
+    )
+    enabled: BoolProperty(name="Use", description="Whether the next stitch may use this match", default=True)
+    error: FloatProperty(
+        name="Error", description="How far, in target pixels, the last stitch missed this match; -1: not measured",
+        default=-1.0, precision=2,
+    )
+    state: EnumProperty(name="State", description="What the last stitch did with it", items=MATCH_STATES)
+
+
+class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
+    """bpy.types.Scene.edf_stitch."""
+
+    reference: PointerProperty(
+        name="Reference", type=bpy.types.Image,
+        description="The picture whose place and plane the panorama keeps: the one that looks at the scene more "
+        "squarely",
+    )
+    target: PointerProperty(
+        name="Target", type=bpy.types.Image, description="The picture that is bent to meet the reference"
+    )
+    result: PointerProperty(name="Panorama", type=bpy.types.Image, description="What was stitched last")
+
+    camera: EnumProperty(name="Camera", description="Where the focal length comes from", items=CAMERA_SOURCES)
+    focal: FloatProperty(
+        name="Focal Length", description="The lens's focal length, as engraved, not its 35 mm equivalent", default=24.0,
+        min=0.1, soft_min=1.0, soft_max=300.0, unit="CAMERA", precision=2,
+    )
+    sensor: FloatProperty(
+        name="Sensor Width", description="The sensor's longer side", default=36.0, min=0.1, soft_min=3.0, soft_max=60.0,
+        unit="CAMERA", precision=2,
+    )
+    focal35: FloatProperty(
+        name="Focal Length", description="35 mm equivalent, as phones give it", default=26.0, min=0.1, soft_min=5.0,
+        soft_max=300.0, unit="CAMERA", precision=1,
+    )
+    focal_px: FloatProperty(
+        name="Focal Length", description="In pixels of the full picture", default=3000.0, min=1.0, precision=1,
+        subtype="PIXEL",
+    )
+    own_lens: BoolProperty(
+        name="Target Has Its Own Lens", description="The target was taken with another lens, zoom or sensor",
+    )
+    target_focal: FloatProperty(
+        name="Target Focal Length", description="The focal length of the target's lens", default=24.0, min=0.1,
+        soft_min=1.0, soft_max=300.0, unit="CAMERA", precision=2,
+    )
+    target_sensor: FloatProperty(
+        name="Target Sensor Width", description="The longer side of the target's sensor", default=36.0, min=0.1,
+        soft_min=3.0, soft_max=60.0, unit="CAMERA", precision=2,
+    )
+    target_focal35: FloatProperty(
+        name="Target Focal Length", description="The target's 35 mm equivalent", default=26.0, min=0.1, soft_min=5.0,
+        soft_max=300.0, unit="CAMERA", precision=1,
+    )
+    target_focal_px: FloatProperty(
+        name="Target Focal Length", description="In pixels of the full target", default=3000.0, min=1.0, precision=1,
+        subtype="PIXEL",
+    )
+    reference_camera: PointerProperty(
+        name="Reference Camera", type=bpy.types.Object, poll=is_camera, description="The camera that took the reference"
+    )
+    target_camera: PointerProperty(
+        name="Target Camera", type=bpy.types.Object, poll=is_camera, description="The camera that took the target"
+    )
+
+    field: EnumProperty(name="Field", description="How the target may be bent to meet the reference", items=FIELDS)
+    fade: EnumProperty(name="Outside", description="What the field becomes outside the overlap", items=FADES)
+    blend: EnumProperty(name="Blend", description="How the two pictures go over into each other", items=BLENDS)
+    crop: EnumProperty(name="Crop", description="What of the panorama is kept", items=CROPS)
+    crop_box: IntVectorProperty(
+        name="Box", description="Left, top, width and height, in pixels of the full panorama, from its top left",
+        size=4, default=(0, 0, 1000, 1000), min=0,
+    )
+    scale: FloatProperty(
+        name="Scale", description="Both pictures are resized by this first", default=1.0, min=0.02, max=1.0,
+        subtype="FACTOR",
+    )
+    preview_scale: FloatProperty(
+        name="Preview Scale", description="Size of the quick preview, as a share of the full one", default=0.25,
+        min=0.02, max=1.0, subtype="FACTOR",
+    )
+    seed: IntProperty(
+        name="Seed", description="Of every random choice: the same seed gives the same panorama", default=0, min=0
+    )
+
+    ignore_reference: PointerProperty(
+        name="Ignore in Reference", type=bpy.types.Image,
+        description="An image of the reference's shape: what is white in it is kept out of everything",
+    )
+    ignore_target: PointerProperty(
+        name="Ignore in Target", type=bpy.types.Image,
+        description="An image of the target's shape: what is white in it is kept out of everything",
+    )
+    edited_matches: BoolProperty(
+        name="Use These Matches", description="Stitch with the matches of the list, as they were edited, instead of "
+        "searching for new ones",
+    )
+    matches: CollectionProperty(type=EDF_PG_match)
+    match_index: IntProperty(name="Active Match", default=-1, options={"SKIP_SAVE"})
+
+    take_layers: BoolProperty(
+        name="Layers", description="Both pictures on the panorama's canvas, with alpha, before they are blended"
+    )
+    take_masks: BoolProperty(name="Masks", description="Where each of the two pictures shows something, as images")
+    take_depth: BoolProperty(
+        name="Inverse Depth", description="The panorama's inverse depth, in units of the distance between the cameras"
+    )
+    fake_user: BoolProperty(
+        name="Fake User", description="Keep the images in the file even where nothing uses them", default=True
+    )
+    pack: BoolProperty(
+        name="Pack", description="Keep the images' pixels inside the .blend file, so that saving it saves them",
+        default=True,
+    )
+
+    overlay: EnumProperty(name="Overlay", description="What lies over the panorama", items=OVERLAYS)
+    overlay_opacity: FloatProperty(
+        name="Opacity", description="How much the overlay covers", default=0.8, min=0.0, max=1.0, subtype="FACTOR"
+    )
+    show_matches: BoolProperty(
+        name="Matches", description="Matches over the pictures, coloured by how far the stitch missed them"
+    )
+    show_epipolar: BoolProperty(
+        name="Epipolar Lines", description="The line in the other picture on which the point under the pointer lies"
+    )
+
+
+class EDF_PG_job(bpy.types.PropertyGroup):  # noqa: N801
+    """bpy.types.WindowManager.edf_stitch_job: what is going on. Read only, and never part of a file or an undo step:
+    every value is looked up where the work keeps it."""
+
+    running: BoolProperty(name="Running", get=lambda _: status.now.running)
+    cancelling: BoolProperty(name="Cancelling", get=lambda _: status.now.cancelling)
+    stage: StringProperty(name="Stage", get=lambda _: status.now.stage)
+    share: FloatProperty(name="Done", get=lambda _: status.now.share, min=0.0, max=1.0, subtype="FACTOR")
+    message: StringProperty(name="Message", get=lambda _: status.now.message)
+    failed: BoolProperty(name="Failed", get=lambda _: status.now.failed)
+
+
+# The properties that are options of the engine under the same name, one word of CHOICES or a plain value each.
+CHOICES = ("field", "fade", "blend")
+VALUES = ("scale", "seed")
+# What changes places when reference and target do; the lenses only where each picture has its own.
+PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))
+LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))
+# What `reset` leaves alone: what is stitched, what came of it, and how it is looked at.
+NO_SETTINGS = frozenset({"name", "reference", "target", "result", "matches", "match_index", "overlay",
+                         "overlay_opacity", "show_matches", "show_epipolar"})  # fmt: skip
+
+
+def options_of(settings: EDF_PG_settings) -> dict[str, Any]:
+    """The settings as fields of StitchOptions, JSON-ready; `camera` holds those of CameraRequest. What needs images or
+    scene cameras (masks, matches, CAMERAS) is added by whoever has them."""
+    options: dict[str, Any] = {name: getattr(settings, name).lower() for name in CHOICES}
+    options |= {name: getattr(settings, name) for name in VALUES}
+    options["crop"] = list(settings.crop_box) if settings.crop == "BOX" else settings.crop.lower()
+    options["camera"] = _camera_of(settings)
+    return options
+
+
+def _camera_of(settings: EDF_PG_settings) -> dict[str, Any]:
+    def of(name: str) -> list[float]:
+        return [getattr(settings, name), *([getattr(settings, f"target_{name}")] if settings.own_lens else [])]
+
+    if settings.camera == "FOCAL":
+        return {"focal_mm": of("focal"), "sensor_mm": of("sensor")}
+    if settings.camera == "FOCAL35":
+        return {"focal35": of("focal35")}
+    if settings.camera == "FOCAL_PX":
+        return {"focal_px": of("focal_px")}
+    return {}
+
+
+def settings_of(scene: bpy.types.Scene) -> EDF_PG_settings:
+    """A scene's settings."""
+    return getattr(scene, idnames.SETTINGS)
+
+
+CLASSES = (EDF_PG_match, EDF_PG_settings, EDF_PG_job)
+
+
+def register() -> None:
+    """Make the properties known and hang them where Blender's files keep them."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    setattr(bpy.types.Scene, idnames.SETTINGS, PointerProperty(type=EDF_PG_settings))
+    setattr(bpy.types.WindowManager, idnames.JOB, PointerProperty(type=EDF_PG_job))
+
+
+def unregister() -> None:
+    """Take them away again."""
+    delattr(bpy.types.WindowManager, idnames.JOB)
+    delattr(bpy.types.Scene, idnames.SETTINGS)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,34 @@
+"""Switching the extension on and off."""
+
+import subprocess
+import sys
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+
+def test_on_and_off_twice_each(blender):
+    import edf_stitch
+
+    edf_stitch.register()  # is on already
+    for _ in range(2):
+        edf_stitch.unregister()
+        edf_stitch.unregister()
+        assert not hasattr(bpy.types.Scene, "edf_stitch") and not hasattr(bpy.types, "EDF_OT_swap")
+        edf_stitch.register()
+        edf_stitch.register()
+        assert hasattr(bpy.types.Scene, "edf_stitch") and hasattr(bpy.types, "EDF_OT_swap")
+
+
+def test_registering_loads_nothing_of_the_engine():
+    """What it loads is Blender's own; what takes time is the worker's."""
+    code = (
+        "import sys, bpy; before = set(sys.modules); import edf_stitch; edf_stitch.register()\n"
+        "print(*sorted({name.split('.')[0] for name in set(sys.modules) - before}))\n"
+        "print(*sorted(name for name in sys.modules if name.startswith('edf_stitch.core')))"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, timeout=120, check=True)
+    loaded, engine = done.stdout.split("\n")[:2]
+    assert not {"cv2", "scipy", "poselib", "OpenEXR", "exifread", "tqdm", "numpy"} & set(loaded.split())
+    assert engine == ""
