@@ -13,7 +13,7 @@ PYTEST := $(BIN)/python -m pytest
 export OPENBLAS_NUM_THREADS := 1
 export BLENDER_RUN
 
-.PHONY: setup demo test slow validate end-to-end lint bench zip clean
+.PHONY: setup demo test slow soak validate end-to-end lint bench zip clean
 
 setup: $(READY)
 
@@ -30,11 +30,15 @@ demo: setup
 	$(BIN)/edf demo -o demo_output --overwrite
 
 test: setup
-	$(PYTEST) -n $(WORKERS) -m "not slow and not blender"
+	$(PYTEST) -n $(WORKERS) -m "not slow and not soak and not blender"
 
 # pytest exits 5 where no test is marked so.
 slow: setup
-	$(PYTEST) -n $(WORKERS) -m "slow and not blender" || [ $$? -eq 5 ]
+	$(PYTEST) -n $(WORKERS) -m "slow and not soak and not blender" || [ $$? -eq 5 ]
+
+# What may never break, tried thousands of times: damaged files, interruptions, long sessions. Half an hour or so.
+soak: setup
+	$(PYTEST) -n $(WORKERS) -m soak
 
 # SUITE=full: all scenes at 1280×960, 25 minutes from empty on two cores. Pictures are kept and made only once.
 validate: setup

@@ -157,7 +157,7 @@ def _jpeg(data: bytes) -> Structure:
 
 def _png(data: bytes) -> Structure:
     found = Structure("png", damage="it is cut off: its end chunk is missing")
-    at = 8
+    at, holds_data = 8, False
     while at + 12 <= len(data):
         length, name = _u32(data, at), data[at + 4 : at + 8]
         body = data[at + 8 : at + 8 + length]
@@ -173,10 +173,27 @@ def _png(data: bytes) -> Structure:
             found = replace(found, exif=body)
         elif name == b"iCCP":
             found = replace(found, icc=_bounded_inflate(body[body.find(b"\0") + 2 :]))
+        holds_data = holds_data or name == b"IDAT"
         if name == b"IEND":
-            return replace(found, damage="")
+            return replace(found, damage="" if holds_data else "it holds no picture data")
         at += 12 + length
     return found
+
+
+def neutral_png(data: bytes) -> bytes:
+    """The same PNG with nothing but its first picture: the chunks that hold it, up to the end chunk.
+
+    OpenCV's reader of animations crashes on damaged ones and believes any length, even behind the end.
+    """
+    parts, at = [data[:8]], 8
+    while at + 12 <= len(data):
+        end = at + 12 + _u32(data, at)
+        if data[at + 4 : at + 8] in (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"):
+            parts.append(data[at:end])
+        if data[at + 4 : at + 8] == b"IEND":
+            break
+        at = end
+    return b"".join(parts)
 
 
 def _webp(data: bytes) -> Structure:

@@ -9,12 +9,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .containers import Structure, neutral_tiff
+from .containers import Structure, neutral_png, neutral_tiff
 from .errors import StitchError, UnreadableImage
 from .exr import read_exr
 
 _MOST_PIXELS = 400_000_000
 _LONGEST_SIDE = 65535
+# Channels of all the layers and parts of an EXR file together, in pixels of four
+_MOST_SAMPLES = 4 * _MOST_PIXELS
+# A file may unpack to so many pixels whatever its length; beyond, its length has to be in proportion.
+_SMALL = 2_000_000
+# Most pixels for each byte of a file. A photograph takes a tenth of a byte or more for each, and JPEG cannot write less
+# than six bits for 256; a mask may be of one colour all over, and deflate packs one bit a pixel a thousand times.
+PHOTOGRAPH, DRAWING = 400, 10_000
 
 
 def read_file(path: Path) -> bytes:
@@ -35,14 +42,19 @@ def read_file(path: Path) -> bytes:
     return data
 
 
-def check_size(width: int, height: int) -> None:
-    """Raises UnreadableImage where a header promises no picture, or one too large to hold (pixels)."""
+def check_size(width: int, height: int, stored: int, pixels_per_byte: int = PHOTOGRAPH) -> None:
+    """Raises UnreadableImage where a header promises no picture, one too large to hold (pixels), or more than a file of
+    `stored` bytes can mean: PHOTOGRAPH or DRAWING pixels a byte (a decompression bomb, or a damaged header)."""
     if width < 1 or height < 1:
         raise UnreadableImage("the file is damaged: its header gives no size; copy or export it again")
     if width * height > _MOST_PIXELS or max(width, height) > _LONGEST_SIDE:
         raise UnreadableImage(
             f"{width} × {height} pixels are too many: at most {_MOST_PIXELS // 10**6} megapixels and {_LONGEST_SIDE}"
             " pixels a side can be read; scale the picture down")
+    if width * height > max(_SMALL, pixels_per_byte * stored):
+        raise UnreadableImage(
+            f"{width} × {height} pixels cannot come out of {stored} bytes: the file is damaged or was made to fill the"
+            " memory; copy or export it again")
 
 
 @contextmanager
@@ -63,6 +75,8 @@ def decode_file(data: bytes, structure: Structure) -> tuple[np.ndarray, list[str
     R, G, B, A order, not turned. Raises UnreadableImage.
     """
     tiff, warnings = structure.tiff, []
+    if structure.kind == "png":
+        data = neutral_png(data)
     if tiff is not None:
         data = neutral_tiff(data)
         if tiff.photometric == 5 and tiff.bits > 8:
@@ -97,10 +111,19 @@ def decode_file(data: bytes, structure: Structure) -> tuple[np.ndarray, list[str
     return raw, warnings
 
 
-def decode_exr(data: bytes) -> tuple[np.ndarray, list[str]]:
-    """Like `decode_file` for EXR: float32, premultiplied by alpha where there is one."""
+def decode_exr(data: bytes, pixels_per_byte: int = PHOTOGRAPH) -> tuple[np.ndarray, list[str]]:
+    """Like `decode_file` for EXR: float32, premultiplied by alpha where there is one; see `check_size`."""
+
+    def check(sizes: list[tuple[int, int]], samples: int) -> None:
+        for width, height in sizes:
+            check_size(width, height, len(data), pixels_per_byte)
+        if samples > _MOST_SAMPLES:
+            raise UnreadableImage(
+                f"the layers of the EXR file hold {samples // 10**6} million numbers together, at most"
+                f" {_MOST_SAMPLES // 10**6} can be read; render only the picture (Combined) into the file")
+
     try:
-        pixels, alpha, warning = read_exr(data, check_size)
+        pixels, alpha, warning = read_exr(data, check)
     except StitchError:
         raise
     except Exception as error:  # OpenEXR raises whatever its C++ side threw

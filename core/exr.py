@@ -28,21 +28,25 @@ class _Layer(NamedTuple):
     part: Any
 
 
-def read_exr(data: bytes, check_size: Callable[[int, int], None]) -> ExrPixels:
+def read_exr(data: bytes, check: Callable[[list[tuple[int, int]], int], None]) -> ExrPixels:
     """Reads the picture of an EXR file: R, G, B or Y, with A where there is one; in a render the Combined pass.
 
-    check_size(width, height) is asked before pixels are read and raises what it likes. The data window is placed in the
-    display window; what lies outside is transparent. Raises UnreadableImage where no layer has the colours,
-    RuntimeError or ValueError (from OpenEXR) where the file is damaged.
+    check(sizes, samples) is asked before pixels are read and raises what it likes; sizes: (W, H) of all windows;
+    samples: numbers in all channels together. The data window is placed in the display window; what lies outside is
+    transparent. Raises UnreadableImage where no layer has the colours, RuntimeError or ValueError (from OpenEXR) where
+    the file is damaged.
     """
     import OpenEXR
 
     # OpenEXR prints a line to sys.stdout for a damaged part and leaves it out.
     with contextlib.redirect_stdout(io.StringIO()):
         headers = OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True).parts
-        for part in headers:
-            for window in ("displayWindow", "dataWindow"):
-                check_size(*_window(part.header[window])[1])
+        sizes = [(_window(part.header["displayWindow"])[1], _window(part.header["dataWindow"])[1]) for part in headers]
+        samples = sum(
+            width * height * len(part.header["channels"])
+            for part, (_, (width, height)) in zip(headers, sizes, strict=True)
+        )
+        check([size for both in sizes for size in both], samples)
         parts = OpenEXR.File(io.BytesIO(data), separate_channels=True).parts
     if len(parts) < len(headers):
         raise ValueError("damaged part")

@@ -15,7 +15,7 @@ import numpy as np
 
 from .colour import Curve, decode, encode, icc_channels, parse_icc, srgb_curve
 from .containers import foreign_kind, read_structure
-from .decoding import check_size, decode_exr, decode_file, quiet_opencv, read_file, turn
+from .decoding import PHOTOGRAPH, check_size, decode_exr, decode_file, quiet_opencv, read_file, turn
 from .errors import BadRequest, UnreadableImage, UnwritableOutput
 from .exr import write_exr
 from .metadata import Exif, embed, read_exif
@@ -57,21 +57,21 @@ class Picture:
     warnings: tuple[str, ...] = ()
 
 
-def load_picture(path: str | Path) -> Picture:
+def load_picture(path: str | Path, pixels_per_byte: int = PHOTOGRAPH) -> Picture:
     """Reads a PNG, JPEG, TIFF, EXR, WebP or BMP file.
 
-    8, 16 or 32 bits (float), gray or colour, with or without alpha. Raises UnreadableImage, with what was found and
-    what to do, for everything else: missing, damaged, cut off, too large (over 400 megapixels or 65535 pixels a side),
-    HEIC and camera RAW.
+    8, 16 or 32 bits (float), gray or colour, with or without alpha. pixels_per_byte: see `check_size`. Raises
+    UnreadableImage, with what was found and what to do, for everything else: missing, damaged, cut off, too large (over
+    400 megapixels or 65535 pixels a side) for memory or for its own length, HEIC and camera RAW.
     """
     path = Path(path)
     try:
-        return _load(path)
+        return _load(path, pixels_per_byte)
     except UnreadableImage as error:
         raise UnreadableImage(f"{path}: {error}") from error
 
 
-def _load(path: Path) -> Picture:
+def _load(path: Path, pixels_per_byte: int) -> Picture:
     data = read_file(path)
     foreign = foreign_kind(data, path.suffix.lower())
     if foreign:
@@ -80,12 +80,12 @@ def _load(path: Path) -> Picture:
     if structure is None:
         raise UnreadableImage(f"not a picture of a known kind; export it as {_READABLE}")
     if structure.kind == "exr":
-        raw, warnings = decode_exr(data)
+        raw, warnings = decode_exr(data, pixels_per_byte)
         return _picture(raw, True, Exif(), None, path.name, warnings)
     if structure.damage:
         kind = structure.kind.upper()
         raise UnreadableImage(f"the {kind} file is damaged: {structure.damage}; copy or export it again")
-    check_size(structure.width, structure.height)
+    check_size(structure.width, structure.height, len(data), pixels_per_byte)
     exif = read_exif(structure.exif)
     if structure.tiff is not None:  # the value that decoding set aside, in BigTIFF too, which ExifRead does not know
         exif = replace(exif, orientation=structure.tiff.orientation if 1 <= structure.tiff.orientation <= 8 else 1)

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .decoding import DRAWING
 from .errors import BadRequest
 from .images import Picture, load_picture, picture_from_array
 
@@ -53,7 +54,7 @@ def without(picture: Picture, mask: NDArray[np.bool_]) -> Picture:
 
 def _picture(source: str | Path | np.ndarray, label: str) -> Picture:
     if not isinstance(source, np.ndarray):
-        return load_picture(source)
+        return load_picture(source, DRAWING)
     return picture_from_array(source.astype(np.uint8) * 255 if source.dtype == bool else source, label)
 
 
