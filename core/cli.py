@@ -16,10 +16,12 @@ from pathlib import Path
 from typing import NoReturn
 
 from .arguments import add_options, options_from
-from .errors import BadRequest, Cancelled, StitchError
+from .errors import BadRequest, Cancelled, StitchError, UnwritableOutput
+from .streams import messages_may_be_lost, silence
 
 # Of one item; every frame of a clip may have its own.
 _MOST_WARNINGS = 5
+_STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -31,38 +33,72 @@ class _Parser(argparse.ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command; returns its exit code (DESIGN 5: 0, 1, 2, 3, 4, 130)."""
+    with messages_may_be_lost():
+        code = _run(argv)
+        try:
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        except OSError as error:
+            silence(sys.stdout)
+            code = code or _stream_lost(error)
+        return code
+
+
+def _run(argv: Sequence[str] | None) -> int:
     # before NumPy loads: BLAS gives other bytes with other thread counts, and the same call owes the same bytes
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    # a farm ends a job with SIGTERM: leave as cleanly as after Ctrl-C
+    asked_to_stop = False
+
+    def interrupt(_number: int, _frame: object) -> NoReturn:
+        nonlocal asked_to_stop
+        asked_to_stop = True
+        raise KeyboardInterrupt
+
+    # a farm ends a job with SIGTERM: leave as cleanly as after Ctrl-C; and a shell starts background jobs with SIGINT
+    # ignored: whoever sends one to a stitch wants it to stop
     main_thread = threading.current_thread() is threading.main_thread()
-    previous = signal.signal(signal.SIGTERM, _interrupt) if main_thread else None
-    # a shell starts background jobs with SIGINT ignored; whoever sends one to a stitch wants it to stop
-    previous_int = signal.signal(signal.SIGINT, signal.default_int_handler) if main_thread else None
+    before = {number: signal.signal(number, interrupt) for number in _STOPPING} if main_thread else {}
     try:
         args = _parser().parse_args(argv)
         return args.run(args)
     except SystemExit as leaving:
         return int(leaving.code or 0)
-    except KeyboardInterrupt:
-        print("edf: interrupted, nothing was written", file=sys.stderr)
-        return Cancelled.exit_code
-    except StitchError as error:
-        print(f"edf: {error}", file=sys.stderr)
-        return error.exit_code
-    except MemoryError:
-        print("edf: not enough memory for pictures of this size; use smaller ones", file=sys.stderr)
-        return 3
-    except Exception as error:  # a bug or a library's refusal: the user gets a sentence all the same
-        print(f"edf: internal error, please report it: {type(error).__name__}: {error}", file=sys.stderr)
-        return StitchError.exit_code
+    except (KeyboardInterrupt, Exception) as error:
+        # a library that is interrupted while it loads makes an ImportError of it
+        return _told(KeyboardInterrupt() if asked_to_stop else error)
     finally:
-        if main_thread:
-            signal.signal(signal.SIGTERM, previous if previous is not None else signal.SIG_DFL)
-            signal.signal(signal.SIGINT, previous_int if previous_int is not None else signal.SIG_DFL)
+        for number, handler in before.items():
+            signal.signal(number, handler if handler is not None else signal.SIG_DFL)
 
 
-def _interrupt(_number: int, _frame: object) -> NoReturn:
-    raise KeyboardInterrupt
+def _told(error: BaseException) -> int:
+    """Says in a sentence why there is no result; returns the exit code."""
+    if isinstance(error, KeyboardInterrupt):
+        sentence, code = "interrupted, nothing was written", Cancelled.exit_code
+    elif isinstance(error, StitchError):
+        sentence, code = str(error), error.exit_code
+    elif isinstance(error, MemoryError):
+        sentence, code = "not enough memory for pictures of this size; use smaller ones", StitchError.exit_code
+    elif isinstance(error, OSError):
+        return _stream_lost(error)
+    else:  # a bug or a library's refusal: the user gets a sentence all the same
+        sentence = f"internal error, please report it: {type(error).__name__}: {error}"
+        code = StitchError.exit_code
+    print(f"edf: {sentence}", file=sys.stderr)
+    return code
+
+
+def _stream_lost(error: OSError) -> int:
+    """Files have their own errors by then: what is left is the output of this command, or the system's own places."""
+    print(f"edf: cannot be read or written: {error.filename or 'the output'}: {error.strerror}", file=sys.stderr)
+    return UnwritableOutput.exit_code
+
+
+def _too_late_to_interrupt() -> None:
+    """All is made and only has to be put in place: whoever interrupts now would be told that nothing was written."""
+    if threading.current_thread() is threading.main_thread():
+        for number in _STOPPING:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -207,6 +243,7 @@ def _stitch(args: argparse.Namespace) -> int:
             result = stitch(args.reference, args.target[0], options, progress=show)
             show("write", 0.95)
             warnings = [*result.warnings, *write(result, outputs, files)]
+        _too_late_to_interrupt()
     for warning in warnings:
         print(f"edf: warning: {warning}", file=sys.stderr)
     if not args.quiet:

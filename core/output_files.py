@@ -4,12 +4,26 @@ from __future__ import annotations
 
 import errno
 import os
+import platform
+import re
 import secrets
-from collections.abc import Callable, Iterable
+import signal
+import sys
+import threading
+import time
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
 from .errors import BadRequest, UnwritableOutput
+
+# .edf-HOST-PROCESS-RANDOM.tmp: whose it is can be told when its process was killed
+_TEMPORARY = re.compile(r"\.edf-([0-9a-f]{8})-(\d+)-[0-9a-f]{12}\.tmp")
+_HOST = f"{zlib.crc32(platform.node().encode()):08x}"
+# Where nobody can say whether its process lives (another host's, Windows), a file this old is a dead one's. Seconds
+_OLD = 86_400
 
 
 class OutputFiles:
@@ -71,8 +85,7 @@ class OutputFiles:
         if target in self._staged:
             raise BadRequest(f"{target}: named for two outputs; give each its own name")
         self._check_free(target)
-        # Hidden, and without the target's name, which may be as long as the file system allows
-        temporary = target.parent / f".edf-{os.getpid()}-{secrets.token_hex(6)}.tmp"
+        temporary = _temporary_in(target.parent)
         self._staged[target] = temporary
         try:
             with open(temporary, "xb") as file:
@@ -96,6 +109,10 @@ class OutputFiles:
 
     def commit(self) -> None:
         """Puts all staged files in place, or none."""
+        with undisturbed():
+            self._commit()
+
+    def _commit(self) -> None:
         new: list[Path] = []
         try:
             for target in self._staged:
@@ -103,26 +120,43 @@ class OutputFiles:
             new = [target for target in self._staged if not target.exists()]
             for target, temporary in self._staged.items():
                 try:
-                    os.replace(temporary, target)
+                    self._place(temporary, target)
                 except OSError as error:
                     raise _unwritable(target, error) from error
         except BaseException:
             for target in new:
-                if not self._staged[target].exists():  # renamed
+                if not self._staged[target].exists() or _same_file(self._staged[target], target):  # ours, in place
                     _quietly(target.unlink)
             self.discard()
             raise
         self._staged.clear()
         self._made.clear()
 
+    def _place(self, temporary: Path, target: Path) -> None:
+        """One step, which replaces nothing where nothing may be replaced: another process may have been faster."""
+        if self._overwrite:
+            os.replace(temporary, target)
+            return
+        try:
+            os.link(temporary, target)  # unlike a rename it fails where something stands
+        except FileExistsError:
+            self._check_free(target)
+            raise
+        except OSError:  # a file system without links: look once more, then rename
+            self._check_free(target)
+            os.replace(temporary, target)
+        else:
+            _quietly(temporary.unlink)
+
     def discard(self) -> None:
         """Removes everything staged, and the folders made for it as far as they are empty."""
-        for temporary in self._staged.values():
-            _quietly(temporary.unlink)
-        for folder in reversed(self._made):
-            _quietly(folder.rmdir)
-        self._staged.clear()
-        self._made.clear()
+        with undisturbed():
+            for temporary in self._staged.values():
+                _quietly(temporary.unlink)
+            for folder in reversed(self._made):
+                _quietly(folder.rmdir)
+            self._staged.clear()
+            self._made.clear()
 
     def _check_free(self, target: Path) -> None:
         if not _exists(target):
@@ -162,13 +196,57 @@ def _real(path: str | Path) -> Path:
 
 
 def _probe(folder: Path) -> None:
-    """Writes and removes a file: asking the permissions is wrong on Windows, for root and on read-only mounts."""
-    trial = folder / f".edf-{os.getpid()}-{secrets.token_hex(6)}.tmp"
+    """Writes and removes a file: asking the permissions is wrong on Windows, for root and on read-only mounts. Removes
+    what processes that were killed have left."""
+    trial = _temporary_in(folder)
     try:
         trial.touch(exist_ok=False)
         trial.unlink()
+        left = [Path(entry) for entry in os.scandir(folder) if _is_left(entry)]
     except OSError as error:
         raise _unwritable(folder, error) from error
+    for path in left:
+        _quietly(path.unlink)
+
+
+def _temporary_in(folder: Path) -> Path:
+    """Hidden, and without the target's name, which may be as long as the file system allows."""
+    return folder / f".edf-{_HOST}-{os.getpid()}-{secrets.token_hex(6)}.tmp"
+
+
+def _is_left(entry: os.DirEntry[str]) -> bool:
+    """Whether this is a temporary file of a process that is no more."""
+    named = _TEMPORARY.fullmatch(entry.name)
+    if named is None:
+        return False
+    try:
+        if named[1] != _HOST or sys.platform == "win32":
+            return time.time() - entry.stat(follow_symlinks=False).st_mtime > _OLD
+        os.kill(int(named[2]), 0)  # asks only
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):  # somebody else's process, or gone already
+        return False
+    return False
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """A short while in which signals wait, so that nobody's impatience (a second Ctrl-C) leaves anything half done."""
+    if threading.current_thread() is not threading.main_thread():  # signals never come here
+        yield
+        return
+    came: list[int] = []
+    # a handler of None is not Python's and could not be put back: Blender's
+    numbers = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not None]
+    before = {number: signal.signal(number, lambda number, _frame: came.append(number)) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in came:
+            signal.raise_signal(number)
 
 
 def _quietly(remove: Callable[[], None]) -> None:

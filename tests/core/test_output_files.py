@@ -6,6 +6,7 @@ import errno
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -118,14 +119,16 @@ def test_links_are_written_through(tmp_path: Path) -> None:
 
 
 def test_failing_midway_takes_the_new_files_away_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    replace = os.replace
+    def fails_at_b(step: Callable[[Path, Path], None]) -> Callable[[Path, Path], None]:
+        def run(source: Path, target: Path) -> None:
+            if Path(target).name == "b.png":
+                raise OSError(errno.EACCES, "Permission denied")
+            step(source, target)
 
-    def fails_at_b(source: Path, target: Path) -> None:
-        if Path(target).name == "b.png":
-            raise OSError(errno.EACCES, "Permission denied")
-        replace(source, target)
+        return run
 
-    monkeypatch.setattr(os, "replace", fails_at_b)
+    for name in ("link", "replace"):
+        monkeypatch.setattr(os, name, fails_at_b(getattr(os, name)))
     with pytest.raises(UnwritableOutput, match=r"b\.png cannot be written: Permission denied"), OutputFiles() as files:
         files.add(tmp_path / "a.png", b"1")
         files.add_to_folder(tmp_path / "new", "b.png", b"2")
