@@ -30,7 +30,7 @@ demo: setup
 	$(BIN)/edf demo -o demo_output --overwrite
 
 test: setup
-	$(PYTEST) -n $(WORKERS) -m "not slow and not soak and not blender"
+	$(PYTEST) -n $(WORKERS) -m "not slow and not blender"
 
 # pytest exits 5 where no test is marked so.
 slow: setup

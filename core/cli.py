@@ -231,9 +231,11 @@ def _add_loudness(parser: argparse.ArgumentParser) -> None:
 def _stitch(args: argparse.Namespace) -> int:
     if len(args.target) > 1:
         raise BadRequest(f"{1 + len(args.target)} pictures given: two at a time for now; stitch them pair by pair")
-    from .output_files import OutputFiles
-    from .outputs import OutputRequest, check, write
-    from .pipeline import stitch
+    from .output_files import OutputFiles, undisturbed
+
+    with undisturbed():  # NumPy prints a traceback of its own where a signal breaks into its loading
+        from .outputs import OutputRequest, check, write
+        from .pipeline import stitch
 
     options = options_from(args, measure=bool(args.report or args.verbose))
     outputs = OutputRequest(args.output, args.report, args.layers, args.warp)
@@ -255,9 +257,12 @@ def _stitch(args: argparse.Namespace) -> int:
 
 
 def _batch(args: argparse.Namespace) -> int:
-    from .batch import Outcome, run_batch
-    from .batch_list import read_list
-    from .batch_outputs import BatchRequest
+    from .output_files import undisturbed
+
+    with undisturbed():  # see _stitch
+        from .batch import Outcome, run_batch
+        from .batch_list import read_list
+        from .batch_outputs import BatchRequest
 
     suffix = args.format if args.format.startswith(".") else f".{args.format}"
     request = BatchRequest(args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard)

@@ -57,6 +57,7 @@ def test_mutated_files_are_read_or_refused() -> None:
     assert CASES * 0.1 < pictures < CASES * 0.6, "the mutations are neither harmless nor all found by a checksum"
 
 
+@pytest.mark.slow
 @pytest.mark.soak
 @pytest.mark.parametrize("quarter", range(4))
 def test_many_mutated_files_are_read_or_refused(quarter: int) -> None:

@@ -241,6 +241,7 @@ def test_interrupted_at_random_a_few_times(folder: Path, tmp_path: Path) -> None
 
 
 @linux
+@pytest.mark.slow
 @pytest.mark.soak
 def test_interrupted_at_random_many_times(folder: Path, tmp_path: Path) -> None:
     codes = interrupted(folder, tmp_path / "out", range(100, 100 + INTERRUPTIONS))
