@@ -72,11 +72,30 @@ def prepare(reference: Picture, target: Picture, options: StitchOptions) -> Fram
     )
 
 
+@dataclass(frozen=True)
+class Registration:
+    """How two cameras stood, before any field: what all fields of a pair have in common.
+
+    cameras, matches, two_view, warnings: as in `Alignment`; ideal: the matches in ideal (undistorted) pixels.
+    """
+
+    cameras: tuple[Camera, Camera]
+    matches: Matches
+    ideal: Matches
+    two_view: TwoView
+    warnings: tuple[str, ...]
+
+
 def align(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> Alignment:
     """Aligns the target of each frame with the reference; all frames share both cameras, hence one alignment.
 
     Raises StitchError and its kinds.
     """
+    return lay(register(frames, options, steps), options, steps)
+
+
+def register(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> Registration:
+    """Matches and two-view geometry of frames that share both cameras. Raises StitchError and its kinds."""
     first, second, sizes = frames[0].reference, frames[0].target, frames[0].full_sizes
     if any(frame.full_sizes != sizes for frame in frames):
         raise BadRequest("the frames of a clip differ in size: one alignment is for one camera each")
@@ -91,14 +110,19 @@ def align(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> Alig
     steps("geometry", 0.0)
     ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
     two_view = estimate(ideal, *cameras, seed=options.seed)
+    return Registration(cameras, matches, ideal, two_view, (*warnings, *two_view.warnings))
 
+
+def lay(registration: Registration, options: StitchOptions, steps: Steps) -> Alignment:
+    """Field and map of a pair whose geometry is known. Raises StitchError and its kinds."""
+    cameras, two_view = registration.cameras, registration.two_view
     steps("field", 0.0)
-    size, target_size = cameras[0].size, cameras[1].size
-    field = fit_field(options.field, options.fade, two_view, ideal.subset(two_view.inliers), size, target_size)
+    inliers, sizes = registration.ideal.subset(two_view.inliers), (cameras[0].size, cameras[1].size)
+    field = fit_field(options.field, options.fade, two_view, inliers, *sizes, options.seed)
 
     steps("warp", 0.0)
-    warp = build_warp(field, two_view, *cameras)
-    return Alignment(cameras, matches, two_view, field, warp, (*warnings, *two_view.warnings))
+    warp = build_warp(field, field.two_view, *cameras)
+    return Alignment(cameras, registration.matches, field.two_view, field, warp, registration.warnings)
 
 
 def size_of(picture: Picture) -> tuple[int, int]:

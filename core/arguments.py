@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 # What DESIGN names and what is not there yet is refused by name, so that nobody takes silence for success.
 FADE_CHOICES = ("plane", "infinity")
-FIELD_CHOICES, FIELDS_TO_COME = ("slack", "strict", "paper"), ("rew", "apap", "homography")
+FIELD_CHOICES = ("slack", "strict", "paper", "rew", "apap", "homography")
 BLEND_CHOICES, BLENDS_TO_COME = ("feather", "linear"), ("multiband",)
 
 
@@ -66,9 +66,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     how.add_argument(
         "--field",
         default="slack",
-        type=_choice(FIELD_CHOICES, FIELDS_TO_COME),
+        type=_choice(FIELD_CHOICES, ()),
         metavar="FIELD",
-        help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), paper",
+        help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), "
+        "paper, or one that knows no depth: rew, apap, homography",
     )
     how.add_argument(
         "--fade",

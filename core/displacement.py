@@ -38,8 +38,8 @@ PLANE_PX = 0.3
 
 @dataclass(frozen=True)
 class FieldValues:
-    """A field at nodes: inverse_depth (rows, columns), and shift (rows, columns, 2) in target px that comes on top of
-    π(H_inf p + d e'), None where the field keeps to its epipolar lines."""
+    """A field at nodes: inverse_depth (rows, columns), NaN where it knows none (e' is 0 then), and shift (rows,
+    columns, 2) in target px that comes on top of π(H_inf p + d e'), None where the field keeps to its lines."""
 
     inverse_depth: Array
     shift: Array | None = None
@@ -68,6 +68,11 @@ class Field(Protocol):
     @property
     def name(self) -> str:
         """What `--field` calls it."""
+        ...
+
+    @property
+    def two_view(self) -> TwoView:
+        """The geometry that its values come on top of."""
         ...
 
     @property
@@ -146,7 +151,7 @@ class StrictField:
     def refitted(self, matches: Matches) -> StrictField:
         """A spline on other matches of the pair, all kept, at the same λ; the plane stays, since whatever is affine in
         d the spline takes up. Raises DegenerateGeometry."""
-        _refuse_no_spread(matches.x, matches.scale)
+        refuse_no_spread(matches.x, matches.scale)
         fit = replace(self.fit, kept=np.full(len(matches), True))
         if not self.two_view.e_prime.any():
             return replace(self, fit=fit)
@@ -188,7 +193,9 @@ def fade_share(
 
 def target_points(two_view: TwoView, points: Array, inverse_depth: Array) -> Array:
     """π(H_inf p + d e') (…, 2) for points (…, 2) and d (…); NaN where the point lies behind the target camera."""
-    ray = homogeneous(points) @ two_view.H_inf.T + inverse_depth[..., None] * two_view.e_prime
+    ray = homogeneous(points) @ two_view.H_inf.T
+    if two_view.e_prime.any():  # else depth, known or not (NaN), moves nothing
+        ray += inverse_depth[..., None] * two_view.e_prime
     # relative to the ray's own length: less than this in front is behind for any picture
     behind = ray[..., 2] <= 1e-6 * np.abs(ray[..., :2]).max(axis=-1)
     ray[behind] = np.nan
@@ -252,7 +259,7 @@ def fit_strict(
         plane = continued_plane(x[index], d[index], sensitivity[index], weight, beyond, unit, tolerance, noise_px)
     off_line = np.linalg.norm(target_points(two_view, x[index], d[index]) - y[index], axis=1)
     index = _thinned(matches, index, off_line, unit)
-    _refuse_no_spread(x[index], matches.scale)
+    refuse_no_spread(x[index], matches.scale)
     g = d - (x @ plane[:2] + plane[2])
     index, spline, residual, smoothing, held_out_px = _prune_and_smooth(matches, g, sensitivity, index, unit)
     s = sensitivity[index]
@@ -276,7 +283,7 @@ def _thinned(matches: Matches, index: NDArray[np.intp], off: Array, unit: float)
     return index[spread_points(matches.x[index], off / matches.weights[index], CENTRE_BUDGET, unit / 200)]
 
 
-def _refuse_no_spread(x: Array, scale: float) -> None:
+def refuse_no_spread(x: Array, scale: float) -> None:
     """Raises DegenerateGeometry where points (N, 2) with noise of the unit `scale` px are too few for a spline, or lie
     on a line."""
     if len(x) < MIN_CENTRES or np.linalg.svd(x - x.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(x)) < scale:
@@ -355,11 +362,12 @@ def _supported(x: Array, g: Array, sensitivity: Array, tolerance: float) -> NDAr
 
 
 def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> float:
-    """λ of the ladder with the least leave-one-out error in px.
+    """λ of the ladder with the least leave-one-out error in px; g (N,) or, in two components, (N, 2).
 
     Large errors count in proportion, not squared: a few depth edges must not decide for the whole picture.
     """
-    error = np.abs(problem.held_out(g, SMOOTHING_LADDER)) * sensitivity
+    parts = [problem.held_out(part, SMOOTHING_LADDER) for part in np.atleast_2d(g.T)]
+    error = np.linalg.norm(parts, axis=0) * sensitivity
     knee = 3 * np.median(error, axis=1, keepdims=True) + 1e-12
     score = np.where(error < knee, error**2, knee * (2 * error - knee)).mean(axis=1)
     return float(SMOOTHING_LADDER[int(np.argmin(score))])

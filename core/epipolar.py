@@ -24,6 +24,13 @@ def project(rays: Array) -> Array:
     return rays[..., :2] / rays[..., 2:]
 
 
+def normalisation(points: Array) -> Array:
+    """The similarity (3, 3) that moves points to mean 0 and mean distance √2 (H&Z 4.4.4)."""
+    centre = points.mean(axis=0)
+    scale = np.sqrt(2) / max(float(np.linalg.norm(points - centre, axis=1).mean()), 1e-12)
+    return np.array([[scale, 0, -scale * centre[0]], [0, scale, -scale * centre[1]], [0, 0, 1.0]])
+
+
 def skew(v: Array) -> Array:
     """The matrix [v]ₓ with [v]ₓ w = v × w."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

@@ -1,24 +1,37 @@
-"""The displacement fields by name."""
+"""The displacement fields by name, our own and the rivals."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from .displacement import Field, fit_strict
 from .features import Matches
 from .paper import fit_paper
+from .rivals.apap import fit_apap
+from .rivals.homography import fit_one_homography
+from .rivals.rew import fit_rew
 from .slack import fit_slack
 from .two_view import TwoView
 
-FIELDS = ("slack", "strict", "paper")
+RIVALS = ("rew", "apap", "homography")
+FIELDS = ("slack", "strict", "paper", *RIVALS)
 
 
 def fit_field(
-    name: str, fade: str, two_view: TwoView, matches: Matches, size: tuple[int, int], target_size: tuple[int, int]
-) -> Field:
+    name: str, fade: str, two_view: TwoView, matches: Matches, size: tuple[int, int], target_size: tuple[int, int],
+    seed: int = 0,
+) -> Field:  # fmt: skip
     """The field called `name` (one of FIELDS), fitted to inlier matches; sizes (W, H) px; fade: `plane` or `infinity`.
 
-    Raises DegenerateGeometry.
+    Its `two_view` is what its map is built on: the given one, of a rival as little as it knows. Raises
+    DegenerateGeometry.
     """
+    if name == "homography":
+        return fit_one_homography(two_view, matches, seed)
     strict = fit_strict(two_view, matches, size, target_size, fade)
-    if name == "strict":
-        return strict
-    return fit_slack(strict, matches) if name == "slack" else fit_paper(strict, matches)
+    on_top: dict[str, Callable[[], Field]] = {
+        "strict": lambda: strict, "slack": lambda: fit_slack(strict, matches),
+        "paper": lambda: fit_paper(strict, matches), "rew": lambda: fit_rew(strict, matches),
+        "apap": lambda: fit_apap(strict, matches),
+    }  # fmt: skip
+    return on_top[name]()

@@ -108,9 +108,11 @@ def warp_bytes(result: StitchResult) -> bytes:
     """The .npz of DESIGN 5: x' ~ H_inf p + inverse_depth e' for canvas pixels p + offset; NaN for what a model
     lacks."""
     view, warp = result.two_view, result.warp
+    # a field without depth slides nothing: inside, its e' is 0
+    e_prime = view.e_prime if np.isfinite(warp.inverse_depth).any() else np.full(3, np.nan)
     arrays: dict[str, np.ndarray] = {
         "map_x": warp.map_x, "map_y": warp.map_y, "offset": np.array(warp.canvas.offset, np.int64),
-        "F": view.F, "H_inf": view.H_inf, "e_prime": view.e_prime, "inverse_depth": warp.inverse_depth,
+        "F": view.F, "H_inf": view.H_inf, "e_prime": e_prime, "inverse_depth": warp.inverse_depth,
         "K": view.K, "K_prime": view.K_prime, "R": view.R, "t": view.t,
         "dist": result.cameras[0].distortion, "dist_prime": result.cameras[1].distortion,
     }  # fmt: skip

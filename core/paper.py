@@ -17,6 +17,7 @@ from .epipolar import Array
 from .errors import DegenerateGeometry
 from .features import Matches
 from .spline import SmoothingProblem, ThinPlateSpline, kernel
+from .two_view import TwoView
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,11 @@ class PaperField:
     fit: Fit
 
     name = "paper"
+
+    @property
+    def two_view(self) -> TwoView:
+        """The strict field's geometry."""
+        return self.strict.two_view
 
     @property
     def plane(self) -> Array:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from .epipolar import Array, distance_to_line, homogeneous, sampson_residuals
+from .epipolar import Array, distance_to_line, homogeneous, normalisation, sampson_residuals
 from .features import Matches
 from .metrics import Shown
 
@@ -72,16 +72,9 @@ def _refitted(F: Array, matches: Matches, limit: float) -> Array | None:
 def eight_point(x: Array, y: Array, weight: Array) -> Array:
     """F (3, 3) of norm 1 with yᵀ F x = 0 for matches (N ≥ 9, 2) and weights (N,), by the normalised 8-point algorithm
     (H&Z algorithm 11.1)."""
-    T, T_prime = _normalisation(x), _normalisation(y)
+    T, T_prime = normalisation(x), normalisation(y)
     a, b = homogeneous(x) @ T.T, homogeneous(y) @ T_prime.T
     design = (b[:, :, None] * a[:, None, :]).reshape(len(x), 9) * weight[:, None]
     U, S, Vt = np.linalg.svd(np.linalg.svd(design, full_matrices=False)[2][-1].reshape(3, 3))
     F = T_prime.T @ (U * [S[0], S[1], 0.0]) @ Vt @ T
     return F / np.linalg.norm(F)
-
-
-def _normalisation(points: Array) -> Array:
-    """The similarity (3, 3) that moves points to mean 0 and mean distance √2 (H&Z 4.4.4)."""
-    centre = points.mean(axis=0)
-    scale = np.sqrt(2) / max(float(np.linalg.norm(points - centre, axis=1).mean()), 1e-12)
-    return np.array([[scale, 0, -scale * centre[0]], [0, scale, -scale * centre[1]], [0, 0, 1.0]])

@@ -66,7 +66,7 @@ def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camer
     found: list[tuple[float, Rotation]] = []
     for factor in factors:
         K, K_prime = camera.scaled(factor if free else 1.0), camera_prime.scaled(factor if free_prime else 1.0)
-        start = _nearest_rotation(inverse_intrinsics(K_prime) @ H @ K)
+        start = nearest_rotation(inverse_intrinsics(K_prime) @ H @ K)
         p = np.zeros(3 + free + free_prime)
         p[3:] = np.log(factor)
         solution = least_squares(residuals, p, loss="cauchy", max_nfev=100)
@@ -74,7 +74,7 @@ def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camer
     return min(found, key=lambda item: item[0])[1]
 
 
-def _nearest_rotation(M: Array) -> Array:
+def nearest_rotation(M: Array) -> Array:
     """The rotation nearest to a multiple of M (orthogonal Procrustes)."""
     U, _, Vt = np.linalg.svd(M)
     return U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt

@@ -15,6 +15,7 @@ from .displacement import FieldValues, Fit, StrictField, on_nodes
 from .epipolar import Array
 from .features import Matches
 from .spline import SmoothingProblem, ThinPlateSpline
+from .two_view import TwoView
 
 # s is so much smoother than the strict field's spline.
 STIFFER = 10.0
@@ -28,6 +29,11 @@ class SlackField:
     spline: ThinPlateSpline
 
     name = "slack"
+
+    @property
+    def two_view(self) -> TwoView:
+        """The strict field's geometry."""
+        return self.strict.two_view
 
     @property
     def plane(self) -> Array:

@@ -34,7 +34,7 @@ LEAST_ALPHA = 1e-2
 @dataclass(frozen=True)
 class Warp:
     """map_x, map_y (H, W) float32: raw target pixel of each canvas pixel, NaN behind the camera; inverse_depth (H, W)
-    float32."""
+    float32, NaN where the field knows none."""
 
     canvas: Canvas
     map_x: NDArray[np.float32]
@@ -108,13 +108,14 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
         # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
         strip = (left, top + start, canvas.width, stop - start)
         d = grid.to_pixels(values.inverse_depth, *strip).astype(np.float64)
+        slide = d if e.any() else np.zeros_like(d)  # where nothing slides, depth may be unknown (NaN)
         ys = np.arange(top + start, top + stop, dtype=np.float64)[:, None]
         if camera.distortion.any():
             raw = np.stack(np.broadcast_arrays(xs[None, :], ys), axis=-1)
             ray = homogeneous(undistort(raw, camera)) @ H.T
-            a, b, c = (ray[..., k] + d * e[k] for k in range(3))
+            a, b, c = (ray[..., k] + slide * e[k] for k in range(3))
         else:
-            a, b, c = ((H[k, 0] * xs)[None, :] + (H[k, 1] * ys + H[k, 2]) + d * e[k] for k in range(3))
+            a, b, c = ((H[k, 0] * xs)[None, :] + (H[k, 1] * ys + H[k, 2]) + slide * e[k] for k in range(3))
         c[c <= 1e-6 * np.maximum(np.abs(a), np.abs(b))] = np.nan
         x, y = a / c, b / c
         if values.shift is not None:

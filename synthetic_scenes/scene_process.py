@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import StitchError
+from ..core.fields import RIVALS
 from ..core.output_files import OutputFiles
 from ..core.outputs import json_bytes
 from ..core.report import plain
@@ -19,7 +20,7 @@ from .measures import figures, on_the_wide_canvas, truth_of, whole_picture
 from .recipes import parse_scene
 from .rendered import rendered_pair
 from .scene_pictures import scene_pictures
-from .stitches import WAYS, stitched
+from .stitches import WAYS, Shared, stitched
 
 SCHEMA = 1
 # The stitch that the report shows.
@@ -40,9 +41,10 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
     pair = rendered_pair(recipe, difficulty, recipe.size(*size), folder / "pictures")
     truth = truth_of(pair)
     results, runs = {}, {}
+    shared: Shared = {}
     for way in WAYS:
         try:
-            results[way] = stitched(pair, way)
+            results[way] = stitched(pair, way, shared)
         except StitchError as refusal:
             runs[way] = _run(refused=str(refusal))
     placed = {way: on_the_wide_canvas(result, truth) for way, result in results.items()}
@@ -57,8 +59,8 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
         if common is not None:
             measured |= whole_picture(placed[way][0], common, truth)
         said = any("not determined" in text for text in (view.focal_source, *result.warnings))
-        # in the rival's hands the model is no decision
-        model = None if way.endswith("homography") else view.model
+        # in a rival's hands the model is no decision
+        model = None if way.endswith(RIVALS) else view.model
         runs[way] = _run(model=model, undetermined_said=said, warnings=list(result.warnings), figures=measured)
         seconds |= {f"{way} {stage}": value for stage, value in result.seconds.items()}
     name = file_name(scene)

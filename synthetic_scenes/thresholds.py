@@ -75,7 +75,7 @@ SCENE = (
 )
 # Every scene with parallax: no worse than any rival by more than this, whole picture against the true panorama. A rival
 # that refused the scene, or that does not exist yet, is none.
-OURS, RIVALS = "known/strict", ("known/paper", "known/homography")
+OURS, RIVALS = "known/strict", ("known/paper", "known/rew", "known/apap", "known/homography")
 LEAD = Limit(OURS, "whole_psnr_db", "dB", at_least=-0.2)
 # The whole suite: medians over its scenes with parallax.
 SUITE = (

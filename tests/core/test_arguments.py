@@ -76,7 +76,7 @@ def test_how_it_is_done(words: list[str], expected: dict) -> None:
 
 
 @pytest.mark.parametrize("words", [
-    *(["--field", name] for name in ("rew", "apap", "homography")), ["--blend", "multiband"], ["--seam", "graphcut"],
+    ["--blend", "multiband"], ["--seam", "graphcut"],
     *(["--projection", name] for name in ("cylindrical", "equirectangular")), ["--dense"], ["--exposure"],
 ], ids=" ".join)  # fmt: skip
 def test_what_is_yet_to_come_is_refused_by_name(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:

@@ -207,7 +207,7 @@ def test_the_demo_prints_its_figures_and_says_where_its_files_are(
 
 # --- refusals -------------------------------------------------------------------------------------------------------
 
-YET_TO_COME = [["--field", "rew"], ["--dense"], ["--exposure"], ["--blend", "multiband"], ["--seam", "graphcut"]]
+YET_TO_COME = [["--dense"], ["--exposure"], ["--blend", "multiband"], ["--seam", "graphcut"]]
 WRONG = [
     ["--field", "nonsense"], ["--fade", "slowly"], ["--nonsense"], ["--seed", "x"], ["--seed", "-1"], ["--scale", "0"],
     ["--quiet", "--verbose"], ["--principal", "1"], ["--focal-px", "abc"], ["--focal-px", "0"], ["--focal-px"],
@@ -343,7 +343,7 @@ def run(*arguments: str | Path, cwd: Path, **environment: str | None) -> subproc
 def test_importing_the_command_loads_nothing_heavy(tmp_path: Path) -> None:
     code = (
         "import sys, edf_stitch.core.cli as c\n"
-        "c.main(['stitch', 'a.png', 'c.png', '-o', 'b.png', '--field', 'rew'])\n"
+        "c.main(['stitch', 'a.png', 'c.png', '-o', 'b.png', '--dense'])\n"
         "print(sorted({'numpy', 'cv2', 'scipy', 'poselib', 'tqdm', 'bpy'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)

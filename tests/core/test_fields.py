@@ -13,7 +13,7 @@ from edf_stitch.core.displacement import FADES, Field, StrictField, fit_strict, 
 from edf_stitch.core.epipolar import distance_to_line, homogeneous, project
 from edf_stitch.core.errors import DegenerateGeometry
 from edf_stitch.core.features import Matches
-from edf_stitch.core.fields import FIELDS, fit_field
+from edf_stitch.core.fields import FIELDS, RIVALS, fit_field
 from edf_stitch.core.paper import PaperField
 from edf_stitch.core.slack import SlackField
 from edf_stitch.core.two_view import TwoView
@@ -21,7 +21,8 @@ from edf_stitch.core.warp import build_map
 
 from .test_displacement import SIDE, SIZE, VIEWS, curved, overlap, planar, some_matches
 
-every_field = pytest.mark.parametrize("name", FIELDS)
+OURS = tuple(name for name in FIELDS if name not in RIVALS)  # the others: rivals/test_rivals.py
+every_field = pytest.mark.parametrize("name", OURS)
 every_fade = pytest.mark.parametrize("fade", FADES)
 CAMERAS = (Camera(SIDE.K, SIZE, "test", 0.0), Camera(SIDE.K_prime, SIZE, "test", 0.0))
 
@@ -32,8 +33,8 @@ def field_of(name: str, fade: str = "plane", two_view: TwoView = SIDE, noise: fl
 
 
 def test_each_name_makes_its_field() -> None:
-    assert FIELDS == ("slack", "strict", "paper") and FADES == ("plane", "infinity")
-    for name, kind in zip(FIELDS, (SlackField, StrictField, PaperField), strict=True):
+    assert FIELDS == ("slack", "strict", "paper", "rew", "apap", "homography") and FADES == ("plane", "infinity")
+    for name, kind in zip(OURS, (SlackField, StrictField, PaperField), strict=True):
         field = field_of(name, "infinity")
         assert isinstance(field, kind) and field.name == name
         strict = field if isinstance(field, StrictField) else field.strict

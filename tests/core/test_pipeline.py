@@ -420,7 +420,7 @@ def test_pictures_that_cannot_be_read(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("options", [
-    {"field": "rew"}, {"field": ""}, {"fade": "slowly"}, {"scale": 1.5}, {"crop": "tight"}, {"blend": "multiband"},
+    {"field": "REW"}, {"field": ""}, {"fade": "slowly"}, {"scale": 1.5}, {"crop": "tight"}, {"blend": "multiband"},
     {"blend": "Feather"}, {"seed": -1}, {"seed": 2**31},
 ])  # fmt: skip
 def test_options_that_are_not_offered(options: dict) -> None:

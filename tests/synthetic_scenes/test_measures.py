@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.epipolar import infinite_homography, rotation_from_vector
+from edf_stitch.core.fields import RIVALS
 from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.synthetic_scenes.measures import Truth, figures, on_the_wide_canvas, truth_of, whole_picture
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
 from edf_stitch.synthetic_scenes.scene_pictures import scene_pictures
-from edf_stitch.synthetic_scenes.stitches import WAYS, stitched
+from edf_stitch.synthetic_scenes.stitches import WAYS, Shared, stitched
 
 
 @pytest.fixture(scope="module")
@@ -99,16 +100,23 @@ def test_a_real_stitch_is_close(result: StitchResult, truth: Truth) -> None:
         "whole_psnr_db"]
 
 
+@pytest.fixture(scope="module")
+def shared() -> Shared:
+    """Features and geometry of the rendered pair, found once."""
+    return {}
+
+
 @pytest.mark.parametrize("way", WAYS)
-def test_every_way_stitches(way: str, rendered: RenderedPair, truth: Truth) -> None:
-    result = stitched(rendered, way)
+def test_every_way_stitches(way: str, rendered: RenderedPair, truth: Truth, shared: Shared) -> None:
+    result = stitched(rendered, way, shared)
     found = figures(result, truth)
     assert found["alignment_px"] < 3 and found["covered"] > 0.7
-    if way == "known/homography":
-        assert np.isnan(found["rotation_deg"]) and np.isnan(found["f_px"]) and not result.warp.inverse_depth.any()
+    knows_nothing = way.endswith(RIVALS)
+    if knows_nothing:
+        assert np.isnan(found["rotation_deg"]) and np.isnan(found["f_px"]) and np.isnan(result.warp.inverse_depth).all()
     if way.startswith("unknown"):
         assert found["focal_percent"] != 0
-    elif way != "known/homography":
+    elif not knows_nothing:
         assert found["focal_percent"] == pytest.approx(0, abs=1e-4)
 
 
@@ -117,3 +125,11 @@ def test_the_report_has_every_picture(rendered: RenderedPair, truth: Truth, resu
     made = scene_pictures(rendered, truth, result, picture)
     assert set(made) == {"reference", "target", "stitch", "truth", "difference", "lines", "error_map"}
     assert all(data[:3] == b"\xff\xd8\xff" for data in made.values())
+
+
+def test_what_ways_share_changes_nothing(rendered: RenderedPair) -> None:
+    shared: Shared = {}
+    stitched(rendered, "known/slack", shared)
+    together, alone = stitched(rendered, "known/strict", shared), stitched(rendered, "known/strict")
+    assert set(shared) == {"known"} and np.array_equal(together.warp.map_x, alone.warp.map_x, equal_nan=True)
+    assert np.array_equal(together.pixels, alone.pixels)

@@ -7,9 +7,11 @@ from copy import deepcopy
 from typing import Any
 
 import pytest
-from edf_stitch.synthetic_scenes.thresholds import MODEL_RUNS, Check, judge, medians
+from edf_stitch.core.fields import RIVALS as ALL_RIVALS
+from edf_stitch.synthetic_scenes.stitches import WAYS as ALL_WAYS
+from edf_stitch.synthetic_scenes.thresholds import MODEL_RUNS, RIVALS, Check, judge, medians
 
-WAYS = ("known/strict", "known/slack", "known/paper", "known/homography", "unknown/strict", "unknown/slack")
+WAYS = ("known/strict", "known/slack", *RIVALS, "unknown/strict", "unknown/slack")
 FIGURES = {
     "rotation_deg": 0.01, "focal_percent": -0.5, "h_inf_px": 0.2, "projectivity_px": 0.05, "alignment_px": 0.2,
     "whole_psnr_db": 30.0, "whole_ssim": 0.9,
@@ -23,11 +25,11 @@ PROOF = {
 def good(name: str = "street", model: str = "general", determined: bool = True) -> dict[str, Any]:
     """A scene's result as a perfect program leaves it."""
     runs = {
-        way: {"model": None if way.endswith("homography") else model, "undetermined_said": not determined,
+        way: {"model": None if way in RIVALS[1:] else model, "undetermined_said": not determined,
               "refused": "", "warnings": [], "figures": dict(FIGURES)}
         for way in WAYS
     }  # fmt: skip
-    for rival in ("known/paper", "known/homography"):
+    for rival in RIVALS:
         runs[rival]["figures"]["whole_psnr_db"] = 28.0
     return {
         "schema": 1, "scene": name, "title": "A street", "size": [640, 480], "expected_model": model,
@@ -147,7 +149,7 @@ def test_an_undetermined_focal_length_must_be_said_where_it_shows() -> None:
     assert not failures(plane)
 
 
-@pytest.mark.parametrize("rival", ["known/paper", "known/homography"])
+@pytest.mark.parametrize("rival", RIVALS)
 def test_no_rival_is_better_by_more_than_a_fifth_of_a_decibel(rival: str) -> None:
     assert not failures(with_figure(rival, "whole_psnr_db", 30.2))
     worse = ("street", "known/strict", f"whole_psnr_db over {rival}")
@@ -165,15 +167,20 @@ def test_no_rival_is_better_by_more_than_a_fifth_of_a_decibel(rival: str) -> Non
         assert not failures(result)
 
 
+def test_the_rivals_are_all_that_the_house_has() -> None:
+    assert RIVALS == ("known/paper", *(f"known/{name}" for name in ALL_RIVALS)) and set(RIVALS) < set(ALL_WAYS)
+
+
 def test_with_no_rival_at_all_nothing_is_shown() -> None:
     result = good()
-    del result["runs"]["known/paper"], result["runs"]["known/homography"]
+    for rival in RIVALS:
+        del result["runs"][rival]
     assert failures(result) == [("street", "known/strict", "whole_psnr_db over any rival")]
 
 
 def test_the_median_lead_is_over_the_best_rival_of_each_scene() -> None:
     assert not failures(with_figure("known/paper", "whole_psnr_db", 29.0), complete=True)
-    for rival in ("known/paper", "known/homography"):
+    for rival in RIVALS:
         failed = failures(with_figure(rival, "whole_psnr_db", 29.001), complete=True)
         assert failed == [(None, "known/strict", "lead_db")]
 

@@ -1,0 +1,160 @@
+"""REW, robust elastic warping (Li, Wang, Lai, Zhai and Zhang, IEEE Transactions on Multimedia 2018).
+
+A global transformation, by a rotation and focal lengths where they serve, fitted robustly; a thin-plate spline of two
+components of what it leaves at the matches; matches whose spline weights lie beyond 3σ are outliers, until none is
+left; outside the overlap the spline fades, and the global transformation goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from ..canvas import Grid
+from ..displacement import (
+    MIN_CENTRES,
+    PRUNE_FLOOR_PX,
+    PRUNE_SIGMAS,
+    FieldValues,
+    Fit,
+    StrictField,
+    best_smoothing,
+    fade_share,
+    fade_width,
+    refuse_no_spread,
+    target_points,
+)
+from ..epipolar import Array, homogeneous, infinite_homography, inverse_intrinsics, project, rotation_from_vector
+from ..features import Matches
+from ..fundamental import transfer_error
+from ..rotation import nearest_rotation
+from ..spline import SmoothingProblem, ThinPlateSpline
+from ..two_view import TwoView
+from .homography import fit_one_homography, knowing_only
+
+# The focal lengths are known better than within this factor; without a bound parallax may drive them anywhere.
+MOST_ZOOM = 2.0
+FAR_OFF_PX = 1e4
+# A rotation, which has less freedom than a homography, may be so much worse.
+ROTATION_FACTOR, ROTATION_PX = 1.2, 0.5
+
+
+@dataclass(frozen=True)
+class RewField:
+    """x' = c + α g(c), c = π(H p): H, the global transformation, in the place of H_inf, g a spline in target px over
+    c."""
+
+    two_view: TwoView
+    size: tuple[int, int]
+    target_size: tuple[int, int]
+    spline: ThinPlateSpline
+    fit: Fit
+
+    name = "rew"
+
+    @property
+    def plane(self) -> Array:
+        """It fades to the global transformation."""
+        return np.zeros(3)
+
+    def on_grid(self, grid: Grid, ideal: Array | None = None) -> FieldValues:
+        """Shift from π(H p) at a grid's nodes; no depth."""
+        points = grid.points if ideal is None else ideal
+        c, bend = (part.reshape(points.shape) for part in self._parts(points.reshape(-1, 2)))
+        alpha = fade_share(grid, c + bend, self.size, self.target_size, self.fit.fade_px)
+        return FieldValues(np.full(points.shape[:2], np.nan), alpha[..., None] * bend)
+
+    def sends(self, points: Array) -> Array:
+        """Target pixels (N, 2) of points (N, 2) of the overlap, where nothing fades."""
+        c, bend = self._parts(points)
+        return c + bend
+
+    def refitted(self, matches: Matches) -> RewField:
+        """The spline on other matches, all kept, at the same λ. Raises DegenerateGeometry."""
+        kept = np.full(len(matches), True)
+        return _bent(self.two_view, self.size, self.target_size, matches, kept, self.fit.smoothing)
+
+    def _parts(self, points: Array) -> tuple[Array, Array]:
+        """c, NaN behind the target camera, and g there, each (N, 2)."""
+        c = target_points(self.two_view, points, np.full(len(points), np.nan))
+        return c, self.spline.at(np.where(np.isfinite(c), c, 0.0))
+
+
+def fit_rew(strict: StrictField, matches: Matches) -> RewField:
+    """REW on the matches that the strict field stands on, which are without gross outliers already.
+
+    λ by the house's cross-validation, where the paper has one for all pictures (0.001·W·H: 0 to 3 dB worse here).
+    Matches given by the user are all kept. Raises DegenerateGeometry.
+    """
+    few = matches.subset(strict.fit.kept)
+    view = knowing_only(strict.two_view, global_transformation(strict.two_view, few))
+    return _bent(view, strict.size, strict.target_size, matches, strict.fit.kept, None)
+
+
+def global_transformation(two_view: TwoView, matches: Matches) -> Array:
+    """H (3, 3): K' R K⁻¹ that has the matches nearest, robustly (Cauchy), over R and a common factor of the focal
+    lengths; the homography where that has them nearer by far.
+
+    The paper has a rotation only; where the camera really moved it leaves so much to the spline that what lies beyond
+    the overlap is off by tens of px. Raises DegenerateGeometry.
+    """
+    H = fit_one_homography(two_view, matches).two_view.H_inf
+    K, K_prime, x = two_view.K, two_view.K_prime, homogeneous(matches.x)
+    start = nearest_rotation(inverse_intrinsics(K_prime) @ H @ K)
+
+    def transformation(p: Array) -> Array:
+        first, second = K.copy(), K_prime.copy()
+        first[:2, :2] *= np.exp(p[3])
+        second[:2, :2] *= np.exp(p[3])
+        return infinite_homography(first, second, rotation_from_vector(p[:3]) @ start)
+
+    def residuals(p: Array) -> Array:
+        ray = x @ transformation(p).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = project(ray) - matches.y
+        off = np.where(ray[:, 2:] > 0, np.clip(off, -FAR_OFF_PX, FAR_OFF_PX), FAR_OFF_PX)
+        return (off * np.sqrt(matches.weights)[:, None]).ravel()
+
+    scale = max(float(np.median(np.abs(residuals(np.zeros(4))))), 0.1 * matches.scale)
+    bound = np.array([np.pi, np.pi, np.pi, np.log(MOST_ZOOM)])
+    found = least_squares(residuals, np.zeros(4), bounds=(-bound, bound), loss="cauchy", f_scale=scale, max_nfev=100)
+    rotated = transformation(found.x)
+    off, off_rotated = (float(np.median(transfer_error(M, matches))) for M in (H, rotated))
+    serves = off_rotated <= max(ROTATION_FACTOR * off, ROTATION_PX * matches.scale)
+    return rotated / np.linalg.norm(rotated) if serves else H
+
+
+def _bent(
+    view: TwoView, size: tuple[int, int], target_size: tuple[int, int], matches: Matches, kept: NDArray[np.bool_],
+    smoothing: float | None,
+) -> RewField:  # fmt: skip
+    """The field over a global transformation; smoothing: λ, all `kept` matches stay then; else it is found, and what
+    lies beyond 3σ goes."""
+    index = np.flatnonzero(kept)
+    c = target_points(view, matches.x[index], np.full(len(index), np.nan))
+    seen = np.isfinite(c).all(axis=1)
+    index, c = index[seen], c[seen]
+    refuse_no_spread(matches.x[index], matches.scale)
+    g = matches.y[index] - c
+    unit = float(np.sqrt(size[0] * size[1]))
+    problem = SmoothingProblem.build(c, 1 / np.sqrt(matches.weights[index]), unit)
+    prune = smoothing is None and not matches.given
+    if smoothing is None:
+        smoothing = best_smoothing(problem, g, np.ones(len(g)))
+    while True:
+        # residuals are the weights times 8πλ
+        spline, residual = problem.solve(g, smoothing)
+        sigma = np.sqrt(np.mean(residual**2, axis=0))
+        good = (np.abs(residual) <= np.maximum(PRUNE_SIGMAS * sigma, PRUNE_FLOOR_PX * matches.scale)).all(axis=1)
+        if not prune or good.all() or good.sum() < MIN_CENTRES:
+            break
+        problem, index, g = problem.subset(good), index[good], g[good]
+    left = np.full(len(matches), False)
+    left[index] = True
+    rms = float(np.sqrt(np.mean(np.sum(residual**2, axis=1))))
+    moved = np.linalg.norm(g - residual, axis=1)
+    fit = Fit(left, smoothing, fade_width(moved, matches.scale), rms, np.nan, np.nan)
+    return RewField(view, size, target_size, spline, fit)
