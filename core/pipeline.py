@@ -25,6 +25,9 @@ from .report import make_report
 from .two_view import TwoView
 from .warp import Layer, Warp, cut, reference_layer, target_layer
 
+# What can be stitched: a file's name, an array, or a Picture that was read already.
+Source = str | Path | np.ndarray | Picture
+
 
 @dataclass(frozen=True)
 class StitchResult:
@@ -71,16 +74,17 @@ class StitchResult:
 
 
 def stitch(
-    reference: str | Path | np.ndarray,
-    target: str | Path | np.ndarray,
+    reference: Source,
+    target: Source,
     options: StitchOptions | None = None,
     progress: Callable[[str, float], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> StitchResult:
     """Stitches the target into the reference's plane.
 
-    reference, target: files, or arrays (see `picture_from_array`: 8 and 16 bit display-encoded, float scene-linear;
-    RGB(A) or gray). progress(stage, share of everything done) and cancelled() are called between the steps of the work.
+    reference, target: files, arrays (see `picture_from_array`: 8 and 16 bit display-encoded, float scene-linear; RGB(A)
+    or gray), or Pictures. progress(stage, share of everything done) and cancelled() are called between the steps of the
+    work.
     Raises StitchError and its kinds; Cancelled where asked to stop.
     """
     options = options or StitchOptions()
@@ -91,7 +95,7 @@ def stitch(
     return compose(frame, align([frame], options, steps), options, steps)
 
 
-def read_frame(reference: str | Path | np.ndarray, target: str | Path | np.ndarray, options: StitchOptions) -> Frame:
+def read_frame(reference: Source, target: Source, options: StitchOptions) -> Frame:
     """Both pictures, in the same colour space. Raises UnreadableImage, BadRequest, NoOverlap (one picture twice)."""
     first, second = in_same_colour_space(_picture(reference), _picture(target))
     if first.view.shape == second.view.shape and np.array_equal(first.view, second.view):
@@ -143,7 +147,9 @@ class Stopwatch:
         self._progress(stage, fraction)
 
 
-def _picture(source: str | Path | np.ndarray) -> Picture:
+def _picture(source: Source) -> Picture:
+    if isinstance(source, Picture):
+        return source
     return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
 
 
