@@ -32,8 +32,9 @@ def run(argv: list[str]) -> int:
     return run_worker(*worker_command(argv))
 
 
-def worker_command(argv: list[str]) -> tuple[list[str], dict[str, str]]:
-    """The command line and the environment of a process that does what `edf ARGV…` does."""
+def worker_command(argv: list[str], module: str = "") -> tuple[list[str], dict[str, str]]:
+    """The command line and the environment of a process that does what `edf ARGV…` does, or what a module of ours
+    (its name within the package) does with ARGV."""
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     name = PACKAGE
     if PACKAGE.startswith("bl_ext.") or bpy.app.binary_path:
@@ -44,22 +45,34 @@ def worker_command(argv: list[str]) -> tuple[list[str], dict[str, str]]:
         environment["PYTHONPATH"] = os.pathsep.join([str(FOLDER.parent), *_wheels_folders()])
     if bpy.app.binary_path:  # empty where bpy is a module
         environment[BLENDER_VARIABLE] = bpy.app.binary_path
-    return [sys.executable, "-s", "-P", "-m", name, *argv], environment
+    return [sys.executable, "-s", "-P", "-m", f"{name}.{module}" if module else name, *argv], environment
 
 
 def run_worker(command: list[str], environment: Mapping[str, str]) -> int:
     """Run it to its end, pass on what asks it to stop, return its exit status (130 where Ctrl-C ended it)."""
     sys.stdout.flush()
-    # In a process group of its own the worker gets a Ctrl-C from here, once, and not from the terminal as well: a
-    # second one would break into its tidying up.
-    own_group: dict[str, Any] = {"process_group": 0}
-    if sys.platform == "win32":
-        own_group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     with _signals_held() as forward_to:
-        worker = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, **own_group)
+        worker = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, **own_group())
         forward_to(worker)
         status = worker.wait()
     return 128 - status if status < 0 else status
+
+
+def own_group(hidden: bool = False) -> dict[str, Any]:
+    """What Popen needs to know so that a worker gets a Ctrl-C from here, once, and not from the terminal as well: a
+    second one would break into its tidying up. hidden: Windows opens no console for it."""
+    if sys.platform == "win32":
+        no_window = subprocess.CREATE_NO_WINDOW if hidden else 0
+        return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP | no_window}
+    return {"process_group": 0}
+
+
+def ask_to_stop(worker: subprocess.Popen) -> None:
+    """As Ctrl-C does, whatever came: that is what the worker tidies up after."""
+    if sys.platform == "win32":
+        worker.send_signal(signal.CTRL_BREAK_EVENT)
+    else:
+        worker.send_signal(signal.SIGINT)
 
 
 @contextmanager
@@ -71,12 +84,12 @@ def _signals_held() -> Iterator[Callable[[subprocess.Popen], None]]:
     def handle(number: int, _frame: FrameType | None) -> None:
         asked.append(number)
         for worker in workers:
-            _ask_to_stop(worker)
+            ask_to_stop(worker)
 
     def forward_to(worker: subprocess.Popen) -> None:
         workers.append(worker)
         if asked:
-            _ask_to_stop(worker)
+            ask_to_stop(worker)
 
     previous = {number: signal.signal(number, handle) for number in STOPPING}
     try:
@@ -85,14 +98,6 @@ def _signals_held() -> Iterator[Callable[[subprocess.Popen], None]]:
         for number, handler in previous.items():
             # None stands for Blender's own handler, which Python cannot put back.
             signal.signal(number, signal.default_int_handler if handler is None else handler)
-
-
-def _ask_to_stop(worker: subprocess.Popen) -> None:
-    """As Ctrl-C does, whatever came: that is what the worker tidies up after."""
-    if sys.platform == "win32":
-        worker.send_signal(signal.CTRL_BREAK_EVENT)
-    else:
-        worker.send_signal(signal.SIGINT)
 
 
 def _wheels_folders() -> list[str]:

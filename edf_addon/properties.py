@@ -210,25 +210,60 @@ class EDF_PG_job(bpy.types.PropertyGroup):  # noqa: N801
     failed: BoolProperty(name="Failed", get=lambda _: status.now.failed)
 
 
-# The properties that are options of the engine under the same name, one word of CHOICES or a plain value each.
+# The properties that are options of the engine under the same name: one word of several, or a plain value.
 CHOICES = ("field", "fade", "blend")
-VALUES = ("scale", "seed")
+VALUES = ("seed",)
 # What changes places when reference and target do; the lenses only where each picture has its own.
 PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))
-# What `reset` leaves alone: what is stitched, what came of it, and how it is looked at.
+# What is no setting: what is stitched, what came of it, and how it is looked at.
 NO_SETTINGS = frozenset({"name", "reference", "target", "result", "matches", "match_index", "overlay",
                          "overlay_opacity", "show_matches", "show_epipolar"})  # fmt: skip
 
 
-def options_of(settings: EDF_PG_settings) -> dict[str, Any]:
+def options_of(settings: Any, scale: float | None = None) -> dict[str, Any]:
     """The settings as fields of StitchOptions, JSON-ready; `camera` holds those of CameraRequest. What needs images or
-    scene cameras (masks, matches, CAMERAS) is added by whoever has them."""
+    scene cameras (masks, matches, CAMERAS) is added by whoever has them. scale: instead of the settings' own."""
     options: dict[str, Any] = {name: getattr(settings, name).lower() for name in CHOICES}
     options |= {name: getattr(settings, name) for name in VALUES}
-    options["crop"] = list(settings.crop_box) if settings.crop == "BOX" else settings.crop.lower()
+    options["scale"] = settings.scale if scale is None else scale
+    options["crop"] = settings.crop.lower()
+    if settings.crop == "BOX":
+        options["crop"] = [int(side * options["scale"]) for side in settings.crop_box]
     options["camera"] = _camera_of(settings)
     return options
+
+
+def names_of_settings(settings: Any) -> list[str]:
+    """The settings' own properties: what `reset` sets back, and what a panorama keeps."""
+    return [name for name in settings.bl_rna.properties.keys() if name not in NO_SETTINGS | {"rna_type"}]
+
+
+def keep(settings: Any) -> dict[str, Any]:
+    """All settings, JSON-ready; images and cameras by name."""
+    kept = {}
+    for name in names_of_settings(settings):
+        value = getattr(settings, name)
+        if settings.bl_rna.properties[name].type == "POINTER":
+            value = None if value is None else value.name
+        elif getattr(settings.bl_rna.properties[name], "is_array", False):
+            value = list(value)
+        kept[name] = value
+    return kept
+
+
+def restore(settings: Any, kept: dict[str, Any]) -> None:
+    """Settings that `keep` gave, perhaps in an earlier version: what is not there any more, or not yet, is left out."""
+    for name in set(names_of_settings(settings)) & set(kept):
+        value = kept[name]
+        prop = settings.bl_rna.properties[name]
+        if prop.type == "POINTER" and value is not None:
+            kind = bpy.data.images if prop.fixed_type.identifier == "Image" else bpy.data.objects
+            value = kind.get(value)
+        try:
+            setattr(settings, name, value)
+        except (TypeError, ValueError):  # a choice that this version does not offer
+            settings.property_unset(name)
 
 
 def _camera_of(settings: EDF_PG_settings) -> dict[str, Any]:

@@ -1,8 +1,10 @@
 """An empty scene with the extension on, for each test: in bpy as a module, or in a whole Blender that has it on."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy")
@@ -17,7 +19,31 @@ def blender() -> Iterator[SimpleNamespace]:
         edf_stitch.register()
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
-    yield SimpleNamespace(
-        scene=scene, settings=scene.edf_stitch, window_manager=bpy.context.window_manager, data=bpy.data
-    )
+    yield SimpleNamespace(scene=scene, settings=scene.edf_stitch, window_manager=bpy.context.window_manager)
     bpy.ops.wm.read_homefile(use_empty=True)
+    assert not leftovers(), "a job's folder was left behind"
+
+
+def leftovers() -> list[Path]:
+    """Folders of jobs in Blender's temporary folder."""
+    return list(Path(bpy.app.tempdir).glob("edf_stitch_*"))
+
+
+@pytest.fixture
+def chosen(blender: SimpleNamespace, folder: Path) -> SimpleNamespace:
+    """The small pair's two files, chosen in the scene."""
+    for side in ("reference", "target"):
+        setattr(blender.settings, side, bpy.data.images.load(str(folder / f"{side}.png")))
+    return blender
+
+
+@pytest.fixture(scope="session")
+def pixels_of():
+    """An image's pixels (H, W, 4) as Blender holds them, but with row 0 on top."""
+
+    def pixels(image) -> np.ndarray:
+        flat = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+        image.pixels.foreach_get(flat)
+        return flat.reshape(image.size[1], image.size[0], 4)[::-1]
+
+    return pixels

@@ -21,6 +21,14 @@ def test_on_and_off_twice_each(blender):
         assert hasattr(bpy.types.Scene, "edf_stitch") and hasattr(bpy.types, "EDF_OT_swap")
 
 
+def test_every_operator_that_is_named_is_there(blender):
+    from edf_stitch.edf_addon import idnames
+
+    for name in idnames.Operator:
+        room, _, verb = name.partition(".")
+        assert verb in dir(getattr(bpy.ops, room)), name
+
+
 def test_registering_loads_nothing_of_the_engine():
     """What it loads is Blender's own; what takes time is the worker's."""
     code = (

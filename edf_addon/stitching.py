@@ -1,0 +1,159 @@
+"""From the settings to a job, and from a finished job into the file: what the stitching operators share."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
+
+import bpy
+
+from . import cameras, compat, images, properties, result
+from .images import Unusable
+
+if TYPE_CHECKING:
+    import numpy as np
+
+SIDES = ("reference", "target")
+# The worker's pictures that lie over the panorama: kept with it, out of the artist's lists of images.
+HIDDEN = ("heat", "difference")
+# Those that are values and no colours.
+VALUES = ("reference mask", "target mask", "inverse depth")
+
+
+def why_not(settings: Any) -> str:
+    """Why nothing can be stitched as things stand, in words; "" where it can."""
+    for side in SIDES:
+        if getattr(settings, side) is None:
+            return f"no {side} is chosen: pick one of the file's images, or open a pair"
+    if settings.reference == settings.target:
+        name = settings.target.name
+        return f"“{name}” is both reference and target: choose two photographs taken from different places"
+    if settings.edited_matches and not any(match.enabled for match in settings.matches):
+        return "the list of matches has none that is switched on: add some, or search for new ones"
+    return ""
+
+
+def make_job(
+    context: bpy.types.Context, folder: Path, scale: float | None = None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The job for the scene's settings, its files in `folder`; and what has to be remembered until it is done.
+
+    scale: instead of the settings' own. Raises Unusable.
+    """
+    import numpy as np
+
+    scene = context.scene
+    settings = properties.settings_of(scene)
+    if reason := why_not(settings):
+        raise Unusable(reason)
+    chosen = {side: getattr(settings, side) for side in SIDES}
+    editor = context.space_data if isinstance(context.space_data, bpy.types.SpaceImageEditor) else None
+    user = None if editor is None else editor.image_user
+    job: dict[str, Any] = {side: images.describe(image, side, folder, scene, user) for side, image in chosen.items()}
+    job["options"] = properties.options_of(settings, scale)
+    wanted = [name for name in ("layers", "masks", "depth") if getattr(settings, f"take_{name}")]
+    job["take"] = wanted if scale is None else []
+    job["masks"] = {}
+    for side in SIDES:
+        mask = getattr(settings, f"ignore_{side}")
+        if mask is not None:
+            np.save(folder / f"ignore_{side}.npy", images.read(mask))
+            job["masks"][side] = f"ignore_{side}.npy"
+    if settings.camera == "CAMERAS":
+        job["cameras"] = cameras.describe_both(settings, scene, context.evaluated_depsgraph_get())
+    if settings.edited_matches:
+        np.save(folder / "matches.npy", match_rows(settings))
+        job["matches"] = "matches.npy"
+    memory = {
+        "scene": scene.session_uid, "settings": properties.keep(settings),
+        "pictures": {side: image.name for side, image in chosen.items()},
+        "space": chosen["reference"].colorspace_settings.name, "edited": settings.edited_matches,
+        "pack": settings.pack, "fake_user": settings.fake_user,
+    }  # fmt: skip
+    return job, memory
+
+
+def match_rows(settings: Any) -> np.ndarray:
+    """The list's matches (N, 5): x, y, x2, y2, weight, which is 0 where one is switched off."""
+    import numpy as np
+
+    rows = [[m.x, m.y, m.x2, m.y2, m.weight if m.enabled else 0.0] for m in settings.matches]
+    return np.array(rows, np.float64)
+
+
+def take_over(
+    context: bpy.types.Context, folder: Path, found: dict[str, Any], memory: dict[str, Any], kind: str
+) -> str:
+    """Makes the panorama an image of the file, with all that belongs to it. kind: "panorama" or "preview" (which takes
+    the place of the last one). Returns words about it."""
+    name = f"{PurePath(memory['pictures']['reference']).stem} {kind}"
+    before = _moved_aside(name) if kind == "preview" else None
+    pack, fake_user = memory["pack"], memory["fake_user"] and kind != "preview"
+    image = images.bring(folder / found["files"]["panorama"], name, pack, fake_user)
+    if not image.is_float or memory["space"] == compat.DATA:
+        compat.set_colour_space(image, memory["space"])
+    for what, file in found["files"].items():
+        if what != "panorama":
+            hidden = what in HIDDEN
+            other = images.bring(folder / file, f"{'.' * hidden}{image.name} {what}", pack, fake_user and not hidden)
+            if what in VALUES:
+                compat.set_colour_space(other, compat.DATA)
+            result.attach(image, what, other)
+    kept = {key: value for key, value in found.items() if key != "files"}
+    result.store(image, {**kept, "kind": kind, "settings": memory["settings"], "pictures": memory["pictures"]})
+    if before is not None:
+        before.user_remap(image)
+        bpy.data.images.remove(before)
+    scene = compat.scene_by_uid(memory["scene"])
+    if scene is not None:
+        settings = properties.settings_of(scene)
+        settings.result = image
+        fill_matches(settings, found["matches"], memory["edited"])
+    show(context, image)
+    return _in_words(image, found)
+
+
+def _moved_aside(name: str) -> bpy.types.Image | None:
+    """The last preview, its name free for the next one; what belonged to it goes."""
+    before = bpy.data.images.get(name)
+    if before is None or result.read(before) is None:
+        return None
+    for other in result.companions(before).values():
+        bpy.data.images.remove(other)
+    before.name = f"{name} before"
+    return before
+
+
+def fill_matches(settings: Any, matches: dict[str, Any], edited: bool) -> None:
+    """The list shows what the stitch knows of each match. Edited ones stay as they are (all, if they were changed
+    meanwhile); new ones that the stitch left out are switched off, so that stitching with the list does the same."""
+    states, errors = matches["states"], matches["errors"]
+    if edited:
+        if len(states) != len(settings.matches):
+            return
+    else:
+        settings.matches.clear()
+        for (x, y, x2, y2), weight, state in zip(matches["rows"], matches["weights"], states, strict=True):
+            match = settings.matches.add()
+            match.x, match.y, match.x2, match.y2 = x, y, x2, y2
+            match.weight, match.enabled = weight or 1.0, state == "USED"
+        settings.match_index = -1
+    for match, error, state in zip(settings.matches, errors, states, strict=True):
+        match.error = -1.0 if error is None else error
+        match.state = state
+
+
+def show(context: bpy.types.Context, image: bpy.types.Image) -> None:
+    """The image in the editor that the work was started from, else in the first Image Editor of the window."""
+    areas = [context.area, *(context.window.screen.areas if context.window else ())]
+    for area in areas:
+        if area is not None and area.type == "IMAGE_EDITOR" and area.spaces.active.mode != "MASK":
+            area.spaces.active.image = image
+            return
+
+
+def _in_words(image: bpy.types.Image, found: dict[str, Any]) -> str:
+    width, height = image.size
+    warnings = len(found["warnings"])
+    said = f", {warnings} warning{'s' * (warnings > 1)}" if warnings else ""
+    return f"{image.name}: {width} × {height} px in {sum(found['seconds'].values()):.1f} s{said}."
