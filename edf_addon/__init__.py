@@ -11,10 +11,23 @@ from typing import Any
 
 import bpy
 
-from . import command, operators, properties
+from . import (
+    command,
+    mask_painting,
+    match_editing,
+    match_pointing,
+    operators,
+    overlays,
+    panels,
+    presets,
+    properties,
+    take_along,
+)
 
 # Registered in this order, unregistered in the opposite one; each has register() and unregister().
-ROOMS = (properties, operators)
+ROOMS = (
+    properties, operators, match_editing, match_pointing, mask_painting, take_along, presets, panels, overlays,
+)  # fmt: skip
 _commands: list[Any] = []
 _registered: list[Any] = []
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
+from typing import Any
 
 import bpy
 
@@ -51,3 +53,39 @@ def saving_scene(file_format: str, bits: int) -> Iterator[bpy.types.Scene]:
             yield scene
     finally:
         bpy.data.scenes.remove(scene)
+
+
+def unified_paint(context: Any) -> Any:
+    """What all brushes of the Image Editor share; since 5.0 each kind of painting has its own."""
+    paint = context.tool_settings.image_paint
+    return getattr(paint, "unified_paint_settings", None) or context.tool_settings.unified_paint_settings
+
+
+@cache
+def picture_shader() -> Any:
+    """A shader that shows a texture of display-encoded values times a colour: `pos` (region px) and `uv`, uniforms
+    `color` and `image`. Blender's own ones take textures for light in some versions and for encoded in others."""
+    import gpu
+
+    info = gpu.types.GPUShaderCreateInfo()
+    between = gpu.types.GPUStageInterfaceInfo("edf_stitch_picture")
+    between.smooth("VEC2", "uv_between")
+    info.vertex_in(0, "VEC2", "pos")
+    info.vertex_in(1, "VEC2", "uv")
+    info.vertex_out(between)
+    info.push_constant("MAT4", "ModelViewProjectionMatrix")
+    info.push_constant("VEC4", "color")
+    info.sampler(0, "FLOAT_2D", "image")
+    info.fragment_out(0, "VEC4", "fragment")
+    info.vertex_source(
+        "void main() { uv_between = uv; gl_Position = ModelViewProjectionMatrix * vec4(pos, 0.0, 1.0); }"
+    )
+    # what is drawn over an editor's picture is encoded by the screen's own buffer: it wants light
+    info.fragment_source("""
+        void main() {
+            vec4 shown = texture(image, uv_between) * color;
+            vec3 light = pow((shown.rgb + 0.055) / 1.055, vec3(2.4));
+            fragment = vec4(mix(light, shown.rgb / 12.92, vec3(lessThanEqual(shown.rgb, vec3(0.04045)))), shown.a);
+        }
+    """)
+    return gpu.shader.create_from_info(info)

@@ -17,14 +17,45 @@ class Operator(StrEnum):
     RESET = "edf.reset"
     RESTORE = "edf.restore"
     SAVE = "edf.save"
+    PRESET_ADD = "edf.preset_add"
+    MATCH_ADD = "edf.match_add"
+    MATCH_DELETE = "edf.match_delete"
+    MATCH_ENABLE = "edf.match_enable"
+    MATCH_EDIT = "edf.match_edit"
+    MASK_PAINT = "edf.mask_paint"
+    MASK_DONE = "edf.mask_done"
+    POINTER = "edf.pointer"
+    CREATE_CAMERAS = "edf.create_cameras"
+    DEPTH_MESH = "edf.depth_mesh"
+    LOOK_THROUGH = "edf.look_through"
 
 
 class Panel(StrEnum):
     """Panels of the Image Editor's sidebar."""
 
+    MAIN = "EDF_PT_main"
+    CAMERA = "EDF_PT_camera"
+    FIELD = "EDF_PT_field"
+    MATCHES = "EDF_PT_matches"
+    MASKS = "EDF_PT_masks"
+    OUTPUT = "EDF_PT_output"
+    RESULT = "EDF_PT_result"
+    OVERLAYS = "EDF_PT_overlays"
+    TAKE_ALONG = "EDF_PT_take_along"
+    PRESETS = "EDF_PT_presets"
+
 
 class Menu(StrEnum):
     """Menus."""
+
+    PRESETS = "EDF_MT_presets"
+    MATCHES = "EDF_MT_matches"
+
+
+class List(StrEnum):
+    """Lists."""
+
+    MATCHES = "EDF_UL_matches"
 
 
 # Where the properties hang: bpy.types.Scene.edf_stitch (settings), bpy.types.WindowManager.edf_stitch_job.

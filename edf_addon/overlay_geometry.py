@@ -65,6 +65,13 @@ def residual_colours(errors: Array, worst: float = WORST) -> Colours:
     return np.where(np.isnan(errors)[:, None], GRAY, np.stack(channels, axis=-1)).astype(np.float32)
 
 
+def display_encoded(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Light (…, 4), alpha last and left alone, by the curve of sRGB (IEC 61966-2-1), clipped to what a screen shows."""
+    light = np.clip(pixels[..., :3], 0, 1)
+    shown = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** np.float32(1 / 2.4) - 0.055)
+    return np.concatenate([shown, pixels[..., 3:]], axis=-1).astype(np.float32)
+
+
 def discs(centres: Array, radius: float, colours: Colours) -> tuple[NDArray[np.float32], Colours]:
     """Triangles (N·12·3, 2) that fill discs around centres (N, 2), and a colour for each of their corners."""
     angle = np.linspace(0, 2 * np.pi, _CORNERS + 1)
@@ -176,3 +183,24 @@ def _cameras(geometry: dict[str, Any]) -> dict[str, Camera]:
         found[name] = Camera(matrix(geometry[K]), (size[0], size[1]), "", 0.0, bend)
     return found
 
+
+
+def upright(points: Array, stored: Size, orientation: int) -> Array:
+    """px (N, 2) of a picture as it is stored, `stored` (W, H), to px of the upright one; orientation 1..8 as in EXIF
+    (see core.decoding.turn)."""
+    width, height = stored
+    x, y = points[..., 0], points[..., 1]
+    if orientation >= 5:
+        x, y, width, height = y, x, height, width
+    x = width - 1 - x if orientation in (2, 3, 6, 7) else x
+    y = height - 1 - y if orientation in (3, 4, 7, 8) else y
+    return np.stack([x, y], axis=-1)
+
+
+def as_stored(points: Array, stored: Size, orientation: int) -> Array:
+    """The inverse of `upright`."""
+    width, height = stored if orientation < 5 else stored[::-1]
+    x, y = points[..., 0], points[..., 1]
+    x = width - 1 - x if orientation in (2, 3, 6, 7) else x
+    y = height - 1 - y if orientation in (3, 4, 7, 8) else y
+    return np.stack([y, x] if orientation >= 5 else [x, y], axis=-1)

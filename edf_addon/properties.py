@@ -55,6 +55,14 @@ OVERLAYS = (
 )
 
 
+def look_again(_group: Any, _context: Any) -> None:
+    """What lies over the pictures has changed: Image Editors are drawn anew (nothing under `-b`)."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR":
+                area.tag_redraw()
+
+
 def is_camera(_settings: Any, object_: bpy.types.Object) -> bool:
     """What the pointers to camera objects offer."""
     return object_.type == "CAMERA"
@@ -72,7 +80,8 @@ class EDF_PG_match(bpy.types.PropertyGroup):  # noqa: N801 (Blender's own form)
         name="Weight", description="How much this match counts beside the others; 1 is usual", default=1.0, min=0.001,
         soft_max=100.0,
     )
-    enabled: BoolProperty(name="Use", description="Whether the next stitch may use this match", default=True)
+    enabled: BoolProperty(name="Use", description="Whether the next stitch may use this match", default=True,
+                          update=look_again)
     error: FloatProperty(
         name="Error", description="How far, in target pixels, the last stitch missed this match; -1: not measured",
         default=-1.0, precision=2,
@@ -169,7 +178,7 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         "searching for new ones",
     )
     matches: CollectionProperty(type=EDF_PG_match)
-    match_index: IntProperty(name="Active Match", default=-1, options={"SKIP_SAVE"})
+    match_index: IntProperty(name="Active Match", default=-1, options={"SKIP_SAVE"}, update=look_again)
 
     take_layers: BoolProperty(
         name="Layers", description="Both pictures on the panorama's canvas, with alpha, before they are blended"
@@ -186,15 +195,20 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         default=True,
     )
 
-    overlay: EnumProperty(name="Overlay", description="What lies over the panorama", items=OVERLAYS)
+    overlay: EnumProperty(
+        name="Overlay", description="What lies over the panorama", items=OVERLAYS, update=look_again
+    )
     overlay_opacity: FloatProperty(
-        name="Opacity", description="How much the overlay covers", default=0.8, min=0.0, max=1.0, subtype="FACTOR"
+        name="Opacity", description="How much the overlay covers", default=0.8, min=0.0, max=1.0, subtype="FACTOR",
+        update=look_again,
     )
     show_matches: BoolProperty(
-        name="Matches", description="Matches over the pictures, coloured by how far the stitch missed them"
+        name="Matches", description="Matches over the pictures, coloured by how far the stitch missed them",
+        update=look_again,
     )
     show_epipolar: BoolProperty(
-        name="Epipolar Lines", description="The line in the other picture on which the point under the pointer lies"
+        name="Epipolar Lines", description="The line in the other picture on which the point under the pointer lies",
+        update=look_again,
     )
 
 

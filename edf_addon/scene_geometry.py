@@ -17,6 +17,8 @@ from ..core.epipolar import Array, homogeneous
 
 # From the reference camera's axes (x right, y down, z ahead) to a world with z up.
 UPRIGHT = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
+# R, t of the reference camera.
+ORIGIN = np.eye(3), np.zeros(3)
 
 
 @dataclass(frozen=True)
@@ -45,12 +47,11 @@ def placed_cameras(geometry: dict[str, Any], baseline: float = 1.0) -> list[Plac
     scene's units. Raises ValueError where a picture's pixels are not square.
     """
     sizes = [(int(width), int(height)) for width, height in geometry["full_sizes"]]
-    here = np.eye(3), np.zeros(3)
-    wanted = [("Reference", geometry["K"], sizes[0], here)]
+    wanted = [("Reference", geometry["K"], sizes[0], ORIGIN)]
     if (pose := target_pose(geometry, baseline)) is not None:
         wanted.append(("Target", geometry["K_prime"], sizes[1], pose))
     width, height = geometry["canvas"]
-    wanted.append(("Panorama", geometry["K_canvas"], (int(width), int(height)), here))
+    wanted.append(("Panorama", geometry["K_canvas"], (int(width), int(height)), ORIGIN))
     return [
         PlacedCamera(name, lens_for(square_pixels(matrix(K)), size), in_world(R, t))
         for name, K, size, (R, t) in wanted

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from edf_stitch.core.camera import Camera
+from edf_stitch.core.decoding import turn
 from edf_stitch.core.epipolar import homogeneous, project
 from edf_stitch.core.lens import distort
 from hypothesis import assume, given, settings
@@ -146,3 +147,19 @@ def test_the_nearest_point_within_reach():
     assert og.nearest(points, np.array([8.0, 1]), 5) == 2
     assert og.nearest(points, np.array([5.0, 30]), 5) is None
     assert og.nearest(np.zeros((0, 2)), np.zeros(2), 5) is None
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_px_are_turned_as_the_engine_turns_the_picture(orientation):
+    stored = np.arange(7 * 5).reshape(5, 7, 1)
+    turned = turn(stored, orientation)
+    y, x = np.mgrid[:5, :7]
+    points = np.stack([x, y], axis=-1).reshape(-1, 2).astype(float)
+    there = og.upright(points, (7, 5), orientation)
+    np.testing.assert_array_equal(turned[there[:, 1].astype(int), there[:, 0].astype(int), 0], np.arange(35))
+    np.testing.assert_array_equal(og.as_stored(there, (7, 5), orientation), points)
+
+
+def test_light_is_encoded_for_the_screen_and_alpha_left_alone():
+    shown = og.display_encoded(np.array([[0.0, 0.214, 7.0, 0.5]], np.float32))
+    np.testing.assert_allclose(shown, [[0, 0.5, 1, 0.5]], atol=1e-3)

@@ -1,0 +1,61 @@
+"""Which picture of a stitch an Image Editor shows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from . import photo, properties, result
+
+REFERENCE, TARGET, PANORAMA = "reference", "target", "panorama"
+
+
+def panorama(context: Any) -> bpy.types.Image | None:
+    """The panorama that is meant: the one that the editor shows, else the one that was stitched last."""
+    image = getattr(context.space_data, "image", None)
+    if image is not None and result.read(image) is not None:
+        return image
+    last = properties.settings_of(context.scene).result
+    return last if last is not None and result.read(last) is not None else None
+
+
+def known(image: bpy.types.Image | None) -> dict[str, Any]:
+    """The result that a panorama carries. Raises ValueError where an image is none."""
+    found = result.read(image)
+    if found is None:
+        raise ValueError("this image is no panorama that was stitched here")
+    return found
+
+
+def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:
+    """What an image is in the stitch: REFERENCE or TARGET (also a mask that is painted for one of them), PANORAMA, or
+    None."""
+    if image is None:
+        return None
+    for side in (REFERENCE, TARGET):
+        if image in (getattr(settings, side), getattr(settings, f"ignore_{side}")):
+            return side
+    return PANORAMA if result.read(image) is not None else None
+
+
+def orientation(settings: Any, side: str) -> int:
+    """How a picture of the stitch is stored, as in EXIF; masks lie as their pictures do."""
+    picture = None if side == PANORAMA else getattr(settings, side)
+    return 1 if picture is None else photo.orientation(picture)
+
+
+def all_spaces(context: Any) -> list[tuple[bpy.types.Area, bpy.types.SpaceImageEditor]]:
+    """Every Image Editor of every window."""
+    return [
+        (area, area.spaces.active)
+        for window in context.window_manager.windows
+        for area in window.screen.areas
+        if area.type == "IMAGE_EDITOR"
+    ]
+
+
+def redraw() -> None:
+    """Have every Image Editor draw itself again; nothing where there is no window."""
+    for area, _ in all_spaces(bpy.context):
+        area.tag_redraw()

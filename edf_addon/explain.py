@@ -1,0 +1,79 @@
+"""A stitch in plain words for the panel: its report as facts, and long texts as lines. No bpy, nothing heavy."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+MODELS = {
+    "general": "General scene",
+    "rotation": "Rotation: both from one place",
+    "plane": "Plane: one homography explains it",
+}
+STAGES = {
+    "read": "Reading the pictures",
+    "features": "Looking for matches",
+    "geometry": "Finding the cameras",
+    "field": "Fitting the field",
+    "dense": "Refining the overlap",
+    "warp": "Bending the target",
+    "occlusion": "Looking behind things",
+    "exposure": "Matching the exposure",
+    "seam": "Finding the seam",
+    "blend": "Blending",
+    "write": "Handing over",
+}
+
+
+def facts(report: dict[str, Any]) -> list[tuple[str, str]]:
+    """(what, value) of a report, in the order in which an artist asks."""
+    view, matches, measured = report["two_view"], report["matches"], report["measured"]
+    found, inliers = matches["found"], matches["inliers"]
+    out = [("Model", MODELS.get(view["model"], view["model"]))]
+    out += [("Size", f"{report['canvas']['width']} × {report['canvas']['height']} px")]
+    out += [("Matches", f"{found}"), ("Inliers", f"{inliers} ({_share(inliers, found)})")]
+    out += focal_facts(view)
+    out += [("Alignment", _pixels(measured.get("alignment_median_px"), measured.get("alignment_p95_px")))]
+    # an F of their own is measured only in a full run; that of the model is known in a preview too
+    projectivity = measured.get("projectivity_independent_px")
+    if projectivity is None:
+        projectivity = measured.get("off_line_mean_px")
+    out += [("Projectivity", _pixels(projectivity))]
+    return [(what, value) for what, value in out if value]
+
+
+def focal_facts(view: dict[str, Any]) -> list[tuple[str, str]]:
+    """The focal lengths of a report's two_view, and where they come from."""
+    pair = [value for value in view["focal_px"] if value]
+    if not pair:
+        return []
+    lengths = f"{pair[0]:.0f} px" if max(pair) - min(pair) < 0.5 else " and ".join(f"{one:.0f} px" for one in pair)
+    deviation = view.get("focal_deviation")
+    if deviation and "matches" in view["focal_source"]:
+        lengths += f" ± {deviation:.1%}"
+    return [("Focal", lengths), ("Source", view["focal_source"])]
+
+
+def stage(name: str) -> str:
+    """What the engine is doing, in words."""
+    return STAGES.get(name, name.capitalize())
+
+
+def lines(text: str, width: float, character: float = 6.6) -> list[str]:
+    """A text in lines that fit into `width` px where a character takes so many; one long word keeps a line."""
+    return textwrap.wrap(text, max(12, int(width / character)), break_long_words=False) or [""]
+
+
+def sentence(text: str) -> str:
+    """As a sentence: the engine's messages begin small, as they stand behind a colon on the command line."""
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{part / whole:.0%}" if whole else "none"
+
+
+def _pixels(median: float | None, most: float | None = None) -> str:
+    if median is None:
+        return ""
+    return f"{median:.2f} px" + (f" (95 %: {most:.2f})" if most is not None else "")

@@ -1,0 +1,286 @@
+"""What a stitch leaves in the scene: cameras with the pictures behind them, the panorama as a surface with depth."""
+
+# No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
+import math
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
+from mathutils import Matrix
+
+from . import editor, idnames, photo, properties
+
+ROLES = (
+    ("REFERENCE", "Reference", "The camera that took the reference"),
+    ("TARGET", "Target", "The camera that took the target"),
+    ("PANORAMA", "Panorama", "The reference's camera with a sensor as large as the panorama"),
+)
+RIG, MESH = "RIG", "MESH"
+# What an object is to which panorama, as custom properties of it.
+OF, ROLE = "edf_stitch_panorama", "edf_stitch_role"
+# How a background has to be shown whose pixels are stored so, by EXIF's orientation: turned (degrees) after being
+# mirrored. Tried in a window: a background turns clockwise.
+TURNS = {
+    1: (0, False), 2: (0, True), 3: (180, False), 4: (180, True), 5: (-90, True), 6: (90, False), 7: (90, True),
+    8: (-90, False),
+}  # fmt: skip
+_BASELINE = {
+    "name": "Baseline", "default": 1.0, "min": 1e-4, "soft_max": 100.0, "unit": "LENGTH", "precision": 3,
+    "options": {"SKIP_SAVE"},
+    "description": "Distance between the two cameras in the scene; pictures alone do not tell it",
+}  # fmt: skip
+
+
+class _OfAPanorama:
+    """Operators that need a finished stitch."""
+
+    needs_depth = False
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        reason = lacking(editor.panorama(context), cls.needs_depth)
+        if reason:
+            cls.poll_message_set(reason)  # type: ignore[attr-defined]
+        return not reason
+
+
+class EDF_OT_create_cameras(_OfAPanorama, bpy.types.Operator):  # noqa: N801
+    """Put the cameras of this panorama into the scene, with the pictures as their backgrounds"""
+
+    bl_idname = idnames.Operator.CREATE_CAMERAS
+    bl_label = "Create Cameras"
+    bl_options = {"REGISTER", "UNDO"}
+
+    baseline: FloatProperty(**_BASELINE)
+    look: BoolProperty(
+        name="Look Through the Panorama's", default=True,
+        description="Make the panorama's camera the scene's, and the render size that of the panorama",
+    )
+
+    def execute(self, context: Any) -> set[str]:
+        image = editor.panorama(context)
+        if not self.properties.is_property_set("baseline"):
+            self.baseline = usual_baseline(context.scene, image)
+        try:
+            made = create_cameras(context.scene, image, self.baseline)
+        except ValueError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if self.look:
+            look_through(context.scene, made["PANORAMA"])
+        if "TARGET" not in made:
+            self.report({"WARNING"}, "The target's camera is not known: one plane does not tell where it stood")
+        return {"FINISHED"}
+
+
+class EDF_OT_depth_mesh(_OfAPanorama, bpy.types.Operator):  # noqa: N801
+    """Lay the panorama on a grid that stands as far away as it was found to be, seen from the panorama's camera"""
+
+    bl_idname = idnames.Operator.DEPTH_MESH
+    bl_label = "Depth Mesh"
+    bl_options = {"REGISTER", "UNDO"}
+    needs_depth = True
+
+    baseline: FloatProperty(**_BASELINE)
+    farthest: FloatProperty(
+        name="Farthest", description="Where the surface ends, sky included, in multiples of its median depth",
+        default=20.0, min=1.1, soft_max=100.0,
+    )
+
+    def execute(self, context: Any) -> set[str]:
+        image = editor.panorama(context)
+        if not self.properties.is_property_set("baseline"):
+            self.baseline = usual_baseline(context.scene, image)
+        try:
+            depth_mesh(context.scene, image, self.baseline, self.farthest)
+        except ValueError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class EDF_OT_look_through(_OfAPanorama, bpy.types.Operator):  # noqa: N801
+    """Make this camera the scene's, with the render size of its picture, and look through it in the 3D views"""
+
+    bl_idname = idnames.Operator.LOOK_THROUGH
+    bl_label = "Look Through"
+    bl_options = {"REGISTER", "UNDO"}
+
+    role: EnumProperty(name="Camera", items=ROLES, default="PANORAMA")
+
+    def execute(self, context: Any) -> set[str]:
+        camera = find(editor.panorama(context), self.role)
+        if camera is None:
+            self.report({"ERROR"}, f"There is no camera of the {self.role.lower()}; create the cameras first")
+            return {"CANCELLED"}
+        look_through(context.scene, camera)
+        for window in context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D":
+                    area.spaces.active.region_3d.view_perspective = "CAMERA"
+        return {"FINISHED"}
+
+
+def lacking(image: bpy.types.Image | None, depth: bool = False) -> str:
+    """Why nothing can be taken along from an image; "" where it can."""
+    if image is None:
+        return "Stitch a panorama first"
+    if depth and not editor.known(image)["has_depth"]:
+        return "This panorama has no depth: its pictures were taken from one place, or show one plane only"
+    return ""
+
+
+def known_baseline(settings: Any) -> float | None:
+    """How far the scene's own cameras stand apart, where the pictures were taken with them."""
+    if settings.camera != "CAMERAS" or settings.reference_camera is None or settings.target_camera is None:
+        return None
+    ends = [camera.matrix_world.translation for camera in (settings.reference_camera, settings.target_camera)]
+    return (ends[1] - ends[0]).length
+
+
+def usual_baseline(scene: bpy.types.Scene, image: bpy.types.Image) -> float:
+    """As far as this panorama's cameras stand apart already, else as the scene's own do, else 1."""
+    rig = find(image, RIG)
+    return rig["baseline"] if rig is not None else known_baseline(properties.settings_of(scene)) or 1.0
+
+
+def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> dict[str, bpy.types.Object]:
+    """The cameras of a panorama, by role; those that are there already are set anew. Raises ValueError."""
+    from . import scene_geometry
+
+    settings = properties.settings_of(scene)
+    pictures = {"REFERENCE": settings.reference, "TARGET": settings.target, "PANORAMA": image}
+    rig = _rig(scene, image, baseline)
+    made = {}
+    for placed in scene_geometry.placed_cameras(editor.known(image)["geometry"], baseline):
+        role, lens = placed.name.upper(), placed.lens
+        camera = find(image, role) or _link(scene, image, role, bpy.data.cameras.new(f"{placed.name} of {image.name}"))
+        data = camera.data
+        data.sensor_fit, data.sensor_width, data.lens = lens.sensor_fit, lens.sensor_width, lens.lens
+        data.shift_x, data.shift_y = lens.shift_x, lens.shift_y
+        data.clip_start, data.clip_end = 0.01 * baseline, 1e4 * baseline
+        _put_behind(data, pictures[role])
+        camera["resolution"] = lens.resolution
+        camera.parent, camera.matrix_parent_inverse = rig, Matrix()
+        camera.matrix_basis = Matrix(placed.matrix_world.tolist())
+        made[role] = camera
+    return made
+
+
+def depth_mesh(
+    scene: bpy.types.Scene, image: bpy.types.Image, baseline: float, farthest: float
+) -> bpy.types.Object:
+    """The panorama as a surface; one that is there already gets new vertices. Raises ValueError."""
+    from . import scene_geometry as geometry_of
+
+    data = editor.known(image)
+    geometry = data["geometry"]
+    K = geometry_of.square_pixels(geometry_of.matrix(geometry["K_canvas"]))
+    surface = geometry_of.depth_mesh(data["depth"], K, tuple(geometry["canvas"]), baseline, farthest)
+    rig, there = _rig(scene, image, baseline), find(image, MESH)
+    mesh = bpy.data.meshes.new(f"Depth of {image.name}") if there is None else there.data
+    mesh.clear_geometry()
+    mesh.from_pydata(surface.vertices.tolist(), [], surface.faces.tolist())
+    uvs = mesh.uv_layers.new(name="Panorama")
+    uvs.data.foreach_set("uv", surface.uvs[surface.faces.ravel()].ravel())
+    mesh.validate()
+    if not mesh.materials:
+        mesh.materials.append(emission(image))
+    object_ = there or _link(scene, image, MESH, mesh)
+    object_.parent, object_.matrix_parent_inverse, object_.matrix_basis = rig, Matrix(), Matrix()
+    return object_
+
+
+def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
+    """Make it the scene's camera, and the render size that of its picture: a camera has none of its own."""
+    scene.camera = camera
+    scene.render.resolution_x, scene.render.resolution_y = camera["resolution"]
+    scene.render.resolution_percentage = 100
+    scene.render.pixel_aspect_x = scene.render.pixel_aspect_y = 1.0
+
+
+def emission(image: bpy.types.Image) -> bpy.types.Material:
+    """A material that shows an image as it is, whatever the lights; transparent where the image is."""
+    material = bpy.data.materials.new(image.name)
+    material.use_nodes = True
+    nodes, link = material.node_tree.nodes, material.node_tree.links.new
+    nodes.clear()
+    kinds = ("TexImage", "Emission", "BsdfTransparent", "MixShader", "OutputMaterial")
+    texture, shine, clear, mix, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
+    for node, place in zip((texture, shine, clear, mix, output), ((-600, 0), (-300, -60), (-300, 60), (0, 0), (200, 0)),
+                           strict=True):  # fmt: skip
+        node.location = place
+    texture.image, texture.extension = image, "EXTEND"
+    link(texture.outputs["Color"], shine.inputs["Color"])
+    link(texture.outputs["Alpha"], mix.inputs[0])
+    link(clear.outputs[0], mix.inputs[1])
+    link(shine.outputs[0], mix.inputs[2])
+    link(mix.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def find(image: bpy.types.Image | None, role: str) -> bpy.types.Object | None:
+    """The object that is `role` to a panorama, if it is still there."""
+    return next((one for one in bpy.data.objects if one.get(OF) == image and one.get(ROLE) == role), None)
+
+
+def _rig(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> bpy.types.Object:
+    """The empty that everything of a panorama hangs on: moved, turned or scaled, all goes along and stays right."""
+    rig = find(image, RIG)
+    if rig is None:
+        rig = _link(scene, image, RIG, None)
+        rig.empty_display_size = 0.2 * baseline
+        settings = properties.settings_of(scene)
+        if known_baseline(settings) is not None:
+            from . import scene_geometry
+
+            here = scene_geometry.in_world(*scene_geometry.ORIGIN)
+            stands = settings.reference_camera.matrix_world.normalized()
+            rig.matrix_world = stands @ Matrix(here.tolist()).inverted()
+    rig["baseline"] = baseline
+    return rig
+
+
+def _link(scene: bpy.types.Scene, image: bpy.types.Image, role: str, data: Any) -> bpy.types.Object:
+    """A new object in the panorama's own collection."""
+    name = data.name if data is not None else f"Rig of {image.name}"
+    made = bpy.data.objects.new(name, data)
+    made[OF], made[ROLE] = image, role
+    collection = next((one for one in bpy.data.collections if one.get(OF) == image), None)
+    if collection is None:
+        collection = bpy.data.collections.new(image.name)
+        collection[OF] = image
+    if collection.name not in scene.collection.children:
+        scene.collection.children.link(collection)
+    collection.objects.link(made)
+    return made
+
+
+def _put_behind(data: bpy.types.Camera, image: bpy.types.Image | None) -> None:
+    """Show an image behind everything that the camera sees."""
+    data.background_images.clear()
+    if image is None:
+        return
+    behind = data.background_images.new()
+    behind.image, behind.alpha, behind.display_depth = image, 1.0, "BACK"
+    turn, behind.use_flip_x = TURNS[photo.orientation(image)]
+    behind.rotation = math.radians(turn)
+    # turned by a quarter, an image is fitted into the frame before it is turned
+    behind.frame_method = "FIT" if turn % 180 else "STRETCH"
+    behind.scale = max(image.size) / max(1, min(image.size)) if turn % 180 else 1.0
+    data.show_background_images = True
+
+
+CLASSES = (EDF_OT_create_cameras, EDF_OT_depth_mesh, EDF_OT_look_through)
+
+
+def register() -> None:
+    """Make the operators known."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take them away again."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,65 @@
+"""A report in an artist's words."""
+
+from __future__ import annotations
+
+import pytest
+
+explain = pytest.importorskip("edf_stitch.edf_addon.explain")
+
+
+def test_a_report_becomes_facts_in_the_order_of_interest(small_result):
+    report = small_result.report
+    facts = dict(explain.facts(report))
+    assert list(facts)[:4] == ["Model", "Size", "Matches", "Inliers"]
+    assert facts["Model"] == "General scene"
+    assert facts["Size"] == f"{report['canvas']['width']} × {report['canvas']['height']} px"
+    assert facts["Inliers"].startswith(f"{report['matches']['inliers']} (") and facts["Inliers"].endswith("%)")
+    assert facts["Focal"] == f"{report['two_view']['focal_px'][0]:.0f} px"
+    assert facts["Source"] == report["two_view"]["focal_source"]
+    assert facts["Alignment"].startswith(f"{report['measured']['alignment_median_px']:.2f} px")
+    assert facts["Projectivity"] == f"{report['measured']['projectivity_independent_px']:.2f} px"
+
+
+def test_a_preview_measures_less_and_says_what_it_knows(small_result):
+    measured = {
+        key: value for key, value in small_result.report["measured"].items()
+        if key in {"alignment_median_px", "alignment_p95_px", "off_line_mean_px"}
+    }  # fmt: skip
+    facts = dict(explain.facts({**small_result.report, "measured": measured}))
+    assert facts["Projectivity"] == f"{measured['off_line_mean_px']:.2f} px"
+
+
+def test_what_a_plane_lacks_is_left_out(small_result):
+    report = small_result.report
+    view = {**report["two_view"], "model": "plane", "focal_px": [None, None]}
+    measured = {key: None for key in report["measured"]}
+    facts = dict(explain.facts({**report, "two_view": view, "measured": measured}))
+    assert "Focal" not in facts and "Projectivity" not in facts and "Alignment" not in facts
+    assert facts["Model"].startswith("Plane")
+
+
+def test_two_focal_lengths_are_both_said_and_an_estimate_says_how_sure():
+    view = {"focal_px": [500.0, 900.0], "focal_source": "the matches, from EXIF", "focal_deviation": 0.02}
+    assert dict(explain.focal_facts(view))["Focal"] == "500 px and 900 px ± 2.0%"
+    given = {**view, "focal_source": "given in px"}
+    assert dict(explain.focal_facts(given))["Focal"] == "500 px and 900 px"
+
+
+def test_every_stage_of_the_engine_has_words():
+    from edf_stitch.core.progress import STAGES
+
+    for name in STAGES:
+        assert explain.stage(name) == explain.STAGES[name]
+    assert explain.stage("unheard") == "Unheard"
+
+
+def test_long_texts_are_broken_and_nothing_is_lost():
+    text = "the focal length is doubtful, and with it depth; see /a/very/long/path/that/cannot/be/broken.png"
+    lines = explain.lines(text, 200)
+    assert " ".join(lines) == text and len(lines) > 2
+    assert explain.lines("", 200) == [""]
+
+
+@pytest.mark.parametrize(("said", "shown"), [("it ended", "It ended."), ("Why?", "Why?"), ("so.", "So."), ("", ".")])
+def test_a_message_becomes_a_sentence(said, shown):
+    assert explain.sentence(said) == shown
