@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import features
+from .cache import Cache
 from .camera import Camera, cameras_for
 from .displacement import Field
 from .errors import BadRequest, NoOverlap, TooFewMatches
@@ -101,15 +102,19 @@ def register(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> R
         raise BadRequest("the frames of a clip differ in size: one alignment is for one camera each")
     full, warnings = cameras_for(options.camera, (first.name, second.name), sizes, (first.exif, second.exif))
     cameras = full[0].resized(size_of(first)), full[1].resized(size_of(second))
+    cache = Cache(options.cache)
     if options.matches is None:
         steps("features", 0.0)
-        matches = _found_in(frames, steps)
+        seen = tuple((p.view, p.alpha) for frame in frames for p in (frame.reference, frame.target))
+        matches = cache.remember("matches", seen, lambda: _found_in(frames, steps))
     else:
         matches = _given(options.matches, frames[0], cameras)
 
     steps("geometry", 0.0)
     ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
-    two_view = estimate(ideal, *cameras, seed=options.seed)
+    two_view = cache.remember(
+        "two_view", (ideal, cameras, options.seed), lambda: estimate(ideal, *cameras, seed=options.seed)
+    )
     return Registration(cameras, matches, ideal, two_view, (*warnings, *two_view.warnings))
 
 
@@ -118,7 +123,8 @@ def lay(registration: Registration, options: StitchOptions, steps: Steps) -> Ali
     cameras, two_view = registration.cameras, registration.two_view
     steps("field", 0.0)
     inliers, sizes = registration.ideal.subset(two_view.inliers), (cameras[0].size, cameras[1].size)
-    field = fit_field(options.field, options.fade, two_view, inliers, *sizes, options.seed)
+    decided = (options.field, options.fade, two_view, inliers, *sizes, options.seed)
+    field = Cache(options.cache).remember("field", decided, lambda: fit_field(*decided))
 
     steps("warp", 0.0)
     warp = build_warp(field, field.two_view, *cameras)

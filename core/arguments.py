@@ -100,6 +100,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     how.add_argument(
         "--exposure", action=argparse.BooleanOptionalAction, default=False, help="exposure compensation (yet to come)"
     )
+    how.add_argument(
+        "--cache", action=argparse.BooleanOptionalAction, default=True,
+        help="keep features, geometry and field for the next stitch of the same pictures (default; EDF_CACHE: where)",
+    )  # fmt: skip
     how.add_argument("--seed", type=int, default=0, metavar="N", help="seed of every random choice (default 0)")
 
 
@@ -107,6 +111,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
     """What the parsed arguments ask for. Raises BadRequest."""
     if args.dense or args.exposure:
         raise BadRequest(f"--{'dense' if args.dense else 'exposure'} is yet to come")
+    from .cache import default_folder
     from .camera import CameraRequest
     from .crop import parse_crop
     from .options import StitchOptions
@@ -125,6 +130,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         blend=args.blend,
         seed=args.seed,
         measure=measure,
+        cache=default_folder() if args.cache else None,
     )
 
 

@@ -26,7 +26,8 @@ class StitchOptions:
     full pictures; ignore_reference, ignore_target: masks of what is to be kept out, files or arrays, white = ignored;
     scale: both pictures are resized by this first, at most 1; crop: what of the panorama is kept (see `crop_box`);
     blend: one of BLENDS; seed: of every random choice; measure: whether the report also compares the pictures in the
-    overlap and holds matches back to see how far the field can be trusted.
+    overlap and holds matches back to see how far the field can be trusted; cache: the folder where features, geometry
+    and fields are kept for the next stitch of the same pictures, None for nowhere (the outcome is the same).
     """
 
     field: str = "slack"
@@ -40,6 +41,7 @@ class StitchOptions:
     blend: str = "feather"
     seed: int = 0
     measure: bool = True
+    cache: Path | None = None
 
     @property
     def files_read(self) -> list[Path]:

@@ -22,6 +22,9 @@ from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.two_view import TwoView
 from edf_stitch.synthetic_scenes.two_planes import Pair, make_pair
 
+# No test finds what another has left, and none leaves anything at home: no folder can be made there.
+os.environ["EDF_CACHE"] = os.devnull
+
 
 @pytest.fixture(scope="session")
 def pair() -> Pair:
