@@ -186,7 +186,8 @@ def _value(plan: Any, arrays: list[np.ndarray]) -> Any:
         return Path(plan["path"])
     module, name = plan["class"]
     kind: Any = getattr(import_module(module, _PACKAGE), name)
-    if not is_dataclass(kind) or not kind.__module__.startswith(f"{_PACKAGE}."):
+    ours = is_dataclass(kind) and kind.__module__.startswith(f"{_PACKAGE}.")
+    if not ours:
         raise ValueError("no dataclass of this package")
     return kind(**{name: _value(part, arrays) for name, part in plan["fields"].items()})
 
