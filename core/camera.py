@@ -213,7 +213,7 @@ def read_camera_file(
             source = json.loads(Path(source).read_text(encoding="utf-8"))
         except OSError as error:
             raise UnreadableImage(f"the camera file cannot be read: {error}") from error
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise BadRequest(f"the camera file is not JSON: {error}") from error
     table = source.get("cameras", source) if isinstance(source, dict) else None
     if not isinstance(table, dict):

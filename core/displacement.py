@@ -301,8 +301,13 @@ def _without_parallax(
     """d = 0 everywhere: the pictures differ by a homography alone."""
     nothing = ThinPlateSpline(np.empty((0, 2)), np.empty(0), np.zeros(3), np.zeros(2), 1.0)
     off = np.linalg.norm(target_points(two_view, matches.x, np.zeros(len(matches))) - matches.y, axis=1)
-    rms = float(np.sqrt(np.nanmean(off**2)))
     index = np.flatnonzero(np.isfinite(off))
+    if not len(index):
+        raise DegenerateGeometry(
+            "all that the two pictures share would lie behind the second camera: check whether one is mirrored, and the"
+            " focal lengths and principal points, if given"
+        )
+    rms = float(np.sqrt(np.mean(off[index] ** 2)))
     kept = np.zeros(len(matches), bool)
     kept[_thinned(matches, index, off[index], float(np.sqrt(size[0] * size[1])))] = True
     fit = Fit(kept, SMOOTHING_START, 8 * matches.scale, rms, rms, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,7 +42,7 @@ class StitchOptions:
     blend: str = "feather"
     seed: int = 0
     measure: bool = True
-    cache: Path | None = None
+    cache: Path | None = dataclasses.field(default=None, compare=False)
 
     @property
     def files_read(self) -> list[Path]:
