@@ -55,9 +55,13 @@ def main(folder: Path) -> int:
 
 
 def _work(folder: Path) -> None:
-    from .camera import CameraRequest
-    from .options import StitchOptions
-    from .pipeline import stitch
+    from .output_files import undisturbed
+
+    with undisturbed():  # a library that is interrupted while it loads seems to be broken
+        from .cache import default_folder
+        from .camera import CameraRequest
+        from .options import StitchOptions
+        from .pipeline import stitch
 
     _say({"stage": "read", "share": 0.0})
     job = json.loads((folder / "job.json").read_text("utf-8"))
@@ -72,6 +76,7 @@ def _work(folder: Path) -> None:
         matches=None if rows is None else rows[rows[:, 4] > 0],
         ignore_reference=_mask(folder, masks.get("reference"), turn),
         ignore_target=_mask(folder, masks.get("target"), turn_prime),
+        cache=default_folder(),
     )  # fmt: skip
     result = stitch(
         reference, target, options, progress=lambda stage, share: _say({"stage": stage, "share": share * STITCH_SHARE})

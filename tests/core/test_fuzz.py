@@ -113,7 +113,7 @@ def test_camera_files(content: str | bytes) -> None:
 words = st.one_of(
     st.sampled_from((
         "--focal-px", "--focal35", "--principal", "--crop", "--scale", "--field", "--blend", "--seed", "-o",
-        "--matches", "--report", "--warp", "--layers", "--ignore-ref", "--cameras", "--overwrite", "--projection", "a.png",
+        "--matches", "--report", "--warp", "--layers", "--ignore-ref", "--cameras", "--projection", "a.png",
         "0", "-1", "1e999", "nan", "1,2", "1,2,3,4", "full", "slack", "out.png", "out.xyz", "", ".", "/", "\0", "--",
     )),
     st.text(max_size=6),
