@@ -1,6 +1,7 @@
 # `make demo`, `make test` and `make lint` set everything up by themselves; nothing after that needs a network.
 PYTHON ?= python3
-PLATFORM ?= linux-x64
+PLATFORM ?=
+LOCAL ?=
 BLENDER_RUN ?=
 WORKERS ?= 2
 SUITE ?= quick
@@ -13,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest
 export OPENBLAS_NUM_THREADS := 1
 export BLENDER_RUN
 
-.PHONY: setup demo test slow soak validate end-to-end lint bench zip clean
+.PHONY: setup demo test test-oldest slow soak validate end-to-end lint bench extension clean
 
 setup: $(READY)
 
@@ -31,6 +32,19 @@ demo: setup
 
 test: setup
 	$(PYTEST) -n $(WORKERS) -m "not slow and not blender"
+
+# The add-on in the oldest Blender that is supported, as a module: 4.2 LTS, with the NumPy that it carries.
+OLDEST := .venv-oldest
+$(OLDEST)/.ready: pyproject.toml .ci/constraints.txt
+	rm -rf $(OLDEST)
+	$(PYTHON) -m venv $(OLDEST)
+	grep -v '^numpy' .ci/constraints.txt > $(OLDEST)/constraints.txt
+	$(OLDEST)/bin/python -m pip install --quiet --constraint $(OLDEST)/constraints.txt --editable . \
+		bpy==4.2.23 numpy==1.24.3 pytest pytest-xdist hypothesis
+	touch $@
+
+test-oldest: $(OLDEST)/.ready
+	$(OLDEST)/bin/python -m pytest -n $(WORKERS) tests/edf_addon tests/core/test_worker.py tests/core/test_seen.py
 
 # pytest exits 5 where no test is marked so.
 slow: setup
@@ -57,8 +71,11 @@ lint: setup
 bench: setup
 	$(BIN)/python tests/benchmarks/bench.py
 
-zip: setup
-	$(BIN)/python .ci/build_extension.py --platform $(PLATFORM) --blender "$$BLENDER_RUN" --output-dir dist
+# One zip for each platform into dist/, or PLATFORM=windows-x64 only. LOCAL=1: for this machine, with no more wheels than
+# the Blender that BLENDER_RUN names needs.
+extension: setup
+	$(BIN)/python .ci/build_extension.py $(if $(PLATFORM),--platform $(PLATFORM)) $(if $(LOCAL),--local) \
+		--blender "$$BLENDER_RUN" --output-dir dist
 
 clean:
-	rm -rf .venv build dist wheels demo_output validation_quick validation_full *.egg-info
+	rm -rf .venv $(OLDEST) build dist wheels demo_output validation_quick validation_full *.egg-info

@@ -1,9 +1,11 @@
-"""Build the extension's zip for one platform, with that platform's wheels.
+"""Build the extension's zips: one for each platform, with that platform's wheels.
 
-    build_extension.py --platform linux-x64 [--python 3.13 ...] [--blender "COMMAND"] -o DIR
+    build_extension.py [--platform linux-x64 ...] [--python 3.13 ...] [--local] [--blender "COMMAND"] -o DIR
 
-With a Blender command, Blender builds and validates the zip. Without one, Python writes the same files. What goes in is
-what git knows or would take in, less the manifest's paths_exclude_pattern.
+Without --platform, one zip for each. --local: for this machine only, with the wheels of its Blender's Python only (or
+of every Python, where no Blender is named). With a Blender command, Blender builds and validates the zips. Without one,
+Python writes the same files. What goes in is what git knows or would take in, less the manifest's
+paths_exclude_pattern.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from __future__ import annotations
 import argparse
 import fnmatch
 import os
+import platform as machine
 import shlex
 import shutil
 import subprocess
@@ -98,15 +101,43 @@ def _zip(stage: Path, made: Path, patterns: Sequence[str], listed: Iterable[str]
             archive.writestr(entry, (stage / name).read_bytes())
 
 
+def this_platform() -> str:
+    """Blender's name of the platform that this runs on. Raises SystemExit where there is no zip for it."""
+    systems = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}
+    processors = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64", "aarch64": "arm64"}
+    name = f"{systems.get(machine.system())}-{processors.get(machine.machine().lower())}"
+    if name not in wheels.PYTHONS:
+        raise SystemExit(f"build_extension.py: there are no wheels for this machine; for: {', '.join(wheels.PYTHONS)}")
+    return name
+
+
+def python_of(blender: Sequence[str]) -> str:
+    """The Python inside a Blender, as wheels name it. Raises SystemExit where no wheels are locked for it."""
+    code = "import sys; print('PYTHON %d.%d' % sys.version_info[:2])"
+    said = subprocess.run([*blender, "-b", "--python-expr", code], check=True, capture_output=True, text=True).stdout
+    found = said.split("PYTHON ")[1].split()[0]
+    if found not in wheels.SCIPY:
+        raise SystemExit(
+            f"build_extension.py: this Blender has Python {found}; wheels are locked for {', '.join(wheels.SCIPY)}"
+        )
+    return found
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--platform", required=True, choices=wheels.PYTHONS)
+    parser.add_argument("--platform", action="append", choices=wheels.PYTHONS, help="default: all, one zip each")
     parser.add_argument("--python", action="append", default=[], choices=wheels.SCIPY, help="default: all it serves")
+    parser.add_argument("--local", action="store_true", help="for this machine and its Blender only")
     parser.add_argument("--blender", default="", metavar="COMMAND", help="how to run Blender; without it, Python zips")
     parser.add_argument("-o", "--output-dir", required=True, type=Path)
     arguments = parser.parse_args()
-    command = shlex.split(arguments.blender)
-    print(build(arguments.platform, arguments.python, command, arguments.output_dir.resolve()))
+    blender = shlex.split(arguments.blender)
+    platforms, pythons = arguments.platform or list(wheels.PYTHONS), arguments.python
+    if arguments.local:
+        platforms = [this_platform()]
+        pythons = [python_of(blender)] if blender else []
+    for platform in platforms:
+        print(build(platform, pythons, blender, arguments.output_dir.resolve()))
     return 0
 
 

@@ -29,19 +29,29 @@ WHEELS = ROOT / "wheels"
 
 # One set for every Blender from 4.2 on. SciPy 1.16 and later fail on the NumPy 1.24 of Blender 4.2; only Python 3.14,
 # which has no SciPy 1.15, takes a later one.
-PINS = ("opencv-python-headless==4.11.0.86", "poselib==2.0.5", "OpenEXR==3.5.3", "ExifRead==3.5.1", "tqdm==4.70.1")
+PINS = ("opencv-python-headless==4.11.0.86", "OpenEXR==3.5.3", "ExifRead==3.5.1", "tqdm==4.70.1")
 SCIPY = {"3.11": "scipy==1.15.3", "3.13": "scipy==1.15.3", "3.14": "scipy==1.17.1"}
+# PoseLib's wheels for Intel Macs ended with 2.0.4, and Blender for them with 4.5, which has Python 3.11.
+POSELIB = {"macos-x64": "poselib==2.0.4"}
+POSELIB_ELSEWHERE = "poselib==2.0.5"
 # Blender's own builds have 3.11 and 3.13; Linux distributions build Blender on their own Python.
-PYTHONS = {"linux-x64": ("3.11", "3.13", "3.14"), "windows-x64": ("3.11", "3.13"), "macos-arm64": ("3.11", "3.13")}
+PYTHONS = {
+    "linux-x64": ("3.11", "3.13", "3.14"),
+    "windows-x64": ("3.11", "3.13"),
+    "macos-arm64": ("3.11", "3.13"),
+    "macos-x64": ("3.11",),
+}
 PIP_PLATFORMS = {
     "linux-x64": tuple(f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 17)) + ("manylinux2014_x86_64",),
     "windows-x64": ("win_amd64",),
     "macos-arm64": ("macosx_13_0_arm64",),
+    "macos-x64": ("macosx_13_0_x86_64",),
 }
 PLATFORM_TAG = {
     "linux-x64": re.compile("manylinux.*_x86_64"),
     "windows-x64": re.compile("win_amd64"),
     "macos-arm64": re.compile("macosx_.*_arm64"),
+    "macos-x64": re.compile("macosx_.*_x86_64"),
 }
 
 
@@ -94,7 +104,8 @@ def lock() -> None:
     wheels = set()
     for platform, pythons in PYTHONS.items():
         for python in pythons:
-            for path in _download(platform, python, (*PINS, SCIPY[python]), WHEELS):
+            poselib = POSELIB.get(platform, POSELIB_ELSEWHERE)
+            for path in _download(platform, python, (*PINS, poselib, SCIPY[python]), WHEELS):
                 wheels.add(Wheel(path.name, _sha256(path)))
     head = "# Written by `.ci/wheels.py lock`. One line a wheel; `.ci/wheels.py fetch` picks a platform's own.\n"
     LOCK.write_text(head + "".join(f"{wheel.requirement}  # {wheel.filename}\n" for wheel in sorted(wheels)), "utf-8")

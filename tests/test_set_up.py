@@ -145,3 +145,31 @@ def test_a_zip_is_of_one_platform_and_twice_the_same(tmp_path, monkeypatch):
     assert {f"./{name}" for name in names if name.endswith(".whl")} == set(manifest["wheels"])
     assert {"LICENSE", "__init__.py", "__main__.py", "core/errors.py", "edf_addon/command.py"} <= names
     assert not [name for name in names if name.startswith((".", "tests/")) or name in ("setup.py", "pyproject.toml")]
+
+
+def test_a_local_build_takes_no_more_than_this_machines_blender_needs(monkeypatch, tmp_path):
+    built = []
+    monkeypatch.setattr(build_extension, "build", lambda *call: built.append(call) or tmp_path)
+    monkeypatch.setattr(build_extension, "python_of", lambda blender: "3.13")
+    monkeypatch.setattr(build_extension.machine, "system", lambda: "Darwin")
+    monkeypatch.setattr(build_extension.machine, "machine", lambda: "x86_64")
+    monkeypatch.setattr(sys, "argv", ["build", "--local", "--blender", "run it", "-o", str(tmp_path)])
+    build_extension.main()
+    assert built == [("macos-x64", ["3.13"], ["run", "it"], tmp_path)]
+
+
+def test_without_a_platform_every_one_gets_its_zip(monkeypatch, tmp_path):
+    built = []
+    monkeypatch.setattr(build_extension, "build", lambda platform, *_: built.append(platform) or tmp_path)
+    monkeypatch.setattr(sys, "argv", ["build", "-o", str(tmp_path)])
+    build_extension.main()
+    assert built == MANIFEST["platforms"] == ["linux-x64", "windows-x64", "macos-arm64", "macos-x64"]
+
+
+def test_a_machine_or_a_python_without_wheels_is_told_so(monkeypatch):
+    monkeypatch.setattr(build_extension.machine, "machine", lambda: "riscv64")
+    with pytest.raises(SystemExit, match="no wheels for this machine"):
+        build_extension.this_platform()
+    said = "import sys; print('PYTHON 3.12')"
+    with pytest.raises(SystemExit, match="3.12; wheels are locked for 3.11, 3.13, 3.14"):
+        build_extension.python_of([sys.executable, "-c", said])

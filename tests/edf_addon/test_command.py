@@ -12,11 +12,12 @@ from types import SimpleNamespace
 import pytest
 from edf_stitch.synthetic_scenes import blender_process
 
-pytest.importorskip("bpy")
+bpy = pytest.importorskip("bpy")
 
 from edf_stitch.edf_addon import _commands, command, register, unregister  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.skipif(bool(bpy.app.binary_path), reason="inside a whole Blender: test_extension.py's part")
 
 
 def test_the_command_is_offered_once_and_withdrawn():

@@ -7,11 +7,13 @@ import sys
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.images import encode_picture, load_picture, picture_from_array
+from edf_stitch.core.images import picture_from_array
 
 bpy = pytest.importorskip("bpy")
 
 from edf_stitch.edf_addon import images  # noqa: E402
+
+from . import picture_files  # noqa: E402
 
 WIDTH, HEIGHT = 6, 4
 
@@ -49,7 +51,7 @@ def test_bytes_come_as_they_are_and_upright(blender, tmp_path, channels):
 def test_a_16_bit_file_comes_as_straight_light(blender, tmp_path):
     array = gradient(4, np.uint16)
     image = bpy.data.images.load(write(tmp_path / "a.png", array))
-    ours = load_picture(tmp_path / "a.png")
+    ours = picture_files.read(tmp_path / "a.png")
     found = images.read(image)
     assert np.abs(found[..., :3] - ours.pixels).max() < 2e-4  # Blender's own curve
     assert np.abs(found[..., 3] - ours.alpha).max() < 1e-6
@@ -58,8 +60,7 @@ def test_a_16_bit_file_comes_as_straight_light(blender, tmp_path):
 def test_an_exr_comes_as_it_is_with_straight_colours(blender, tmp_path):
     light = gradient().astype(np.float32) / 50
     alpha = np.linspace(0.2, 1, WIDTH * HEIGHT, dtype=np.float32).reshape(HEIGHT, WIDTH)
-    (tmp_path / "a.exr").write_bytes(encode_picture(light, alpha, 32, ".exr")[0])
-    found = images.read(bpy.data.images.load(str(tmp_path / "a.exr")))
+    found = images.read(bpy.data.images.load(picture_files.write(tmp_path / "a.exr", light, alpha)))
     assert found.dtype == np.float32
     assert np.allclose(found, np.dstack([light, alpha]), rtol=1e-5, atol=1e-7)
 
@@ -108,8 +109,7 @@ def test_a_packed_and_painted_image_goes_as_it_was_painted(blender, tmp_path):
 
 
 def test_a_float_image_of_another_colour_space_goes_as_blender_converts_it(blender, tmp_path):
-    (tmp_path / "a.exr").write_bytes(encode_picture(gradient() / np.float32(255), None, 32, ".exr")[0])
-    image = bpy.data.images.load(str(tmp_path / "a.exr"))
+    image = bpy.data.images.load(picture_files.write(tmp_path / "a.exr", gradient() / np.float32(255)))
     assert "path" in entry(image, tmp_path)
     image.colorspace_settings.name = "Linear Rec.2020"
     assert "array" in entry(image, tmp_path)
@@ -197,7 +197,7 @@ def test_the_last_render_keeps_its_light(blender, tmp_path):
         exec(code, {})
     else:  # as a module, Blender never ends when Cycles has rendered and other libraries' threads came after it
         subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
-    picture = load_picture(tmp_path / "reference.exr")
+    picture = picture_files.read(tmp_path / "reference.exr")
     assert picture.view.shape[:2] == (8, 16)
     assert np.allclose(picture.pixels[2, 3], (3.0, 0.2, 0.1), rtol=1e-3)
 
@@ -207,7 +207,7 @@ def test_the_last_render_keeps_its_light(blender, tmp_path):
 def test_a_picture_of_the_worker_becomes_an_image_with_its_values(blender, tmp_path, pixels_of, pack, suffix):
     alpha = np.linspace(0, 1, WIDTH * HEIGHT, dtype=np.float32).reshape(HEIGHT, WIDTH)
     light = picture_from_array(gradient()).pixels * (1 if suffix == ".png" else 5)
-    (tmp_path / f"x{suffix}").write_bytes(encode_picture(light, alpha, 8 if suffix == ".png" else 32, suffix)[0])
+    picture_files.write(tmp_path / f"x{suffix}", light, alpha)
     image = images.bring(tmp_path / f"x{suffix}", "left panorama", pack, fake_user=True)
     (tmp_path / f"x{suffix}").unlink()
     assert (image.name, image.use_fake_user, image.is_float) == ("left panorama", True, suffix == ".exr")
@@ -228,14 +228,14 @@ def test_saving_keeps_the_values(blender, tmp_path, make, suffix):
     """Read back by the engine, value by value; the scene's view transform has no say."""
     blender.scene.view_settings.view_transform = "AgX"
     light = picture_from_array(gradient()).pixels * np.float32(0.9)
-    (tmp_path / "x.exr").write_bytes(encode_picture(light, None, 32, ".exr")[0])
+    picture_files.write(tmp_path / "x.exr", light)
     image = images.bring(tmp_path / "x.exr", "x", make != "generated", False)
     if make == "painted":
         image.pixels[0] = image.pixels[0]
         image.update()
         assert image.is_dirty
     images.save(image, tmp_path / f"out{suffix}")
-    saved = load_picture(tmp_path / f"out{suffix}")
+    saved = picture_files.read(tmp_path / f"out{suffix}")
     assert saved.bits == (32 if suffix == ".exr" else 16)
     assert np.abs(saved.pixels - light).max() < (1e-6 if suffix == ".exr" else 1e-4)
     assert not [path for path in tmp_path.iterdir() if ".part" in path.name]
@@ -249,7 +249,7 @@ def test_saving_bytes_keeps_every_level(blender, tmp_path, suffix, channels):
     image = bpy.data.images.new("x", 16, 16, alpha=channels == 4)
     set_pixels(image, np.dstack([array / 255, np.ones((16, 16))])[..., :4])
     images.save(image, tmp_path / f"out{suffix}")
-    saved = load_picture(tmp_path / f"out{suffix}")
+    saved = picture_files.read(tmp_path / f"out{suffix}")
     if suffix == ".exr":
         ours = picture_from_array(array)
         assert np.abs(saved.pixels - ours.pixels).max() < 1e-4

@@ -8,12 +8,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edf_stitch.core.images import encode_picture, load_picture, picture_from_array
+from edf_stitch.core.images import picture_from_array
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 bpy = pytest.importorskip("bpy")
 
 from edf_stitch.edf_addon import job, modal, operators, properties, result, status  # noqa: E402
+
+from . import picture_files  # noqa: E402
 
 
 def event(kind: str = "TIMER", value: str = "NOTHING") -> SimpleNamespace:
@@ -132,9 +134,8 @@ def test_a_pair_of_float_images_gives_a_float_panorama(chosen, folder, pixels_of
     """Painted over, linear, brighter than white: nothing is lost on the way."""
     settings = chosen.settings
     for side in ("reference", "target"):
-        light = load_picture(folder / f"{side}.png").pixels * 4
-        (tmp_path / f"{side}.exr").write_bytes(encode_picture(light, None, 32, ".exr")[0])
-        setattr(settings, side, bpy.data.images.load(str(tmp_path / f"{side}.exr")))
+        light = picture_files.read(folder / f"{side}.png").pixels * 4
+        setattr(settings, side, bpy.data.images.load(picture_files.write(tmp_path / f"{side}.exr", light)))
     settings.crop, settings.take_masks = "REFERENCE", True
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     panorama = settings.result
@@ -165,8 +166,7 @@ def test_colours_and_rows_survive_the_whole_way(blender, tmp_path, kind):
     for side, array in (("reference", left), ("target", right)):
         light = picture_from_array(array).pixels
         path = tmp_path / f"{side}{'.png' if kind == 'bytes' else '.exr'}"
-        path.write_bytes(encode_picture(light, None, 8 if kind == "bytes" else 32, path.suffix)[0])
-        setattr(settings, side, bpy.data.images.load(str(path)))
+        setattr(settings, side, bpy.data.images.load(picture_files.write(path, light)))
     rows = [(x, y, x - 60, y) for x in range(70, 235, 12) for y in range(8, 155, 12)]
     for x, y, x2, y2 in rows:
         match = settings.matches.add()
@@ -175,7 +175,7 @@ def test_colours_and_rows_survive_the_whole_way(blender, tmp_path, kind):
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     for suffix in (".exr", ".png"):
         assert bpy.ops.edf.save(filepath=str(tmp_path / f"out{suffix}")) == {"FINISHED"}
-        saved = load_picture(tmp_path / f"out{suffix}")
+        saved = picture_files.read(tmp_path / f"out{suffix}")
         height, width = saved.view.shape[:2]
         assert abs(width - 300) <= 1 and abs(height - 160) <= 1
         expected = picture_from_array(truth).pixels

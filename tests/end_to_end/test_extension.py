@@ -122,6 +122,18 @@ def test_switching_off_and_on_again(home):
     assert "warning" not in (done.stdout + done.stderr).lower()
 
 
+def test_the_add_ons_own_tests_inside_this_blender(home, python, tmp_path):
+    """The same tests as those of bpy as a module, against what was installed."""
+    tools = tmp_path / "tools"
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", tools, "--python-version", python]
+    command += ["--only-binary=:all:", "--constraint", ROOT / ".ci" / "constraints.txt", "pytest", "hypothesis"]
+    subprocess.run(command, check=True, cwd=ROOT, timeout=300)
+    script = ROOT / "tests" / "end_to_end" / "inside_blender.py"
+    done = home.run("--python-exit-code", "9", "--python", script, "--", tools, "-q", "tests/edf_addon")
+    assert done.returncode == 0, done.stdout[-8000:] + done.stderr[-2000:]
+    assert " passed" in done.stdout and " failed" not in done.stdout
+
+
 def test_a_wrong_option_gives_2(home):
     done = home.edf("stitch", "a.png", "b.png", "-o", "out.png", "--no-such-option")
     assert done.returncode == 2
