@@ -22,6 +22,8 @@ from . import command
 
 # Seconds that a worker gets to end by itself when asked to; nothing is lost when it is killed.
 GRACE = 2.0
+# Seconds that what was said last may take on its way after the worker has ended.
+LATE = 10.0
 # Bytes: a longer line is none of ours; and what is kept of stderr for a message.
 LONGEST_LINE, LONGEST_TAIL = 1 << 16, 4096
 WORKER = "core.worker"
@@ -47,7 +49,7 @@ class Job:
         self.folder = folder
         self.stage, self.share = "read", 0.0
         self.cancelled = False
-        self._deadline = float("inf")
+        self._deadline = self._ended = float("inf")
         self._last: dict[str, Any] = {}
         self._tail = b""
         self._process: subprocess.Popen[bytes] = subprocess.Popen(
@@ -68,9 +70,9 @@ class Job:
             if time.monotonic() > self._deadline:
                 self._process.kill()
             return None
-        for listener in self._listeners:  # what was said last is still on its way
-            listener.join(timeout=5)
-        return self._outcome(status)
+        self._ended = min(self._ended, time.monotonic())
+        is_heard = not any(listener.is_alive() for listener in self._listeners)
+        return self._outcome(status) if is_heard or time.monotonic() > self._ended + LATE else None
 
     def cancel(self) -> None:
         """Ask the worker to stop; a later `poll` kills one that does not. Whatever it still makes is not wanted."""
@@ -123,11 +125,11 @@ class Job:
             self._tail = (self._tail + chunk)[-LONGEST_TAIL:]
 
     def _hear(self, line: bytes) -> None:
+        if not line.startswith(b"{"):
+            return
         try:
             said = json.loads(line)
         except (ValueError, RecursionError):
-            return
-        if not isinstance(said, dict):
             return
         if "error" in said or "done" in said:
             self._last = said

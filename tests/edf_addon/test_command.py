@@ -31,6 +31,8 @@ def test_the_command_is_offered_once_and_withdrawn():
         assert not _commands
 
 
+# 4.2's module crashes on its way out after any property with a Python callback, registered or not; its program does not
+@pytest.mark.skipif(bpy.app.version < (4, 3), reason="bpy 4.2 as a module crashes when it ends, whoever used callbacks")
 def test_bpy_as_a_module_ends_well_when_nobody_switched_the_extension_off():
     code = "import edf_stitch; edf_stitch.register()"
     assert subprocess.run([sys.executable, "-c", code], timeout=120).returncode == 0

@@ -33,9 +33,10 @@ def test_every_operator_that_is_named_is_there(blender):
 def test_registering_loads_nothing_of_the_engine():
     """What it loads is Blender's own; what takes time is the worker's."""
     code = (
-        "import sys, bpy; before = set(sys.modules); import edf_stitch; edf_stitch.register()\n"
+        "import os, sys, bpy; before = set(sys.modules); import edf_stitch; edf_stitch.register()\n"
         "print(*sorted({name.split('.')[0] for name in set(sys.modules) - before}))\n"
-        "print(*sorted(name for name in sys.modules if name.startswith('edf_stitch.core')))"
+        "print(*sorted(name for name in sys.modules if name.startswith('edf_stitch.core')), flush=True)\n"
+        "os._exit(0)"
     )
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, timeout=120, check=True)
     loaded, engine = done.stdout.split("\n")[:2]
