@@ -1,6 +1,7 @@
 """The plainest stitcher, as a yardstick for `bench.py`: EDF Stitch's own features, one homography, 8-bit feathering.
 
     homography_stitch.py [--opencv-stitcher] REF TARGET OUT
+    homography_stitch.py --floor REF TARGET PANORAMA OUT     nothing but decode, remap, and encode of as many pixels
 """
 
 import sys
@@ -41,9 +42,25 @@ def stitcher(reference: str, target: str, out: str) -> None:
     cv2.imwrite(out, panorama)
 
 
+def floor(reference: str, target: str, panorama: str, out: str) -> None:
+    """Read two files, remap one onto a canvas of the panorama's size, write it."""
+    from edf_stitch.core.containers import read_structure
+
+    cv2.imread(reference)
+    picture = cv2.imread(target)
+    with open(panorama, "rb") as file:
+        size = read_structure(file.read())
+    height, width = picture.shape[:2]
+    x = np.linspace(0, width - 1, size.width, dtype=np.float32)[None].repeat(size.height, axis=0)
+    y = np.linspace(0, height - 1, size.height, dtype=np.float32)[:, None].repeat(size.width, axis=1)
+    cv2.imwrite(out, cv2.remap(picture, x, y, cv2.INTER_CUBIC))
+
+
 if __name__ == "__main__":
     arguments = sys.argv[1:]
-    if arguments[0] == "--opencv-stitcher":
+    if arguments[0] == "--floor":
+        floor(*arguments[1:])
+    elif arguments[0] == "--opencv-stitcher":
         stitcher(*arguments[1:])
     else:
         main(*arguments)
