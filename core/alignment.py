@@ -22,9 +22,11 @@ from .features import Matches
 from .fields import fit_field
 from .images import Picture, resized
 from .lens import undistort
+from .levelling import rotation_for
 from .masks import read_mask, without
 from .match_files import read_matches
 from .options import StitchOptions
+from .projection import Projection, round_projection
 from .two_view import MIN_MATCHES, TwoView, estimate
 from .warp import Warp, build_warp
 
@@ -127,7 +129,7 @@ def lay(registration: Registration, options: StitchOptions, steps: Steps) -> Ali
     field = Cache(options.cache).remember("field", decided, lambda: fit_field(*decided))
 
     steps("warp", 0.0)
-    warp = build_warp(field, field.two_view, *cameras)
+    warp = build_warp(field, field.two_view, *cameras, _projection(options, field.two_view))
     return Alignment(cameras, registration.matches, field.two_view, field, warp, registration.warnings)
 
 
@@ -135,6 +137,13 @@ def size_of(picture: Picture) -> tuple[int, int]:
     """(W, H) px of a picture."""
     height, width = picture.pixels.shape[:2]
     return width, height
+
+
+def _projection(options: StitchOptions, two_view: TwoView) -> Projection | None:
+    """The round projection that is asked for, levelled; None for a flat panorama."""
+    if options.projection == "perspective":
+        return None
+    return round_projection(options.projection, two_view.K, rotation_for(options.level, two_view.R))
 
 
 def _found_in(frames: Sequence[Frame], steps: Steps) -> Matches:

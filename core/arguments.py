@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 # What DESIGN names and what is not there yet is refused by name, so that nobody takes silence for success.
 FADE_CHOICES = ("plane", "infinity")
 FIELD_CHOICES = ("slack", "strict", "paper", "rew", "apap", "homography")
+PROJECTION_CHOICES = ("perspective", "cylindrical", "equirectangular")
 BLEND_CHOICES, BLENDS_TO_COME = ("feather", "linear"), ("multiband",)
 
 
@@ -87,8 +88,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     how.add_argument(
         "--projection",
         default="perspective",
-        type=_choice(("perspective",), ("cylindrical", "equirectangular")),
-        help="perspective",
+        type=_choice(PROJECTION_CHOICES, ()),
+        metavar="PROJECTION",
+        help="perspective (default: REF keeps every pixel), cylindrical, or equirectangular (the whole sphere)",
+    )
+    how.add_argument(
+        "--level",
+        default="auto",
+        metavar="LEVEL",
+        help="of the other two: auto (default: the horizon by how the cameras were held), none, or YAW,PITCH,ROLL of "
+        "REF in degrees (right, up, clockwise); write --level=-5,0,0 where it begins with a minus",
     )
     how.add_argument(
         "--blend",
@@ -114,6 +123,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
     from .cache import default_folder
     from .camera import CameraRequest
     from .crop import parse_crop
+    from .levelling import parse_level
     from .options import StitchOptions
 
     return StitchOptions(
@@ -125,6 +135,8 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         matches=args.matches,
         ignore_reference=args.ignore_ref,
         ignore_target=args.ignore_target,
+        projection=args.projection,
+        level=parse_level(args.level),
         scale=args.scale,
         crop=parse_crop(args.crop),
         blend=args.blend,

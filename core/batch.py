@@ -289,8 +289,8 @@ def _align(job: Job, steps: Stopwatch) -> _Locked:
     if reports or crop == "inscribed":
         result = compose(read_frame(*item.pair(shown), options), alignment, options, steps)
         if crop == "inscribed":  # what one frame shows decides for all: the frames of a clip have one size
-            (x, y), (left, top) = alignment.warp.canvas.offset, result.warp.canvas.offset
-            crop = (x - left, y - top, result.warp.canvas.width, result.warp.canvas.height)
+            whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
+            crop = (x - left - whole[0], y - top - whole[1], result.canvas.width, result.canvas.height)
         about = {"frames": list(item.frames or ()), "aligned_on": list(used), "shown": shown}
         for unit in reports:
             unit.write(replace(result, report={**result.report, "clip": about}))

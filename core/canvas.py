@@ -1,19 +1,23 @@
 """The plane the panorama lives in: its size and where the reference lies in it; grids of nodes over it.
 
-Canvas pixels are reference pixels moved by whole numbers, so that the reference is pasted exactly.
+Canvas pixels are pixels of that plane moved by whole numbers. The plane is the reference's own, so that the reference
+is pasted exactly, or that of a round panorama (see `projection`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.blas import sgemm
 
-from .epipolar import Array
+from .camera import Camera
+from .epipolar import Array, homogeneous, inverse_intrinsics
 from .errors import OutputTooLarge
+from .lens import distort, undistort
+from .projection import Projection, extent
 
 # Fields are smooth: about this many nodes carry them at any picture size.
 NODES = 20_000
@@ -30,13 +34,65 @@ Box = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class Canvas:
-    """width, height px; offset: canvas pixel (x, y) of the reference's pixel (0, 0); cropped: part of the target runs
-    off the canvas."""
+    """width, height px; offset: canvas pixel (x, y) of the plane's pixel (0, 0), in a flat panorama the reference's;
+    cropped: part of the pictures runs off the canvas; projection: of a round panorama, None for a flat one."""
 
     width: int
     height: int
     offset: tuple[int, int]
     cropped: bool = False
+    projection: Projection | None = None
+
+    @property
+    def xs(self) -> Array:
+        """x of the columns, px of the plane."""
+        return np.arange(-self.offset[0], self.width - self.offset[0], dtype=np.float64)
+
+    @property
+    def ys(self) -> Array:
+        """y of the lines, px of the plane."""
+        return np.arange(-self.offset[1], self.height - self.offset[1], dtype=np.float64)
+
+    @property
+    def whole(self) -> Box:
+        """The whole panorama in px of the canvas: itself, but of a sphere all of it."""
+        sphere = None if self.projection is None else self.projection.sphere
+        if sphere is None:
+            return 0, 0, self.width, self.height
+        return sphere[0] + self.offset[0], sphere[1] + self.offset[1], sphere[2], sphere[3]
+
+    def within(self, box: Box) -> Canvas:
+        """The canvas of a box (left, top, width, height) of it."""
+        left, top, width, height = box
+        return replace(self, width=width, height=height, offset=(self.offset[0] - left, self.offset[1] - top))
+
+    def of_reference(self, points: Array, camera: Camera | None = None) -> Array:
+        """Canvas px (…, 2) of raw pixels (…, 2) of the reference; camera: its, if its lens matters."""
+        if self.projection is not None:
+            points = self.projection.of_reference(points if camera is None else undistort(points, camera))
+        return points + np.array(self.offset, np.float64)
+
+    def through(self, rows: Array, xs: Array, ys: Array, camera: Camera | None = None) -> list[Array]:
+        """rows (k, 3) times canvas points p, each (len(ys), len(xs)), for columns xs and lines ys in px of the plane.
+        camera: the reference's, if its lens matters.
+
+        p is the homogeneous ideal pixel of the reference, with p_3 = 1 in a flat panorama and |K⁻¹ p| = 1 in a round
+        one (see `projection`): what lies ahead of the reference camera has p_3 > 0.
+        """
+        if self.projection is not None:
+            return self.projection.through(rows, xs, ys)
+        if camera is not None and camera.distortion.any():
+            raw = np.stack(np.broadcast_arrays(xs[None, :], ys[:, None]), axis=-1)
+            return list(np.moveaxis(homogeneous(undistort(raw, camera)) @ rows.T, -1, 0))
+        return [(row[0] * xs)[None, :] + (row[1] * ys[:, None] + row[2]) for row in rows]
+
+    def on_reference(self, xs: Array, ys: Array, camera: Camera | None = None) -> tuple[Array, Array]:
+        """Raw pixels (len(ys), len(xs), 2) of the reference at columns xs and lines ys in px of the plane, NaN behind
+        its camera; and p_3 there."""
+        a, b, c = self.through(np.eye(3), xs, ys, camera)
+        c = np.where(c > 1e-6 * np.maximum(np.abs(a), np.abs(b)), c, np.nan)
+        ideal = np.stack([a / c, b / c], axis=-1)
+        return ideal if camera is None else distort(ideal, camera), c
 
 
 @dataclass(frozen=True)
@@ -86,39 +142,65 @@ class Grid:
         strips = (down @ np.asarray(values, np.float64)).astype(np.float32)
         return sgemm(1.0, across.T.astype(np.float32), strips.T, trans_a=True).T
 
+    def at(self, values: NDArray, points: Array) -> Array:
+        """Node values (rows, columns) at points (…, 2), by the same convolution; 0 where a point is NaN or lies beyond
+        the cells that have neighbours."""
+        place = (points - np.array(self.start) - (self.step - 1) / 2) / self.step
+        with np.errstate(invalid="ignore"):
+            inside = (place >= 1).all(axis=-1) & (place < np.array([self.columns, self.rows]) - 2).all(axis=-1)
+        node = np.floor(place[inside]).astype(int)
+        weights, (column, row) = _keys(place[inside] - node), node.T
+        out = np.zeros(points.shape[:-1])
+        out[inside] = sum(
+            weights[i][:, 0] * weights[j][:, 1] * values[row + j - 1, column + i - 1]
+            for j in range(4) for i in range(4)
+        )  # fmt: skip
+        return out
+
 
 def _cubic_weights(start: int, step: int, nodes: int, first: int, count: int) -> Array:
     """Weights (count, nodes) of the nodes of one axis for the pixels first, first + 1, …"""
     at = (np.arange(first, first + count) - start - (step - 1) / 2) / step
     node = np.clip(np.floor(at).astype(int), 1, nodes - 3)
-    u = at - node
     weights = np.zeros((count, nodes))
     each = np.arange(count)
-    weights[each, node - 1] = ((-0.5 * u + 1.0) * u - 0.5) * u
-    weights[each, node] = (1.5 * u - 2.5) * u * u + 1.0
-    weights[each, node + 1] = ((-1.5 * u + 2.0) * u + 0.5) * u
-    weights[each, node + 2] = (0.5 * u - 0.5) * u * u
+    for k, weight in enumerate(_keys(at - node)):
+        weights[each, node + k - 1] = weight
     return weights
 
 
+def _keys(u: Array) -> tuple[Array, Array, Array, Array]:
+    """Weights of the four nodes about a point u (0 to 1) past the second of them."""
+    return (
+        ((-0.5 * u + 1.0) * u - 0.5) * u,
+        (1.5 * u - 2.5) * u * u + 1.0,
+        ((-1.5 * u + 2.0) * u + 0.5) * u,
+        (0.5 * u - 0.5) * u * u,
+    )
+
+
 def bounding_canvas(
-    target_at: Callable[[Grid], Array], reference_size: tuple[int, int], target_size: tuple[int, int], reach: Array
-) -> Canvas:
+    target_at: Callable[[Grid], Array], reference: Box, target_size: tuple[int, int], reach: Array,
+    projection: Projection | None = None,
+) -> Canvas:  # fmt: skip
     """A canvas, small to within a cell, that holds the reference and every well-behaved part of the target.
 
-    target_at(grid) gives target pixels (rows, columns, 2), NaN behind the camera; sizes (W, H) px; reach (4,): left,
-    top, right, bottom in px of the reference's plane that the target is expected to reach (see `expected_reach`).
-    Raises OutputTooLarge.
+    target_at(grid) gives target pixels (rows, columns, 2), NaN behind the camera; reference: where it lies,
+    target_size: (W, H), reach (4,): left, top, right, bottom that the target is expected to reach (see
+    `expected_reach`), all in px of the plane. Raises OutputTooLarge.
     """
-    width, height = reference_size
     left, top, right, bottom = reach
+    limits = np.array([-np.inf, -np.inf, np.inf, np.inf]) if projection is None else projection.limits
+    # a sphere has no far side that grows without end
+    max_stretch = np.inf if projection is not None and projection.sphere else MAX_STRETCH
     cropped = False
     for _ in range(2):  # the second pass looks closer at what the first found
         grid = Grid.over(int(left), int(top), max(1, int(right - left)), max(1, int(bottom - top)), nodes=NODES // 10)
         target = target_at(grid)
         seen = _inside(target, target_size)
-        stretched = seen & (_area_ratio(target, grid.step) < 1 / MAX_STRETCH**2)
+        stretched = seen & (_area_ratio(target, grid.step) < 1 / max_stretch**2)
         useful = seen & ~stretched
+        new = np.array([reference[0], reference[1], reference[0] + reference[2], reference[1] + reference[3]])
         if useful.any():
             rows, columns = np.flatnonzero(useful.any(axis=1)), np.flatnonzero(useful.any(axis=0))
             xs, ys, margin = grid.xs, grid.ys, grid.step
@@ -126,17 +208,16 @@ def bounding_canvas(
             new = np.array(
                 [xs[columns[0]] - margin, ys[rows[0]] - margin, xs[columns[-1]] + margin, ys[rows[-1]] + margin]
             )
-        else:
-            new = np.array([0.0, 0.0, width, height])
-        left, top, right, bottom = _union(new, width, height)
+        left, top, right, bottom = _union(new, reference, limits)
         cropped = cropped or bool(stretched.any())
-    out_width, out_height = right - left, bottom - top
-    if out_width * out_height > MAX_PIXELS:
+    canvas = Canvas(right - left, bottom - top, (-left, -top), cropped, projection)
+    _, _, width, height = canvas.whole
+    if width * height > MAX_PIXELS:
         raise OutputTooLarge(
-            f"the panorama would have {out_width}×{out_height} pixels, {MAX_PIXELS // 1_000_000} million at most: "
-            "use smaller pictures"
+            f"the panorama would have {width}×{height} pixels, {MAX_PIXELS // 1_000_000} million at most: "
+            "use smaller pictures, or --scale"
         )
-    return Canvas(out_width, out_height, (-left, -top), cropped)
+    return canvas
 
 
 def expected_reach(corners: Array, size: tuple[int, int], target_size: tuple[int, int]) -> tuple[Array, bool]:
@@ -164,11 +245,62 @@ def expected_reach(corners: Array, size: tuple[int, int], target_size: tuple[int
     return np.concatenate([np.maximum(lowest, limit_low), np.minimum(highest, limit_high)]), cut
 
 
-def _union(box: Array, width: int, height: int) -> tuple[int, int, int, int]:
-    return (
-        min(0, int(np.floor(box[0]))), min(0, int(np.floor(box[1]))),
-        max(width, int(np.ceil(box[2])) + 1), max(height, int(np.ceil(box[3])) + 1),
-    )  # fmt: skip
+def round_reach(
+    projection: Projection, H_plane: Array, outline: Array, camera: Camera, camera_prime: Camera
+) -> tuple[Box, Array, bool]:
+    """Where a round panorama's plane holds the reference, and both pictures (left, top, right, bottom), with a margin;
+    and whether it cuts them.
+
+    H_plane (3, 3): from the reference to the target by a plane; outline (N, 3): of the target, as canvas points p by
+    it.
+    """
+    to_ray = inverse_intrinsics(projection.K)
+
+    def shows(matrix: Array, picture: Camera) -> Callable[[Array], bool]:
+        return lambda ray: bool(_inside(_raw(matrix @ projection.K @ ray, picture), picture.size))
+
+    own = homogeneous(undistort(border(camera.size), camera))
+    extents = [
+        extent(projection, outline @ to_ray.T, shows(matrix, picture))
+        for outline, matrix, picture in ((own, np.eye(3), camera), (outline, H_plane, camera_prime))
+    ]
+    limits = projection.limits
+    margin = 0.1 * max(camera.size)
+    (low, high) = np.minimum(*extents)[:2], np.maximum(*extents)[2:]
+    cut = projection.sphere is None and bool((low < limits[:2]).any() or (high > limits[2:]).any())
+    reach = np.concatenate([np.maximum(low - margin, limits[:2]), np.minimum(high + margin, limits[2:])])
+    left, top = np.floor(np.maximum(extents[0][:2], limits[:2])).astype(int)
+    right, bottom = np.ceil(np.minimum(extents[0][2:], limits[2:])).astype(int) + 1
+    return (int(left), int(top), int(right - left), int(bottom - top)), reach, cut
+
+
+def common(box: Box, other: Box) -> Box:
+    """What two boxes that meet have in common."""
+    left, top = max(box[0], other[0]), max(box[1], other[1])
+    right, bottom = min(box[0] + box[2], other[0] + other[2]), min(box[1] + box[3], other[1] + other[3])
+    return left, top, right - left, bottom - top
+
+
+def border(size: tuple[int, int]) -> Array:
+    """Points (N, 2) all around a picture of (W, H) px, in order."""
+    width, height = size
+    u = np.linspace(0, 1, 32, endpoint=False)
+    around = [np.column_stack(p) for p in ((u, 0 * u), (0 * u + 1, u), (1 - u, 0 * u + 1), (0 * u, 1 - u))]
+    return np.concatenate(around) * np.array([width - 1.0, height - 1.0])
+
+
+def _raw(point: Array, camera: Camera) -> Array:
+    """The raw pixel (2,) of a canvas point's image p (3,), NaN behind the camera."""
+    ahead = point[2] > 1e-6 * np.abs(point[:2]).max()
+    return distort(point[:2] / point[2], camera) if ahead else np.full(2, np.nan)
+
+
+def _union(box: Array, reference: Box, limits: Array) -> tuple[int, int, int, int]:
+    """left, top, right, bottom of what holds both a box given so and the reference, as far as the plane goes."""
+    left, top, width, height = reference
+    low = np.maximum(np.minimum([left, top], np.floor(box[:2])), limits[:2])
+    high = np.minimum(np.maximum([left + width, top + height], np.ceil(box[2:]) + 1), limits[2:])
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
 def _inside(target: Array, size: tuple[int, int]) -> NDArray[np.bool_]:

@@ -27,16 +27,16 @@ def parse_crop(text: str) -> Crop:
     return left, top, width, height
 
 
-def crop_box(kind: Crop, shape: tuple[int, int], shows: NDArray[np.bool_], reference_box: Box) -> Box:
+def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Box) -> Box:
     """The part of the panorama that is kept: left, top, width, height in canvas px.
 
-    kind: one of CROPS, or a box in px of the whole canvas; shape: (H, W) of the canvas; shows (H, W): where the
-    panorama shows something; reference_box: where the reference lies. Raises BadRequest, also for a box that reaches
-    outside the canvas.
+    kind: one of CROPS, or a box in px of the whole panorama; whole: the whole panorama (see `Canvas.whole`); shows
+    (H, W): where the canvas shows something; reference_box: where the reference lies. Raises BadRequest, also for a box
+    that reaches outside the panorama, or lies beside both pictures.
     """
-    height, width = shape
+    left, top, width, height = whole
     if kind == "full":
-        return 0, 0, width, height
+        return whole
     if kind == "reference":
         return reference_box
     if kind == "inscribed":
@@ -49,6 +49,9 @@ def crop_box(kind: Crop, shape: tuple[int, int], shows: NDArray[np.bool_], refer
             f"the crop {x},{y},{w},{h} (X,Y,W,H) is not a part of the panorama, which has {width}×{height} pixels: X "
             f"and Y from 0, X + W at most {width}, Y + H at most {height}"
         )
+    x, y = x + left, y + top
+    if not shows[max(0, y) : max(0, y + h), max(0, x) : max(0, x + w)].size:
+        raise BadRequest(f"the crop {x - left},{y - top},{w},{h} (X,Y,W,H) lies beside both pictures")
     return x, y, w, h
 
 

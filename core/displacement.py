@@ -39,10 +39,13 @@ PLANE_PX = 0.3
 @dataclass(frozen=True)
 class FieldValues:
     """A field at nodes: inverse_depth (rows, columns), NaN where it knows none (e' is 0 then), and shift (rows,
-    columns, 2) in target px that comes on top of π(H_inf p + d e'), None where the field keeps to its lines."""
+    columns, 2) in target px that comes on top of π(H_inf p + d e'), None where the field keeps to its lines; far (3,):
+    the plane that inverse_depth ends in beyond the fade, None for a field that means nothing off the reference's plane.
+    """
 
     inverse_depth: Array
     shift: Array | None = None
+    far: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,12 @@ class StrictField:
 
         ideal (rows, columns, 2): the nodes' ideal pixels, where the reference's lens bends its picture.
         """
-        return FieldValues(self.with_fade(grid, ideal)[0])
+        return FieldValues(self.with_fade(grid, ideal)[0], far=self.far)
+
+    @property
+    def far(self) -> Array:
+        """The plane (3,) that d ends in beyond the fade: m, or infinity."""
+        return np.zeros(3) if self.fade == "infinity" else self.plane
 
     def with_fade(
         self, grid: Grid, ideal: Array | None = None, bend: Array | None = None
@@ -193,7 +201,12 @@ def fade_share(
 
 def target_points(two_view: TwoView, points: Array, inverse_depth: Array) -> Array:
     """π(H_inf p + d e') (…, 2) for points (…, 2) and d (…); NaN where the point lies behind the target camera."""
-    ray = homogeneous(points) @ two_view.H_inf.T
+    return target_of(two_view, homogeneous(points), inverse_depth)
+
+
+def target_of(two_view: TwoView, points: Array, inverse_depth: Array) -> Array:
+    """The same for canvas points p (…, 3) (see `Canvas.through`)."""
+    ray = points @ two_view.H_inf.T
     if two_view.e_prime.any():  # else depth, known or not (NaN), moves nothing
         ray += inverse_depth[..., None] * two_view.e_prime
     # relative to the ray's own length: less than this in front is behind for any picture

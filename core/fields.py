@@ -15,6 +15,8 @@ from .two_view import TwoView
 
 RIVALS = ("rew", "apap", "homography")
 FIELDS = ("slack", "strict", "paper", *RIVALS)
+# Those that mean something on every ray, not only in the reference's plane.
+ROUND_FIELDS = ("slack", "strict")
 
 
 def fit_field(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
+from .canvas import MAX_REACH
 from .epipolar import Array, distance_to_line
 from .images import Picture
 from .lens import undistort
@@ -51,7 +52,8 @@ def _gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
-    """PSNR (dB), SSIM and size of the overlap, between the 8-bit views of the reference and of the warped target.
+    """PSNR (dB), SSIM and size of the overlap, between the 8-bit views of the reference and of the warped target, by a
+    flat warp.
 
     Exposure differences are in it; it is what a reader of the literature calls alignment quality on the overlap.
     """
@@ -76,9 +78,10 @@ def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str
     }
 
 
-def look_up(warp: Warp, x: Array) -> Array:
-    """The map (N, 2) at points (N, 2) of the reference, bilinear between canvas pixels; NaN outside."""
-    at = x + np.array(warp.canvas.offset, np.float64)
+def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
+    """The map (N, 2) at raw points (N, 2) of the reference, bilinear between canvas pixels; NaN outside.
+    camera: the reference's, if its lens matters."""
+    at = warp.canvas.of_reference(x, camera)
     limit = np.array([warp.canvas.width, warp.canvas.height]) - 1
     outside = ((at < 0) | (at > limit)).any(axis=1)
     corner = np.clip(np.floor(at).astype(int), 0, np.maximum(limit - 1, 0))
@@ -117,13 +120,23 @@ class Shown:
 
 
 def shown_points(warp: Warp, cameras: tuple[Camera, Camera], samples: int = SAMPLES) -> Shown:
-    """What a warp shows of the target at about `samples` pixels of the whole canvas, on an even grid."""
+    """What a warp shows of the target at about `samples` pixels of the whole canvas, on an even grid.
+
+    Of a round panorama no more than a flat one would show: beyond, pixels of the reference's plane mean nothing.
+    """
     canvas = warp.canvas
     step = max(1, int(np.sqrt(canvas.width * canvas.height / samples)))
     nodes = np.s_[step // 2 :: step, step // 2 :: step]
     shows = warp.inside(cameras[1].size)[nodes]
     raw = np.stack([warp.map_x[nodes][shows], warp.map_y[nodes][shows]], axis=-1).astype(np.float64)
-    points = np.argwhere(shows)[:, ::-1] * float(step) + step // 2 - np.array(canvas.offset)
+    if canvas.projection is None:
+        points = np.argwhere(shows)[:, ::-1] * float(step) + step // 2 - np.array(canvas.offset)
+    else:
+        points = canvas.on_reference(canvas.xs[nodes[1]], canvas.ys[nodes[0]], cameras[0])[0][shows]
+        far = MAX_REACH * max(*cameras[0].size, *cameras[1].size)
+        with np.errstate(invalid="ignore"):
+            flat = ((points >= -far) & (points <= np.array(cameras[0].size) + far)).all(axis=1)
+        points, raw = points[flat], raw[flat]
     overlap = (points >= 0).all(axis=1) & (points <= np.array(cameras[0].size) - 1).all(axis=1)
     return Shown(undistort(points, cameras[0]), undistort(raw, cameras[1]), overlap)
 

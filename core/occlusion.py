@@ -51,13 +51,9 @@ def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDA
 
 def inverse_depth_in_target(warp: Warp, two_view: TwoView) -> NDArray[np.float32]:
     """baseline / depth in front of the target camera (H, W): d / x'₃, 0 at infinity and beyond; NaN without depth."""
-    height, width = warp.map_x.shape
-    left, top = -warp.canvas.offset[0], -warp.canvas.offset[1]
-    a, b, c = two_view.H_inf[2]
-    xs = (a * np.arange(left, left + width) + c).astype(np.float32)
-    ys = (b * np.arange(top, top + height)).astype(np.float32)
+    (infinite,) = warp.canvas.through(two_view.H_inf[2:], warp.canvas.xs, warp.canvas.ys)
     d = warp.inverse_depth
-    third = d * np.float32(two_view.e_prime[2]) + xs + ys[:, None]
+    third = d * np.float32(two_view.e_prime[2]) + infinite.astype(np.float32)
     return np.maximum(d, np.float32(0)) / third
 
 

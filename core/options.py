@@ -13,7 +13,9 @@ from .camera import CameraRequest
 from .crop import CROPS, Crop
 from .displacement import FADES
 from .errors import BadRequest
-from .fields import FIELDS
+from .fields import FIELDS, ROUND_FIELDS
+from .levelling import LEVELS, Level
+from .projection import PROJECTIONS
 
 LEAST_SCALE = 0.02
 
@@ -25,10 +27,12 @@ class StitchOptions:
     field: one of FIELDS; fade: what it ends in outside the overlap, one of FADES; camera: what is known of the cameras;
     matches: to be used as given instead of searched for, a file or (N, 4 or 5) rows x, y, x2, y2[, weight] in px of the
     full pictures; ignore_reference, ignore_target: masks of what is to be kept out, files or arrays, white = ignored;
-    scale: both pictures are resized by this first, at most 1; crop: what of the panorama is kept (see `crop_box`);
-    blend: one of BLENDS; seed: of every random choice; measure: whether the report also compares the pictures in the
-    overlap and holds matches back to see how far the field can be trusted; cache: the folder where features, geometry
-    and fields are kept for the next stitch of the same pictures, None for nowhere (the outcome is the same).
+    projection: one of PROJECTIONS; level: how a cylindrical or equirectangular panorama is turned, one of LEVELS or
+    yaw, pitch, roll of the reference camera in degrees (see `levelling`); scale: both pictures are resized by this
+    first, at most 1; crop: what of the panorama is kept (see `crop_box`); blend: one of BLENDS; seed: of every random
+    choice; measure: whether the report also compares the pictures in the overlap and holds matches back to see how far
+    the field can be trusted; cache: the folder where features, geometry and fields are kept for the next stitch of the
+    same pictures, None for nowhere (the outcome is the same).
     """
 
     field: str = "slack"
@@ -37,6 +41,8 @@ class StitchOptions:
     matches: Path | np.ndarray | None = None
     ignore_reference: Path | np.ndarray | None = None
     ignore_target: Path | np.ndarray | None = None
+    projection: str = "perspective"
+    level: Level = "auto"
     scale: float = 1.0
     crop: Crop = "full"
     blend: str = "feather"
@@ -53,6 +59,7 @@ class StitchOptions:
     def __post_init__(self) -> None:
         for name, value, known in (
             ("field", self.field, FIELDS), ("fade", self.fade, FADES), ("blend", self.blend, BLENDS),
+            ("projection", self.projection, PROJECTIONS),
         ):  # fmt: skip
             if value not in known:
                 raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")
@@ -60,9 +67,29 @@ class StitchOptions:
             raise BadRequest(f"a scale of {self.scale:g}: it must lie between {LEAST_SCALE:g} and 1 (the full size)")
         if not 0 <= self.seed < 2**31:
             raise BadRequest("the seed must be a whole number from 0 to 2147483647")
+        self._check_level()
         if isinstance(self.crop, str) and self.crop not in CROPS:
             raise BadRequest(f"the crop {self.crop!r} is not known; choose from: {', '.join(CROPS)}, or X, Y, W, H")
         if not isinstance(self.crop, str) and (len(self.crop) != 4 or min(self.crop[:2]) < 0 or min(self.crop[2:]) < 1):
             raise BadRequest(
                 f"the crop {self.crop} is no box: X, Y, W, H in px are needed, X and Y from 0, W and H at least 1"
+            )
+
+    def _check_level(self) -> None:
+        flat = self.projection == "perspective"
+        if not flat and self.field not in ROUND_FIELDS:
+            raise BadRequest(
+                f"the field {self.field!r} knows the reference's plane only: for a {self.projection} panorama choose "
+                f"from: {', '.join(ROUND_FIELDS)}"
+            )
+        if isinstance(self.level, str):
+            if self.level not in LEVELS:
+                known = ", ".join(LEVELS)
+                raise BadRequest(f"the level {self.level!r} is not known; choose from: {known}, or yaw, pitch, roll")
+        elif len(self.level) != 3 or not np.isfinite(self.level).all():
+            raise BadRequest(f"the level {self.level} is not yaw, pitch, roll in degrees")
+        elif flat:
+            raise BadRequest(
+                "a perspective panorama keeps the reference's plane and is not turned: leave the level out, or choose "
+                "the projection cylindrical or equirectangular"
             )

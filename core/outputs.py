@@ -17,7 +17,7 @@ from .match_files import matches_csv
 from .output_files import OutputFiles
 from .pipeline import StitchResult
 from .report import plain
-from .warp import Layer
+from .warp import Layer, cut
 
 # What lies beside the layers, white where it holds, by its name in the result.
 MASKS = ("occluded",)
@@ -71,9 +71,10 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     warnings = list(warned)
     if request.layers is not None:
         for name, layer in (("reference", result.reference_layer), ("target", result.target_layer)):
-            _add_layer(files, request.layers, name, layer, result)
+            _add_layer(files, request.layers, name, layer.within(result.spread), result)
         for name in MASKS:
-            files.add_to_folder(request.layers, f"{name}.png", _mask_bytes(getattr(result, name)))
+            mask = cut(getattr(result, name), result.spread)
+            files.add_to_folder(request.layers, f"{name}.png", _mask_bytes(mask))
     if request.warp is not None:
         files.add(request.warp, warp_bytes(result))
     if request.report is not None and request.timing is not None and request.matches is not None:
@@ -105,9 +106,12 @@ def _mask_bytes(mask: np.ndarray) -> bytes:
 
 
 def warp_bytes(result: StitchResult) -> bytes:
-    """The .npz of DESIGN 5: x' ~ H_inf p + inverse_depth e' for canvas pixels p + offset; NaN for what a model
-    lacks."""
-    view, warp = result.two_view, result.warp
+    """The .npz of DESIGN 5: x' ~ H_inf p + inverse_depth e' for canvas pixels p + offset; NaN for what a model lacks.
+
+    A round panorama has p = K r for unit rays r (see `projection`) and no offset, but projection (its name), focal (px
+    per radian), centre (canvas px of the direction ahead) and rotation (from its axes to the reference camera's).
+    """
+    view, warp = result.two_view, result.warp.within(result.spread)
     # a field without depth slides nothing: inside, its e' is 0
     e_prime = view.e_prime if np.isfinite(warp.inverse_depth).any() else np.full(3, np.nan)
     arrays: dict[str, np.ndarray] = {
@@ -116,6 +120,12 @@ def warp_bytes(result: StitchResult) -> bytes:
         "K": view.K, "K_prime": view.K_prime, "R": view.R, "t": view.t,
         "dist": result.cameras[0].distortion, "dist_prime": result.cameras[1].distortion,
     }  # fmt: skip
+    projection = warp.canvas.projection
+    if projection is not None:
+        arrays |= {
+            "offset": np.full(2, np.nan), "projection": np.array(projection.kind), "focal": np.array(projection.focal),
+            "centre": np.array(projection.centre) + warp.canvas.offset, "rotation": projection.rotation,
+        }  # fmt: skip
     return npz_bytes(arrays)
 
 
@@ -125,7 +135,7 @@ def npz_bytes(arrays: dict[str, np.ndarray]) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
         for name, array in arrays.items():
             with archive.open(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
+                np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
     return buffer.getvalue()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from .alignment import Alignment, Frame, align, prepare, size_of
 from .blend import blend
 from .camera import Camera
+from .canvas import Box, Canvas, common
 from .crop import crop_box
 from .displacement import Field
 from .errors import NoOverlap
@@ -23,7 +24,7 @@ from .options import StitchOptions
 from .progress import Progress
 from .report import make_report
 from .two_view import TwoView
-from .warp import Layer, Warp, cut, reference_layer, target_layer
+from .warp import Layer, Warp, cut, reference_box, reference_layer, target_layer
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
 Source = str | Path | np.ndarray | Picture
@@ -33,15 +34,17 @@ Source = str | Path | np.ndarray | Picture
 class StitchResult:
     """A finished panorama and everything it was made of.
 
-    pixels (H, W, C) float32 scene-linear and alpha (H, W), straight; the two layers and the warp on the same canvas;
-    occluded (H, W) bool: what the target cannot see though the map falls inside it; the geometry, the field, the
-    matches (all, before inlier choice), the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage.
-    Scale and crop are done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes`
-    (W, H): of the pictures as they came.
+    pixels (H, W, C) float32 scene-linear and alpha (H, W), straight, of `canvas`; the two layers, the warp and occluded
+    (H, W) bool (what the target cannot see though the map falls inside it) on `warp.canvas`, which is the same, but of
+    a whole sphere the part that the pictures cover (see `spread`); the geometry, the field, the matches (all, before
+    inlier choice), the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage. Scale and crop are
+    done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes` (W, H): of the
+    pictures as they came.
     """
 
     pixels: np.ndarray
     alpha: np.ndarray
+    canvas: Canvas
     reference: Picture
     target: Picture
     reference_layer: Layer
@@ -66,6 +69,22 @@ class StitchResult:
             for points, full, camera in zip((used.x, used.y), self.full_sizes, self.cameras, strict=True)
         )
         return Matches(x, y, used.scale, used.weights)
+
+    @property
+    def spread(self) -> Box:
+        """The panorama's place on the canvas of warp and layers: `within` this they have its size."""
+        (x, y), (left, top) = self.warp.canvas.offset, self.canvas.offset
+        return x - left, y - top, self.canvas.width, self.canvas.height
+
+    def spread_out(self) -> StitchResult:
+        """The same with warp, layers and masks as large as the panorama."""
+        if (self.canvas.width, self.canvas.height) == (self.warp.canvas.width, self.warp.canvas.height):
+            return self
+        box = self.spread
+        return replace(
+            self, warp=self.warp.within(box), occluded=cut(self.occluded, box),
+            reference_layer=self.reference_layer.within(box), target_layer=self.target_layer.within(box),
+        )  # fmt: skip
 
     @property
     def bits(self) -> int:
@@ -107,25 +126,26 @@ def compose(frame: Frame, alignment: Alignment, options: StitchOptions, steps: S
     """The panorama of two pictures by an alignment, which may come from other frames of the same two cameras."""
     first, second, whole = frame.reference, frame.target, alignment.warp
     steps("warp", 0.5)
-    base, layer = reference_layer(first, whole.canvas), target_layer(second, whole)
+    base, layer = reference_layer(first, whole.canvas, alignment.cameras[0]), target_layer(second, whole)
 
     steps("occlusion", 0.0)
     hidden = occluded(whole, alignment.two_view, size_of(second))
 
     steps("blend", 0.0)
     panorama = blend(base, layer, options.blend)
-    shape = (whole.canvas.height, whole.canvas.width)
-    box = crop_box(options.crop, shape, panorama.alpha > 0, (*whole.canvas.offset, *size_of(first)))
-    panorama, base, layer = (part.within(box) for part in (panorama, base, layer))
-    warp, hidden = whole.within(box), cut(hidden, box)
+    place = reference_box(whole.canvas, alignment.cameras[0])
+    box = crop_box(options.crop, whole.canvas.whole, panorama.alpha > 0, place)
+    panorama, shown = panorama.within(box), whole.canvas.within(box)
+    box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))
+    base, layer, warp, hidden = base.within(box), layer.within(box), whole.within(box), cut(hidden, box)
 
     steps("write", 0.0)
-    report, more = make_report(options, (first, second), alignment, warp.canvas)
+    report, more = make_report(options, (first, second), alignment, shown)
     warnings = (*_named(first), *_named(second), *alignment.warnings, *more)
     report["warnings"] = list(warnings)
     steps("write", 0.5)
     return StitchResult(
-        panorama.pixels, panorama.alpha, first, second, base, layer, warp, hidden, alignment.two_view,
+        panorama.pixels, panorama.alpha, shown, first, second, base, layer, warp, hidden, alignment.two_view,
         alignment.field, alignment.matches, alignment.cameras, warnings, report, steps.seconds,
         frame.full_sizes,
     )  # fmt: skip

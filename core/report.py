@@ -8,17 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .canvas import Canvas
 from .held_out import held_out
 from .lens import undistort
+from .levelling import angles_of
 from .metrics import folds, look_up, off_line_mean, overlap_quality, shown_points
 from .projectivity import independent_fundamental, projectivity
+from .warp import build_map
 
 if TYPE_CHECKING:
     from .alignment import Alignment
     from .camera import Camera
-    from .canvas import Canvas
     from .images import Picture
     from .options import StitchOptions
+    from .two_view import TwoView
 
 SCHEMA = 1
 # More inliers than this behind infinity means that the focal length, hence H_inf, is doubtful.
@@ -39,8 +42,8 @@ def make_report(
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
         "options": {
-            "field": options.field, "fade": options.fade, "scale": options.scale, "crop": options.crop,
-            "blend": options.blend, "seed": options.seed,
+            "field": options.field, "fade": options.fade, "projection": options.projection, "level": options.level,
+            "scale": options.scale, "crop": options.crop, "blend": options.blend, "seed": options.seed,
         },
         "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
         "two_view": {
@@ -57,7 +60,9 @@ def make_report(
             "negative_share": field.fit.negative_share,
         },
         "canvas": {
-            "width": canvas.width, "height": canvas.height, "offset": canvas.offset, "cropped": canvas.cropped,
+            "width": canvas.width, "height": canvas.height,
+            "offset": None if canvas.projection else canvas.offset, "cropped": canvas.cropped,
+            "projection": _projection_entry(canvas, two_view),
         },
         "measured": measured,
     }  # fmt: skip
@@ -71,7 +76,7 @@ def _measured(
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
     field, warp = alignment.field, alignment.warp
     inliers = matches.subset(two_view.inliers)
-    error = np.linalg.norm(look_up(warp, inliers.x) - inliers.y, axis=1)
+    error = np.linalg.norm(look_up(warp, inliers.x, cameras[0]) - inliers.y, axis=1)
     error = error[np.isfinite(error)]
     shown = shown_points(warp, cameras)
     measured = {
@@ -87,7 +92,11 @@ def _measured(
     # where the pair has no F of its own, none that matches give means anything
     independent = independent_fundamental(ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
     unseen = held_out(field, ideal.subset(two_view.inliers), shown, options.seed)
-    return measured | overlap_quality(*pictures, warp) | {
+    # pixels are compared in the reference's own frame, where only one of the two pictures is resampled
+    framed = warp
+    if warp.canvas.projection is not None:
+        framed = build_map(field, two_view, Canvas(*cameras[0].size, (0, 0)), *cameras)
+    return measured | overlap_quality(*pictures, framed) | {
         "projectivity_own_px": projectivity(two_view.F, shown),
         "projectivity_independent_px": projectivity(independent, shown),
         "projectivity_points": int((~shown.overlap).sum()),
@@ -106,15 +115,34 @@ def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
             f"({two_view.K[0, 0]:.0f} px) is doubtful, and with it depth and H_inf; the picture itself hardly "
             "depends on it"
         )
-    if (warp.canvas.width, warp.canvas.height) == alignment.cameras[0].size:
+    if not warp.canvas.projection and (warp.canvas.width, warp.canvas.height) == alignment.cameras[0].size:
         out.append("the target shows nothing beyond the reference's edges: the panorama is no larger than that")
     if warp.canvas.cropped:
         out.append(
-            "the target reaches too far to the side to be shown whole in a flat picture: its far end was cropped"
+            "the pictures reach too far up or down for a cylinder and were cropped there; --projection equirectangular "
+            "shows them whole"
+            if warp.canvas.projection
+            else "the target reaches too far to the side to be shown whole in a flat picture: its far end was cropped; "
+            "--projection cylindrical or equirectangular shows it"
         )
     if fold_share > 0.005:
         out.append(f"the warp folds over in {fold_share:.1%} of the target: look for doubled or torn things there")
     return out
+
+
+def _projection_entry(canvas: Canvas, two_view: TwoView) -> dict[str, Any]:
+    """How canvas pixels become rays in the reference camera's frame (see `projection`); level: yaw, pitch and roll of
+    the reference in degrees, as --level takes them."""
+    if canvas.projection is None:
+        focal = float(np.sqrt(two_view.K[0, 0] * two_view.K[1, 1]))
+        kind, centre, rotation = "perspective", two_view.K[:2, 2], np.eye(3)
+    else:
+        kind, focal, centre = canvas.projection.kind, canvas.projection.focal, np.array(canvas.projection.centre)
+        rotation = canvas.projection.rotation
+    return {
+        "kind": kind, "focal_px": focal, "centre": centre + np.array(canvas.offset), "rotation": rotation,
+        "level": angles_of(rotation),
+    }  # fmt: skip
 
 
 def _picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:

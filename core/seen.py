@@ -1,5 +1,8 @@
 """What a window shows of a finished stitch: each match with its error, the overlap's difference, how far points slide,
-and the inverse depth on a coarse grid. Small beside the panorama, and in px of the full pictures."""
+and the inverse depth on a coarse grid. Small beside the panorama, and in px of the full pictures.
+
+A whole sphere's warp and layers are to be spread over it before (`StitchResult.spread_out`).
+"""
 
 from __future__ import annotations
 
@@ -35,11 +38,12 @@ def scales(result: StitchResult) -> tuple[Array, Array]:
 def full_geometry(result: StitchResult) -> dict[str, Any]:
     """Where things lie, JSON-ready up to arrays: `full_sizes` (W, H); `F`, `K`, `K_prime`, `R`, `t`, `distortion`,
     `distortion_prime` (5,) in px of the full upright pictures; `S` (3, 3): from those of the reference to the canvas;
-    `canvas` (W, H) px; `K_canvas` (3, 3)."""
-    view, canvas = result.two_view, result.warp.canvas
+    `canvas` (W, H) px; `K_canvas` (3, 3). The canvas of a round panorama is none of a pinhole camera: S and K_canvas
+    are NaN there, and the report's `canvas.projection` says what it shows."""
+    view, canvas = result.two_view, result.canvas
     S, S_prime = scales(result)
-    shift = np.eye(3)
-    shift[:2, 2] = canvas.offset
+    shift = np.eye(3) if canvas.projection is None else np.full((3, 3), np.nan)
+    shift[:2, 2] += canvas.offset
     return {
         "full_sizes": result.full_sizes, "F": S_prime.T @ view.F @ S, "K": np.linalg.inv(S) @ view.K,
         "K_prime": np.linalg.inv(S_prime) @ view.K_prime, "R": view.R, "t": view.t, "model": view.model,
@@ -53,7 +57,7 @@ def match_errors(result: StitchResult, rows: NDArray[np.float64]) -> NDArray[np.
     panorama does not show x."""
     S, S_prime = scales(result)
     x, y = homogeneous(rows[:, :2]) @ S.T, homogeneous(rows[:, 2:4]) @ S_prime.T
-    error = look_up(result.warp, x[:, :2]) - y[:, :2]
+    error = look_up(result.warp, x[:, :2], result.cameras[0]) - y[:, :2]
     return np.linalg.norm(error / np.diag(S_prime)[:2], axis=1)
 
 
@@ -98,10 +102,7 @@ def slide(result: StitchResult) -> NDArray[np.float32]:
     warp, view = result.warp, result.two_view
     if not view.e_prime.any():
         return np.zeros(warp.map_x.shape, np.float32)
-    x, y = warp.canvas.offset
-    columns = np.arange(warp.canvas.width, dtype=np.float64) - x
-    rows = (np.arange(warp.canvas.height, dtype=np.float64) - y)[:, None]
-    a, b, c = (H[0] * columns + (H[1] * rows + H[2]) for H in view.H_inf)
+    a, b, c = warp.canvas.through(view.H_inf, warp.canvas.xs, warp.canvas.ys)
     with np.errstate(divide="ignore", invalid="ignore"):
         far = np.hypot(warp.map_x - a / c, warp.map_y - b / c)
     return np.where(c > 0, far / scales(result)[1][0, 0], np.nan).astype(np.float32)

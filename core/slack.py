@@ -57,7 +57,7 @@ class SlackField:
             values = on_nodes(replace(mine, weights=weights, affine=affine), grid, ideal)
             slack, bent = values[..., :2], values[..., 2]
         inverse_depth, alpha = self.strict.with_fade(grid, ideal, bent)
-        return FieldValues(inverse_depth, alpha[..., None] * slack)
+        return FieldValues(inverse_depth, alpha[..., None] * slack, self.strict.far)
 
     def sends(self, points: Array) -> Array:
         """Target pixels (N, 2) of points (N, 2) of the overlap, where nothing fades."""

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
-from .canvas import Box, Canvas, Grid, bounding_canvas, expected_reach
-from .displacement import Field, target_points
+from .canvas import NODES, Box, Canvas, Grid, border, bounding_canvas, expected_reach, round_reach
+from .displacement import Field, FieldValues, target_of
 from .epipolar import Array, homogeneous, project
-from .errors import NoOverlap
+from .errors import BadRequest, NoOverlap
 from .lens import distort, undistort
+from .projection import Projection
 from .two_view import TwoView
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ TILE = 1024
 REMAP_LIMIT = 32000
 # Where less than this of a pixel is shown, its colour is rounding.
 LEAST_ALPHA = 1e-2
+# Fields fade out within so many pictures beside the reference, for round panoramas at least.
+MAX_FADE = 3.0
 
 
 @dataclass(frozen=True)
@@ -42,19 +45,13 @@ class Warp:
     inverse_depth: NDArray[np.float32]
 
     def within(self, box: Box) -> Warp:
-        """The part in a box (left, top, width, height) of the canvas."""
-        left, top, width, height = box
-        offset = self.canvas.offset[0] - left, self.canvas.offset[1] - top
-        canvas = Canvas(width, height, offset, self.canvas.cropped)
-        return Warp(canvas, *(cut(a, box) for a in (self.map_x, self.map_y, self.inverse_depth)))
+        """The part in a box (left, top, width, height) of the canvas; NaN where that reaches over its edges."""
+        maps = (cut(a, box, np.nan) for a in (self.map_x, self.map_y, self.inverse_depth))
+        return Warp(self.canvas.within(box), *maps)
 
     def inside(self, target_size: tuple[int, int]) -> NDArray[np.bool_]:
         """Where the map falls inside a target of (W, H) px."""
-        with np.errstate(invalid="ignore"):
-            return (
-                (self.map_x >= 0) & (self.map_y >= 0)
-                & (self.map_x <= target_size[0] - 1) & (self.map_y <= target_size[1] - 1)
-            )  # fmt: skip
+        return _inside(self.map_x, self.map_y, target_size)
 
 
 @dataclass(frozen=True)
@@ -66,42 +63,58 @@ class Layer:
     alpha: NDArray[np.float32]
 
     def within(self, box: Box) -> Layer:
-        """The part in a box (left, top, width, height) of the canvas."""
+        """The part in a box (left, top, width, height) of the canvas; nothing where that reaches over its edges."""
         return Layer(cut(self.pixels, box), cut(self.alpha, box))
 
 
-def cut(array: NDArray, box: Box) -> NDArray:
-    """The part of an array (H, W, …) in a box (left, top, width, height)."""
+def cut(array: NDArray, box: Box, beyond: float = 0.0) -> NDArray:
+    """The part of an array (H, W, …) in a box (left, top, width, height); `beyond` where that reaches over its edges.
+    """
     left, top, width, height = box
-    return np.ascontiguousarray(array[top : top + height, left : left + width])
+    right, bottom = left + width, top + height
+    if left >= 0 and top >= 0 and right <= array.shape[1] and bottom <= array.shape[0]:
+        return np.ascontiguousarray(array[top:bottom, left:right])
+    out = np.full((height, width, *array.shape[2:]), beyond, array.dtype)
+    part = array[max(0, top) : bottom, max(0, left) : right]
+    y, x = max(0, -top), max(0, -left)
+    out[y : y + part.shape[0], x : x + part.shape[1]] = part
+    return out
 
 
-def build_warp(field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera) -> Warp:
-    """The canvas that holds both pictures, and its map. Raises NoOverlap or OutputTooLarge."""
-    size, target_size = camera.size, camera_prime.size
+def build_warp(
+    field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera, projection: Projection | None = None
+) -> Warp:
+    """The canvas that holds both pictures, flat or of a round projection, and its map.
+
+    Raises NoOverlap, OutputTooLarge, or BadRequest for a field that knows the reference's plane only.
+    """
+    outline = _outline(field, two_view, camera_prime)
+    if projection is None:
+        reference: Box = (0, 0, *camera.size)
+        reach, cropped = expected_reach(_in_plane(outline), camera.size, camera_prime.size)
+    else:
+        reference, reach, cropped = round_reach(projection, _plane_map(field, two_view), outline, camera, camera_prime)
+    plane = Canvas(0, 0, (0, 0), projection=projection)
 
     def target_at(grid: Grid) -> Array:
-        ideal = _ideal_nodes(grid, camera)
-        points = grid.points if ideal is None else ideal
-        values = field.on_grid(grid, ideal)
-        target = target_points(two_view, points, values.inverse_depth)
+        values = _node_values(field, grid, plane, camera)
+        points = np.stack(plane.through(np.eye(3), grid.xs, grid.ys, camera), axis=-1)
+        target = target_of(two_view, points, values.inverse_depth)
         return distort(target if values.shift is None else target + values.shift, camera_prime)
 
-    reach, cut = expected_reach(_outline(field, two_view, camera_prime), size, target_size)
-    canvas = bounding_canvas(target_at, size, target_size, reach)
-    warp = build_map(field, two_view, replace(canvas, cropped=canvas.cropped or cut), camera, camera_prime)
-    return _trimmed(warp, size, target_size)
+    canvas = bounding_canvas(target_at, reference, camera_prime.size, reach, projection)
+    warp = build_map(field, two_view, replace(canvas, cropped=canvas.cropped or cropped), camera, camera_prime)
+    return _trimmed(warp, camera, camera_prime.size)
 
 
 def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, camera_prime: Camera) -> Warp:
     """The map of a given canvas, evaluated in strips."""
     left, top = -canvas.offset[0], -canvas.offset[1]
     grid = Grid.over(left, top, canvas.width, canvas.height)
-    values = field.on_grid(grid, _ideal_nodes(grid, camera))
+    values = _node_values(field, grid, canvas, camera)
     shape = (canvas.height, canvas.width)
     map_x, map_y, inverse_depth = (np.empty(shape, np.float32) for _ in range(3))
-    xs = np.arange(left, left + canvas.width, dtype=np.float64)
-    H, e = two_view.H_inf, two_view.e_prime
+    xs, ys, e = canvas.xs, canvas.ys, two_view.e_prime
     rows = max(1, 1_000_000 // canvas.width)
     for start in range(0, canvas.height, rows):
         stop = min(canvas.height, start + rows)
@@ -109,13 +122,8 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
         strip = (left, top + start, canvas.width, stop - start)
         d = grid.to_pixels(values.inverse_depth, *strip).astype(np.float64)
         slide = d if e.any() else np.zeros_like(d)  # where nothing slides, depth may be unknown (NaN)
-        ys = np.arange(top + start, top + stop, dtype=np.float64)[:, None]
-        if camera.distortion.any():
-            raw = np.stack(np.broadcast_arrays(xs[None, :], ys), axis=-1)
-            ray = homogeneous(undistort(raw, camera)) @ H.T
-            a, b, c = (ray[..., k] + slide * e[k] for k in range(3))
-        else:
-            a, b, c = ((H[k, 0] * xs)[None, :] + (H[k, 1] * ys + H[k, 2]) + slide * e[k] for k in range(3))
+        infinite = canvas.through(two_view.H_inf, xs, ys[start:stop], camera)
+        a, b, c = (part + slide * e[k] for k, part in enumerate(infinite))
         c[c <= 1e-6 * np.maximum(np.abs(a), np.abs(b))] = np.nan
         x, y = a / c, b / c
         if values.shift is not None:
@@ -127,37 +135,108 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
     return Warp(canvas, map_x, map_y, inverse_depth)
 
 
-def _ideal_nodes(grid: Grid, camera: Camera) -> Array | None:
-    return undistort(grid.points, camera) if camera.distortion.any() else None
+def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> FieldValues:
+    """A field's values at the nodes of a grid over the canvas's plane.
+
+    In a round panorama they come from a grid over the reference's plane, where fields live: what d has there beside the
+    plane it ends in, times p_3; and that plane alone where the reference camera does not look.
+    """
+    if canvas.projection is None:
+        return field.on_grid(grid, undistort(grid.points, camera) if camera.distortion.any() else None)
+    width, height = camera.size
+    margin = int(np.ceil(min(field.fit.fade_px, MAX_FADE * max(camera.size))))
+    across, down = width + 2 * margin, height + 2 * margin
+    share = min(4.0, max(1.0, across * down / (2 * width * height)))
+    flat = Grid.over(-margin, -margin, across, down, int(share * NODES))
+    ideal = undistort(flat.points, camera)
+    values = field.on_grid(flat, ideal if camera.distortion.any() else None)
+    if values.far is None:
+        raise BadRequest(
+            f"the field {field.name!r} knows the reference's plane only: use slack or strict, or a perspective panorama"
+        )
+    places, ahead = canvas.on_reference(grid.xs, grid.ys, camera)
+    left_over = flat.at(values.inverse_depth - homogeneous(ideal) @ values.far, places)
+    (base,) = canvas.through(values.far[None], grid.xs, grid.ys, camera)
+    shift = values.shift
+    if shift is not None:
+        shift = np.stack([flat.at(shift[..., k], places) for k in (0, 1)], axis=-1)
+    return FieldValues(base + np.nan_to_num(ahead) * left_over, shift)
+
+
+def _plane_map(field: Field, two_view: TwoView) -> Array:
+    """The homography (3, 3) from the reference to the target of the field's own plane."""
+    return two_view.H_inf + np.outer(two_view.e_prime, field.plane)
 
 
 def _outline(field: Field, two_view: TwoView, camera_prime: Camera) -> Array:
-    """The target's border (N, 2) in the reference's plane by the field's own plane, NaN where that lies behind the
-    reference camera."""
-    width, height = camera_prime.size
-    u = np.linspace(0, 1, 33)
-    edges = np.concatenate([np.column_stack(p) for p in ((u, 0 * u), (u, 0 * u + 1), (0 * u, u), (0 * u + 1, u))])
-    H_plane = two_view.H_inf + np.outer(two_view.e_prime, field.plane)
-    ideal = undistort(edges * np.array([width - 1.0, height - 1.0]), camera_prime)
-    back = homogeneous(ideal) @ np.linalg.inv(H_plane).T
-    back[back[:, 2] <= 1e-6 * np.abs(back[:, :2]).max(axis=1)] = np.nan
-    return project(back)
+    """The target's border (N, 3), in order, as canvas points p by the field's own plane."""
+    ideal = undistort(border(camera_prime.size), camera_prime)
+    return homogeneous(ideal) @ np.linalg.inv(_plane_map(field, two_view)).T
 
 
-def _trimmed(warp: Warp, size: tuple[int, int], target_size: tuple[int, int]) -> Warp:
+def _in_plane(points: Array) -> Array:
+    """Reference pixels (N, 2) of canvas points (N, 3), NaN behind the reference camera."""
+    points = points.copy()
+    points[points[:, 2] <= 1e-6 * np.abs(points[:, :2]).max(axis=1)] = np.nan
+    return project(points)
+
+
+def _trimmed(warp: Warp, camera: Camera, target_size: tuple[int, int]) -> Warp:
     """Without rim lines that neither picture reaches."""
     seen = warp.inside(target_size)
-    x, y = warp.canvas.offset
     if not seen.any():
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
-    seen[y : y + size[1], x : x + size[0]] = True
+    seen |= reference_shown(warp.canvas, camera)
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     left, top = int(columns[0]), int(rows[0])
     return warp.within((left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top))
 
 
-def reference_layer(picture: Picture, canvas: Canvas) -> Layer:
-    """The reference pasted on the canvas, pixel for pixel."""
+def reference_map(canvas: Canvas, camera: Camera | None = None) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """x, y (H, W): the reference's raw pixel that each pixel of a round panorama shows, NaN behind its camera."""
+    map_x, map_y = (np.empty((canvas.height, canvas.width), np.float32) for _ in range(2))
+    rows = max(1, 1_000_000 // canvas.width)
+    for start in range(0, canvas.height, rows):
+        strip = slice(start, start + rows)
+        places, _ = canvas.on_reference(canvas.xs, canvas.ys[strip], camera)
+        map_x[strip], map_y[strip] = places[..., 0], places[..., 1]
+    return map_x, map_y
+
+
+def reference_box(canvas: Canvas, camera: Camera) -> Box:
+    """Where the reference lies on the canvas: left, top, width, height."""
+    if canvas.projection is None:
+        return (*canvas.offset, *camera.size)
+    seen = reference_shown(canvas, camera)
+    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+    return int(columns[0]), int(rows[0]), int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1
+
+
+def reference_shown(canvas: Canvas, camera: Camera) -> NDArray[np.bool_]:
+    """Where (H, W) the canvas lies in the reference's frame."""
+    if canvas.projection is not None:
+        return _inside(*reference_map(canvas, camera), camera.size)
+    shown = np.zeros((canvas.height, canvas.width), bool)
+    left, top = canvas.offset
+    shown[top : top + camera.size[1], left : left + camera.size[0]] = True
+    return shown
+
+
+def _inside(
+    map_x: NDArray[np.float32], map_y: NDArray[np.float32], size: tuple[int, int]
+) -> NDArray[np.bool_]:
+    """Where a map falls inside a picture of (W, H) px."""
+    with np.errstate(invalid="ignore"):
+        return (map_x >= 0) & (map_y >= 0) & (map_x <= size[0] - 1) & (map_y <= size[1] - 1)
+
+
+def reference_layer(picture: Picture, canvas: Canvas, camera: Camera | None = None) -> Layer:
+    """The reference on the canvas: pasted pixel for pixel on a flat one, fetched like the target on a round one.
+
+    camera: the reference's, if its lens matters.
+    """
+    if canvas.projection is not None:
+        return _fetched_layer(picture, *reference_map(canvas, camera))
     height, width, channels = picture.pixels.shape
     x, y = canvas.offset
     pixels = np.zeros((canvas.height, canvas.width, channels), np.float32)
@@ -168,19 +247,22 @@ def reference_layer(picture: Picture, canvas: Canvas) -> Layer:
 
 
 def target_layer(picture: Picture, warp: Warp) -> Layer:
-    """The target fetched through the map, bicubic in scene-linear float; alpha by what it was in the picture, 0 outside
-    it.
+    """The target fetched through the map; alpha by what it was in the picture, 0 outside it."""
+    return _fetched_layer(picture, warp.map_x, warp.map_y)
 
+
+def _fetched_layer(picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32]) -> Layer:
+    """A picture through a map of its raw pixels (H, W), bicubic in scene-linear float.
     Colours are weighted by alpha while interpolating, so that transparent pixels never bleed. Bicubic overshoot is held
     to the range of the picture itself: a black edge never turns negative.
     """
     height, width = picture.pixels.shape[:2]
     source = picture.pixels if picture.alpha is None else picture.pixels * picture.alpha[..., None]
-    pixels = fetch(source, warp.map_x, warp.map_y)
-    alpha = warp.inside((width, height)).astype(np.float32)
+    pixels = fetch(source, map_x, map_y)
+    alpha = _inside(map_x, map_y, (width, height)).astype(np.float32)
     if picture.alpha is not None:
         # both overshoot alike: divided before alpha is clipped
-        fetched = fetch(picture.alpha[..., None], warp.map_x, warp.map_y)[..., 0]
+        fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
         pixels /= np.maximum(fetched, LEAST_ALPHA)[..., None]
         alpha *= np.where(fetched > LEAST_ALPHA, np.minimum(fetched, 1.0), 0)
     np.clip(pixels, float(picture.pixels.min()), float(picture.pixels.max()), out=pixels)

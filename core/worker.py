@@ -81,7 +81,7 @@ def _work(folder: Path) -> None:
     result = stitch(
         reference, target, options, progress=lambda stage, share: _say({"stage": stage, "share": share * STITCH_SHARE})
     )
-    _write(folder, result, rows, job.get("take", []), (turn, turn_prime))
+    _write(folder, result.spread_out(), rows, job.get("take", []), (turn, turn_prime))
 
 
 def cameras_of(entries: dict[str, Any], pictures: tuple[Any, Any]) -> dict[str, Any]:

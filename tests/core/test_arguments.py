@@ -69,6 +69,10 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--crop", "3,4,50,60"], {"crop": (3, 4, 50, 60)}), (["--crop", "reference"], {"crop": "reference"}),
     (["--no-dense", "--no-exposure"], {}),
     (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {}),
+    (["--projection", "perspective"], {}), (["--projection", "cylindrical"], {"projection": "cylindrical"}),
+    (["--projection", "equirectangular", "--level=-5,2.5,0"],
+     {"projection": "equirectangular", "level": (-5.0, 2.5, 0.0)}),
+    (["--level", "auto"], {}), (["--level", "none"], {"level": "none"}),
     (["--seed", "7"], {"seed": 7}), (["--seed", "2147483647"], {"seed": 2147483647}),
 ])  # fmt: skip
 def test_how_it_is_done(words: list[str], expected: dict) -> None:
@@ -76,8 +80,7 @@ def test_how_it_is_done(words: list[str], expected: dict) -> None:
 
 
 @pytest.mark.parametrize("words", [
-    ["--blend", "multiband"], ["--seam", "graphcut"],
-    *(["--projection", name] for name in ("cylindrical", "equirectangular")), ["--dense"], ["--exposure"],
+    ["--blend", "multiband"], ["--seam", "graphcut"], ["--dense"], ["--exposure"],
 ], ids=" ".join)  # fmt: skip
 def test_what_is_yet_to_come_is_refused_by_name(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     try:

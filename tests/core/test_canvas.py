@@ -89,7 +89,7 @@ def test_the_canvas_holds_both_pictures_and_not_much_more(
     size = (200, 150)
     reach, cut = expected_reach(corners(dx, dy, *(s - 1 for s in target_size)), size, target_size)
     assert not cut
-    canvas = bounding_canvas(shifted(dx, dy), size, target_size, reach)
+    canvas = bounding_canvas(shifted(dx, dy), (0, 0, *size), target_size, reach)
     left, top = -canvas.offset[0], -canvas.offset[1]
     right, bottom = max(size[0], dx + target_size[0]) - 1, max(size[1], dy + target_size[1]) - 1
     need = (min(0, dx), min(0, dy), right, bottom)
@@ -102,7 +102,7 @@ def test_the_canvas_holds_both_pictures_and_not_much_more(
 
 
 def test_a_target_that_shows_nothing_useful_leaves_the_reference() -> None:
-    canvas = bounding_canvas(shifted(1e6, 0), (60, 40), (60, 40), np.array([0.0, 0, 60, 40]))
+    canvas = bounding_canvas(shifted(1e6, 0), (0, 0, 60, 40), (60, 40), np.array([0.0, 0, 60, 40]))
     assert canvas.offset == (0, 0) and 60 <= canvas.width <= 62 and 40 <= canvas.height <= 42
 
 
@@ -113,7 +113,7 @@ def test_what_is_stretched_beyond_four_times_in_length_is_cropped_and_said() -> 
         slow = np.maximum(x - 300, 0)
         return np.stack([np.minimum(x, 300) - 100 + 0.05 * slow, np.where(slow > 0, 75 + 0.05 * (y - 75), y)], axis=-1)
 
-    canvas = bounding_canvas(bend, (200, 150), (400, 150), np.array([0.0, 0, 900, 150]))
+    canvas = bounding_canvas(bend, (0, 0, 200, 150), (400, 150), np.array([0.0, 0, 900, 150]))
     assert canvas.cropped and 295 <= canvas.width + canvas.offset[0] <= 300 + 2 * 20
 
 
@@ -135,4 +135,4 @@ def test_an_outline_too_far_away_is_cut() -> None:
 def test_a_panorama_of_too_many_pixels_is_refused_with_its_size() -> None:
     size = (40_000, 26_000)
     with pytest.raises(OutputTooLarge, match=r"4\d{4}×2\d{4} pixels, 1000 million at most: use smaller pictures"):
-        bounding_canvas(shifted(0, 0), size, size, np.array([0.0, 0, *size]))
+        bounding_canvas(shifted(0, 0), (0, 0, *size), size, np.array([0.0, 0, *size]))

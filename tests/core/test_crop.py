@@ -19,7 +19,7 @@ REFERENCE = (12, 6, 20, 15)
 
 
 def box(kind: str | tuple) -> tuple[int, int, int, int]:
-    return crop_box(kind, SHOWS.shape, SHOWS, REFERENCE)
+    return crop_box(kind, (0, 0, 50, 30), SHOWS, REFERENCE)
 
 
 def largest_area(mask: np.ndarray) -> int:
