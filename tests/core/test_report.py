@@ -62,7 +62,9 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
     assert json.loads(json.dumps(report, allow_nan=False)) == report, "plain JSON, no NaN"
     assert report["canvas"] == {
         "width": result.alpha.shape[1], "height": result.alpha.shape[0], "offset": list(result.warp.canvas.offset),
-        "cropped": False}
+        "cropped": False, "projection": {
+            "kind": "perspective", "focal_px": view.K[0, 0], "rotation": np.eye(3).tolist(), "level": [0.0, 0.0, 0.0],
+            "centre": list(view.K[:2, 2] + result.warp.canvas.offset)}}
     assert report["matches"]["found"] == len(result.matches)
     assert report["matches"]["inliers"] == view.inliers.sum() <= len(result.matches)
     for name in ("K", "K_prime", "R", "t", "F", "H_inf", "e_prime"):
@@ -76,7 +78,8 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
         assert (entry["name"], entry["bits"], entry["alpha"], entry["icc"]) == ("array", 8, False, False)
         assert entry["camera"]["fixed"] and entry["camera"]["focal_px"] == view.K[0, 0]
     assert report["options"] == {
-        "field": "slack", "fade": "plane", "scale": 1.0, "crop": "full", "blend": "feather", "seed": 0}
+        "field": "slack", "fade": "plane", "projection": "perspective", "level": "auto", "scale": 1.0,
+        "crop": "full", "blend": "feather", "seed": 0}
     assert report["warnings"] == list(result.warnings)
 
 
