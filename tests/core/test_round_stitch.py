@@ -18,6 +18,7 @@ from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output_files import OutputFiles
 from edf_stitch.core.outputs import OutputRequest, warp_bytes, write
 from edf_stitch.core.pipeline import StitchResult, stitch
+from edf_stitch.core.seen import depth_grid, full_geometry, heat_map, match_rows, slide
 from edf_stitch.synthetic_scenes.two_planes import FLOOR_Y, WALL_Z, Pair, Textures
 
 ROUND = ("cylindrical", "equirectangular")
@@ -201,6 +202,22 @@ def test_files_of_a_sphere_all_have_its_size(results: dict[str, StitchResult], t
         seen = np.isfinite(warp["map_x"]) & (np.pad(result.target_layer.alpha, _margins(result)) > 0)
         off = np.hypot(at[..., 0] / at[..., 2] - warp["map_x"], at[..., 1] / at[..., 2] - warp["map_y"])[seen]
         assert off.max() < 2.0 and np.median(off) < 0.5, "slack apart"
+
+
+def test_what_a_window_shows_of_a_round_panorama(results: dict[str, StitchResult]) -> None:
+    for result in results.values():
+        whole = result.spread_out()
+        shape = result.alpha.shape
+        assert whole.warp.map_x.shape == whole.occluded.shape == whole.target_layer.alpha.shape == shape
+        assert (whole.target_layer.alpha > 0).sum() == (result.target_layer.alpha > 0).sum()
+        geometry = full_geometry(whole)
+        assert np.isnan(geometry["S"]).all() and geometry["canvas"] == shape[::-1]
+        assert np.nanmedian(match_rows(whole)["errors"]) < 0.5
+        assert np.nanmedian(slide(whole)[whole.target_layer.alpha > 0]) > 1
+        picture, (low, high) = heat_map(whole)
+        assert (picture[..., 3] > 0).any() and low < high
+        grid = depth_grid(whole)
+        assert len(grid["inverse_depth"]) == grid["columns"] * grid["rows"] and np.any(grid["shows"])
 
 
 def _margins(result: StitchResult) -> list[tuple[int, int]]:
