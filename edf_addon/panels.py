@@ -162,7 +162,9 @@ class EDF_PT_main(_Sidebar, bpy.types.Panel):  # noqa: N801
             pictures.template_ID(settings, side, open="image.open")
         both = pictures.row(align=True)
         both.operator(Operator.OPEN_PAIR, icon="FILE_FOLDER")
-        both.operator(Operator.SWAP, text="Swap", icon="ARROW_LEFTRIGHT")
+        swap = both.row(align=True)
+        swap.enabled = settings.reference is not None or settings.target is not None
+        swap.operator(Operator.SWAP, text="Swap", icon="ARROW_LEFTRIGHT")
         layout.separator(factor=0.5)
         (_working if job.running else _ready)(layout, settings, job, width)
 

@@ -28,6 +28,9 @@ FIELDS = (
     ("SLACK", "Slack", "Along the epipolar lines, with a little slack for what lens distortion does"),
     ("STRICT", "Strict", "Exactly along the epipolar lines: every point of the panorama is geometrically right"),
     ("PAPER", "Paper", "As published: free to leave the epipolar lines"),
+    ("REW", "Elastic Warp", "For comparison: one homography, bent freely towards the matches; no depth, no cameras"),
+    ("APAP", "As-Projective-As-Possible", "For comparison: a homography for each cell of a grid; no depth, no cameras"),
+    ("HOMOGRAPHY", "Homography", "For comparison: what every other stitcher starts from; no depth, no cameras"),
 )
 FADES = (
     ("PLANE", "Plane", "Outside the overlap the scene carries on as the plane that fits it best"),

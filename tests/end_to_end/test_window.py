@@ -29,6 +29,16 @@ pytestmark = [pytest.mark.blender, pytest.mark.skipif(not (SHOT and RUN), reason
 
 
 @pytest.fixture(scope="module")
+def archive(tmp_path_factory) -> Path:
+    """The zip for that Blender alone."""
+    script, folder = ROOT / ".ci" / "build_extension.py", tmp_path_factory.mktemp("zip")
+    command = [sys.executable, script, "--local", "--blender", shlex.join(RUN), "--output-dir", folder]
+    subprocess.run(command, check=True, cwd=ROOT, timeout=300)
+    (made,) = folder.glob("*.zip")
+    return made
+
+
+@pytest.fixture(scope="module")
 def walked(archive, rendered_pair, tmp_path_factory) -> Path:
     """The folder that a walk leaves; EDF_WALK names one to keep."""
     out = Path(os.environ.get("EDF_WALK") or tmp_path_factory.mktemp("walk"))
@@ -63,6 +73,7 @@ def test_the_panorama_and_what_goes_with_it(walked):
     facts = json.loads((walked / "walk.json").read_text("utf-8"))["facts"]
     assert (facts["running"], facts["failed"]) == (False, False), facts["message"]
     assert facts["panorama"][0] > 640 and facts["matches"] > 300 and facts["cameras"] >= 3
+    assert (facts["added"], facts["state"]) == (1, "ADDED"), "a click in one picture, then in the other"
     assert facts["exr_bytes"] > 100_000
 
 

@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
+from mathutils import Euler
 
 ARCHIVE, LEFT, RIGHT, OUT = (Path(argument) for argument in sys.argv[sys.argv.index("--") + 1 :])
 TAB, ADD_ON = "EDF Stitch", "bl_ext.user_default.edf_stitch"
@@ -96,8 +97,8 @@ def way() -> Iterator[float]:
     with in_editor(area):
         bpy.ops.edf.match_edit("INVOKE_DEFAULT")
     before = len(settings.matches)
-    for x, y in ((0.30, 0.50), (0.25, 0.50)):  # a point of the reference, then the same of the target
-        point_at(area, x, y)
+    for x, y in lonely_point(settings):  # of the reference, then roughly the same of the target
+        point_at(area, *in_area(area, x, y))
         subprocess.run(["xdotool", "click", "1"], check=True)
         yield 2.0
     settings = bpy.context.scene.edf_stitch
@@ -129,6 +130,8 @@ def way() -> Iterator[float]:
         bpy.ops.edf.save(filepath=str(exr))
     walk["facts"]["exr_bytes"] = exr.stat().st_size
 
+    for name in ("Cube", "Light", "Camera"):
+        bpy.data.objects.remove(bpy.data.objects[name])
     area.type = "VIEW_3D"
     space = area.spaces.active
     space.shading.light, space.shading.color_type = "FLAT", "TEXTURE"  # EEVEE takes minutes on software OpenGL
@@ -138,6 +141,7 @@ def way() -> Iterator[float]:
     space.region_3d.view_perspective = "PERSP"
     with bpy.context.temp_override(area=area, region=window_region(area)):
         bpy.ops.view3d.view_all()
+    space.region_3d.view_rotation = Euler((1.2, 0, 0.6)).to_quaternion()
     yield 4.0
     shoot("14_cameras_and_mesh")
 
@@ -199,6 +203,27 @@ def point_at(area: bpy.types.Area, x: float, y: float) -> None:
     for step in (0, 3):  # Blender hears of a pointer that moves
         place = area.x + x * area.width + step, height - area.y - y * area.height + step
         subprocess.run(["xdotool", "mousemove", *(str(round(value)) for value in place)], check=True)
+
+
+def in_area(area: bpy.types.Area, x: float, y: float) -> tuple[float, float]:
+    """Where a px of the shown picture lies, as a share of the area."""
+    region, (width, height) = window_region(area), area.spaces.active.image.size
+    across, up = region.view2d.view_to_region((x + 0.5) / width, 1 - (y + 0.5) / height, clip=False)
+    return (region.x + across - area.x) / area.width, (region.y + up - area.y) / area.height
+
+
+def lonely_point(settings) -> list[tuple[float, float]]:
+    """A point of the reference with no match nearby, and where its nearest match says it is in the target."""
+    ends = [(match.x, match.y, match.x2 - match.x, match.y2 - match.y) for match in settings.matches if match.enabled]
+    width, height = settings.reference.size
+
+    def nearest(x: float, y: float) -> tuple:
+        return min(((x - end[0]) ** 2 + (y - end[1]) ** 2, end) for end in ends)
+
+    candidates = [(x, y) for x in range(width // 4, width // 2, 4) for y in range(height // 4, 3 * height // 4, 4)]
+    x, y = max(candidates, key=lambda point: nearest(*point)[0])
+    _, (_, _, dx, dy) = nearest(x, y)
+    return [(x, y), (x + dx, y + dy)]
 
 
 def paint(mask: bpy.types.Image) -> None:
