@@ -19,8 +19,9 @@ PROJECTION_CHOICES = ("perspective", "cylindrical", "equirectangular")
 BLEND_CHOICES, BLENDS_TO_COME = ("feather", "linear"), ("multiband",)
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Adds everything that decides about a panorama; where files go is each command's own."""
+def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> None:
+    """Adds everything that decides about a panorama; where files go is each command's own, as is `--field` where one
+    command stitches with several."""
     camera = parser.add_argument_group(
         "cameras", "One value serves both pictures; two are for REF,TARGET. Without any: EXIF, or an estimate."
     )
@@ -64,14 +65,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
     how = parser.add_argument_group("how")
-    how.add_argument(
-        "--field",
-        default="slack",
-        type=_choice(FIELD_CHOICES, ()),
-        metavar="FIELD",
-        help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), "
-        "paper, or one that knows no depth: rew, apap, homography",
-    )
+    if with_field:
+        how.add_argument(
+            "--field",
+            default="slack",
+            type=_choice(FIELD_CHOICES, ()),
+            metavar="FIELD",
+            help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), "
+            "paper, or one that knows no depth: rew, apap, homography",
+        )
     how.add_argument(
         "--fade",
         default="plane",
@@ -127,7 +129,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
     from .options import StitchOptions
 
     return StitchOptions(
-        field=args.field,
+        field=getattr(args, "field", "slack"),
         fade=args.fade,
         camera=CameraRequest(
             args.focal_px, args.focal_mm, args.sensor_mm, args.focal35, args.principal, args.cameras

@@ -110,6 +110,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_stitch(commands.add_parser("stitch", help="stitch a pair into one panorama", description=_STITCH))
     _add_batch(commands.add_parser("batch", help="stitch a list of pairs and clips", description=_BATCH))
+    _add_compare(
+        commands.add_parser("compare", help="every field on every pair, in one table", description=_COMPARE)
+    )
     _add_validate(
         commands.add_parser("validate", help="render scenes with known cameras and measure", description=_VALIDATE)
     )
@@ -134,6 +137,12 @@ a_####.png), whose frames share one alignment. A line holds reference,target and
 first, last, step, focal_px and focal35 as well. A bad pair is reported and the rest goes on; DIR/batch.json says what
 became of each. Exit codes: 0 all done, 2 the call is wrong, 3 a pair can't be stitched, 4 a file can't be read or
 written, 130 interrupted."""
+
+_COMPARE = """Stitch every pair with every field, features and geometry found once, and put the figures side by side:
+OUTDIR gets compare.html, .md, .csv and .json, pictures, and the seconds in timing.md and .json. A PATH is a folder of
+two pictures, a folder of such folders (also OUTDIR/pictures of `edf validate`: then the truth is asked too), or a
+picture followed by its target. Exit codes: 0 done, 2 the call is wrong, 3 a pair can't be stitched with any field, 4 a
+file can't be read or written, 130 interrupted."""
 
 _VALIDATE = """Render scenes with known cameras in Blender, stitch them, and hold all of it against the truth: OUTDIR
 gets report.html, report.json and report.csv. Pictures are kept in OUTDIR/pictures and made only once. Exit codes: 0 all
@@ -190,6 +199,19 @@ def _shard(text: str) -> tuple[int, int]:
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not like 2/3: which of how many runs") from None
     return index, count
+
+
+def _add_compare(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_compare)
+    parser.add_argument("paths", metavar="PATH", type=Path, nargs="+", help="folders of pairs, or REF TARGET")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUTDIR", help="folder for everything")
+    parser.add_argument(
+        "--fields", type=lambda text: tuple(text.split(",")), default=None, metavar="A,B,C",
+        help="the fields to compare, in this order (default: all)",
+    )  # fmt: skip
+    add_options(parser, with_field=False)
+    parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    _add_loudness(parser)
 
 
 def _add_validate(parser: argparse.ArgumentParser) -> None:
@@ -287,6 +309,30 @@ def _batch(args: argparse.Namespace) -> int:
         counts = ", ".join(f"{summary.count(status)} {status}" for status in ("done", "skipped", "failed"))
         print(f"edf: {request.summary}: {counts}", file=sys.stderr)
     return summary.exit_code
+
+
+def _compare(args: argparse.Namespace) -> int:
+    from importlib import import_module
+
+    from ..synthetic_scenes.compared import truth_beside
+    from .compare.pairs import find_pairs
+    from .compare.run import ComparisonRequest, run_comparison
+    from .compare.tables import comparison_markdown
+    from .fields import FIELDS
+
+    pairs = tuple(find_pairs(args.paths))
+    request = ComparisonRequest(args.output, pairs, args.fields or FIELDS, args.overwrite)
+    version = str(import_module(__package__.rpartition(".")[0]).__version__)
+    options = options_from(args, measure=False)
+    with _progress_shown(args.quiet or not sys.stderr.isatty()) as show:
+        summary, code = run_comparison(
+            request, options, version, truth_beside, lambda what, share: show(f"{what:<32}", share),
+            lambda line: None if args.quiet and "failed" not in line else _say(f"edf: {line}"),
+        )  # fmt: skip
+    if args.verbose:
+        print(comparison_markdown(summary), file=sys.stderr)
+    print(args.output / "compare.html")
+    return code
 
 
 def _say(line: str) -> None:

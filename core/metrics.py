@@ -51,12 +51,11 @@ def _gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return picture[..., 0] if picture.shape[2] == 1 else cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
 
 
-def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
-    """PSNR (dB), SSIM and size of the overlap, between the 8-bit views of the reference and of the warped target, by a
-    flat warp.
-
-    Exposure differences are in it; it is what a reader of the literature calls alignment quality on the overlap.
-    """
+def overlap_views(
+    reference: Picture, target: Picture, warp: Warp
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.bool_]]:
+    """The 8-bit views (H, W, C) of the reference and, on its pixels, of the warped target; and where (H, W) both show
+    something whole; by a flat warp."""
     height, width = reference.view.shape[:2]
     x, y = warp.canvas.offset
     box = (slice(y, y + height), slice(x, x + width))
@@ -67,14 +66,42 @@ def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str
         # whole, where the colours are fetched from: what is hidden has no colour to compare
         alpha = fetch(target.alpha[..., None], warp.map_x[box], warp.map_y[box], cv2.INTER_LINEAR)
         inside = inside & (alpha[..., 0] > 1 - 1 / 255)
+    map_x, map_y = (np.where(inside, m[box], -1).astype(np.float32) for m in (warp.map_x, warp.map_y))
+    return reference.view, fetch(target.view, map_x, map_y, cv2.INTER_LINEAR), inside
+
+
+def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
+    """PSNR (dB), SSIM and size of the overlap, between the 8-bit views of the reference and of the warped target.
+
+    Exposure differences are in it; it is what a reader of the literature calls alignment quality on the overlap.
+    """
+    view, fetched, inside = overlap_views(reference, target, warp)
     if not inside.any():
         return {"overlap_px": 0, "overlap_psnr_db": float("nan"), "overlap_ssim": float("nan")}
-    map_x, map_y = (np.where(inside, m[box], -1).astype(np.float32) for m in (warp.map_x, warp.map_y))
-    fetched = fetch(target.view, map_x, map_y, cv2.INTER_LINEAR)
     return {
         "overlap_px": int(inside.sum()),
-        "overlap_psnr_db": psnr(reference.view, fetched, inside),
-        "overlap_ssim": ssim(reference.view, fetched, inside),
+        "overlap_psnr_db": psnr(view, fetched, inside),
+        "overlap_ssim": ssim(view, fetched, inside),
+    }
+
+
+def canvas_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
+    """The same as published tables have it: both pictures black outside the overlap, averaged over the whole canvas.
+
+    For comparison with them only: black counts as perfect, so a larger canvas looks better.
+    """
+    view, fetched, inside = overlap_views(reference, target, warp)
+    if not inside.any():
+        return {"canvas_psnr_db": float("nan"), "canvas_ssim": float("nan")}
+    share = float(inside.sum()) / (warp.canvas.width * warp.canvas.height)
+    bare = [np.where(inside[..., None], part, 0).astype(np.uint8) for part in (view, fetched)]
+    # a window's width of black around it holds all that is not perfect
+    first, second = (np.pad(part, ((6, 6), (6, 6), (0, 0))) for part in bare)
+    similar = ssim(first, second, np.ones(first.shape[:2], bool))
+    pixels = (first.shape[0] - 10) * (first.shape[1] - 10)
+    return {
+        "canvas_psnr_db": psnr(view, fetched, inside) - 10 * float(np.log10(share)),
+        "canvas_ssim": 1 - (1 - similar) * pixels / (warp.canvas.width * warp.canvas.height),
     }
 
 

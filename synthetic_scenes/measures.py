@@ -112,6 +112,22 @@ def whole_picture(picture: NDArray[np.uint8], shown: NDArray[np.bool_], truth: T
     }  # fmt: skip
 
 
+def hidden_quality(result: StitchResult, truth: Truth) -> dict[str, float]:
+    """occluded_precision and occluded_recall of what a stitch says is hidden from the target, among what the reference
+    sees and what lies within the target's frame; NaN where nothing is said or nothing is hidden."""
+    here, there = _common(result, truth)
+    width, height = result.cameras[1].size
+    with np.errstate(invalid="ignore"):
+        within = ((truth.target[there] >= 0) & (truth.target[there] <= (width - 1, height - 1))).all(axis=-1)
+    asked = truth.in_reference[there] & within
+    said, hidden = result.occluded[here] & asked, asked & ~truth.in_target[there]
+    right = float((said & hidden).sum())
+    return {
+        "occluded_precision": right / said.sum() if said.any() else math.nan,
+        "occluded_recall": right / hidden.sum() if hidden.any() else math.nan,
+    }  # fmt: skip
+
+
 def _common(result: StitchResult, truth: Truth) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
     """Rows and columns of the part that panorama and true panorama share, in either."""
     first = -np.array(result.warp.canvas.offset)

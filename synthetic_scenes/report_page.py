@@ -8,6 +8,7 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
+from ..core.page import STYLE, table
 from .thresholds import LEAD, SAYING_RUN, Check, Median, Result, Verdict
 
 # Figures of a run: what people call them, their unit, digits after the point.
@@ -47,41 +48,6 @@ HEADS = {
     "whole_psnr_db": "whole<br>dB",
 }  # fmt: skip
 GOOD, BAD = '<b class="mark">✓</b>', '<b class="mark">✗</b>'
-
-STYLE = """
-:root { color-scheme: light dark; --ink: #1d2126; --quiet: #656d78; --paper: #fff; --line: #e2e5e9; --soft: #f5f6f8;
-  --good: #1a7041; --good-soft: #e9f5ee; --bad: #b3261e; --bad-soft: #fdecea; --link: #1f5fbf; }
-@media (prefers-color-scheme: dark) { :root { --ink: #dfe3e8; --quiet: #98a1ad; --paper: #15181c; --line: #2d333b;
-  --soft: #1d2127; --good: #6fcf97; --good-soft: #16281e; --bad: #ff8a80; --bad-soft: #361b1a; --link: #86b4ff; } }
-* { box-sizing: border-box; }
-body { margin: 0; background: var(--paper); color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }
-main { max-width: 1560px; margin: 0 auto; padding: 1rem clamp(0.75rem, 2vw, 2rem) 4rem; }
-header { padding: 1rem 1.25rem; border-radius: 8px; border-left: 6px solid; }
-header.good, header.bad { font-weight: 400; } header p { margin: 0.2rem 0 0; color: var(--ink); }
-h1 { margin: 0; font-size: 1.7rem; line-height: 1.2; } h2 { margin: 2rem 0 0.6rem; font-size: 1.2rem; }
-h2.good, h2.bad { background: none; color: var(--ink); } h2.good .mark { color: var(--good); }
-h2.bad .mark { color: var(--bad); } a { color: var(--link); text-decoration: none; }
-a:hover { text-decoration: underline; }
-p { margin: 0.3rem 0; max-width: 60rem; } .quiet, header .quiet { color: var(--quiet); font-size: 0.87rem; }
-.good { background: var(--good-soft); color: var(--good); } .bad { background: var(--bad-soft); color: var(--bad); }
-.scroll { overflow-x: auto; max-width: 100%; }
-table { border-collapse: collapse; font-size: 0.87rem; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.28rem 0.45rem; border-bottom: 1px solid var(--line); text-align: left; white-space: nowrap; }
-th { font-weight: 600; } tbody th { position: sticky; left: 0; background: var(--paper); }
-tbody th.good { background: var(--good-soft); } tbody th.bad { background: var(--bad-soft); }
-thead th { color: var(--quiet); line-height: 1.25; vertical-align: bottom; }
-.n { text-align: right; } .first { border-left: 1px solid var(--line); }
-.mark { display: inline-block; width: 1em; text-align: center; font-weight: 600; }
-section { margin-top: 2.5rem; border-top: 1px solid var(--line); } section h2 { margin-top: 1.2rem; }
-.failures { margin: 0.6rem 0; padding: 0.5rem 1rem; border-radius: 6px; list-style: none; }
-.pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 340px), 1fr)); gap: 0.8rem;
-  margin: 0.8rem 0; }
-figure { margin: 0; } figcaption { color: var(--quiet); font-size: 0.82rem; padding-top: 0.2rem; }
-img { display: block; width: 100%; aspect-ratio: 4 / 3; object-fit: contain; background: var(--soft);
-  border-radius: 4px; }
-details { margin: 0.5rem 0; } summary { cursor: pointer; color: var(--link); }
-pre { background: var(--soft); padding: 0.6rem 0.8rem; border-radius: 6px; overflow-x: auto; white-space: pre-wrap; }
-"""
 
 
 def page(results: Sequence[Result], suite: str, version: str, verdict: Verdict, middles: Sequence[Median]) -> str:
@@ -140,7 +106,7 @@ def _bars(middles: Sequence[Median], judged: bool) -> str:
             + f"<td class=n>{escape(f'{limit.text} {limit.unit}')}</td><td class=n>{middle.scenes}{lacking}</td></tr>"
         )
     head = "<tr><th>run</th><th>median of</th><th class=n>value</th><th class=n>limit</th><th class=n>scenes</th></tr>"
-    return f"<h2>The suite’s bars</h2>{_table(head, rows)}"
+    return f"<h2>The suite’s bars</h2>{table(head, rows)}"
 
 
 def _overview(results: Sequence[Result], verdict: Verdict) -> str:
@@ -176,7 +142,7 @@ def _overview(results: Sequence[Result], verdict: Verdict) -> str:
         "Coloured and marked: judged. Overlap and whole: PSNR. Of the whole picture it is judged that no rival is "
         "better by more than 0.2 dB; where the focal length is not determined, that this is said."
     )
-    return _table(head, rows) + f'<p class="quiet">{note}</p>'
+    return table(head, rows) + f'<p class="quiet">{note}</p>'
 
 
 def _column(check: Check) -> str:
@@ -200,7 +166,7 @@ def _rivals(results: Sequence[Result]) -> str:
             text = check_value(value, LEAD.measure)
             cells += f"<td class=n>{f'<b>{text}</b>' if value is not None and value == best else text}</td>"
         rows.append(f'<tr><th><a href="#{_slug(result)}">{escape(result["scene"])}</a></th>{cells}</tr>')
-    return _table(head, rows) + '<p class="quiet">PSNR in dB over the pixels that all of them show; best: bold.</p>'
+    return table(head, rows) + '<p class="quiet">PSNR in dB over the pixels that all of them show; best: bold.</p>'
 
 
 def _section(result: Result, checks: Sequence[Check]) -> str:
@@ -229,7 +195,7 @@ def _section(result: Result, checks: Sequence[Check]) -> str:
         rows = [f"<tr><th>{escape(named(name))}</th>{_cell(value, name, None)}<td>{escape(_unit(name))}</td></tr>"
                 for name, value in result["proof"].items()]  # fmt: skip
         title = "Proof of the ground truth: worst distances, px and relative, and PSNR"
-        parts.append(f"<details><summary>{title}</summary>{_table('', rows)}</details>")
+        parts.append(f"<details><summary>{title}</summary>{table('', rows)}</details>")
     return "\n".join([*parts, '<p class="quiet"><a href="#">to the top</a></p></section>'])
 
 
@@ -265,7 +231,7 @@ def _figures(runs: dict[str, dict[str, Any]]) -> str:
         rows.append(f"<tr><th>{escape(named(name))}</th><td>{escape(_unit(name))}</td>{cells}</tr>")
     said = "".join(_cell(run["undetermined_said"], "undetermined_said", None) for run in runs.values())
     rows.append(f"<tr><th>{escape(named('undetermined_said'))}</th><td></td>{said}</tr>")
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _warnings(runs: dict[str, dict[str, Any]]) -> str:
@@ -284,11 +250,6 @@ def _cell(value: object, measure: str, passed: bool | None, unit: str = "", firs
     kinds += [] if passed is None else [_class(passed)]
     mark = "" if passed is None else f" {GOOD if passed else BAD}"
     return f'<td class="{" ".join(kinds)}">{escape(check_value(value, measure) + unit)}{mark}</td>'
-
-
-def _table(head: str, rows: Iterable[str]) -> str:
-    top = f"<thead>{head}</thead>" if head else ""
-    return f'<div class="scroll"><table>{top}<tbody>{"".join(rows)}</tbody></table></div>'
 
 
 def _unit(measure: str) -> str:

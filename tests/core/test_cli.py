@@ -235,7 +235,7 @@ def test_a_wrong_call_gives_2(
 
 @pytest.mark.parametrize("arguments", [
     [], ["nonsense"], ["stitch"], ["stitch", "a.png"], ["stitch", "a.png", "b.png"], ["batch"], ["batch", "list.csv"],
-    ["compare", "x", "-o", "y"], ["validate"], ["demo", "what"],
+    ["compare"], ["compare", "x"], ["validate"], ["demo", "what"],
     ["--quiet"],
 ])  # fmt: skip
 def test_a_call_without_what_it_needs_gives_2(said: Callable, arguments: list[str]) -> None:

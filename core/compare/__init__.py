@@ -1,0 +1,4 @@
+"""`edf compare`: every field on every pair, in one table and one page.
+
+    pairs ──► register once ──► each field: lay, compose, figures, pictures ──► tables, page
+"""

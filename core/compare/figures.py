@@ -1,0 +1,78 @@
+"""What a field is worth on a pair, figure by figure, the same for all fields."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..alignment import Registration
+from ..epipolar import Array
+from ..held_out import held_out
+from ..metrics import canvas_quality, off_line_mean, overlap_quality, shown_points
+from ..pipeline import StitchResult
+from ..projectivity import projectivity
+
+# What people call a figure, its unit, digits, and whether more is better (None: neither).
+FIGURES: dict[str, tuple[str, str, int, bool | None]] = {
+    "overlap_psnr_db": ("overlap PSNR", "dB", 2, True), "overlap_ssim": ("overlap SSIM", "", 3, True),
+    "projectivity_px": ("projectivity", "px", 2, False),
+    "projectivity_independent_px": ("projectivity, independent F", "px", 2, False),
+    "off_line_mean_px": ("off its lines in the overlap", "px", 2, False),
+    "held_out_rms_px": ("held out, RMS", "px", 2, False),
+    "held_out_towards_rms_px": ("held out, towards the rest", "px", 2, False),
+    "alignment_median_px": ("matches, median", "px", 2, False), "alignment_p95_px": ("matches, 95th", "px", 2, False),
+    "folds": ("folds", "%", 3, False), "occluded": ("occluded, of the overlap", "%", 1, None),
+    "overlap_px": ("overlap", "px", 0, None), "canvas_psnr_db": ("canvas PSNR", "dB", 2, None),
+    "canvas_ssim": ("canvas SSIM", "", 3, None),
+    "truth_alignment_px": ("off the true map, median", "px", 2, False),
+    "truth_alignment_p95_px": ("off the true map, 95th", "px", 2, False),
+    "truth_projectivity_px": ("off the true lines beyond the overlap", "px", 2, False),
+    "truth_whole_psnr_db": ("whole picture PSNR", "dB", 2, True),
+    "truth_whole_ssim": ("whole picture SSIM", "", 3, True),
+    "truth_occluded_precision": ("occluded: precision", "", 2, True),
+    "truth_occluded_recall": ("occluded: recall", "", 2, True),
+}  # fmt: skip
+SHARES = ("folds", "occluded")
+# Canvas pixels this close to an occluded one may turn over with it.
+RIM = np.ones((7, 7), np.uint8)
+
+
+def figures_of(result: StitchResult, registration: Registration, independent: Array, seed: int) -> dict[str, float]:
+    """The figures of a field's stitch (on the whole flat canvas); NaN where one has no meaning.
+
+    Projectivity and distances from lines are by the pair's own F and by `independent`, whatever the field knows of
+    them, so that all fields are measured alike; folds are counted outside what is occluded and its rim.
+    """
+    warp, size = result.warp, result.cameras[1].size
+    shown = shown_points(warp, result.cameras)
+    F = registration.two_view.F
+    inliers = registration.ideal.subset(registration.two_view.inliers)
+    unseen = held_out(result.field, inliers, shown, seed)
+    measured = result.report["measured"]
+    inside = (result.reference_layer.alpha > 0) & warp.inside(size)
+    hidden = result.occluded & inside
+    return {
+        **overlap_quality(result.reference, result.target, warp),
+        **canvas_quality(result.reference, result.target, warp),
+        "projectivity_px": projectivity(F, shown), "projectivity_independent_px": projectivity(independent, shown),
+        "off_line_mean_px": off_line_mean(F, shown),
+        "held_out_rms_px": unseen.rms_px, "held_out_towards_rms_px": unseen.towards_rms_px,
+        "alignment_median_px": _number(measured["alignment_median_px"]),
+        "alignment_p95_px": _number(measured["alignment_p95_px"]),
+        "folds": turned_over(result), "occluded": float(hidden.sum() / max(1, inside.sum())),
+    }  # fmt: skip
+
+
+def turned_over(result: StitchResult) -> float:
+    """Share of the overlap, away from what is occluded, where the map turns over."""
+    warp = result.warp
+    x, y = warp.map_x.astype(np.float64), warp.map_y.astype(np.float64)
+    turn = np.gradient(x, axis=1) * np.gradient(y, axis=0) - np.gradient(x, axis=0) * np.gradient(y, axis=1)
+    near = cv2.dilate(result.occluded.astype(np.uint8), RIM) > 0
+    overlap = (result.reference_layer.alpha > 0) & warp.inside(result.cameras[1].size)
+    turn = turn[overlap & ~near & np.isfinite(turn)]
+    return float(np.mean(np.sign(turn) != np.sign(np.median(turn)))) if turn.size else 0.0
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else value

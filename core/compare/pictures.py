@@ -1,0 +1,61 @@
+"""What the page shows of a field: its panorama, the overlap to blink, and where the pictures differ there."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..colour import encode
+from ..metrics import overlap_views
+from ..pipeline import StitchResult
+
+Rgb = NDArray[np.uint8]
+
+# Larger pictures are shrunk to this for the page; differences are looked for before.
+LONGEST = 1600
+QUALITY = 88
+# Differences are shown so many times as strong.
+STRONGER = 4
+
+
+def field_pictures(result: StitchResult) -> dict[str, bytes]:
+    """JPEG files by kind: panorama; average (of reference and warped target in the overlap: what is off shows twice);
+    difference (× STRONGER); warped, and reference the same way: the two that blink."""
+    view, fetched, inside = overlap_views(result.reference, result.target, result.warp)
+    view, fetched = _rgb(view), _rgb(fetched)
+    box = _bounds(inside)
+    here, there, both = view[box], fetched[box], inside[box][..., None]
+    apart = np.minimum(STRONGER * np.abs(here.astype(int) - there), 255)
+    pictures = {
+        "panorama": _on_gray(result),
+        "average": np.where(both, (here.astype(np.uint16) + there + 1) // 2, 0),
+        "difference": np.where(both, apart, 0), "warped": np.where(both, there, 0),
+        "reference": np.where(both, here, 0),  # cut as the field's overlap is, which differs from field to field
+    }  # fmt: skip
+    return {kind: _jpeg(picture.astype(np.uint8)) for kind, picture in pictures.items()}
+
+
+def _on_gray(result: StitchResult) -> Rgb:
+    """The panorama over gray where it shows nothing."""
+    alpha = result.alpha[..., None]
+    return np.rint(_rgb(encode(result.pixels, 8)) * alpha + 96 * (1 - alpha)).astype(np.uint8)
+
+
+def _rgb(picture: NDArray) -> Rgb:
+    return np.repeat(picture, 3, axis=2) if picture.shape[2] == 1 else picture
+
+
+def _bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return slice(0, 1), slice(0, 1)
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+
+
+def _jpeg(picture: Rgb) -> bytes:
+    scale = min(1.0, LONGEST / max(picture.shape[:2]))
+    if scale < 1:
+        picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    coded = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    return coded[1].tobytes()

@@ -1,0 +1,248 @@
+"""The comparison itself: each pair read and registered once, then every field laid, composed and measured."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from ..alignment import Frame, Registration, lay, register
+from ..camera import CameraRequest
+from ..errors import BadRequest, Cancelled, StitchError
+from ..fields import FIELDS
+from ..options import StitchOptions
+from ..output_files import OutputFiles
+from ..outputs import json_bytes
+from ..pipeline import StitchResult, Stopwatch, compose, read_frame
+from ..progress import Progress
+from ..projectivity import independent_fundamental
+from .figures import figures_of
+from .page import comparison_page
+from .pairs import PairFiles
+from .pictures import field_pictures
+from .published import published
+from .tables import SCHEMA, comparison_csv, comparison_markdown, timing_markdown
+
+FILES = ("compare.json", "compare.csv", "compare.md", "compare.html", "timing.json", "timing.md")
+PICTURES = "pictures"
+Tell = Callable[[str], None]
+Show = Callable[[str, float], None]
+
+
+class PairTruth(Protocol):
+    """What is known of a rendered pair besides its pictures."""
+
+    @property
+    def camera(self) -> CameraRequest:
+        """What is told of the cameras."""
+        ...
+
+    def figures(self, results: Mapping[str, StitchResult]) -> dict[str, dict[str, float]]:
+        """Figures against the truth, by field; pictures are compared over the pixels that all of them show."""
+        ...
+
+
+Truths = Callable[[Path], PairTruth | None]
+
+
+@dataclass(frozen=True)
+class ComparisonRequest:
+    """What is compared, and where it goes: all pairs with all fields. Raises BadRequest."""
+
+    folder: Path
+    pairs: tuple[PairFiles, ...]
+    fields: tuple[str, ...] = FIELDS
+    overwrite: bool = False
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.fields if name not in FIELDS]
+        if unknown or not self.fields:
+            raise BadRequest(f"no field {', '.join(map(repr, unknown)) or 'named'}; choose from: {', '.join(FIELDS)}")
+        if len(set(self.fields)) < len(self.fields):
+            raise BadRequest("a field is named twice")
+
+
+@dataclass
+class PairOutcome:
+    """What became of a pair: entry, as compare.json has it; pictures by path below `pictures`; seconds; the exit code
+    where nothing came of it."""
+
+    entry: dict[str, Any]
+    pictures: dict[str, bytes] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    exit_code: int = 0
+
+
+def check_options(options: StitchOptions, pairs: Sequence[PairFiles]) -> None:
+    """Refuses what would make figures of different things. Raises BadRequest."""
+    if options.crop != "full":
+        raise BadRequest("a comparison looks at whole panoramas: leave --crop out")
+    if getattr(options, "projection", "perspective") != "perspective":
+        raise BadRequest("a comparison looks at flat panoramas, where all fields exist: leave --projection out")
+    if len(pairs) > 1:
+        for name, value in (
+            ("--matches", options.matches), ("--ignore-ref", options.ignore_reference),
+            ("--ignore-target", options.ignore_target),
+        ):  # fmt: skip
+            if value is not None:
+                raise BadRequest(f"{name} belongs to one pair, and {len(pairs)} are named")
+
+
+def run_comparison(
+    request: ComparisonRequest, options: StitchOptions, version: str, truths: Truths | None = None,
+    show: Show | None = None, tell: Tell | None = None, cancelled: Callable[[], bool] | None = None,
+) -> tuple[dict[str, Any], int]:  # fmt: skip
+    """Compares, and writes compare.json, .csv, .md, .html, pictures, timing.json and .md into the request's folder.
+
+    options: of every stitch, whatever field they name; truths(folder): what is known of a rendered pair there;
+    show(what is being done, share of everything), tell(a line about each pair). Returns what compare.json holds and the
+    exit code: 0, or that of the first pair that nothing came of, which is a row that says why. Raises StitchError
+    before the work or where nothing can be written, Cancelled; nothing is left then.
+    """
+    check_options(options, request.pairs)
+    read = [path for pair in request.pairs for path in (pair.reference, pair.target)]
+    with OutputFiles(request.overwrite, [*read, *options.files_read]) as files:
+        files.check_folder(request.folder, FILES)
+        outcomes = []
+        for number, pair in enumerate(request.pairs):
+            steps = _Steps(show, cancelled, number, len(request.pairs), len(request.fields))
+            outcomes.append(_outcome(pair, request.fields, options, truths, steps))
+            if tell is not None:
+                tell(_in_words(outcomes[-1].entry, number + 1, len(request.pairs)))
+        summary = {
+            "schema": SCHEMA, "version": version, "fields": list(request.fields),
+            "pairs": [outcome.entry for outcome in outcomes],
+        }  # fmt: skip
+        seconds = {outcome.entry["name"]: outcome.seconds for outcome in outcomes}
+        texts = {
+            "compare.csv": comparison_csv(summary), "compare.md": comparison_markdown(summary),
+            "compare.html": comparison_page(summary), "timing.md": timing_markdown(seconds),
+        }  # fmt: skip
+        for name, text in texts.items():
+            files.add_to_folder(request.folder, name, text.encode())
+        files.add_to_folder(request.folder, "compare.json", json_bytes(summary))
+        files.add_to_folder(request.folder, "timing.json", json_bytes(seconds))
+        for outcome in outcomes:
+            for path, data in outcome.pictures.items():
+                place = request.folder / PICTURES / path
+                files.add_to_folder(place.parent, place.name, data)
+    return summary, next((outcome.exit_code for outcome in outcomes if outcome.exit_code), 0)
+
+
+class _Steps:
+    """The progress of one pair's work, in pieces: registration, then each field."""
+
+    def __init__(
+        self, show: Show | None, cancelled: Callable[[], bool] | None, number: int, count: int, fields: int
+    ) -> None:
+        self._show, self._cancelled = show, cancelled
+        self._number, self._count, self._pieces = number, count, fields + 1
+        self._piece, self._label = 0, ""
+
+    def begin(self, label: str) -> Stopwatch:
+        """The next piece."""
+        piece, self._label = self._piece, label
+        self._piece += 1
+
+        def report(stage: str, share: float) -> None:
+            if self._show is not None:
+                done = self._number + (piece + share) / self._pieces
+                self._show(f"[{self._number + 1}/{self._count}] {label} {stage}", min(1.0, done / self._count))
+
+        return Stopwatch(Progress(report, self._cancelled))
+
+
+def _outcome(
+    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, steps: _Steps
+) -> PairOutcome:
+    """Does what there is to do for a pair. Raises Cancelled only: whatever goes wrong with it stops no other."""
+    entry: dict[str, Any] = {
+        "name": pair.name, "reference": pair.reference.name, "target": pair.target.name, "status": "failed",
+        "message": "", "published": published(pair.name), "fields": {},
+    }  # fmt: skip
+    try:
+        if pair.trouble:
+            raise BadRequest(pair.trouble)
+        return _compared(pair, fields, options, truths, steps, entry)
+    except Cancelled:
+        raise
+    except (StitchError, MemoryError) as error:
+        message = str(error) if isinstance(error, StitchError) else "not enough memory for pictures of this size"
+        code = error.exit_code if isinstance(error, StitchError) else StitchError.exit_code
+        return PairOutcome({**entry, "message": message}, exit_code=code)
+
+
+def _compared(
+    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, steps: _Steps,
+    entry: dict[str, Any],
+) -> PairOutcome:  # fmt: skip
+    truth = truths(pair.folder) if truths is not None and pair.folder is not None else None
+    # measured here, alike for all; nothing from a cache, or seconds would mean nothing
+    options = replace(options, measure=False, cache=None)
+    if truth is not None:
+        options = replace(options, camera=truth.camera)
+    watch, start = steps.begin("registration"), time.process_time()
+    watch("read")
+    frame = read_frame(pair.reference, pair.target, options)
+    registration = register([frame], options, watch)
+    seconds = {"registration": time.process_time() - start}
+    independent = independent_fundamental(registration.ideal, options.seed)
+    outcome = PairOutcome(entry, seconds=seconds)
+    results: dict[str, StitchResult] = {}
+    for name in fields:
+        try:
+            results[name] = _stitched(name, frame, registration, options, steps.begin(name), seconds)
+        except Cancelled:
+            raise
+        except StitchError as error:
+            entry["fields"][name] = {"status": "failed", "message": str(error), "figures": {}, "pictures": {}}
+            outcome.exit_code = error.exit_code
+            continue
+        figures = figures_of(results[name], registration, independent, options.seed)
+        made = field_pictures(results[name])
+        outcome.pictures |= {f"{pair.name}/{name}-{kind}.jpg": data for kind, data in made.items()}
+        entry["fields"][name] = {
+            "status": "done", "message": "", "figures": figures,
+            "pictures": {kind: f"{PICTURES}/{pair.name}/{name}-{kind}.jpg" for kind in made},
+        }  # fmt: skip
+        if truth is None:
+            del results[name]  # only what the truth looks at is kept
+    if truth is not None:
+        for name, figures in truth.figures(results).items():
+            entry["fields"][name]["figures"] |= figures
+    done = [one for one in entry["fields"].values() if one["status"] == "done"]
+    view = registration.two_view
+    entry |= {
+        "status": "done" if done else "failed",
+        "message": "" if done else next(one["message"] for one in entry["fields"].values()),
+        "size": list(registration.cameras[0].size), "target_size": list(registration.cameras[1].size),
+        "model": view.model, "why": view.why, "matches": len(registration.matches), "inliers": int(view.inliers.sum()),
+        "focal_source": view.focal_source, "rendered": truth is not None,
+    }  # fmt: skip
+    outcome.exit_code = 0 if done else outcome.exit_code
+    return outcome
+
+
+def _stitched(
+    name: str, frame: Frame, registration: Registration, options: StitchOptions, watch: Stopwatch,
+    seconds: dict[str, float],
+) -> StitchResult:  # fmt: skip
+    chosen, start = replace(options, field=name), time.process_time()
+    alignment = lay(registration, chosen, watch)
+    laid = time.process_time()
+    result = compose(frame, alignment, chosen, watch)
+    seconds |= {f"{name}: alignment": laid - start, f"{name}: composition": time.process_time() - laid}
+    return result
+
+
+def _in_words(entry: dict[str, Any], number: int, count: int) -> str:
+    """A line about a pair: its best field, or why there is none."""
+    if entry["status"] != "done":
+        return f"[{number}/{count}] {entry['name']}: failed: {entry['message']}"
+    psnr = {
+        name: one["figures"]["overlap_psnr_db"] for name, one in entry["fields"].items() if one["status"] == "done"
+    }  # fmt: skip
+    ranked = sorted(psnr, key=lambda name: -psnr[name])
+    return f"[{number}/{count}] {entry['name']}: " + ", ".join(f"{name} {psnr[name]:.2f} dB" for name in ranked)

@@ -1,0 +1,168 @@
+"""The comparison as tables: Markdown, CSV, and seconds apart from both. The same results give the same bytes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable
+from statistics import median
+from typing import Any
+
+from .figures import FIGURES, SHARES
+
+SCHEMA = 1
+# The figures that have a table of their own in Markdown, a row a pair; PSNR and SSIM share one.
+TABLES = ("projectivity_px", "projectivity_independent_px", "held_out_rms_px", "folds", "truth_alignment_px",
+          "truth_alignment_p95_px", "truth_whole_psnr_db")  # fmt: skip
+
+Summary = dict[str, Any]
+
+
+def number(value: object) -> float | None:
+    """A figure that means something, else None."""
+    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
+
+
+def shown(value: object, name: str) -> str:
+    """A figure with the digits that it is worth; – for none."""
+    found = number(value)
+    if found is None:
+        return "–"
+    return f"{100 * found if name in SHARES else found:.{FIGURES[name][2]}f}"
+
+
+def figure(entry: dict[str, Any], field: str, name: str) -> float | None:
+    """A figure of a field on a pair."""
+    return number(entry["fields"].get(field, {}).get("figures", {}).get(name))
+
+
+def best(entry: dict[str, Any], fields: Iterable[str], name: str) -> set[str]:
+    """The fields that are best on a pair by a figure, as it is shown; none where neither more nor less is better."""
+    more = FIGURES[name][3]
+    values = {field: figure(entry, field, name) for field in fields}
+    known = [value for value in values.values() if value is not None]
+    if more is None or not known:
+        return set()
+    top = max(known) if more else min(known)
+    return {field for field, value in values.items() if value is not None and shown(value, name) == shown(top, name)}
+
+
+def medians(summary: Summary, name: str) -> dict[str, float | None]:
+    """The median of a figure over the pairs that have it for every field; None where there is none."""
+    fields = summary["fields"]
+    rows = [[figure(entry, field, name) for field in fields] for entry in summary["pairs"]]
+    whole = [[value for value in row if value is not None] for row in rows]
+    whole = [row for row in whole if len(row) == len(fields)]
+    return {field: median(row[i] for row in whole) if whole else None for i, field in enumerate(fields)}
+
+
+def comparison_markdown(summary: Summary) -> str:
+    """Every figure that matters in a table of its own, best in bold, medians below; then what others published."""
+    parts = ["# Fields compared", "", "Overlap, PSNR in dB / SSIM:", "", *_main_table(summary)]
+    for name in TABLES:
+        if any(figure(entry, field, name) is not None for entry in summary["pairs"] for field in summary["fields"]):
+            title, unit, _, _ = FIGURES[name]
+            parts += ["", f"{title[0].upper()}{title[1:]}{f', {unit}' if unit else ''}:", "", *_table(summary, name)]
+    parts += _published(summary)
+    failed = [
+        f"- {entry['name']}{f', {field}' if field else ''}: {message}"
+        for entry in summary["pairs"] for field, message in failures(entry)
+    ]  # fmt: skip
+    if failed:
+        parts += ["", "Not compared:", "", *failed]
+    return "\n".join(parts) + "\n"
+
+
+def failures(entry: dict[str, Any]) -> list[tuple[str, str]]:
+    """Why there are no figures: (field, or "" for the whole pair, message)."""
+    if entry["status"] != "done":
+        return [("", entry["message"])]
+    return [(name, one["message"]) for name, one in entry["fields"].items() if one["status"] != "done"]
+
+
+def _main_table(summary: Summary) -> list[str]:
+    fields = summary["fields"]
+    rows = [["pair", *fields], ["---"] * (1 + len(fields))]
+    for entry in summary["pairs"]:
+        row = [_title(entry)]
+        for field in fields:
+            row.append(" / ".join(
+                _marked(entry, field, name, fields) for name in ("overlap_psnr_db", "overlap_ssim")
+            ))  # fmt: skip
+        rows.append(row)
+    psnr, ssim = (medians(summary, name) for name in ("overlap_psnr_db", "overlap_ssim"))
+    middle = [f"{shown(psnr[f], 'overlap_psnr_db')} / {shown(ssim[f], 'overlap_ssim')}" for f in fields]
+    return [_line(row) for row in [*rows, ["median", *middle]]]
+
+
+def _table(summary: Summary, name: str) -> list[str]:
+    fields = summary["fields"]
+    rows = [["pair", *fields], ["---"] * (1 + len(fields))]
+    rows += [[_title(entry), *(_marked(entry, f, name, fields) for f in fields)] for entry in summary["pairs"]]
+    middle = medians(summary, name)
+    return [_line(row) for row in [*rows, ["median", *(shown(middle[f], name) for f in fields)]]]
+
+
+def _published(summary: Summary) -> list[str]:
+    """Canvas values beside published ones; black counts as perfect there, and a larger canvas gains."""
+    fields = summary["fields"]
+    head = ["pair", *fields, "paper: EDF", "paper: REW", "measured elsewhere: overlap PSNR / SSIM"]
+    rows = [head, ["---"] * len(head)]
+    for entry in summary["pairs"]:
+        known = entry["published"]
+        if not known or entry["status"] != "done":
+            continue
+        ours = [
+            f"{shown(figure(entry, f, 'canvas_psnr_db'), 'canvas_psnr_db')} / "
+            f"{shown(figure(entry, f, 'canvas_ssim'), 'canvas_ssim')}"
+            for f in fields
+        ]
+        paper = known.get("paper", {})
+        theirs = [f"{paper[m][1]:.2f} / {paper[m][0]:.3f}; {paper[m][2]:g} px" if m in paper else "–"
+                  for m in ("EDF", "REW")]  # fmt: skip
+        others = ", ".join(f"{m} {p:.2f} / {s:.3f}" for m, (p, s) in known.get("measured", {}).items())
+        rows.append([entry["name"], *ours, *theirs, others or "–"])
+    if len(rows) == 2:
+        return []
+    note = "Canvas PSNR / SSIM (black outside the overlap counts as perfect: for information only), beside published:"
+    return ["", note, "", *(_line(row) for row in rows)]
+
+
+def _title(entry: dict[str, Any]) -> str:
+    size = entry.get("size")
+    return f"{entry['name']} ({size[0]}×{size[1]})" if size else entry["name"]
+
+
+def _marked(entry: dict[str, Any], field: str, name: str, fields: Iterable[str]) -> str:
+    text = shown(figure(entry, field, name), name)
+    return f"**{text}**" if field in best(entry, fields, name) else text
+
+
+def _line(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def comparison_csv(summary: Summary) -> str:
+    """A row for every field of every pair, all figures in full; empty: undefined. `why`: where there are none."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["pair", "reference", "target", "width", "height", "model", "field", "status", "why", *FIGURES])
+    for entry in summary["pairs"]:
+        first = [entry["name"], entry["reference"], entry["target"], *entry.get("size", ("", "")),
+                 entry.get("model", "")]  # fmt: skip
+        fields = entry["fields"] or {"": {"status": "failed", "message": entry["message"], "figures": {}}}
+        for name, one in fields.items():
+            values = [number(one["figures"].get(key)) for key in FIGURES]
+            row = [*first, name, one["status"], one["message"], *("" if v is None else repr(v) for v in values)]
+            table.writerow(row)
+    return text.getvalue()
+
+
+def timing_markdown(seconds: dict[str, dict[str, float]]) -> str:
+    """CPU seconds: what all fields share, and each field's own alignment and composition."""
+    names = list(dict.fromkeys(name for one in seconds.values() for name in one))
+    rows = [["pair", *names], ["---"] * (1 + len(names))]
+    for pair, one in seconds.items():
+        rows.append([pair, *(f"{one[name]:.2f}" if name in one else "–" for name in names)])
+    return "\n".join(["# CPU seconds", "", *(_line(row) for row in rows)]) + "\n"

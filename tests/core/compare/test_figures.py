@@ -1,0 +1,80 @@
+"""Figures that no other module has: canvas values, and folds away from what is occluded; and the judge's own scorer."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from edf_stitch.core.alignment import Registration
+from edf_stitch.core.compare.figures import FIGURES, figures_of, turned_over
+from edf_stitch.core.compare.tables import shown
+from edf_stitch.core.metrics import canvas_quality, overlap_quality, overlap_views, psnr, ssim
+from edf_stitch.core.outputs import warp_bytes
+from edf_stitch.core.pipeline import StitchResult
+
+
+def test_canvas_values_are_of_both_pictures_black_outside_the_overlap(small_result: StitchResult) -> None:
+    """The slow way: the whole canvas built and averaged."""
+    result = small_result
+    view, fetched, inside = overlap_views(result.reference, result.target, result.warp)
+    canvas = result.warp.canvas
+    whole = np.zeros((2, canvas.height, canvas.width, 3), np.uint8)
+    (x, y), (height, width) = canvas.offset, inside.shape
+    for layer, part in zip(whole, (view, fetched), strict=True):
+        layer[y : y + height, x : x + width] = np.where(inside[..., None], part, 0)
+    everywhere = np.ones(whole.shape[1:3], bool)
+    found = canvas_quality(result.reference, result.target, result.warp)
+    assert found["canvas_psnr_db"] == pytest.approx(psnr(*whole, everywhere), abs=1e-4)
+    # windows that hang over the canvas's edge are counted by the one and not by the other
+    assert found["canvas_ssim"] == pytest.approx(ssim(*whole, everywhere), abs=0.02)
+    assert found["canvas_psnr_db"] > overlap_quality(result.reference, result.target, result.warp)["overlap_psnr_db"]
+
+
+def test_folds_count_outside_what_is_occluded_and_its_rim(small_result: StitchResult) -> None:
+    map_x = small_result.warp.map_x.copy()
+    x, y = small_result.warp.canvas.offset
+    inside = small_result.warp.inside(small_result.cameras[1].size)[y:, x:]
+    row, column = (int(v) for v in np.argwhere(inside)[len(np.argwhere(inside)) // 2])
+    spot = np.s_[y + row - 4 : y + row + 4, x + column - 4 : x + column + 4]
+    map_x[spot] = map_x[spot][:, ::-1]
+    folded = replace(small_result, warp=replace(small_result.warp, map_x=map_x))
+    assert turned_over(folded) > turned_over(small_result) + 1e-4
+    occluded = small_result.occluded.copy()
+    occluded[y + row - 4 : y + row + 4, x + column - 4 : x + column + 4] = True
+    assert turned_over(replace(folded, occluded=occluded)) <= turned_over(small_result) + 1e-9
+
+
+def test_every_figure_has_a_name_and_digits(small_result: StitchResult) -> None:
+    registration = Registration(
+        small_result.cameras, small_result.matches, small_result.matches, small_result.two_view, ()
+    )
+    found = figures_of(small_result, registration, small_result.two_view.F, 0)
+    assert set(found) == {name for name in FIGURES if not name.startswith("truth_")}
+    assert all(shown(value, name) for name, value in found.items())
+    assert found["projectivity_px"] == found["projectivity_independent_px"], "by the same F the same"
+
+
+def test_the_judges_scorer_says_the_same_of_the_overlap(
+    small_result: StitchResult, folder: Path, tmp_path: Path
+) -> None:
+    score = Path(__file__).resolve().parents[4] / "shared" / "tools" / "score.py"
+    if not score.is_file():
+        pytest.skip("no scorer beside the checkout")
+    (tmp_path / "warp.npz").write_bytes(warp_bytes(small_result))
+    pictures = [str(folder / f"{name}.png") for name in ("reference", "target")]
+    said = subprocess.run(
+        [sys.executable, str(score), *pictures, str(tmp_path / "warp.npz")], capture_output=True, text=True, check=True
+    )
+    theirs = json.loads(said.stdout)
+    ours = overlap_quality(small_result.reference, small_result.target, small_result.warp)
+    ours |= canvas_quality(small_result.reference, small_result.target, small_result.warp)
+    assert ours["overlap_psnr_db"] == pytest.approx(theirs["ov_psnr_rgb"], abs=0.01)
+    assert ours["overlap_ssim"] == pytest.approx(theirs["ov_ssim_g11"], abs=0.002)
+    assert ours["canvas_psnr_db"] == pytest.approx(theirs["canvas_psnr_rgb"], abs=0.01)
+    assert ours["canvas_ssim"] == pytest.approx(theirs["canvas_ssim_g11"], abs=0.005)
+    assert ours["overlap_px"] == theirs["overlap_px"]
