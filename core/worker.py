@@ -114,7 +114,7 @@ def _picture(folder: Path, entry: dict[str, Any]) -> tuple[Any, int]:
         return replace(picture, name=entry["name"]), picture.exif.orientation
     exif = Exif()
     if entry.get("exif_of"):
-        structure = read_structure(read_file(Path(entry["exif_of"])))
+        structure = read_structure(read_file(folder / entry["exif_of"]))
         exif = read_exif(structure.exif) if structure is not None else exif
     picture = picture_from_array(turn(_array(folder / entry["array"]), exif.orientation), entry["name"])
     return replace(picture, exif=exif.upright()), exif.orientation

@@ -36,11 +36,11 @@ class EDF_OT_preset_add(AddPresetBase, bpy.types.Operator):  # noqa: N801
     bl_label = "Add Stitch Preset"
     preset_menu = idnames.Menu.PRESETS
     preset_subdir = SUBFOLDER
-    preset_defines = [f"settings = bpy.context.scene.{idnames.SETTINGS}"]
+    preset_defines: list[str] = []  # 4.x, where it runs on Python 3.13, does not find what is defined here
 
     @property
     def preset_values(self) -> list[str]:
-        return [f"settings.{name}" for name in names()]
+        return [f"bpy.context.scene.{idnames.SETTINGS}.{name}" for name in names()]
 
 
 def names() -> list[str]:

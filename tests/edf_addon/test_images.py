@@ -136,6 +136,12 @@ def test_portrait_photographs_end_upright_by_file_and_by_array(blender, tmp_path
     assert turned == turned_too == orientation
     assert by_file.view.shape[:2] == ((60, 40) if orientation >= 5 else (40, 60))
     assert np.abs(by_file.view.astype(int) - by_array.view.astype(int)).max() <= 3  # two JPEG decoders
+    image = bpy.data.images.load(str(tmp_path / "a.jpg"))
+    image.pack()
+    image.pixels[0] = image.pixels[0]
+    image.update()
+    found = entry(image, tmp_path)
+    assert found["exif_of"] == "reference.packed" and _picture(tmp_path, found)[1] == orientation
 
 
 def test_a_missing_file_is_named(blender, tmp_path):

@@ -9,11 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from edf_stitch.core.images import picture_from_array
+from edf_stitch.core.progress import STAGES
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 bpy = pytest.importorskip("bpy")
 
-from edf_stitch.edf_addon import job, modal, operators, properties, result, status  # noqa: E402
+from edf_stitch.edf_addon import command, job, modal, operators, properties, result, status  # noqa: E402
 
 from . import picture_files  # noqa: E402
 
@@ -31,7 +32,7 @@ class Modal(operators._Stitching):
     def report(self, kind: set[str], words: str) -> None:
         self.said.append((*kind, words))
 
-    def until(self, reached, kind: str = "TIMER") -> set[str]:
+    def until(self, reached) -> set[str]:
         end = time.monotonic() + 60
         while True:
             answer = self.modal(bpy.context, event())
@@ -187,14 +188,30 @@ def test_colours_and_rows_survive_the_whole_way(blender, tmp_path, kind):
         assert saved.pixels[100:, :, 0].mean() > saved.pixels[:60, :, 0].mean(), "redder to the bottom"
 
 
-@pytest.mark.parametrize("stage", ["read", "features", "geometry", "field", "warp", "blend", "write"])
-def test_cancel_at_every_stage_leaves_nothing(working, stage):
+def worker_that(monkeypatch, prepare: str) -> None:
+    """The real worker, after Python code that has its module at hand as `worker`."""
+    line, environment = command.worker_command([], job.WORKER)
+    code = f"import sys\nfrom {line[-1].removesuffix('.' + job.WORKER)}.{job.WORKER.rpartition('.')[0]} import worker\n"
+    code += f"from pathlib import Path\n{prepare}\nsys.exit(worker.main(Path(sys.argv[1])))"
+    python = line[: line.index("-m")]
+    monkeypatch.setattr(command, "worker_command", lambda argv, _: ([*python, "-c", code, *argv], environment))
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_cancel_at_every_stage_leaves_nothing(chosen, monkeypatch, stage):
+    """The worker stops to think at the stage, so that it is there when it is cancelled."""
+    pause = f"import time; say = worker._say\ndef pausing(line):\n say(line)\n if line.get('stage') == {stage!r}: "
+    worker_that(monkeypatch, pause + "time.sleep(60)\nworker._say = pausing")
+    working = Modal()
+    assert working._start(bpy.context)
     before = names()
     working.until(lambda: status.now.stage == stage)
+    assert status.now.running and status.now.stage == stage
     modal.cancel()
     assert status.now.cancelling
     assert working.until(lambda: False) == {"CANCELLED"}
     assert working.said == [("INFO", "Cancelled. Nothing was changed.")]
+    assert working._job._process.returncode in (130, -signal.SIGINT), "it ended by itself"
     assert names() == before and not modal.is_working() and not status.now.running
 
 
@@ -360,14 +377,9 @@ def test_settings_of_a_later_version_are_taken_as_far_as_they_are_known(blender)
 
 
 def test_a_broken_library_is_told_in_words(chosen, monkeypatch):
-    from edf_stitch.edf_addon import command, health
+    from edf_stitch.edf_addon import health
 
-    line, environment = command.worker_command(["FOLDER"], job.WORKER)
-    broken = line[:-3] + ["-c", "import sys; sys.modules['cv2'] = None; sys.argv = sys.argv[1:]\n"
-                          "import runpy; runpy.run_module('edf_stitch.core.worker', run_name='__main__')"]  # fmt: skip
-    monkeypatch.setattr(
-        command, "worker_command", lambda argv, _module: ([*broken, "worker", *argv], environment)
-    )
+    worker_that(monkeypatch, "sys.modules['cv2'] = None")
     assert health.problem() == ""
     with pytest.raises(RuntimeError, match="cannot be loaded.*cv2"):
         bpy.ops.edf.stitch()
@@ -375,5 +387,3 @@ def test_a_broken_library_is_told_in_words(chosen, monkeypatch):
     monkeypatch.undo()
     bpy.ops.edf.stitch()
     assert health.problem() == ""
-
-
