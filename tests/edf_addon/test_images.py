@@ -184,6 +184,9 @@ scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
 scene.collection.objects.link(scene.camera)
 scene.world = bpy.data.worlds.new("sky")
 scene.world.color = (3.0, 0.2, 0.1)
+for node in scene.world.node_tree.nodes if scene.world.node_tree else ():  # 5.0: a world always has nodes
+    if node.type == "BACKGROUND":
+        node.inputs["Color"].default_value = (3.0, 0.2, 0.1, 1.0)
 bpy.ops.render.render(scene=scene.name)
 image = next(image for image in bpy.data.images if image.type == "RENDER_RESULT")
 assert images.describe(image, "reference", Path(FOLDER), scene) == {"name": image.name, "path": "reference.exr"}
