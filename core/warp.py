@@ -74,7 +74,9 @@ def cut(array: NDArray, box: Box, beyond: float = 0.0) -> NDArray:
     right, bottom = left + width, top + height
     if left >= 0 and top >= 0 and right <= array.shape[1] and bottom <= array.shape[0]:
         return np.ascontiguousarray(array[top:bottom, left:right])
-    out = np.full((height, width, *array.shape[2:]), beyond, array.dtype)
+    out = np.zeros((height, width, *array.shape[2:]), array.dtype)  # a sphere is mostly empty: memory untouched is free
+    if beyond:
+        out[:] = beyond
     part = array[max(0, top) : bottom, max(0, left) : right]
     y, x = max(0, -top), max(0, -left)
     out[y : y + part.shape[0], x : x + part.shape[1]] = part
