@@ -55,6 +55,24 @@ def saving_scene(file_format: str, bits: int) -> Iterator[bpy.types.Scene]:
         bpy.data.scenes.remove(scene)
 
 
+def make_panoramic(
+    camera: bpy.types.Camera, kind: str, headings: tuple[float, float], elevations: tuple[float, float]
+) -> None:
+    """Sets a camera's panoramic lens (see scene_geometry.RoundLens). Cycles sees through it. Before 4.5 its properties
+    were Cycles' own, and are not there without it."""
+    camera.type = "PANO"
+    lens = camera if hasattr(camera, "panorama_type") else getattr(camera, "cycles", None)
+    if lens is None:
+        return
+    if kind == "equirectangular":
+        lens.panorama_type = "EQUIRECTANGULAR"
+        (lens.longitude_min, lens.longitude_max), (lens.latitude_min, lens.latitude_max) = headings, elevations
+    else:
+        lens.panorama_type, lens.central_cylindrical_radius = "CENTRAL_CYLINDRICAL", 1.0
+        lens.central_cylindrical_range_u_min, lens.central_cylindrical_range_u_max = headings
+        lens.central_cylindrical_range_v_min, lens.central_cylindrical_range_v_max = elevations
+
+
 def unified_paint(context: Any) -> Any:
     """What all brushes of the Image Editor share; since 5.0 each kind of painting has its own."""
     paint = context.tool_settings.image_paint

@@ -28,6 +28,7 @@ class Operator(StrEnum):
     CREATE_CAMERAS = "edf.create_cameras"
     DEPTH_MESH = "edf.depth_mesh"
     LOOK_THROUGH = "edf.look_through"
+    USE_AS_WORLD = "edf.use_as_world"
 
 
 class Panel(StrEnum):

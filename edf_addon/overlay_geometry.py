@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..core.camera import Camera
 from ..core.epipolar import Array, homogeneous, project
 from ..core.lens import distort, undistort
-from .scene_geometry import matrix
+from .scene_geometry import matrix, projection_of
 
 Colours = NDArray[np.float32]
 Size = tuple[int, int]
@@ -47,14 +47,33 @@ def to_region(points: Array, size: Size, seen: Array, region: Size) -> Array:
     return (to_view(points, size) - low) / (high - low) * np.array(region)
 
 
-def on_panorama(geometry: dict[str, Any], points: Array) -> Array:
-    """Reference px (N, 2) to px of the panorama, for panoramas in the reference's plane."""
-    return project(homogeneous(points) @ np.asarray(geometry["S"], np.float64).T)
+def on_panorama(known: dict[str, Any], points: Array) -> Array:
+    """Reference px (N, 2) to px of a result's panorama."""
+    projection = projection_of(known)
+    if projection is not None:
+        return projection.of_reference(undistort(points, _cameras(known["geometry"])[REFERENCE]))
+    return project(homogeneous(points) @ matrix(known["geometry"]["S"]).T)
 
 
-def from_panorama(geometry: dict[str, Any], points: Array) -> Array:
-    """px of the panorama (N, 2) to reference px: the inverse of `on_panorama`."""
-    return project(homogeneous(points) @ np.linalg.inv(np.asarray(geometry["S"], np.float64)).T)
+def from_panorama(known: dict[str, Any], points: Array) -> Array:
+    """px of the panorama (N, 2) to reference px: the inverse of `on_panorama`; NaN behind the reference camera."""
+    projection = projection_of(known)
+    if projection is None:
+        return project(homogeneous(points) @ np.linalg.inv(matrix(known["geometry"]["S"])).T)
+    seen = projection.rays(points) @ projection.K.T
+    ahead = np.where(seen[:, 2:] > 1e-6, seen[:, 2:], np.nan)
+    return distort(seen[:, :2] / ahead, _cameras(known["geometry"])[REFERENCE])
+
+
+def line_on_panorama(known: dict[str, Any], polyline: Array) -> NDArray[np.float32]:
+    """A polyline of reference px as line segments (2·N, 2) of panorama px: bent where the panorama is round, and cut
+    where that ends on one side and goes on on the other."""
+    if projection_of(known) is not None:
+        at = np.linspace(0, len(polyline) - 1, _CURVE)
+        polyline = np.stack([np.interp(at, np.arange(len(polyline)), polyline[:, axis]) for axis in (0, 1)], axis=-1)
+    pieces = segments(on_panorama(known, polyline)).reshape(-1, 2, 2)
+    width = known["geometry"]["canvas"][0]
+    return pieces[np.abs(pieces[:, 1, 0] - pieces[:, 0, 0]) < width / 2].reshape(-1, 2)
 
 
 def residual_colours(errors: Array, worst: float = WORST) -> Colours:

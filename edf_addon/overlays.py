@@ -172,32 +172,32 @@ def _points_in(view: _View, reference: Any, target: Any) -> Any:
     from . import overlay_geometry
 
     if view.side == editor.PANORAMA:
-        return overlay_geometry.on_panorama(view.result["geometry"], reference) if view.result else None
+        return overlay_geometry.on_panorama(view.result, reference) if view.result else None
     return reference if view.side == editor.REFERENCE else target
 
 
 def _draw_lines(view: _View) -> None:
-    import numpy as np
-
     from . import overlay_geometry as geometry_of
 
     if view.result is None or _pointer["point"] is None:
         return
-    geometry, side, point = view.result["geometry"], _pointer["side"], _pointer["point"]
+    known, side, point = view.result, _pointer["side"], _pointer["point"][None]
     if side == editor.PANORAMA:
-        side, point = editor.REFERENCE, geometry_of.from_panorama(geometry, point)
-    found = geometry_of.epipolar_lines(geometry, point, side)
+        side, point = editor.REFERENCE, geometry_of.from_panorama(known, point)
+    found = geometry_of.epipolar_lines(known["geometry"], point[0], side)
     here = editor.REFERENCE if view.side == editor.PANORAMA else view.side
     line = found.get(here)
     if line is not None:
         if view.side == editor.PANORAMA:
-            line = geometry_of.on_panorama(geometry, line)
-        segments = geometry_of.segments(view.at(line))
-        _lines(segments, SHADE, view, 2 * LINE_WIDTH)
-        _lines(segments, LINE, view)
+            ends = geometry_of.line_on_panorama(known, line)
+        else:
+            ends = geometry_of.segments(line)
+        ends = view.at(ends)
+        _lines(ends, SHADE, view, 2 * LINE_WIDTH)
+        _lines(ends, LINE, view)
     if here == side:
-        at = geometry_of.on_panorama(geometry, point[None]) if view.side == editor.PANORAMA else point[None]
-        _lines(geometry_of.rings(view.at(np.asarray(at)), 6 * view.unit), POINTER, view)
+        at = geometry_of.on_panorama(known, point) if view.side == editor.PANORAMA else point
+        _lines(geometry_of.rings(view.at(at), 6 * view.unit), POINTER, view)
 
 
 def _draw_waiting(view: _View) -> None:

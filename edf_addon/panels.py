@@ -60,6 +60,16 @@ def _pack_why_not(settings: Any) -> str:
     return "" if settings.fake_user else "Images without a fake user may be dropped on save, packed or not"
 
 
+def _is_round(settings: Any) -> bool:
+    return settings.projection != "PERSPECTIVE"
+
+
+def _projection_why_not(settings: Any) -> str:
+    if _is_round(settings) and settings.field not in properties.ROUND_FIELDS:
+        return "A round panorama needs a field that knows depth everywhere: Slack or Strict"
+    return ""
+
+
 CAMERA = (
     Row("camera"),
     Row("focal", shown=_camera_is("FOCAL")),
@@ -76,6 +86,9 @@ CAMERA = (
 )
 FIELD = (Row("field"), Row("fade"))
 OUTPUT = (
+    Row("projection", why_not=_projection_why_not),
+    Row("level", shown=_is_round),
+    Row("level_angles", shown=lambda settings: _is_round(settings) and settings.level == "ANGLES"),
     Row("blend"),
     Row("crop"),
     Row("crop_box", shown=lambda settings: settings.crop == "BOX"),
@@ -340,6 +353,8 @@ class EDF_PT_take_along(_Sub, bpy.types.Panel):  # noqa: N801
         column = layout.column(align=True)
         column.operator(Operator.CREATE_CAMERAS, icon="OUTLINER_OB_CAMERA")
         column.operator(Operator.DEPTH_MESH, icon="MESH_GRID")
+        if not take_along.no_world(image):
+            column.operator(Operator.USE_AS_WORLD, icon="WORLD")
         if reason := take_along.lacking(image) or take_along.lacking(image, depth=True):
             words(layout, reason, width, NOTE)
         layout.label(text="Look Through")

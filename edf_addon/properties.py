@@ -1,6 +1,7 @@
 """What an artist decides about a stitch, kept in the scene; and what becomes of it in the engine's words."""
 
 # No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
+import math
 from typing import Any
 
 import bpy
@@ -9,6 +10,7 @@ from bpy.props import (
     CollectionProperty,
     EnumProperty,
     FloatProperty,
+    FloatVectorProperty,
     IntProperty,
     IntVectorProperty,
     PointerProperty,
@@ -32,9 +34,21 @@ FIELDS = (
     ("APAP", "As-Projective-As-Possible", "For comparison: a homography for each cell of a grid; no depth, no cameras"),
     ("HOMOGRAPHY", "Homography", "For comparison: what every other stitcher starts from; no depth, no cameras"),
 )
+# Those that round panoramas can be made of.
+ROUND_FIELDS = ("SLACK", "STRICT")
 FADES = (
     ("PLANE", "Plane", "Outside the overlap the scene carries on as the plane that fits it best"),
     ("INFINITY", "Infinity", "Outside the overlap the scene is taken as infinitely far"),
+)
+PROJECTIONS = (
+    ("PERSPECTIVE", "Perspective", "Flat: what the reference's camera would see with a larger sensor"),
+    ("CYLINDRICAL", "Cylindrical", "Round, for wide panoramas: upright lines stay straight"),
+    ("EQUIRECTANGULAR", "Equirectangular", "The whole sphere, as a World's environment texture wants it"),
+)
+LEVELS = (
+    ("AUTO", "Automatic", "The horizon is found by how the cameras were held"),
+    ("NONE", "As Taken", "The reference looks straight ahead"),
+    ("ANGLES", "Angles", "Yaw, pitch and roll of the reference in the panorama"),
 )
 BLENDS = (
     ("FEATHER", "Feather", "A soft change from one picture to the other, across the whole overlap"),
@@ -150,6 +164,12 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
 
     field: EnumProperty(name="Field", description="How the target may be bent to meet the reference", items=FIELDS)
     fade: EnumProperty(name="Outside", description="What the field becomes outside the overlap", items=FADES)
+    projection: EnumProperty(name="Projection", description="What the panorama is drawn on", items=PROJECTIONS)
+    level: EnumProperty(name="Level", description="How a round panorama is turned", items=LEVELS)
+    level_angles: FloatVectorProperty(
+        name="Yaw, Pitch, Roll", description="Where the reference looks in the panorama: to the right, above the "
+        "horizon, clockwise", size=3, unit="ROTATION", precision=2,
+    )
     blend: EnumProperty(name="Blend", description="How the two pictures go over into each other", items=BLENDS)
     crop: EnumProperty(name="Crop", description="What of the panorama is kept", items=CROPS)
     crop_box: IntVectorProperty(
@@ -228,7 +248,7 @@ class EDF_PG_job(bpy.types.PropertyGroup):  # noqa: N801
 
 
 # The properties that are options of the engine under the same name: one word of several, or a plain value.
-CHOICES = ("field", "fade", "blend")
+CHOICES = ("field", "fade", "projection", "blend")
 VALUES = ("seed",)
 # What changes places when reference and target do; the lenses only where each picture has its own.
 PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))
@@ -247,6 +267,9 @@ def options_of(settings: Any, scale: float | None = None) -> dict[str, Any]:
     options["crop"] = settings.crop.lower()
     if settings.crop == "BOX":
         options["crop"] = [int(side * options["scale"]) for side in settings.crop_box]
+    options["level"] = "auto" if settings.projection == "PERSPECTIVE" else settings.level.lower()
+    if options["level"] == "angles":
+        options["level"] = [math.degrees(angle) for angle in settings.level_angles]
     options["camera"] = _camera_of(settings)
     return options
 

@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 from mathutils import Matrix
 
-from . import editor, idnames, photo, properties
+from . import compat, editor, idnames, photo, properties
 
 ROLES = (
     ("REFERENCE", "Reference", "The camera that took the reference"),
@@ -121,6 +121,34 @@ class EDF_OT_look_through(_OfAPanorama, bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
+class EDF_OT_use_as_world(bpy.types.Operator):  # noqa: N801
+    """Surround the scene with this panorama, as the reference camera saw it: an equirectangular one in the World"""
+
+    bl_idname = idnames.Operator.USE_AS_WORLD
+    bl_label = "Use as World"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        reason = no_world(editor.panorama(context))
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def execute(self, context: Any) -> set[str]:
+        use_as_world(context.scene, editor.panorama(context))
+        return {"FINISHED"}
+
+
+def no_world(image: bpy.types.Image | None) -> str:
+    """Why an image cannot surround a scene; "" where it can."""
+    if image is None:
+        return "Stitch a panorama first"
+    if editor.known(image)["report"]["canvas"]["projection"]["kind"] != "equirectangular":
+        return "Only an equirectangular panorama can surround the scene: choose that projection, and stitch"
+    return ""
+
+
 def lacking(image: bpy.types.Image | None, depth: bool = False) -> str:
     """Why nothing can be taken along from an image; "" where it can."""
     if image is None:
@@ -152,12 +180,16 @@ def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: flo
     pictures = {"REFERENCE": settings.reference, "TARGET": settings.target, "PANORAMA": image}
     rig = _rig(scene, image, baseline)
     made = {}
-    for placed in scene_geometry.placed_cameras(editor.known(image)["geometry"], baseline):
+    for placed in scene_geometry.placed_cameras(editor.known(image), baseline):
         role, lens = placed.name.upper(), placed.lens
         camera = find(image, role) or _link(scene, image, role, bpy.data.cameras.new(f"{placed.name} of {image.name}"))
         data = camera.data
-        data.sensor_fit, data.sensor_width, data.lens = lens.sensor_fit, lens.sensor_width, lens.lens
-        data.shift_x, data.shift_y = lens.shift_x, lens.shift_y
+        if isinstance(lens, scene_geometry.RoundLens):
+            compat.make_panoramic(data, lens.kind, lens.headings, lens.elevations)
+        else:
+            data.type = "PERSP"
+            data.sensor_fit, data.sensor_width, data.lens = lens.sensor_fit, lens.sensor_width, lens.lens
+            data.shift_x, data.shift_y = lens.shift_x, lens.shift_y
         data.clip_start, data.clip_end = 0.01 * baseline, 1e4 * baseline
         _put_behind(data, pictures[role])
         camera["resolution"] = lens.resolution
@@ -171,12 +203,9 @@ def depth_mesh(
     scene: bpy.types.Scene, image: bpy.types.Image, baseline: float, farthest: float
 ) -> bpy.types.Object:
     """The panorama as a surface; one that is there already gets new vertices. Raises ValueError."""
-    from . import scene_geometry as geometry_of
+    from . import scene_geometry
 
-    data = editor.known(image)
-    geometry = data["geometry"]
-    K = geometry_of.square_pixels(geometry_of.matrix(geometry["K_canvas"]))
-    surface = geometry_of.depth_mesh(data["depth"], K, tuple(geometry["canvas"]), baseline, farthest)
+    surface = scene_geometry.depth_mesh(editor.known(image), baseline, farthest)
     rig, there = _rig(scene, image, baseline), find(image, MESH)
     mesh = bpy.data.meshes.new(f"Depth of {image.name}") if there is None else there.data
     mesh.clear_geometry()
@@ -197,6 +226,36 @@ def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     scene.render.resolution_x, scene.render.resolution_y = camera["resolution"]
     scene.render.resolution_percentage = 100
     scene.render.pixel_aspect_x = scene.render.pixel_aspect_y = 1.0
+
+
+def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
+    """Gives the scene a World that shows the panorama where its rig's cameras see it, or those of a new rig would."""
+    from ..core.blender_world import world_rotation
+    from . import scene_geometry
+
+    known = editor.known(image)
+    rig = find(image, RIG)
+    camera = scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(known))
+    if rig is not None:
+        import numpy as np
+
+        camera = np.array(rig.matrix_world) @ camera
+    turn = world_rotation(camera, scene_geometry.matrix(known["report"]["canvas"]["projection"]["rotation"]))
+    world = bpy.data.worlds.new(image.name)
+    world.use_nodes = True
+    nodes, link = world.node_tree.nodes, world.node_tree.links.new
+    nodes.clear()
+    kinds = ("TexCoord", "Mapping", "TexEnvironment", "Background", "OutputWorld")
+    where, mapping, texture, background, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
+    for number, node in enumerate((where, mapping, texture, background, output)):
+        node.location = (220 * number - 800, 0)
+    texture.image = image
+    mapping.inputs["Rotation"].default_value = Matrix(turn.tolist()).to_euler("XYZ")
+    link(where.outputs["Generated"], mapping.inputs["Vector"])
+    link(mapping.outputs["Vector"], texture.inputs["Vector"])
+    link(texture.outputs["Color"], background.inputs["Color"])
+    link(background.outputs["Background"], output.inputs["Surface"])
+    scene.world = world
 
 
 def emission(image: bpy.types.Image) -> bpy.types.Material:
@@ -234,7 +293,7 @@ def _rig(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> bpy
         if known_baseline(settings) is not None:
             from . import scene_geometry
 
-            here = scene_geometry.in_world(*scene_geometry.ORIGIN)
+            here = scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(editor.known(image)))
             stands = settings.reference_camera.matrix_world.normalized()
             rig.matrix_world = stands @ Matrix(here.tolist()).inverted()
     rig["baseline"] = baseline
@@ -271,7 +330,7 @@ def _put_behind(data: bpy.types.Camera, image: bpy.types.Image | None) -> None:
     data.show_background_images = True
 
 
-CLASSES = (EDF_OT_create_cameras, EDF_OT_depth_mesh, EDF_OT_look_through)
+CLASSES = (EDF_OT_create_cameras, EDF_OT_depth_mesh, EDF_OT_look_through, EDF_OT_use_as_world)
 
 
 def register() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.camera import Camera
 from edf_stitch.core.decoding import turn
-from edf_stitch.core.epipolar import homogeneous, project
+from edf_stitch.core.epipolar import homogeneous, project, rotation_from_vector
 from edf_stitch.core.lens import distort
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -66,9 +66,40 @@ def test_a_region_that_shows_the_upper_right_quarter_puts_its_middle_in_the_midd
 
 def test_points_go_to_the_panorama_and_back(geometry):
     points = np.array([[0.0, 0], [399, 299], [17.5, 200]])
-    there = og.on_panorama(geometry, points)
+    known = {"geometry": geometry, "report": {"canvas": {"projection": {"kind": "perspective"}}}}
+    there = og.on_panorama(known, points)
     np.testing.assert_allclose(there[0], [70.25, 11.75])
-    np.testing.assert_allclose(og.from_panorama(geometry, there), points, atol=1e-9)
+    np.testing.assert_allclose(og.from_panorama(known, there), points, atol=1e-9)
+
+
+@pytest.fixture(scope="module", params=["cylindrical", "equirectangular"])
+def round_one(request, geometry):
+    """A round panorama, turned by 20° so that the reference reaches over its left edge, through a lens that bends."""
+    turn_ = rotation_from_vector(np.radians((5.0, -20.0, 3.0)))
+    told = {"kind": request.param, "focal_px": 200.0, "centre": [100.0, 150.0], "rotation": turn_.tolist()}
+    bent = {**geometry, "distortion": [-0.1, 0.01, 0, 0, 0], "canvas": [1256, 628]}
+    return {"geometry": bent, "report": {"canvas": {"projection": told}}}
+
+
+def test_points_go_to_a_round_panorama_and_back(round_one):
+    points = np.array([[0.0, 0], [399, 299], [17.5, 200]])
+    there = og.on_panorama(round_one, points)
+    assert (np.abs(there - points) > 5).any()
+    np.testing.assert_allclose(og.from_panorama(round_one, there), points, atol=1e-6)
+
+
+def test_what_lies_behind_the_reference_has_no_px_there(round_one):
+    assert np.isnan(og.from_panorama(round_one, np.array([[100 + 200 * np.pi, 150.0]]))).all()
+
+
+def test_a_line_on_a_round_panorama_is_a_curve_of_short_pieces(round_one):
+    pieces = og.line_on_panorama(round_one, np.array([[0.0, 10], [399, 290]])).reshape(-1, 2, 2)
+    assert len(pieces) > 40
+    assert np.abs(np.diff(pieces[..., 0], axis=1)).max() < 60, "none goes right across"
+    back = og.from_panorama(round_one, pieces.reshape(-1, 2).astype(float))
+    along = np.array([399.0, 280]) / np.hypot(399, 280)
+    off = (back - [0, 10]) @ [-along[1], along[0]]
+    assert np.abs(off).max() < 1e-2
 
 
 @given(seed=st.integers(0, 10_000), side=sides)

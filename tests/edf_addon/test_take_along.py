@@ -5,7 +5,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from edf_stitch.core.epipolar import homogeneous, project  # noqa: E402
+from edf_stitch.core.epipolar import homogeneous, project, rotation_from_vector  # noqa: E402
 from edf_stitch.edf_addon import result, take_along  # noqa: E402
 
 SIZE, SIZE_PRIME, CANVAS = (400, 300), (320, 480), (560, 360)
@@ -24,7 +24,8 @@ def stitched(blender, by_hand, monkeypatch):
         "K_canvas": K_canvas, "canvas": CANVAS,
     }  # fmt: skip
     depth = {"columns": COLUMNS, "rows": ROWS, "inverse_depth": d, "shows": np.ones(ROWS * COLUMNS, int)}
-    known = {"geometry": geometry, "depth": depth, "has_depth": True}
+    report = {"canvas": {"projection": {"kind": "perspective"}}}
+    known = {"geometry": geometry, "depth": depth, "has_depth": True, "report": report}
     settings = blender.settings
     for side, size in (("reference", SIZE), ("target", SIZE_PRIME), ("result", CANVAS)):
         setattr(settings, side, bpy.data.images.new(side, *size))
@@ -165,3 +166,54 @@ def test_undo_takes_the_cameras_back_and_leaves_the_panorama(stitched):
 def test_looking_through_a_camera_that_is_not_there_says_so(stitched):
     with pytest.raises(RuntimeError, match="create the cameras first"):
         bpy.ops.edf.look_through(role="TARGET")
+
+
+@pytest.fixture
+def sphere(stitched):
+    """The same as an equirectangular panorama, turned."""
+    rotation = rotation_from_vector(np.radians((-7.0, 11.0, 4.0)))
+    told = {"kind": "equirectangular", "focal_px": 360 / np.pi, "centre": [359.5, 179.5], "rotation": rotation}
+    stitched["report"]["canvas"]["projection"] = told
+    stitched["geometry"]["canvas"] = (720, 360)
+    return stitched
+
+
+def test_a_sphere_surrounds_the_scene_as_its_cameras_see_it(sphere):
+    """Wherever the rig stands and looks: a direction is found in the texture where the panorama's mesh has it."""
+    from mathutils import Euler, Matrix
+
+    bpy.ops.edf.create_cameras()
+    scene = bpy.context.scene
+    rig = take_along.find(scene.edf_stitch.result, "RIG")
+    rig.matrix_world = Matrix.Translation((1, 2, 3)) @ Euler((0.4, -0.2, 1.1)).to_matrix().to_4x4()
+    bpy.context.view_layer.update()
+    bpy.ops.edf.use_as_world()
+    nodes = {node.bl_idname: node for node in scene.world.node_tree.nodes}
+    assert nodes["ShaderNodeTexEnvironment"].image == scene.edf_stitch.result
+    turn = np.array(Euler(nodes["ShaderNodeMapping"].inputs["Rotation"].default_value).to_matrix())
+    bpy.ops.edf.depth_mesh()
+    mesh = take_along.find(scene.edf_stitch.result, "MESH")
+    bpy.context.view_layer.update()
+    corners = np.array([mesh.data.vertices[loop.vertex_index].co for loop in mesh.data.loops])
+    away = corners @ np.array(rig.matrix_world.to_3x3()).T  # from the cameras, in the world
+    x, y, z = (away @ turn.T).T
+    found = np.column_stack([0.5 - np.arctan2(y, x) / (2 * np.pi), 0.5 + np.arctan2(z, np.hypot(x, y)) / np.pi])
+    uvs = np.array([one.uv for one in mesh.data.uv_layers["Panorama"].data])
+    apart = found - uvs
+    apart[:, 0] -= np.round(apart[:, 0])
+    assert np.abs(apart).max() < 1e-4
+
+
+def test_a_spheres_camera_is_panoramic(sphere):
+    bpy.ops.edf.create_cameras()
+    camera = take_along.find(bpy.context.scene.edf_stitch.result, "PANORAMA").data
+    assert camera.type == "PANO"
+    if hasattr(camera, "panorama_type"):
+        assert camera.panorama_type == "EQUIRECTANGULAR"
+        assert (camera.longitude_min, camera.longitude_max) == pytest.approx((-np.pi, np.pi), abs=1e-5)
+        assert (camera.latitude_min, camera.latitude_max) == pytest.approx((-np.pi / 2, np.pi / 2), abs=1e-5)
+
+
+def test_a_flat_panorama_surrounds_nothing(stitched):
+    with pytest.raises(RuntimeError, match="Only an equirectangular"):
+        bpy.ops.edf.use_as_world()
