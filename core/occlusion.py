@@ -18,6 +18,9 @@ COARSEST, MARGIN = 4, 1.1
 # What lies between two points of one surface that share a cell is seen no further off than its diagonal (in cells).
 LEAVES_CELL = 1.45
 BETWEEN = (0.25, 0.5, 0.75)
+# Where the map folds is known to blocks of the target, 2^BLOCK px wide and with their neighbours wider than any cell.
+BLOCK = 5
+STRIP = 2_000_000
 
 
 def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -28,13 +31,11 @@ def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDA
     the pixels.
     """
     hidden = np.zeros(warp.map_x.shape, bool)
-    with np.errstate(invalid="ignore"):
-        near = inverse_depth_in_target(warp, two_view)
-        points = np.flatnonzero(warp.inside(target_size) & np.isfinite(near))
-    if not points.size or not (near.ravel()[points] > 0).any():
+    points, near = _contested(warp, two_view, target_size)
+    if not (near > 0).any():
         return hidden
-    near, x, y = (values.ravel()[points] for values in (near, warp.map_x, warp.map_y))
-    levels = _levels(warp).ravel()[points]
+    x, y = (values.ravel()[points] for values in (warp.map_x, warp.map_y))
+    levels = _levels(warp, points)
     order = _ascending(near)
     found = np.zeros(points.size, bool)
     for level in np.unique(levels):
@@ -49,6 +50,76 @@ def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDA
     return closed & warp.inside(target_size)
 
 
+def _contested(
+    warp: Warp, two_view: TwoView, target_size: tuple[int, int]
+) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """Canvas points (flat indices) that others may hide, with all those others, and their inverse depth in the target.
+
+    Along an epipolar line the map is a function of one variable, and continuous between pixels. Where it takes a value
+    twice it turns back in between, over that value. So what is hidden lies in the target where the map folds, and
+    where it folds nowhere nothing is hidden.
+    """
+    blocks = _folded_blocks(warp, target_size)
+    found, depths = [np.empty(0, np.intp)], [np.empty(0, np.float32)]
+    height, width = warp.map_x.shape
+    rows = max(1, STRIP // width)
+    for top in range(0, height if blocks.any() else 0, rows):
+        strip = warp.within((0, top, width, min(rows, height - top)))
+        inside = np.flatnonzero(strip.inside(target_size))
+        row, column = ((v.ravel()[inside] + np.float32(0.5)).astype(np.intp) for v in (strip.map_y, strip.map_x))
+        inside = inside[blocks[row >> BLOCK, column >> BLOCK]]
+        if not inside.size:
+            continue
+        with np.errstate(invalid="ignore", divide="ignore"):
+            near = inverse_depth_in_target(strip, two_view).ravel()[inside]
+        known = np.isfinite(near)
+        found.append(inside[known] + top * width)
+        depths.append(near[known])
+    return np.concatenate(found), np.concatenate(depths)
+
+
+def _folded_blocks(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_]:
+    """The blocks of the target that folds of the map fall on, and their neighbours.
+
+    A fold is a triangle between canvas pixels that the map turns over (or flattens); it counts as its bounding box.
+    """
+    width, height = target_size
+    counts = np.zeros(((height >> BLOCK) + 2, (width >> BLOCK) + 2), np.int32)
+    mirrored = _mirrored(warp)
+    rows = max(1, STRIP // warp.map_x.shape[1])
+    for top in range(0, warp.map_x.shape[0] - 1, rows):
+        x, y = (values[top : top + rows + 1] for values in (warp.map_x, warp.map_y))
+        with np.errstate(invalid="ignore", over="ignore"):
+            right, down = ([np.diff(v, axis=axis) for v in (x, y)] for axis in (1, 0))
+            upper = right[0][:-1] * down[1][:, :-1] - right[1][:-1] * down[0][:, :-1]
+            lower = right[0][1:] * down[1][:, 1:] - right[1][1:] * down[0][:, 1:]
+            turned = (upper >= 0) | (lower >= 0) if mirrored else (upper <= 0) | (lower <= 0)
+        row, column = np.nonzero(turned)
+        if not row.size:
+            continue
+        corners = [np.stack([v[row + i, column + j] for i in (0, 1) for j in (0, 1)]) for v in (x, y)]
+        low, high = ([np.nan_to_num(how(v, axis=0), nan=-9) for v in corners] for how in (np.nanmin, np.nanmax))
+        there = (high[0] >= 0) & (high[1] >= 0) & (low[0] <= width - 1) & (low[1] <= height - 1)
+        (x0, x1), (y0, y1) = (
+            [(np.clip(ends[axis][there], 0, size - 1) + 0.5).astype(np.intp) >> BLOCK for ends in (low, high)]
+            for axis, size in enumerate(target_size)
+        )
+        for at, sign in (((y0, x0), 1), ((y0, x1 + 1), -1), ((y1 + 1, x0), -1), ((y1 + 1, x1 + 1), 1)):
+            np.add.at(counts, at, sign)
+    covered = counts.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
+    return cv2.dilate(covered.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+
+
+def _mirrored(warp: Warp) -> bool:
+    """Whether most of the map turns the picture over."""
+    step = max(1, min(warp.map_x.shape) // 64)
+    x, y = (values[::step, ::step] for values in (warp.map_x, warp.map_y))
+    with np.errstate(invalid="ignore", over="ignore"):
+        right, down = ([np.diff(v, axis=axis) for v in (x, y)] for axis in (1, 0))
+        turn = right[0][:-1] * down[1][:, :-1] - right[1][:-1] * down[0][:, :-1]
+    return bool((turn < 0).sum() > (turn > 0).sum())
+
+
 def inverse_depth_in_target(warp: Warp, two_view: TwoView) -> NDArray[np.float32]:
     """baseline / depth in front of the target camera (H, W): d / x'₃, 0 at infinity and beyond; NaN without depth."""
     (infinite,) = warp.canvas.through(two_view.H_inf[2:], warp.canvas.xs, warp.canvas.ys)
@@ -57,20 +128,24 @@ def inverse_depth_in_target(warp: Warp, two_view: TwoView) -> NDArray[np.float32
     return np.maximum(d, np.float32(0)) / third
 
 
-def _levels(warp: Warp) -> NDArray[np.uint8]:
-    """Which cells the canvas fills: log2 of the target px from one canvas pixel to the next, rounded up.
+def _levels(warp: Warp, points: NDArray[np.intp]) -> NDArray[np.uint8]:
+    """Which cells the canvas fills at its points: log2 of the target px from one canvas pixel to the next, rounded up.
 
     Of the steps to either side the shorter counts: at the edge of an object the longer one leads off it.
     """
-    step = np.zeros(warp.map_x.shape, np.float32)
+    step = np.zeros(points.size, np.float32)
+    place = np.divmod(points, warp.map_x.shape[1])
     for axis in (0, 1):
-        if warp.map_x.shape[axis] < 2:
+        last = warp.map_x.shape[axis] - 2
+        if last < 0:
             continue
-        ahead = np.hypot(np.diff(warp.map_x, axis=axis), np.diff(warp.map_y, axis=axis))
-        ahead = np.where(np.isfinite(ahead), ahead, np.float32(0))
-        first, last = (np.take(ahead, [i], axis=axis) for i in (0, -1))
-        shorter = np.minimum(np.concatenate([first, ahead], axis), np.concatenate([ahead, last], axis))
-        np.maximum(step, shorter, out=step)
+        sides = []
+        for begin in (np.clip(place[axis] - 1, 0, last), np.minimum(place[axis], last)):
+            here = (begin, place[1]) if axis == 0 else (place[0], begin)
+            there = (begin + 1, place[1]) if axis == 0 else (place[0], begin + 1)
+            side = np.hypot(*(values[there] - values[here] for values in (warp.map_x, warp.map_y)))
+            sides.append(np.where(np.isfinite(side), side, np.float32(0)))
+        np.maximum(step, np.minimum(*sides), out=step)
     levels = np.ceil(np.log2(np.maximum(step / np.float32(MARGIN), np.float32(1))))
     return np.minimum(levels, COARSEST).astype(np.uint8)
 

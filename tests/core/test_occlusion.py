@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from edf_stitch.core import occlusion
 from edf_stitch.core.canvas import Canvas
 from edf_stitch.core.epipolar import homogeneous, infinite_homography
 from edf_stitch.core.occlusion import inverse_depth_in_target, occluded
@@ -132,6 +133,23 @@ def test_a_smooth_hill_without_folds_hides_nothing() -> None:
     steep = SIDEWAYS.warp(1 / (0.4 + 0.38 * np.sin(x / 25) * np.cos(y / 30)))
     assert (np.diff(steep.map_x, axis=1) < 0).any()
     assert occluded(steep, SIDEWAYS.view, TARGET).any(), "where the map folds, something is hidden"
+
+
+@pytest.mark.parametrize("t", [(-1, 0.1, 0.05), (1, 0.2, -0.3), (0.2, 0.1, -1.0)])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_where_the_map_folds_is_all_that_has_to_be_looked_at(
+    t: tuple[float, ...], mirrored: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = replace(SIDEWAYS, t=unit(*t))
+    warp, _ = scene.truth()
+    if mirrored:
+        warp = replace(warp, map_x=scene.target_size[0] - 1 - warp.map_x)
+    monkeypatch.setattr(occlusion, "STRIP", 5000)  # in several pieces
+    seen = occlusion._folded_blocks(warp, scene.target_size)
+    assert seen.any() and not seen.all()
+    found = occluded(warp, scene.view, scene.target_size)
+    monkeypatch.setattr(occlusion, "_folded_blocks", lambda *_: np.ones_like(seen))
+    assert found.any() and (found == occluded(warp, scene.view, scene.target_size)).all()
 
 
 def test_infinity_and_beyond_are_one_depth() -> None:
