@@ -23,7 +23,7 @@ from .fields import fit_field
 from .images import Picture, resized
 from .lens import undistort
 from .levelling import rotation_for
-from .masks import read_mask, without
+from .masks import read_mask, read_painted, without
 from .match_files import read_matches
 from .options import StitchOptions
 from .projection import Projection, round_projection
@@ -54,11 +54,13 @@ class Alignment:
 
 @dataclass(frozen=True)
 class Frame:
-    """Two pictures as they are worked on, without what is masked and at the scale asked for; and their full sizes."""
+    """Two pictures as they are worked on, without what is masked and at the scale asked for; their full sizes; and what
+    was painted over the panorama (see `masks.read_painted`)."""
 
     reference: Picture
     target: Picture
     full_sizes: tuple[tuple[int, int], tuple[int, int]]
+    painted: NDArray[np.int8] | None = None
 
 
 def prepare(reference: Picture, target: Picture, options: StitchOptions) -> Frame:
@@ -72,6 +74,7 @@ def prepare(reference: Picture, target: Picture, options: StitchOptions) -> Fram
         worked_on(reference, options.ignore_reference, "the reference"),
         worked_on(target, options.ignore_target, "the target"),
         (size_of(reference), size_of(target)),
+        None if options.mask is None else read_painted(options.mask),
     )
 
 

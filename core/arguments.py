@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 FADE_CHOICES = ("plane", "infinity")
 FIELD_CHOICES = ("slack", "strict", "paper", "rew", "apap", "homography")
 PROJECTION_CHOICES = ("perspective", "cylindrical", "equirectangular")
-BLEND_CHOICES, BLENDS_TO_COME = ("feather", "linear"), ("multiband",)
+BLEND_CHOICES, SEAM_CHOICES = ("multiband", "feather", "linear"), ("graphcut", "none")
 
 
 def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> None:
@@ -103,14 +103,23 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
     )
     how.add_argument(
         "--blend",
-        default="feather",
-        type=_choice(BLEND_CHOICES, BLENDS_TO_COME),
-        help="feather (default) or linear (plain average)",
+        default="multiband",
+        type=_choice(BLEND_CHOICES, ()),
+        metavar="BLEND",
+        help="multiband (default: light evened out across the seam, detail cut), feather, or linear (plain average)",
     )
-    how.add_argument("--seam", default="none", type=_choice(("none",), ("graphcut",)), help="none")
     how.add_argument(
-        "--exposure", action=argparse.BooleanOptionalAction, default=False, help="exposure compensation (yet to come)"
-    )
+        "--seam", default="graphcut", type=_choice(SEAM_CHOICES, ()), metavar="SEAM",
+        help="graphcut (default: where the pictures look most alike) or none (midway between their borders)",
+    )  # fmt: skip
+    how.add_argument(
+        "--mask", type=Path, metavar="MASK",
+        help="painted over the whole panorama: black from REF, white from TARGET, gray or transparent: the seam's",
+    )  # fmt: skip
+    how.add_argument(
+        "--exposure", action=argparse.BooleanOptionalAction, default=True,
+        help="match TARGET's exposure and white balance to REF's (default)",
+    )  # fmt: skip
     how.add_argument(
         "--cache", action=argparse.BooleanOptionalAction, default=True,
         help="keep features, geometry and field for the next stitch of the same pictures (default; EDF_CACHE: where)",
@@ -120,8 +129,8 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
 
 def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
     """What the parsed arguments ask for. Raises BadRequest."""
-    if args.dense or args.exposure:
-        raise BadRequest(f"--{'dense' if args.dense else 'exposure'} is yet to come")
+    if args.dense:
+        raise BadRequest("--dense is yet to come")
     from .cache import default_folder
     from .camera import CameraRequest
     from .crop import parse_crop
@@ -142,6 +151,9 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         scale=args.scale,
         crop=parse_crop(args.crop),
         blend=args.blend,
+        seam=args.seam,
+        mask=args.mask,
+        exposure=args.exposure,
         seed=args.seed,
         measure=measure,
         cache=default_folder() if args.cache else None,

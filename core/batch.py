@@ -1,7 +1,7 @@
 """Many pairs, and clips of two fixed cameras: one after the other, resumable, in shards; one bad pair stops nothing.
 
-A clip has one alignment, estimated over frames spread evenly through it: every frame gets the same map on the same
-canvas, so that nothing swims.
+A clip has one alignment, one exposure and one seam, found over frames spread evenly through it: every frame gets the
+same map on the same canvas, cut at the same places, so that nothing swims and nothing flickers.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from .alignment import Alignment, Frame, align
 from .batch_list import BatchItem
 from .batch_outputs import BatchRequest, Job, Unit, UnitFiles, plan, read_json
+from .composition import Decided, pooled_decision
 from .errors import BadRequest, Cancelled, StitchError, UnreadableImage
 from .images import Picture
 from .options import StitchOptions
@@ -182,7 +183,7 @@ class _Meter:
 def _weight(job: Job) -> float:
     if job.item.frames is None:
         return float(len(job.todo))
-    return ALIGNMENT_WEIGHT + FRAME_WEIGHT * len(job.todo) if job.todo else 0.0
+    return ALIGNMENT_WEIGHT + FRAME_WEIGHT * (len(job.todo) + len(job.item.aligned_on)) if job.todo else 0.0
 
 
 def _outcome(job: Job, meter: _Meter) -> Outcome:
@@ -236,9 +237,11 @@ def _with_report(job: Job, outcome: Outcome) -> Outcome:
 
 @dataclass(frozen=True)
 class _Locked:
-    """What all frames of a clip share: alignment, full sizes of the pictures, options with the crop settled."""
+    """What all frames of a clip share: alignment, exposure and seam, full sizes of the pictures, options with the crop
+    settled."""
 
     alignment: Alignment
+    decided: Decided
     sizes: tuple[tuple[int, int], tuple[int, int]]
     options: StitchOptions
 
@@ -253,7 +256,7 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
     failed: list[FrameTrouble] = []
     frames = [unit for unit in job.todo if unit.frame is not None]
     if job.todo:
-        locked = _align(job, meter.steps(ALIGNMENT_WEIGHT))
+        locked = _lock(job, meter)
     size = None
     for unit in frames:
         try:
@@ -277,24 +280,31 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
     return _with_report(job, outcome)
 
 
-def _align(job: Job, steps: Stopwatch) -> _Locked:
-    """The alignment of a clip; also writes its report, where that is due, from the first frame it was taken from."""
-    item, options = job.item, job.options
+def _lock(job: Job, meter: _Meter) -> _Locked:
+    """What the frames of a clip share; also writes its report, where that is due, from the first frame it was taken
+    from."""
+    item, options, steps = job.item, job.options, meter.steps(ALIGNMENT_WEIGHT)
     used = _readable(item, options, steps)
     shown = next(iter(used))
     sizes = used[shown].full_sizes
     alignment = align(list(used.values()), options, steps)
+    quick = replace(options, crop="full", measure=False)
+    decided = pooled_decision([
+        compose(read_frame(*item.pair(number), options), alignment, quick, meter.steps(FRAME_WEIGHT)).decided
+        for number in used
+    ])
     reports = [unit for unit in job.todo if unit.frame is None]
     crop = options.crop
     if reports or crop == "inscribed":
-        result = compose(read_frame(*item.pair(shown), options), alignment, options, steps)
+        frame = read_frame(*item.pair(shown), options)
+        result = compose(frame, alignment, options, meter.steps(FRAME_WEIGHT), decided)
         if crop == "inscribed":  # what one frame shows decides for all: the frames of a clip have one size
             whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
             crop = (x - left - whole[0], y - top - whole[1], result.canvas.width, result.canvas.height)
         about = {"frames": list(item.frames or ()), "aligned_on": list(used), "shown": shown}
         for unit in reports:
             unit.write(replace(result, report={**result.report, "clip": about}))
-    return _Locked(alignment, sizes, replace(options, crop=crop, measure=False))
+    return _Locked(alignment, decided, sizes, replace(options, crop=crop, measure=False))
 
 
 def _readable(item: BatchItem, options: StitchOptions, steps: Stopwatch) -> dict[int, Frame]:
@@ -332,7 +342,7 @@ def _frame(unit: Unit, locked: _Locked, steps: Stopwatch) -> tuple[tuple[int, in
     if frame.full_sizes != locked.sizes:
         found, needed = (" and ".join(f"{w}×{h}" for w, h in sizes) for sizes in (frame.full_sizes, locked.sizes))
         raise BadRequest(f"the pictures have {found} pixels, the clip {needed}: one alignment is for one camera each")
-    result: StitchResult = compose(frame, locked.alignment, locked.options, steps)
+    result: StitchResult = compose(frame, locked.alignment, locked.options, steps, locked.decided)
     height, width = result.alpha.shape
     return (width, height), unit.write(result)
 

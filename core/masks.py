@@ -18,6 +18,8 @@ from .images import Picture, load_picture, picture_from_array
 
 # Less than this of a picture left is a mask that means something else.
 LEAST_LEFT = 0.01
+# Share of white up to which paint is black, and from the other end white.
+PAINTED = 0.25
 # Share of white by which a colour may differ and still be one: rounding, and compression that is not lossless.
 ONE_COLOUR = 8 / 255
 
@@ -44,6 +46,26 @@ def read_mask(source: str | Path | np.ndarray, size: tuple[int, int], name: str)
     return mask
 
 
+def read_painted(source: str | Path | np.ndarray) -> NDArray[np.int8]:
+    """What an artist painted over a panorama (h, w), at its own size: -1 from the reference where it is black, 1 from
+    the target where it is white, 0 where it is gray or transparent and the seam decides.
+
+    source: any picture file that can be read, or an array as for `picture_from_array`. Raises UnreadableImage (file).
+    """
+    picture = _picture(source, "the mask of the seam")
+    values = _gray(picture)
+    painted = np.zeros(values.shape, np.int8)
+    painted[values < PAINTED], painted[values > 1 - PAINTED] = -1, 1
+    if picture.alpha is not None:
+        painted[picture.alpha <= 0.5] = 0
+    return painted
+
+
+def painted_over(painted: NDArray[np.int8], size: tuple[int, int]) -> NDArray[np.int8]:
+    """The same on a panorama of `size` (W, H) px. Raises BadRequest where its shape is another one."""
+    return _stretched(painted, size, "the mask of the seam", "the whole panorama")
+
+
 def without(picture: Picture, mask: NDArray[np.bool_]) -> Picture:
     """The picture with alpha 0 where the mask (H, W) is True; the same picture where it is True nowhere."""
     if not mask.any():
@@ -66,17 +88,25 @@ def _refuse_labels(picture: Picture, label: str) -> None:
 
 def _white(picture: Picture) -> NDArray[np.bool_]:
     """Where the mask says ignore (h, w), at its own size."""
-    # a float picture's view is exposed for the eye; its values themselves are the mask
-    values = picture.pixels if picture.bits == 32 else picture.view.astype(np.float32) / 255
-    gray = values[..., 0] if values.shape[2] == 1 else cv2.cvtColor(values, cv2.COLOR_RGB2GRAY)
+    gray = _gray(picture)
     if picture.alpha is None:
         return gray > 0.5
-    shown = values[picture.alpha > 0.5]
+    shown = _values(picture)[picture.alpha > 0.5]
     one_colour = not len(shown) or np.ptp(shown, axis=0).max() <= ONE_COLOUR
     return (picture.alpha if one_colour else gray * picture.alpha) > 0.5
 
 
-def _stretched(mask: NDArray[np.bool_], size: tuple[int, int], label: str) -> NDArray[np.bool_]:
+def _values(picture: Picture) -> NDArray[np.float32]:
+    """A float picture's view is exposed for the eye; its values themselves are the mask."""
+    return picture.pixels if picture.bits == 32 else picture.view.astype(np.float32) / 255
+
+
+def _gray(picture: Picture) -> NDArray[np.float32]:
+    values = _values(picture)
+    return values[..., 0] if values.shape[2] == 1 else cv2.cvtColor(values, cv2.COLOR_RGB2GRAY)
+
+
+def _stretched(mask: NDArray, size: tuple[int, int], label: str, what: str = "the picture") -> NDArray:
     width, height = size
     own_height, own_width = mask.shape
     if (own_width, own_height) == size:
@@ -85,8 +115,8 @@ def _stretched(mask: NDArray[np.bool_], size: tuple[int, int], label: str) -> ND
     (w, h), (small_w, small_h) = sorted([(own_width, own_height), size], reverse=True, key=lambda s: s[0] * s[1])
     if max((small_w - 1) / w, (small_h - 1) / h) > min((small_w + 1) / w, (small_h + 1) / h):
         raise BadRequest(
-            f"{label} has {own_width}×{own_height} pixels, the picture has {width}×{height}: a mask needs the "
-            "picture's size, or its shape at another size, upright"
+            f"{label} has {own_width}×{own_height} pixels, {what} has {width}×{height}: a mask needs the same size, or "
+            "the same shape at another size, upright"
         )
     rows = (2 * np.arange(height) + 1) * own_height // (2 * height)
     columns = (2 * np.arange(width) + 1) * own_width // (2 * width)

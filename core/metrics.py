@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -10,10 +11,13 @@ from numpy.typing import NDArray
 
 from .camera import Camera
 from .canvas import MAX_REACH
+from .colour import encode
 from .epipolar import Array, distance_to_line
 from .images import Picture
 from .lens import undistort
-from .warp import Warp, fetch
+from .overlap import bounds
+from .tone import to_tones
+from .warp import Layer, Warp, fetch
 
 # Constants of the structural similarity index for 8 bit (Wang et al., IEEE TIP 2004, section III-B).
 SSIM_C1, SSIM_C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
@@ -47,7 +51,7 @@ def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) ->
     return float(index[inner].mean(dtype=np.float64))
 
 
-def _gray(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _gray(picture: NDArray) -> NDArray:
     return picture[..., 0] if picture.shape[2] == 1 else cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
 
 
@@ -103,6 +107,57 @@ def canvas_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str,
         "canvas_psnr_db": psnr(view, fetched, inside) - 10 * float(np.log10(share)),
         "canvas_ssim": 1 - (1 - similar) * pixels / (warp.canvas.width * warp.canvas.height),
     }
+
+
+def appearance(
+    panorama: Layer, reference: Layer, target: Layer, from_target: NDArray[np.bool_] | None, floats: tuple[bool, bool]
+) -> dict[str, float]:
+    """How much of a panorama's overlap looks as one of its pictures does, and how much its seam shows.
+
+    source_fidelity_mean, source_fidelity_p5: for every pixel of the overlap the better of the structural similarities
+    (gray, 7×7) to the reference and to the target, which is exposed as it is in the panorama: mean and 5th percentile;
+    a ghost looks like neither. seam_visibility: by how many levels (of 255) the step from pixel to pixel across the
+    seam differs from the same step in the picture that is nearer to it, mean over the seam. NaN where there is none.
+    """
+    box = bounds((reference.alpha > 0) & (target.alpha > 0))
+    if box is None:
+        return {"source_fidelity_mean": math.nan, "source_fidelity_p5": math.nan, "seam_visibility": math.nan}
+    # what else is there may be missing for want of room in 8 bit: light beyond white is looked at as tones
+    levels = [
+        np.float32(255) * to_tones(part.pixels[box]) if any(floats) else encode(part.pixels[box], 8).astype(np.float32)
+        for part in (panorama, reference, target)
+    ]
+    both = ((reference.alpha > 0) & (target.alpha > 0))[box]
+    whole, first, second = (_gray(part) for part in levels)
+    fidelity = np.maximum(_similarity(whole, first), _similarity(whole, second))[both]
+    seam = math.nan if from_target is None else _seam_visibility(levels, from_target[box], both)
+    return {
+        "source_fidelity_mean": float(fidelity.mean(dtype=np.float64)),
+        "source_fidelity_p5": float(np.percentile(fidelity, 5)), "seam_visibility": seam,
+    }  # fmt: skip
+
+
+def _similarity(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray:
+    """The structural similarity (H, W) of two gray pictures, 7×7."""
+
+    def smooth(values: NDArray) -> NDArray:
+        return cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
+
+    mx, my = smooth(x), smooth(y)
+    vx, vy, vxy = smooth(x * x) - mx * mx, smooth(y * y) - my * my, smooth(x * y) - mx * my
+    return (2 * mx * my + SSIM_C1) * (2 * vxy + SSIM_C2) / ((mx * mx + my * my + SSIM_C1) * (vx + vy + SSIM_C2))
+
+
+def _seam_visibility(
+    levels: list[NDArray[np.float32]], from_target: NDArray[np.bool_], both: NDArray[np.bool_]
+) -> float:
+    beyond = []
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        across = (from_target[here] != from_target[there]) & both[here] & both[there]
+        steps = [part[here][across] - part[there][across] for part in levels]
+        beyond.append(np.minimum(*(np.abs(steps[0] - step).mean(axis=1) for step in steps[1:])))
+    every = np.concatenate(beyond)
+    return float(every.mean(dtype=np.float64)) if every.size else math.nan
 
 
 def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:

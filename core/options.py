@@ -16,6 +16,7 @@ from .errors import BadRequest
 from .fields import FIELDS, ROUND_FIELDS
 from .levelling import LEVELS, Level
 from .projection import PROJECTIONS
+from .seam import SEAMS
 
 LEAST_SCALE = 0.02
 
@@ -29,10 +30,12 @@ class StitchOptions:
     full pictures; ignore_reference, ignore_target: masks of what is to be kept out, files or arrays, white = ignored;
     projection: one of PROJECTIONS; level: how a cylindrical or equirectangular panorama is turned, one of LEVELS or
     yaw, pitch, roll of the reference camera in degrees (see `levelling`); scale: both pictures are resized by this
-    first, at most 1; crop: what of the panorama is kept (see `crop_box`); blend: one of BLENDS; seed: of every random
-    choice; measure: whether the report also compares the pictures in the overlap and holds matches back to see how far
-    the field can be trusted; cache: the folder where features, geometry and fields are kept for the next stitch of the
-    same pictures, None for nowhere (the outcome is the same).
+    first, at most 1; crop: what of the panorama is kept (see `crop_box`); blend: one of BLENDS; seam: one of SEAMS, of
+    no matter for `linear`; mask: what an artist painted over the whole panorama, a file or array, black = from the
+    reference, white = from the target, gray or transparent = the seam decides; exposure: whether the target's is
+    matched to the reference's; seed: of every random choice; measure: whether the report also compares the pictures in
+    the overlap and holds matches back to see how far the field can be trusted; cache: the folder where features,
+    geometry and fields are kept for the next stitch of the same pictures, None for nowhere (the outcome is the same).
     """
 
     field: str = "slack"
@@ -45,21 +48,29 @@ class StitchOptions:
     level: Level = "auto"
     scale: float = 1.0
     crop: Crop = "full"
-    blend: str = "feather"
+    blend: str = "multiband"
+    seam: str = "graphcut"
+    mask: Path | np.ndarray | None = None
+    exposure: bool = True
     seed: int = 0
     measure: bool = True
     cache: Path | None = dataclasses.field(default=None, compare=False)
 
     @property
+    def has_seam(self) -> bool:
+        """An average has none; bands need one, if only that which lies midway between the borders."""
+        return self.blend == "multiband" or (self.blend == "feather" and self.seam != "none")
+
+    @property
     def files_read(self) -> list[Path]:
         """The files that these options name."""
-        named = (self.camera.cameras, self.matches, self.ignore_reference, self.ignore_target)
+        named = (self.camera.cameras, self.matches, self.ignore_reference, self.ignore_target, self.mask)
         return [Path(one) for one in named if isinstance(one, (str, Path))]
 
     def __post_init__(self) -> None:
         for name, value, known in (
             ("field", self.field, FIELDS), ("fade", self.fade, FADES), ("blend", self.blend, BLENDS),
-            ("projection", self.projection, PROJECTIONS),
+            ("projection", self.projection, PROJECTIONS), ("seam", self.seam, SEAMS),
         ):  # fmt: skip
             if value not in known:
                 raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")

@@ -21,6 +21,8 @@ from .warp import Layer, cut
 
 # What lies beside the layers, white where it holds, by its name in the result.
 MASKS = ("occluded",)
+# Where the pictures meet, in the form that --mask takes; only where there is a seam.
+SEAM = "seam"
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ def check(request: OutputRequest, files: OutputFiles) -> None:
     files.check(*single)
     if request.layers is not None:
         names = [f"{layer}{suffix}" for layer in ("reference", "target") for suffix in (".png", ".exr")]
-        names += [f"{mask}.png" for mask in MASKS]
+        names += [f"{mask}.png" for mask in (*MASKS, SEAM)]
         files.check_folder(request.layers, names)
         taken = {(request.layers / name).resolve() for name in names}
         for path in single:
@@ -75,6 +77,9 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
         for name in MASKS:
             mask = cut(getattr(result, name), result.spread)
             files.add_to_folder(request.layers, f"{name}.png", _mask_bytes(mask))
+        if result.from_target is not None:
+            seam = _mask_bytes(cut(result.from_target, result.spread), result.alpha > 0)
+            files.add_to_folder(request.layers, f"{SEAM}.png", seam)
     if request.warp is not None:
         files.add(request.warp, warp_bytes(result))
     if request.report is not None and request.timing is not None and request.matches is not None:
@@ -100,9 +105,10 @@ def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result
         files.add_to_folder(folder, f"{name}.exr", encode_picture(layer.pixels, layer.alpha, 32, ".exr", icc, exif)[0])
 
 
-def _mask_bytes(mask: np.ndarray) -> bytes:
-    """A PNG of a mask (H, W), white where it is True."""
-    return encode_picture(mask[..., None].astype(np.float32), None, 8, ".png")[0]
+def _mask_bytes(mask: np.ndarray, shown: np.ndarray | None = None) -> bytes:
+    """A PNG of a mask (H, W), white where it is True; transparent where nothing is shown (H, W)."""
+    alpha = None if shown is None else shown.astype(np.float32)
+    return encode_picture(mask[..., None].astype(np.float32), alpha, 8, ".png")[0]
 
 
 def warp_bytes(result: StitchResult) -> bytes:

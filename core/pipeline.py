@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 
 from .alignment import Alignment, Frame, align, prepare, size_of
-from .blend import blend
 from .camera import Camera
 from .canvas import Box, Canvas, common
+from .composition import Decided, composed
 from .crop import crop_box
 from .displacement import Field
 from .errors import NoOverlap
 from .features import Matches
 from .images import Picture, in_same_colour_space, load_picture, picture_from_array
-from .occlusion import occluded
+from .masks import painted_over
+from .metrics import appearance
 from .options import StitchOptions
 from .progress import Progress
 from .report import make_report
@@ -34,12 +35,13 @@ Source = str | Path | np.ndarray | Picture
 class StitchResult:
     """A finished panorama and everything it was made of.
 
-    pixels (H, W, C) float32 scene-linear and alpha (H, W), straight, of `canvas`; the two layers, the warp and occluded
-    (H, W) bool (what the target cannot see though the map falls inside it) on `warp.canvas`, which is the same, but of
-    a whole sphere the part that the pictures cover (see `spread`); the geometry, the field, the matches (all, before
-    inlier choice), the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage. Scale and crop are
-    done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes` (W, H): of the
-    pictures as they came.
+    pixels (H, W, C) float32 scene-linear and alpha (H, W), straight, of `canvas`; the two layers, the warp, occluded
+    (H, W) bool (what the target cannot see though the map falls inside it) and from_target (H, W) bool (which side of
+    the seam a pixel lies on, None without a seam) on `warp.canvas`, which is the same, but of a whole sphere the part
+    that the pictures cover (see `spread`); what was decided on the whole canvas; the geometry, the field, the matches
+    (all, before inlier choice), the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage. Scale and
+    crop are done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes` (W, H): of
+    the pictures as they came.
     """
 
     pixels: np.ndarray
@@ -51,6 +53,8 @@ class StitchResult:
     target_layer: Layer
     warp: Warp
     occluded: np.ndarray
+    from_target: np.ndarray | None
+    decided: Decided
     two_view: TwoView
     field: Field
     matches: Matches
@@ -122,31 +126,36 @@ def read_frame(reference: Source, target: Source, options: StitchOptions) -> Fra
     return prepare(first, second, options)
 
 
-def compose(frame: Frame, alignment: Alignment, options: StitchOptions, steps: Stopwatch) -> StitchResult:
-    """The panorama of two pictures by an alignment, which may come from other frames of the same two cameras."""
+def compose(
+    frame: Frame, alignment: Alignment, options: StitchOptions, steps: Stopwatch, decided: Decided | None = None
+) -> StitchResult:
+    """The panorama of two pictures by an alignment, which may come from other frames of the same two cameras, as may
+    what was decided about exposure and seam."""
     first, second, whole = frame.reference, frame.target, alignment.warp
     steps("warp", 0.5)
     base, layer = reference_layer(first, whole.canvas, alignment.cameras[0]), target_layer(second, whole)
 
-    steps("occlusion", 0.0)
-    hidden = occluded(whole, alignment.two_view, size_of(second))
-
-    steps("blend", 0.0)
-    panorama = blend(base, layer, options.blend)
+    painted = None if frame.painted is None else _on_canvas(frame.painted, whole.canvas)
+    floats = (first.bits == 32, second.bits == 32)
+    panorama, exposed, found = composed(
+        base, layer, whole, alignment.two_view, size_of(second), options, floats, painted, steps, decided
+    )
+    seen = appearance(panorama, base, exposed, found.from_target, floats) if options.measure else {}
     place = reference_box(whole.canvas, alignment.cameras[0])
     box = crop_box(options.crop, whole.canvas.whole, panorama.alpha > 0, place)
     panorama, shown = panorama.within(box), whole.canvas.within(box)
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))
-    base, layer, warp, hidden = base.within(box), layer.within(box), whole.within(box), cut(hidden, box)
+    base, layer, warp, hidden = base.within(box), layer.within(box), whole.within(box), cut(found.hidden, box)
+    from_target = None if found.from_target is None else cut(found.from_target, box)
 
     steps("write", 0.0)
-    report, more = make_report(options, (first, second), alignment, shown)
+    report, more = make_report(options, (first, second), alignment, shown, found, seen)
     warnings = (*_named(first), *_named(second), *alignment.warnings, *more)
     report["warnings"] = list(warnings)
     steps("write", 0.5)
     return StitchResult(
-        panorama.pixels, panorama.alpha, shown, first, second, base, layer, warp, hidden, alignment.two_view,
-        alignment.field, alignment.matches, alignment.cameras, warnings, report, steps.seconds,
+        panorama.pixels, panorama.alpha, shown, first, second, base, layer, warp, hidden, from_target, found,
+        alignment.two_view, alignment.field, alignment.matches, alignment.cameras, warnings, report, steps.seconds,
         frame.full_sizes,
     )  # fmt: skip
 
@@ -171,6 +180,12 @@ def _picture(source: Source) -> Picture:
     if isinstance(source, Picture):
         return source
     return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
+
+
+def _on_canvas(painted: np.ndarray, canvas: Canvas) -> np.ndarray:
+    """What was painted over the whole panorama, on the canvas: of a sphere the part that the pictures cover."""
+    left, top, width, height = canvas.whole
+    return cut(painted_over(painted, (width, height)), (-left, -top, canvas.width, canvas.height))
 
 
 def _named(picture: Picture) -> list[str]:

@@ -19,6 +19,7 @@ from .warp import build_map
 if TYPE_CHECKING:
     from .alignment import Alignment
     from .camera import Camera
+    from .composition import Decided
     from .images import Picture
     from .options import StitchOptions
     from .two_view import TwoView
@@ -29,21 +30,24 @@ NEGATIVE_SHARE = 0.02
 
 
 def make_report(
-    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment, canvas: Canvas
+    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment, canvas: Canvas, decided: Decided,
+    appearance: dict[str, float],
 ) -> tuple[dict[str, Any], list[str]]:
     """The report of a stitch that shows `canvas`, and warnings in plain words drawn from it.
 
+    decided: about its composition; appearance: of the panorama (see `metrics.appearance`).
     No seconds, no dates: the same input gives the same report.
     """
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
     field = alignment.field
-    measured = _measured(options, pictures, alignment)
+    measured = _measured(options, pictures, alignment) | appearance
     report = {
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
         "options": {
             "field": options.field, "fade": options.fade, "projection": options.projection, "level": options.level,
-            "scale": options.scale, "crop": options.crop, "blend": options.blend, "seed": options.seed,
+            "scale": options.scale, "crop": options.crop, "blend": options.blend, "seam": options.seam,
+            "exposure": options.exposure, "seed": options.seed,
         },
         "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
         "two_view": {
@@ -63,6 +67,10 @@ def make_report(
             "width": canvas.width, "height": canvas.height,
             "offset": None if canvas.projection else canvas.offset, "cropped": canvas.cropped,
             "projection": _projection_entry(canvas, two_view),
+        },
+        "composition": {
+            "exposure_gain": decided.exposure.gain, "exposure_spread": decided.exposure.spread,
+            "exposure_blocks": decided.exposure.blocks, "occluded_px": int(decided.hidden.sum()),
         },
         "measured": measured,
     }  # fmt: skip

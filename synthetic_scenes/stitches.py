@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..core.alignment import Frame, Registration, lay, register
 from ..core.camera import CameraRequest
 from ..core.fields import RIVALS
@@ -16,6 +18,9 @@ WAYS = (
     "unknown/slack",
 )  # fmt: skip
 
+# Feathered, without a seam: alignment is judged, and not what hides its errors.
+PLAIN = StitchOptions(exposure=False, seam="none", blend="feather", measure=False)
+
 
 Shared = dict[str, tuple[Frame, Registration]]
 
@@ -28,7 +33,7 @@ def stitched(pair: RenderedPair, way: str, shared: Shared | None = None) -> Stit
     told, field = way.split("/")
     focal = tuple(float(pair.cameras[name].K[0, 0]) for name in ("reference", "target"))
     camera = CameraRequest(focal_px=focal) if told == "known" else CameraRequest()
-    options = StitchOptions(field=field, camera=camera, measure=False)
+    options = replace(PLAIN, field=field, camera=camera)
     shared, steps = {} if shared is None else shared, Stopwatch(Progress())
     if told not in shared:
         frame = read_frame(pair.reference, pair.target, options)

@@ -17,6 +17,7 @@ from edf_stitch.core.displacement import FADES
 from edf_stitch.core.errors import BadRequest
 from edf_stitch.core.fields import FIELDS
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.seam import SEAMS
 
 
 def parsed(*words: str) -> argparse.Namespace:
@@ -37,7 +38,8 @@ def test_without_any_the_defaults_are_pythons() -> None:
 def test_it_offers_what_core_offers() -> None:
     """The lists stand twice, so that a wrong call costs no import of NumPy; they must agree."""
     assert arguments.FIELD_CHOICES == FIELDS and arguments.FADE_CHOICES == FADES and arguments.BLEND_CHOICES == BLENDS
-    for name, choices in (("field", FIELDS), ("fade", FADES), ("blend", BLENDS), ("crop", CROPS)):
+    assert arguments.SEAM_CHOICES == SEAMS
+    for name, choices in (("field", FIELDS), ("fade", FADES), ("blend", BLENDS), ("seam", SEAMS), ("crop", CROPS)):
         for choice in choices:
             assert getattr(options(f"--{name}", choice), name) == choice
 
@@ -60,15 +62,17 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
 
 
 @pytest.mark.parametrize(("words", "expected"), [
-    (["--field", "strict", "--fade", "plane", "--projection", "perspective", "--seam", "none"], {"field": "strict"}),
+    (["--field", "strict", "--fade", "plane", "--projection", "perspective", "--seam", "none"],
+     {"field": "strict", "seam": "none"}),
     (["--field", "paper", "--fade", "infinity"], {"field": "paper", "fade": "infinity"}),
     (["--matches", "m.csv", "--ignore-ref", "a.png", "--ignore-target", "b.png"],
      {"matches": Path("m.csv"), "ignore_reference": Path("a.png"), "ignore_target": Path("b.png")}),
     (["--ignore-target", "b.png"], {"ignore_target": Path("b.png")}),
     (["--scale", "0.5", "--crop", "inscribed"], {"scale": 0.5, "crop": "inscribed"}),
     (["--crop", "3,4,50,60"], {"crop": (3, 4, 50, 60)}), (["--crop", "reference"], {"crop": "reference"}),
-    (["--no-dense", "--no-exposure"], {}),
-    (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {}),
+    (["--no-dense", "--no-exposure"], {"exposure": False}), (["--exposure", "--seam", "graphcut"], {}),
+    (["--mask", "m.png"], {"mask": Path("m.png")}),
+    (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {"blend": "feather"}),
     (["--projection", "perspective"], {}), (["--projection", "cylindrical"], {"projection": "cylindrical"}),
     (["--projection", "equirectangular", "--level=-5,2.5,0"],
      {"projection": "equirectangular", "level": (-5.0, 2.5, 0.0)}),
@@ -80,7 +84,7 @@ def test_how_it_is_done(words: list[str], expected: dict) -> None:
 
 
 @pytest.mark.parametrize("words", [
-    ["--blend", "multiband"], ["--seam", "graphcut"], ["--dense"], ["--exposure"],
+    ["--dense"],
 ], ids=" ".join)  # fmt: skip
 def test_what_is_yet_to_come_is_refused_by_name(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     try:
@@ -125,8 +129,9 @@ def test_the_help_names_every_option_and_choice() -> None:
     said = parser.format_help()
     for word in (*(f"--{name}" for name in (
         "focal-px", "focal-mm", "sensor-mm", "focal35", "principal", "cameras", "matches", "ignore-ref",
-        "ignore-target", "scale", "crop", "field", "fade", "dense", "projection", "blend", "seam", "exposure", "seed",
-    )), *FIELDS, *FADES, *BLENDS, *CROPS):  # fmt: skip
+        "ignore-target", "scale", "crop", "field", "fade", "dense", "projection", "blend", "seam", "mask",
+        "exposure", "seed",
+    )), *FIELDS, *FADES, *BLENDS, *SEAMS, *CROPS):  # fmt: skip
         assert word in said, word
 
 

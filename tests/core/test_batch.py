@@ -122,7 +122,7 @@ def test_layers_warp_and_the_kind_of_file(work: Path, quick: list) -> None:
     assert run(work, "--quiet", "--layers", "--warp", "--format", "jpg") == 0
     expected = {f"p1{suffix}" for suffix in (
         ".jpg", ".report.json", ".matches.csv", ".timing.json", ".warp.npz", ".layers/reference.png",
-        ".layers/target.png", ".layers/occluded.png")}  # fmt: skip
+        ".layers/target.png", ".layers/occluded.png", ".layers/seam.png")}  # fmt: skip
     assert {name for name in files(work / "out") if name.startswith("p1")} == expected
 
 

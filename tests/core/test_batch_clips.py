@@ -86,7 +86,7 @@ def test_a_clip_has_one_alignment_and_nothing_swims(whole: Path) -> None:
         "batch.json", ".edf/shot.json", *(f".edf/shot/{name}.json" for name in made),
         *(f"shot.{kind}" for kind in ("report.json", "matches.csv", "timing.json", "warp.npz")),
         *(f"shot/{name}{one}" for name in made for one in (
-            ".png", ".layers/reference.png", ".layers/target.png", ".layers/occluded.png")),
+            ".png", ".layers/reference.png", ".layers/target.png", ".layers/occluded.png", ".layers/seam.png")),
     }  # fmt: skip
     (item,) = summary(out)["items"]
     assert (item["status"], item["panorama"], item["size"]) == ("done", "shot/shot_0007.png", [width, height])
@@ -153,7 +153,7 @@ def test_an_interrupted_clip_goes_on_where_it_was(
 
     def compose(*args: object) -> object:
         nonlocal calls
-        calls += 1
+        calls += len(args) == 5  # what was decided is handed over
         if calls == 4:  # the report, 7, 8, then 9
             raise KeyboardInterrupt
         return original(*args)
@@ -162,7 +162,7 @@ def test_an_interrupted_clip_goes_on_where_it_was(
         patch.setattr(batch, "compose", compose)
         assert clip(work) == 130
     assert list(panoramas(work / "out")) == ["shot_0007", "shot_0008"]
-    assert len(files(work / "out")) == 2 * 4 + 4 + 3 + 1, "two frames with layers, the report's, stamps, batch.json"
+    assert len(files(work / "out")) == 2 * 5 + 4 + 3 + 1, "two frames with layers, the report's, stamps, batch.json"
     times = {path: path.stat().st_mtime_ns for path in (work / "out").rglob("shot*") if path.is_file()}
     said()
     assert clip(work, "--resume") == 0 and "2 frames done, 2 skipped" in said()[0]

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.blend import BLENDS, blend
+from edf_stitch.core.blend import (
+    BLENDS,
+    averaged,
+    distance_labels,
+    feathered,
+    in_bands,
+)
+from edf_stitch.core.overlap import overlap_of
 from edf_stitch.core.warp import Layer
 
 H, W = 60, 140
@@ -21,6 +28,15 @@ def layer(columns: slice, pixels: np.ndarray | float, alpha: np.ndarray | float 
     return Layer(out, shown)
 
 
+def blend(reference: Layer, target: Layer, mode: str) -> Layer:
+    """Without a seam of its own."""
+    hidden = np.zeros(reference.alpha.shape, bool)
+    if mode == "multiband":
+        side = distance_labels(reference, target)
+        return in_bands(reference, target, side, overlap_of(reference, target, hidden))
+    return averaged(reference, target) if mode == "linear" else feathered(reference, target, hidden)
+
+
 def light(seed: int, channels: int = 3) -> np.ndarray:
     """HDR: from 0.01 to 1000."""
     return (10 ** np.random.default_rng(seed).uniform(-2, 3, (H, W, channels))).astype(np.float32)
@@ -34,7 +50,7 @@ def test_linear_is_the_plain_average(channels: int) -> None:
     assert out.pixels.dtype == out.alpha.dtype == np.float32
 
 
-@pytest.mark.parametrize("mode", BLENDS)
+@pytest.mark.parametrize("mode", ["feather", "linear"])
 def test_outside_the_overlap_every_value_stays_as_it_is(mode: str) -> None:
     a, b = light(1), light(2)
     first, second = layer(LEFT, a), layer(slice(50, 120), b)
@@ -109,7 +125,7 @@ def test_what_one_picture_shows_whole_is_never_seen_through(mode: str, other: fl
     assert (both >= np.float32(other)).all() and (both <= 1).all()
 
 
-@pytest.mark.parametrize("mode", BLENDS)
+@pytest.mark.parametrize("mode", ["feather", "linear"])
 def test_holes_are_filled_by_the_other_picture_alone(mode: str) -> None:
     hole = np.ones((H, W), np.float32)
     hole[10:50, 60:80] = 0

@@ -80,7 +80,7 @@ def test_a_stitch_from_files_to_files(
     assert err.splitlines()[-1] == f"edf: {tmp_path / 'out.png'}: {width}×{height}"
     assert set(files(tmp_path)) == {
         "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-        "layers/target.png", "layers/occluded.png"}
+        "layers/target.png", "layers/occluded.png", "layers/seam.png"}
     # the same as stitch() from Python gives
     expected, _ = encode_picture(small_result.pixels, small_result.alpha, 8, ".png")
     assert (tmp_path / "out.png").read_bytes() == expected
@@ -207,7 +207,7 @@ def test_the_demo_prints_its_figures_and_says_where_its_files_are(
 
 # --- refusals -------------------------------------------------------------------------------------------------------
 
-YET_TO_COME = [["--dense"], ["--exposure"], ["--blend", "multiband"], ["--seam", "graphcut"]]
+YET_TO_COME = [["--dense"]]
 WRONG = [
     ["--field", "nonsense"], ["--fade", "slowly"], ["--nonsense"], ["--seed", "x"], ["--seed", "-1"], ["--scale", "0"],
     ["--quiet", "--verbose"], ["--principal", "1"], ["--focal-px", "abc"], ["--focal-px", "0"], ["--focal-px"],

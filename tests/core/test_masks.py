@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core import features
-from edf_stitch.core.blend import BLENDS, blend
+from edf_stitch.core.blend import averaged, feathered
 from edf_stitch.core.errors import BadRequest, UnreadableImage
 from edf_stitch.core.images import Picture, encode_picture, picture_from_array
-from edf_stitch.core.masks import read_mask, without
+from edf_stitch.core.masks import painted_over, read_mask, read_painted, without
 from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.warp import reference_layer, target_layer
 
@@ -225,6 +225,26 @@ def test_no_feature_comes_from_the_mask(small_result: StitchResult, masks: tuple
     assert mask[row, column].any(), "there would be some"
 
 
+def test_paint_is_black_white_or_none() -> None:
+    array = np.full((20, 30, 4), 128, np.uint8)
+    array[..., 3] = 255
+    array[:5, :, :3], array[5:10, :, :3] = 0, 255
+    array[10:15] = (255, 255, 255, 0)
+    painted = read_painted(array)
+    assert painted.dtype == np.int8 and painted.shape == (20, 30)
+    assert (painted[:5] == -1).all() and (painted[5:10] == 1).all() and (painted[10:] == 0).all()
+    assert np.array_equal(read_painted(array[..., :3])[:5], painted[:5]), "opaque pictures too"
+    twice = painted_over(painted, (60, 40))
+    assert twice.shape == (40, 60) and np.array_equal(twice[::2, ::2], painted)
+    with pytest.raises(BadRequest, match="30×20 pixels, the whole panorama has 40×40"):
+        painted_over(painted, (40, 40))
+
+
+def test_paint_that_cannot_be_read_is_told_by_its_name(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableImage, match="none.png"):
+        read_painted(tmp_path / "none.png")
+
+
 def test_what_the_mask_hides_changes_no_layer_and_no_blend(
     small_result: StitchResult, masks: tuple[np.ndarray, np.ndarray]
 ) -> None:
@@ -232,7 +252,7 @@ def test_what_the_mask_hides_changes_no_layer_and_no_blend(
     for noise in (np.zeros_like(masks[0]), True):
         first, second = (without(noisy(p, m & noise), m) for p, m in zip(pictures, masks, strict=True))
         base, layer = reference_layer(first, small_result.warp.canvas), target_layer(second, small_result.warp)
-        found.append([layer, *(blend(base, layer, mode) for mode in BLENDS)])
+        found.append([layer, averaged(base, layer), feathered(base, layer, np.zeros(base.alpha.shape, bool))])
     for ours, theirs in zip(*found, strict=True):
         shown = ours.alpha > 0
         assert shown.any() and np.array_equal(ours.alpha, theirs.alpha)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -9,10 +10,12 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.canvas import Canvas
+from edf_stitch.core.colour import decode, encode
 from edf_stitch.core.images import picture_from_array
 from edf_stitch.core.lens import distort
 from edf_stitch.core.metrics import (
     Shown,
+    appearance,
     folds,
     look_up,
     off_line_mean,
@@ -21,7 +24,7 @@ from edf_stitch.core.metrics import (
     shown_points,
     ssim,
 )
-from edf_stitch.core.warp import Warp, build_warp
+from edf_stitch.core.warp import Layer, Warp, build_warp
 
 
 def two_pictures(channels: int = 3) -> tuple[np.ndarray, np.ndarray]:
@@ -236,3 +239,57 @@ def test_a_map_on_its_lines_is_off_by_nothing_also_through_a_lens(
     assert off_line_mean(view.F, shown_points(warp, (camera, camera))) < 1e-3
     aside = replace(warp, map_y=warp.map_y + np.float32(0.5))
     assert off_line_mean(view.F, shown_points(aside, (camera, camera))) == pytest.approx(0.5, rel=0.25)
+
+
+# --- what the panorama looks like -----------------------------------------------------------------------------------
+
+
+def two_layers(shift: int = 0) -> tuple[Layer, Layer]:
+    """Two pictures of one texture, the second moved by some px."""
+    random = np.random.default_rng(3)
+    light = cv2.GaussianBlur(random.random((120, 200, 3)), (0, 0), 1.5).astype(np.float32)
+    alpha, alpha_too = np.zeros((120, 200), np.float32), np.zeros((120, 200), np.float32)
+    alpha[:, :150], alpha_too[:, 50:] = 1, 1
+    return Layer(light, alpha), Layer(np.roll(light, shift, axis=1), alpha_too)
+
+
+def cut_at(first: Layer, second: Layer, column: int) -> tuple[Layer, np.ndarray]:
+    side = np.zeros(first.alpha.shape, bool)
+    side[:, column:] = True
+    return Layer(np.where(side[..., None], second.pixels, first.pixels), np.ones_like(first.alpha)), side
+
+
+def test_a_panorama_cut_from_its_pictures_is_faithful_to_them() -> None:
+    first, second = two_layers(shift=6)
+    whole, side = cut_at(first, second, 100)
+    seen = appearance(whole, first, second, side, (False, False))
+    assert seen["source_fidelity_mean"] > 0.95 and seen["source_fidelity_p5"] > 0.4
+    same = appearance(first, first, first, side, (False, False))
+    assert same["source_fidelity_p5"] == pytest.approx(1, abs=1e-6) and same["seam_visibility"] == 0
+
+
+def test_a_ghost_is_faithful_to_neither() -> None:
+    first, second = two_layers(shift=6)
+    ghost = Layer((first.pixels + second.pixels) / 2, np.ones_like(first.alpha))
+    assert appearance(ghost, first, second, None, (False, False))["source_fidelity_mean"] < 0.9
+    assert math.isnan(appearance(ghost, first, second, None, (False, False))["seam_visibility"])
+
+
+def test_a_seam_shows_by_as_many_levels_as_the_pictures_differ() -> None:
+    flat = np.full((120, 200, 3), 0.2, np.float32)
+    first, _ = two_layers()
+    brighter = np.full_like(flat, float(decode(encode(flat, 8)[:1, :1] + np.uint8(5))[0, 0, 0]))
+    whole, side = cut_at(Layer(flat, first.alpha), Layer(brighter, first.alpha), 100)
+    seen = appearance(whole, Layer(flat, first.alpha), Layer(brighter, first.alpha), side, (False, False))
+    assert seen["seam_visibility"] == pytest.approx(5)
+
+
+def test_light_beyond_white_counts_and_pictures_that_do_not_meet_have_no_figures() -> None:
+    first, second = two_layers(shift=6)
+    bright = [Layer(1 + 50 * part.pixels, part.alpha) for part in (first, second)]
+    whole, side = cut_at(*bright, 100)
+    ghost = Layer((bright[0].pixels + bright[1].pixels) / 2, whole.alpha)
+    assert appearance(whole, *bright, side, (True, True))["source_fidelity_mean"] > 0.9
+    assert appearance(ghost, *bright, side, (True, True))["source_fidelity_mean"] < 0.9
+    apart = Layer(second.pixels, np.zeros_like(second.alpha))
+    assert all(math.isnan(value) for value in appearance(whole, first, apart, None, (False, False)).values())

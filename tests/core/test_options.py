@@ -15,6 +15,7 @@ from edf_stitch.core.displacement import FADES
 from edf_stitch.core.errors import BadRequest
 from edf_stitch.core.fields import FIELDS
 from edf_stitch.core.options import LEAST_SCALE, StitchOptions
+from edf_stitch.core.seam import SEAMS
 
 
 def test_the_defaults_are_the_designs() -> None:
@@ -22,7 +23,8 @@ def test_the_defaults_are_the_designs() -> None:
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore_reference": None,
         "ignore_target": None, "projection": "perspective", "level": "auto", "scale": 1.0, "crop": "full",
-        "blend": "feather", "seed": 0, "measure": True, "cache": None,
+        "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "seed": 0, "measure": True,
+        "cache": None,
     }  # fmt: skip
 
 
@@ -33,6 +35,7 @@ def test_nothing_changes_them_afterwards() -> None:
 
 @pytest.mark.parametrize("asked", [
     *({"field": name} for name in FIELDS), *({"fade": name} for name in FADES), *({"blend": name} for name in BLENDS),
+    *({"seam": name} for name in SEAMS), {"mask": Path("m.png")}, {"exposure": False},
     *({"crop": name} for name in CROPS), {"crop": (0, 0, 1, 1)}, {"crop": (3, 4, 500, 600)}, {"scale": 1},
     {"scale": LEAST_SCALE}, {"scale": 0.5}, {"seed": 0}, {"seed": 2**31 - 1}, {"matches": Path("m.csv")},
     {"matches": np.zeros((20, 4))}, {"ignore_reference": Path("a.png")}, {"ignore_target": np.zeros((4, 4), bool)},
@@ -47,7 +50,8 @@ def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
     *(({"field": name}, ("field", repr(name), "choose from: slack, strict, paper"))
       for name in ("", "Slack", "slack ")),
     *(({"fade": name}, ("fade", repr(name), "choose from: plane, infinity")) for name in ("none", "", "Plane")),
-    *(({"blend": name}, ("blend", repr(name), "choose from: feather, linear")) for name in ("multiband", "", "Linear")),
+    *(({"blend": name}, ("blend", repr(name), "choose from: multiband, feather, linear")) for name in ("", "Linear")),
+    *(({"seam": name}, ("seam", repr(name), "choose from: graphcut, none")) for name in ("", "voronoi")),
     *(({"crop": name}, ("crop", repr(name), "choose from: full, inscribed, reference, or X, Y, W, H"))
       for name in ("tight", "", "1,2,3,4", "Full")),
     *(({"scale": scale}, ("scale", "between 0.02 and 1"))

@@ -15,6 +15,7 @@ from edf_stitch.core import outputs
 from edf_stitch.core.colour import encode
 from edf_stitch.core.errors import BadRequest, UnwritableOutput
 from edf_stitch.core.images import load_picture
+from edf_stitch.core.masks import read_painted
 from edf_stitch.core.match_files import read_matches
 from edf_stitch.core.output_files import OutputFiles
 from edf_stitch.core.outputs import OutputRequest, check, json_bytes, npz_bytes, warp_bytes, write
@@ -58,7 +59,7 @@ def raw(path: Path) -> np.ndarray:
 def test_all_files_and_no_others_are_there(written: Path) -> None:
     assert set(everything(written)) == {
         "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-        "layers/target.png", "layers/occluded.png"}
+        "layers/target.png", "layers/occluded.png", "layers/seam.png"}
 
 
 def test_only_the_panorama_where_nothing_else_was_asked_for(small_result: StitchResult, tmp_path: Path) -> None:
@@ -171,6 +172,15 @@ def test_what_the_target_cannot_see_is_white_in_a_mask(small_result: StitchResul
     assert np.array_equal(raw(tmp_path / "layers" / "occluded.png"), np.where(hidden, 255, 0))
 
 
+def test_the_seam_is_a_mask_to_paint_on(small_result: StitchResult, written: Path) -> None:
+    seam, sides = raw(written / "layers" / "seam.png"), small_result.from_target
+    shown = small_result.alpha > 0
+    assert sides is not None and sides.any() and (shown & ~sides).any()
+    assert np.array_equal(seam[..., 3], np.where(shown, 255, 0))
+    painted = read_painted(written / "layers" / "seam.png")
+    assert np.array_equal(painted[shown], np.where(sides, 1, -1)[shown]) and not painted[~shown].any()
+
+
 def as_float(result: StitchResult) -> StitchResult:
     """The same result as if it came from float pictures twice as bright."""
     layers = {
@@ -186,7 +196,8 @@ def test_layers_of_float_pictures_have_exr_beside_them(small_result: StitchResul
     assert write_all(bright, tmp_path, "out.exr") == []
     assert set(everything(tmp_path)) == {
         "out.exr", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-        "layers/reference.exr", "layers/target.png", "layers/target.exr", "layers/occluded.png"}
+        "layers/reference.exr", "layers/target.png", "layers/target.exr", "layers/occluded.png",
+        "layers/seam.png"}
     for name, layer in (("reference", bright.reference_layer), ("target", bright.target_layer)):
         back = load_picture(tmp_path / "layers" / f"{name}.exr")
         assert back.pixels.max() > 1 and back.bits == 32
@@ -235,7 +246,7 @@ def test_an_unknown_kind_of_warp_is_refused_before_the_work(tmp_path: Path, name
 
 @pytest.mark.parametrize("name", [
     "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-    "layers/target.png", "layers/target.exr", "layers/occluded.png",
+    "layers/target.png", "layers/target.exr", "layers/occluded.png", "layers/seam.png",
 ])  # fmt: skip
 def test_what_exists_is_refused_before_the_work_and_not_touched(
     small_result: StitchResult, tmp_path: Path, name: str

@@ -31,6 +31,7 @@ from edf_stitch.core.errors import (
     UnreadableImage,
 )
 from edf_stitch.core.images import encode_picture
+from edf_stitch.core.multiband import bands_for
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.progress import STAGES
 from edf_stitch.core.warp import build_map
@@ -150,11 +151,20 @@ def test_the_panorama_is_made_of_its_pictures(pair: Pair, result: StitchResult) 
     only[y : y + 300, x : x + 400] = True
     assert np.array_equal(result.reference_layer.alpha > 0, only)
     assert np.array_equal(result.alpha > 0, only | (result.target_layer.alpha > 0))
-    only &= result.target_layer.alpha == 0
+    only &= (result.target_layer.alpha == 0) & far_from_seam(result)
     pasted = np.zeros_like(result.pixels)
     pasted[y : y + 300, x : x + 400] = decode(pair.reference)
     assert only.sum() > 10_000 and np.array_equal(result.pixels[only], pasted[only])
     assert result.bits == 8 and set(result.seconds) <= set(STAGES)
+
+
+def far_from_seam(result: StitchResult) -> np.ndarray:
+    """Where no band of the blend reaches."""
+    assert result.from_target is not None
+    reach = 2 * (4 << bands_for(result.alpha)) + 1
+    near = [cv2.dilate(((result.alpha > 0) & side).astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0
+            for side in (result.from_target, ~result.from_target)]  # fmt: skip
+    return ~(near[0] & near[1])
 
 
 # --- every kind of input -------------------------------------------------------------------------------------------
@@ -199,8 +209,8 @@ def test_float_keeps_its_light(small_pair: Pair, known: StitchOptions) -> None:
     assert good(small_pair, result) and result.bits == 32
     x, y = result.warp.canvas.offset
     box = (slice(y, y + 180), slice(x, x + 240))
-    only = (result.target_layer.alpha == 0)[box]
-    assert only.sum() > 3000 and np.array_equal(result.pixels[box][only], light[0][only]), "never clipped"
+    only = ((result.target_layer.alpha == 0) & far_from_seam(result))[box]
+    assert only.sum() > 1000 and np.array_equal(result.pixels[box][only], light[0][only]), "never clipped"
     assert result.pixels.max() > 2 and result.pixels.min() >= 0 and np.isfinite(result.pixels).all()
     assert same(result, stitch(*(one.astype(np.float64) for one in light), known))
 
@@ -223,7 +233,8 @@ def test_transparent_parts_are_neither_matched_nor_shown(small_pair: Pair, known
     assert not inside.any()
     x, y = result.warp.canvas.offset
     box = (slice(y + 45, y + 95), slice(x + 155, x + 205))
-    assert np.array_equal(result.pixels[box], result.target_layer.pixels[box]), "the other picture shows through"
+    gained = result.target_layer.pixels[box] * result.decided.exposure.gain
+    assert np.allclose(result.pixels[box], gained, atol=0.02), "the other picture shows through"
     assert not result.reference_layer.alpha[box].any() and (result.alpha[box] == 1).all()
     seen_through = stitch(small_pair.reference, np.dstack([small_pair.target, np.roll(hole, -40, axis=1)]), known)
     x, y = seen_through.warp.canvas.offset
@@ -420,8 +431,8 @@ def test_pictures_that_cannot_be_read(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("options", [
-    {"field": "REW"}, {"field": ""}, {"fade": "slowly"}, {"scale": 1.5}, {"crop": "tight"}, {"blend": "multiband"},
-    {"blend": "Feather"}, {"seed": -1}, {"seed": 2**31},
+    {"field": "REW"}, {"field": ""}, {"fade": "slowly"}, {"scale": 1.5}, {"crop": "tight"}, {"blend": "average"},
+    {"blend": "Feather"}, {"seam": "straight"}, {"seed": -1}, {"seed": 2**31},
 ])  # fmt: skip
 def test_options_that_are_not_offered(options: dict) -> None:
     with pytest.raises(BadRequest) as refused:
@@ -439,7 +450,7 @@ def test_arrays_that_are_no_pictures(array: np.ndarray, small_pair: Pair) -> Non
 
 
 def test_the_blend_is_the_one_asked_for(small_pair: Pair, small_result: StitchResult, known: StitchOptions) -> None:
-    linear = stitch(small_pair.reference, small_pair.target, replace(known, blend="linear", measure=False))
+    linear = stitch(small_pair.reference, small_pair.target, replace(known, blend="linear", exposure=False))
     assert np.array_equal(linear.warp.map_x, small_result.warp.map_x) and linear.report["options"]["blend"] == "linear"
     both = (linear.reference_layer.alpha > 0) & (linear.target_layer.alpha > 0)
     average = (linear.reference_layer.pixels + linear.target_layer.pixels)[both] / 2

@@ -11,7 +11,7 @@ from edf_stitch.core.progress import STAGES, Progress
 
 def test_the_shares_of_the_stages_make_a_whole() -> None:
     assert sum(STAGES.values()) == pytest.approx(1) and min(STAGES.values()) > 0
-    in_order = ["read", "features", "geometry", "field", "warp", "occlusion", "blend", "write"]
+    in_order = ["read", "features", "geometry", "field", "warp", "occlusion", "exposure", "seam", "blend", "write"]
     assert list(STAGES) == in_order, "the data's order"
 
 

@@ -29,7 +29,8 @@ def report_of(result: StitchResult, measure: bool = True, **changed: Any) -> tup
         Alignment(result.cameras, result.matches, result.two_view, result.field, result.warp, ()), **changed
     )
     return make_report(
-        StitchOptions(measure=measure), (result.reference, result.target), alignment, alignment.warp.canvas
+        StitchOptions(measure=measure), (result.reference, result.target), alignment, alignment.warp.canvas,
+        result.decided, {},
     )
 
 
@@ -79,7 +80,10 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
         assert entry["camera"]["fixed"] and entry["camera"]["focal_px"] == view.K[0, 0]
     assert report["options"] == {
         "field": "slack", "fade": "plane", "projection": "perspective", "level": "auto", "scale": 1.0,
-        "crop": "full", "blend": "feather", "seed": 0}
+        "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": True, "seed": 0}
+    assert report["composition"]["exposure_blocks"] > 100
+    assert report["composition"]["exposure_gain"] == pytest.approx([1, 1, 1], abs=0.01)
+    assert report["composition"]["occluded_px"] == 0
     assert report["warnings"] == list(result.warnings)
 
 
@@ -125,6 +129,7 @@ MEASURED_ALWAYS = {"alignment_median_px", "alignment_p95_px", "off_line_mean_px"
 MEASURED_IF_ASKED = {
     "overlap_px", "overlap_psnr_db", "overlap_ssim", "projectivity_own_px", "projectivity_independent_px",
     "projectivity_points", "held_out_rms_px", "held_out_median_px", "held_out_towards_rms_px",
+    "source_fidelity_mean", "source_fidelity_p5", "seam_visibility",
 }  # fmt: skip
 
 

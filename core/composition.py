@@ -1,0 +1,113 @@
+"""How two layers become a panorama: what the target cannot see, its exposure, the seam, and the blend across it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
+from .exposure import Exposure, match_exposure, pooled, unchanged
+from .occlusion import occluded
+from .options import StitchOptions
+from .overlap import Overlap, overlap_of
+from .seam import find_seam, known_labels, seam_cost
+from .two_view import TwoView
+from .warp import Layer, Warp
+
+# Called with a stage's name and how much of it is done.
+Steps = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Decided:
+    """What was decided before a pixel was mixed; the frames of a clip share it.
+
+    hidden (H, W): what the target cannot see; exposure: the target's; from_target (H, W): which side of the seam a
+    pixel lies on, None without a seam; known, cost, box: what the seam was cut by (see `find_seam`), None without one.
+    """
+
+    hidden: NDArray[np.bool_]
+    exposure: Exposure
+    from_target: NDArray[np.bool_] | None = None
+    known: NDArray[np.int8] | None = None
+    cost: NDArray[np.float32] | None = None
+    box: tuple[slice, slice] | None = None
+
+
+def composed(
+    reference: Layer, target: Layer, warp: Warp, two_view: TwoView, target_size: tuple[int, int],
+    options: StitchOptions, floats: tuple[bool, bool], painted: NDArray[np.int8] | None, steps: Steps,
+    decided: Decided | None = None,
+) -> tuple[Layer, Layer, Decided]:
+    """The panorama, the target's layer as it was exposed for it, and what was decided.
+
+    What neither picture shows, and what only a target that cannot see it would show, is transparent. floats: whether
+    reference and target come from float pictures; painted (H, W): see `masks.read_painted`; decided: from other frames
+    of the same two cameras, kept to.
+    """
+    steps("occlusion", 0.0)
+    hidden = decided.hidden if decided else occluded(warp, two_view, target_size)
+
+    steps("exposure", 0.0)
+    if decided:
+        exposure = decided.exposure
+    elif options.exposure:
+        exposure = match_exposure(reference, target, hidden, floats)
+    else:
+        exposure = unchanged(target.pixels.shape[2])
+    target = exposure.applied(target)
+
+    steps("seam", 0.0)
+    if options.blend == "linear":
+        found = Decided(hidden, exposure)
+        steps("blend", 0.0)
+        return averaged(reference, target), target, found
+    seen = _without_holes(target, hidden, reference)
+    overlap = overlap_of(reference, seen, hidden) if options.has_seam else None
+    found = decided or _with_seam(Decided(hidden, exposure), reference, seen, overlap, warp, options, painted)
+
+    steps("blend", 0.0)
+    if found.from_target is None:
+        return feathered(reference, seen, hidden), target, found
+    # the frames of a clip need not show the same everywhere
+    side = (found.from_target & (seen.alpha > 0)) | (reference.alpha == 0)
+    blended = in_bands if options.blend == "multiband" else feathered_across
+    return blended(reference, seen, side, overlap), target, found
+
+
+def pooled_decision(decisions: Sequence[Decided]) -> Decided:
+    """One decision for several frames of two fixed cameras: the exposure in their middle, the seam that is cheapest
+    over all of them."""
+    first = decisions[0]
+    exposure = pooled([decision.exposure for decision in decisions])
+    if first.known is None or first.box is None:
+        return replace(first, exposure=exposure)
+    costs = [decision.cost for decision in decisions if decision.cost is not None and decision.box == first.box]
+    cost = np.mean(np.stack(costs), axis=0)
+    return replace(first, exposure=exposure, cost=cost, from_target=find_seam(first.known, cost, first.box))
+
+
+def _with_seam(
+    so_far: Decided, reference: Layer, target: Layer, overlap: Overlap | None, warp: Warp,
+    options: StitchOptions, painted: NDArray[np.int8] | None,
+) -> Decided:
+    if not options.has_seam:
+        return so_far
+    known = known_labels(reference, target, so_far.hidden, painted)
+    if overlap is None:
+        return replace(so_far, from_target=known == 1)
+    if options.seam == "none":
+        nearest = distance_labels(reference, target)
+        return replace(so_far, from_target=np.where(known == 0, nearest, known == 1))
+    cost = seam_cost(overlap, warp)
+    from_target = find_seam(known, cost, overlap.box)
+    return replace(so_far, from_target=from_target, known=known, cost=cost, box=overlap.box)
+
+
+def _without_holes(target: Layer, hidden: NDArray[np.bool_], reference: Layer) -> Layer:
+    """The target without what it shows beyond the reference though it cannot see it: a hole, and known to be one."""
+    holes = hidden & (reference.alpha == 0) & (target.alpha > 0)
+    return Layer(target.pixels, np.where(holes, np.float32(0), target.alpha)) if holes.any() else target

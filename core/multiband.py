@@ -1,0 +1,101 @@
+"""Blending across a seam in several bands (Burt and Adelson, ACM TOG 1983): fine detail changes over within a pixel or
+two, broad light over as many as the coarsest band is wide.
+
+What is blended is the *difference* of the two pictures, in tones, where they show the same; elsewhere it is continued
+smoothly from there. So a picture's border, a hole or a thing that only one of them sees leaves no dark fringe and no
+ghost: across it light is evened out and content is cut hard. Beyond the band every pixel stays bit for bit what it was.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+# Tones less than this away from what they were are what they were.
+NOTHING = 1e-5
+# The width of the coarsest band, as a share of the canvas's diagonal.
+WIDTH = 1 / 50
+FEWEST, MOST = 3, 7
+
+
+def bands_for(canvas: NDArray) -> int:
+    """How many bands a canvas (H, W, …) is blended in."""
+    return int(np.clip(np.rint(math.log2(WIDTH * math.hypot(canvas.shape[0], canvas.shape[1]))), FEWEST, MOST))
+
+
+def correction(
+    difference: NDArray[np.float32], same: NDArray[np.bool_], from_target: NDArray[np.bool_],
+    shown: NDArray[np.bool_], bands: int,
+) -> NDArray[np.float32]:
+    """What is to be added to the tones (h, w, C) of pictures cut hard along a seam, so that they blend.
+
+    difference (h, w, C): target's tones less the reference's, where `same`; from_target (h, w): which side of the seam
+    a pixel lies on, where anything is `shown`.
+    """
+    # on the far side of the seam: what the picture of this side would show there, had it the other's light
+    light = filled(difference, same)
+    share = _from_nearest(from_target, shown).astype(np.float32)[..., None]
+    blended = _masked_bands(light, share, bands)
+    blended -= np.where(from_target[..., None], light, np.float32(0))
+    # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
+    whole = np.where(from_target[..., None], -light, light)
+    np.clip(blended, np.minimum(whole, 0), np.maximum(whole, 0), out=blended)
+    blended[np.abs(blended) < NOTHING] = 0
+    return blended
+
+
+def _from_nearest(values: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Values (h, w) where known, elsewhere those of the nearest pixel that is."""
+    if known.all() or not known.any():
+        return values
+    _, nearest = cv2.distanceTransformWithLabels(
+        (~known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    by_label = np.zeros(int(nearest.max()) + 1, bool)
+    by_label[nearest[known]] = values[known]
+    return by_label[nearest]
+
+
+def filled(values: NDArray[np.float32], known: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Values (h, w, C) where known, continued smoothly elsewhere (pull and push: means over ever larger cells fill what
+    smaller ones leave open; Gortler et al., SIGGRAPH 1996, section 3.4)."""
+    weight = known.astype(np.float32)
+    return _filled(values * weight[..., None], weight)
+
+
+def _filled(sums: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
+    whole = np.minimum(weight, 1)
+    own = sums / np.maximum(weight, np.float32(1e-6))[..., None]
+    if min(weight.shape) <= 2 or whole.min() == 1:
+        mean = sums.sum(axis=(0, 1)) / max(float(weight.sum()), 1e-6)
+        return own * whole[..., None] + mean.astype(np.float32) * (1 - whole)[..., None]
+    # weights grow on the way up: a cell with a quarter of it known is known
+    coarser = _filled(4 * _down(sums), 4 * _down(weight[..., None])[..., 0])
+    out = _up(coarser, weight.shape)
+    out *= (1 - whole)[..., None]
+    out += own * whole[..., None]
+    return out
+
+
+def _masked_bands(light: NDArray[np.float32], share: NDArray[np.float32], bands: int) -> NDArray[np.float32]:
+    """The sum of the Laplacian bands of `light`, each weighed by the Gaussian level of `share` that goes with it."""
+    if bands == 0 or min(light.shape[:2]) <= 2:
+        return light * share
+    coarser, smooth = _down(light), _down(share)
+    band = light - _up(coarser, light.shape[:2])
+    band *= share
+    band += _up(_masked_bands(coarser, smooth, bands - 1), light.shape[:2])
+    return band
+
+
+def _down(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    out = cv2.pyrDown(values, borderType=cv2.BORDER_REFLECT_101)
+    return out.reshape(*out.shape[:2], values.shape[2])
+
+
+def _up(values: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    out = cv2.pyrUp(values, dstsize=(shape[1], shape[0]))
+    return out.reshape(shape[0], shape[1], values.shape[2])

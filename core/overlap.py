@@ -1,0 +1,71 @@
+"""Where two layers show something at once, and how they differ there: what seam and blending look at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .tone import to_tones
+from .warp import Layer
+
+WHOLE = 1 - 1 / 255
+# Tones that differ by more than the pictures' general difference and this show different things.
+SAME_TONE, SAME_SIGMAS = 0.06, 4.0
+# Pixels around what the target cannot see in which its edge may still lie.
+EDGE = 3
+SAMPLES = 100_000
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """The part of the canvas in which both layers show something.
+
+    box: rows and columns of the canvas; both (h, w): where both show something; difference (h, w, C) float32: target's
+    tones less the reference's, 0 elsewhere; same (h, w): where they also show the same thing, so that what remains of
+    the difference is light, which may be blended, and not content, which must not.
+    """
+
+    box: tuple[slice, slice]
+    both: NDArray[np.bool_]
+    difference: NDArray[np.float32]
+    same: NDArray[np.bool_]
+
+
+def overlap_of(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Overlap | None:
+    """The overlap of two layers on one canvas; None where they do not meet. hidden (H, W): what the target cannot
+    see."""
+    both = (reference.alpha > 0) & (target.alpha > 0)
+    box = bounds(both)
+    if box is None:
+        return None
+    both = both[box]
+    difference = to_tones(target.pixels[box])
+    difference -= to_tones(reference.pixels[box])
+    difference *= both[..., None]
+    edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) > 0
+    same = both & ~edge
+    return Overlap(box, both, difference, same & _alike(difference, same))
+
+
+def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where the difference is about what it is in general."""
+    sample = difference[shown]
+    if not len(sample):
+        return shown
+    sample = sample[:: max(1, len(sample) // SAMPLES)]
+    middle = np.median(sample, axis=0)
+    sigma = 1.4826 * np.median(np.abs(sample - middle), axis=0)
+    # a little blurred: noise is no content
+    away = np.abs(cv2.blur(difference, (3, 3)).reshape(difference.shape) - middle)
+    return (away <= np.maximum(SAME_SIGMAS * sigma, SAME_TONE)).all(axis=2)
+
+
+def bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice] | None:
+    """Rows and columns of the smallest box that holds all of a mask (H, W); None where it is empty."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return None
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

@@ -1,0 +1,143 @@
+"""Which picture each pixel comes from: a minimal cut through the overlap, coarse first, then finer and finer in a band.
+
+The cut goes where the two pictures look alike, in tones and in their gradients, and keeps away from edges of depth,
+from what the target cannot see and from where the warp is uncertain. Its cost is bounded: the coarse cut has so many
+cells at any picture size, and each finer one only looks at a narrow band around what is there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
+from .overlap import WHOLE, Overlap
+from .warp import Layer, Warp
+
+SEAMS = ("graphcut", "none")
+# Cells of the coarse cut, and pixels of a band, at most.
+COARSE, BANDED = 12_000, 80_000
+# Half the width of the band, in pixels of its level.
+BAND = 3
+# Price (of 1, for opposite tones) of a step in depth by a pixel of parallax, of no confidence, and of length alone.
+DEPTH, DOUBT, LENGTH = 0.1, 0.1, 0.004
+# Price of each pixel of the target where both could be shown: the reference is exact, the target is warped.
+BIAS = 2e-5
+
+
+def known_labels(
+    reference: Layer, target: Layer, hidden: NDArray[np.bool_], painted: NDArray[np.int8] | None = None
+) -> NDArray[np.int8]:
+    """What is settled before any seam (H, W): FIRST from the reference, SECOND from the target, FREE, NOWHERE.
+
+    What only one shows whole comes from it, what the target cannot see from the reference where that shows something.
+    painted (H, W): -1 and 1 where the artist has decided, 0 elsewhere; it wins wherever the picture shows something.
+    """
+    shows, shows_too = reference.alpha > 0, target.alpha > 0
+    known = np.full(shows.shape, NOWHERE, np.int8)
+    known[shows & shows_too] = FREE
+    # a soft edge of one gives way to what the other shows whole
+    whole, whole_too = reference.alpha >= WHOLE, target.alpha >= WHOLE
+    known[shows & (~shows_too | hidden | (whole & ~whole_too))] = FIRST
+    known[shows_too & (~shows | (whole_too & ~whole & ~hidden))] = SECOND
+    if painted is not None:
+        known[(painted < 0) & shows] = FIRST
+        known[(painted > 0) & shows_too] = SECOND
+    return known
+
+
+def seam_cost(overlap: Overlap, warp: Warp) -> NDArray[np.float32]:
+    """What a seam costs at each pixel of the overlap's box (h, w), in [0, 1]."""
+    cost = np.abs(overlap.difference).mean(axis=2)
+    for axis in (0, 1):
+        step = np.abs(np.diff(overlap.difference, axis=axis)).mean(axis=2)
+        cost += np.maximum(_padded(step, axis, 0, 1), _padded(step, axis, 1, 0))
+        cost += np.float32(DEPTH) * np.minimum(_jumps(warp, overlap.box, axis), np.float32(1))
+    confidence = getattr(warp, "confidence", None)
+    if confidence is not None:
+        cost += np.float32(DOUBT) * (1 - confidence[overlap.box])
+    cost += np.float32(LENGTH)
+    return np.minimum(cost, np.float32(1), out=cost)
+
+
+def _jumps(warp: Warp, box: tuple[slice, slice], axis: int) -> NDArray[np.float32]:
+    """By how many px the map's step to the next pixel differs from the step before: at edges of depth."""
+    bends = [np.diff(values[box], n=2, axis=axis) for values in (warp.map_x, warp.map_y)]
+    return _padded(np.nan_to_num(np.hypot(*bends), nan=0.0), axis, 1, 1)
+
+
+def _padded(values: NDArray[np.float32], axis: int, before: int, after: int) -> NDArray[np.float32]:
+    return np.pad(values, [(before, after) if k == axis else (0, 0) for k in range(2)])
+
+
+def find_seam(known: NDArray[np.int8], cost: NDArray[np.float32], box: tuple[slice, slice]) -> NDArray[np.bool_]:
+    """Where (H, W) the panorama comes from the target, by the cheapest seam.
+
+    known (H, W): see `known_labels`; cost (h, w) in the overlap's box of rows and columns.
+    """
+    out = known == SECOND
+    free = int((known == FREE).sum())
+    if not free:
+        return out
+    # around the box as far as a coarse cell: what lies there on either side is what the cut holds on to
+    reach = 2 << max(0, math.ceil(math.log(free / COARSE, 4)))
+    around = [
+        slice(max(0, part.start - reach), min(side, part.stop + reach))
+        for part, side in zip(box, known.shape, strict=True)
+    ]
+    margins = [(part.start - far.start, far.stop - part.stop) for part, far in zip(box, around, strict=True)]
+    here = around[0], around[1]
+    out[here] = _cut(known[here], np.pad(cost, margins), 1)
+    return out
+
+
+def _cut(known: NDArray[np.int8], cost: NDArray[np.float32], scale: int) -> NDArray[np.bool_]:
+    """The cut at one level, from that at half the size where this one is too large to be cut at once."""
+    free = known == FREE
+    if free.sum() <= COARSE:
+        return min_cut(_continued(cost, free), known, BIAS * scale)
+    coarse = _cut(_halved_labels(known), _halved(cost, free), 2 * scale)
+    labels = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[: known.shape[0], : known.shape[1]]
+    labels = np.where(known == FREE, labels, known == SECOND)
+    for reach in (BAND, 1):
+        settled = np.where(_near_border(labels, known != NOWHERE, reach), known, np.where(labels, SECOND, FIRST))
+        settled[known == NOWHERE] = NOWHERE
+        if (settled == FREE).sum() <= BANDED:
+            return min_cut(_continued(cost, free), settled.astype(np.int8), BIAS * scale)
+    return labels
+
+
+def _near_border(labels: NDArray[np.bool_], there: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Where a pixel of the other label lies within `reach` px."""
+    size = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+    near = [cv2.dilate((side & there).astype(np.uint8), size) for side in (labels, ~labels)]
+    return (near[0] & near[1]) > 0
+
+
+def _continued(cost: NDArray[np.float32], free: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Beside what is free a seam costs what it does just inside: else it would run along every border."""
+    beside = cv2.dilate(np.where(free, cost, np.float32(0)), np.ones((3, 3), np.uint8))
+    return np.where(free, cost, beside)
+
+
+def _halved(cost: NDArray[np.float32], free: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Means over cells of 2×2, of what is free in them."""
+    sums, counts = (_cell_sums(values) for values in (np.where(free, cost, np.float32(0)), free.astype(np.float32)))
+    return sums / np.maximum(counts, np.float32(1))
+
+
+def _cell_sums(values: NDArray) -> NDArray:
+    even = np.pad(values, [(0, side % 2) for side in values.shape])
+    return even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2]
+
+
+def _halved_labels(known: NDArray[np.int8]) -> NDArray[np.int8]:
+    """A cell is settled where more than half of it is, and nowhere where all of it is."""
+    states = (known == FIRST, known == SECOND, known != NOWHERE)
+    first, second, there = (_cell_sums(state.astype(np.int8)) for state in states)
+    out = np.zeros(first.shape, np.int8)
+    out[2 * first > there], out[2 * second > there], out[there == 0] = FIRST, SECOND, NOWHERE
+    return out

@@ -1,0 +1,119 @@
+"""From two layers to a panorama: what is decided, in which order, and what frames of a clip share."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.composition import Decided, composed, pooled_decision
+from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.warp import Layer
+
+from .test_occlusion import OFFSET, SHAPE, SIDEWAYS, TARGET, points
+
+FLOATS = (False, False)
+
+
+def pictures(gain: float = 1.0) -> tuple[Layer, Layer, Any]:
+    """What the canvas shows of cards before a wall, pasted and fetched by the true warp."""
+    warp, hidden = SIDEWAYS.truth()
+    rough = cv2.resize(np.random.default_rng(0).random((60, 90, 3)), SHAPE[::-1], interpolation=cv2.INTER_CUBIC)
+    light = (0.1 + 0.4 * np.clip(rough, 0, 1)).astype(np.float32)
+    near = warp.inverse_depth > 0.11
+    light[near] = light[near] * [0.2, 0.9, 0.3]
+    x, y = np.moveaxis(points(), -1, 0)
+    inside = ((x >= 0) & (y >= 0) & (x < TARGET[0]) & (y < TARGET[1])).astype(np.float32)
+    seen = light.copy()
+    seen[hidden] = [0.05, 0.4, 0.1]  # of what hides it
+    alpha = warp.inside(TARGET).astype(np.float32)
+    return Layer(light * inside[..., None], inside), Layer(seen * alpha[..., None] / np.float32(gain), alpha), warp
+
+
+def compose(first: Layer, second: Layer, warp: Any, decided: Decided | None = None, said: list | None = None,
+            painted: np.ndarray | None = None, **options: Any) -> tuple[Layer, Layer, Decided]:
+    steps = (lambda *step: None) if said is None else (lambda stage, share: said.append(stage))
+    return composed(first, second, SimpleNamespace(**vars(warp), confidence=None, inside=warp.inside), SIDEWAYS.view,
+                    TARGET, StitchOptions(**options), FLOATS, painted, steps, decided)  # fmt: skip
+
+
+@pytest.mark.parametrize("options", [{}, {"blend": "feather"}, {"blend": "feather", "seam": "none"}, {"seam": "none"}])
+def test_what_the_target_cannot_see_never_comes_from_it(options: dict) -> None:
+    first, second, warp = pictures()
+    first.alpha[80:120] = 0
+    out, _, found = compose(first, second, warp, **options)
+    ours = found.hidden & (first.alpha > 0)
+    assert ours.sum() > 300
+    assert np.abs(out.pixels - first.pixels)[ours].max() < 0.05 < np.abs(second.pixels - first.pixels)[ours].mean()
+    holes = found.hidden & (first.alpha == 0)
+    assert holes.any() and not out.alpha[holes].any(), "nobody sees it: transparent, not filled"
+
+
+def test_an_average_hides_nothing() -> None:
+    first, second, warp = pictures()
+    out, _, found = compose(first, second, warp, blend="linear")
+    both = (first.alpha > 0) & (second.alpha > 0)
+    exposed = found.exposure.applied(second)
+    assert np.allclose(out.pixels[both], (first.pixels[both] + exposed.pixels[both]) / 2, atol=1e-6)
+    assert found.from_target is None
+
+
+def test_exposure_is_evened_out_unless_it_is_to_stay() -> None:
+    first, second, warp = pictures(gain=1.4)
+    out, exposed, found = compose(first, second, warp)
+    assert np.allclose(found.exposure.gain, 1.4, rtol=0.01)
+    alone = (second.alpha > 0) & (first.alpha == 0) & (out.alpha > 0)
+    assert np.allclose(out.pixels[alone], 1.4 * second.pixels[alone], rtol=0.05)
+    _, kept, found = compose(first, second, warp, exposure=False)
+    assert kept is second and found.exposure.blocks == 0
+
+
+def test_the_stages_come_in_the_order_of_the_data() -> None:
+    said: list[str] = []
+    compose(*pictures(), said=said)
+    assert said == ["occlusion", "exposure", "seam", "blend"]
+
+
+def test_paint_decides() -> None:
+    first, second, warp = pictures()
+    painted = np.zeros(SHAPE, np.int8)
+    painted[60:120, 120:200] = 1
+    _, _, found = compose(first, second, warp, painted=painted)
+    assert found.from_target is not None
+    assert found.from_target[(painted > 0) & (second.alpha > 0)].all()
+
+
+def test_frames_keep_to_what_was_decided_for_the_clip() -> None:
+    first, second, warp = pictures()
+    *_, found = compose(first, second, warp)
+    dim = Layer(second.pixels / 2, second.alpha.copy())
+    dim.alpha[:, -40:] = 0
+    out, exposed, kept = compose(first, dim, warp, decided=found)
+    assert kept is found and np.allclose(exposed.pixels, dim.pixels * found.exposure.gain)
+    assert not out.alpha[(dim.alpha == 0) & (first.alpha == 0)].any()
+    again, _, _ = compose(first, second, warp, decided=found)
+    fresh, _, _ = compose(first, second, warp)
+    assert np.array_equal(again.pixels, fresh.pixels)
+
+
+def test_a_clips_seam_is_cheap_over_all_its_frames() -> None:
+    """Each frame has something else in the way; the common seam avoids all of it."""
+    first, second, warp = pictures()
+    decisions = []
+    for top in (40, 90, 140):
+        walker = first.pixels.copy()
+        walker[top : top + 40, 230:300] = 0.9
+        decisions.append(compose(Layer(walker, first.alpha), second, warp)[2])
+    shared = pooled_decision(decisions)
+    assert shared.from_target is not None and shared.cost is not None
+    assert np.allclose(shared.cost, np.mean([d.cost for d in decisions], axis=0))
+    assert shared.exposure.gain == pytest.approx(np.median([d.exposure.gain for d in decisions], axis=0))
+    none = pooled_decision([replace(d, known=None, cost=None, box=None, from_target=None) for d in decisions])
+    assert none.from_target is None
+
+
+def test_offsets_are_those_of_the_tests_world() -> None:
+    assert pictures()[0].alpha[OFFSET[1], OFFSET[0]] == 1
