@@ -51,6 +51,7 @@ LEVELS = (
     ("ANGLES", "Angles", "Yaw, pitch and roll of the reference in the panorama"),
 )
 BLENDS = (
+    ("MULTIBAND", "Multi-band", "Along a seam: light is evened out across it, detail is cut"),
     ("FEATHER", "Feather", "A soft change from one picture to the other, across the whole overlap"),
     ("LINEAR", "Average", "The plain average of both: doubled edges show where they do not fit"),
 )
