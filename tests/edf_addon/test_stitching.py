@@ -137,7 +137,7 @@ def test_a_pair_of_float_images_gives_a_float_panorama(chosen, folder, pixels_of
     for side in ("reference", "target"):
         light = picture_files.read(folder / f"{side}.png").pixels * 4
         setattr(settings, side, bpy.data.images.load(picture_files.write(tmp_path / f"{side}.exr", light)))
-    settings.crop, settings.take_masks = "REFERENCE", True
+    settings.crop, settings.blend, settings.take_masks = "REFERENCE", "FEATHER", True
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     panorama = settings.result
     assert panorama.is_float and panorama.colorspace_settings.name == "Linear Rec.709"
