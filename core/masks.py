@@ -115,8 +115,8 @@ def _stretched(mask: NDArray, size: tuple[int, int], label: str, what: str = "th
     (w, h), (small_w, small_h) = sorted([(own_width, own_height), size], reverse=True, key=lambda s: s[0] * s[1])
     if max((small_w - 1) / w, (small_h - 1) / h) > min((small_w + 1) / w, (small_h + 1) / h):
         raise BadRequest(
-            f"{label} has {own_width}×{own_height} pixels, {what} has {width}×{height}: a mask needs the same size, or "
-            "the same shape at another size, upright"
+            f"{label} has {own_width}×{own_height} pixels, {what} has {width}×{height}: a mask needs "
+            f"{what}'s size, or its shape at another size, upright"
         )
     rows = (2 * np.arange(height) + 1) * own_height // (2 * height)
     columns = (2 * np.arange(width) + 1) * own_width // (2 * width)
