@@ -137,8 +137,11 @@ def _save_render(image: bpy.types.Image, path: Path, scene: bpy.types.Scene) -> 
 
 def bring(path: Path, name: str, pack: bool, fake_user: bool) -> bpy.types.Image:
     """A picture that the worker made as a new image: packed, or in memory only, so that Blender asks before it is
-    lost."""
+    lost. Raises Unusable where it cannot be read."""
     image = bpy.data.images.load(str(path))
+    if not all(image.size):  # Blender loads damaged files without a word
+        bpy.data.images.remove(image)
+        raise Unusable(f"the picture {path.name} that the worker made cannot be read; is the disk full?")
     if path.suffix == ".exr":
         compat.set_colour_space(image, compat.LINEAR)
     if pack:

@@ -116,12 +116,14 @@ class LongWork:
         if is_working():
             self.report({"ERROR"}, "EDF Stitch is still at work: wait for it, or cancel it.")  # type: ignore[attr-defined]
             return False
-        folder = job.new_folder(bpy.app.tempdir)
+        folder = None
         try:
+            folder = job.new_folder(bpy.app.tempdir)
             request = self.prepare(context, folder)
             self._job = _current = job.start(request, folder)
         except Exception as error:
-            job.remove(folder)
+            if folder is not None:
+                job.remove(folder)
             return self._refuse(_in_words(error))
         status.begin()
         return True

@@ -84,26 +84,15 @@ def match_rows(settings: Any) -> np.ndarray:
 def take_over(
     context: bpy.types.Context, folder: Path, found: dict[str, Any], memory: dict[str, Any], kind: str
 ) -> str:
-    """Makes the panorama an image of the file, with all that belongs to it. kind: "panorama" or "preview" (which takes
-    the place of the last one). Returns words about it."""
-    name = f"{PurePath(memory['pictures']['reference']).stem} {kind}"
-    before = _moved_aside(name) if kind == "preview" else None
-    pack, fake_user = memory["pack"], memory["fake_user"] and kind != "preview"
-    image = images.bring(folder / found["files"]["panorama"], name, pack, fake_user)
-    if not image.is_float or memory["space"] == compat.DATA:
-        compat.set_colour_space(image, memory["space"])
-    for what, file in found["files"].items():
-        if what != "panorama":
-            hidden = what in HIDDEN
-            other = images.bring(folder / file, f"{'.' * hidden}{image.name} {what}", pack, fake_user and not hidden)
-            if what in VALUES:
-                compat.set_colour_space(other, compat.DATA)
-            result.attach(image, what, other)
-    kept = {key: value for key, value in found.items() if key != "files"}
-    result.store(image, {**kept, "kind": kind, "settings": memory["settings"], "pictures": memory["pictures"]})
-    if before is not None:
-        before.user_remap(image)
-        bpy.data.images.remove(before)
+    """Makes the panorama an image of the file, with all that belongs to it, or leaves the file as it was. kind:
+    "panorama" or "preview" (which takes the place of the last one). Returns words about it."""
+    made: list[bpy.types.Image] = []
+    try:
+        image = _bring_all(folder, found, memory, kind, made)
+    except Exception:
+        for one in made:
+            bpy.data.images.remove(one)
+        raise
     scene = compat.scene_by_uid(memory["scene"])
     if scene is not None:
         settings = properties.settings_of(scene)
@@ -113,34 +102,74 @@ def take_over(
     return _in_words(image, found)
 
 
-def _moved_aside(name: str) -> bpy.types.Image | None:
-    """The last preview, its name free for the next one; what belonged to it goes."""
-    before = bpy.data.images.get(name)
-    if before is None or result.read(before) is None:
-        return None
-    for other in result.companions(before).values():
-        bpy.data.images.remove(other)
-    before.name = f"{name} before"
-    return before
+def _bring_all(
+    folder: Path, found: dict[str, Any], memory: dict[str, Any], kind: str, made: list[bpy.types.Image]
+) -> bpy.types.Image:
+    """The panorama, holding everything that belongs to it; `made` gets each image as soon as it is there."""
+    name = f"{PurePath(memory['pictures']['reference']).stem} {kind}"
+    last = bpy.data.images.get(name) if kind == "preview" else None
+    if last is not None and result.read(last) is None:
+        last = None  # somebody else's
+    pack, fake_user = memory["pack"], memory["fake_user"] and kind != "preview"
+
+    def bring(what: str, called: str, keep: bool, space: str | None) -> bpy.types.Image:
+        one = images.bring(folder / found["files"][what], called, pack, keep)
+        made.append(one)
+        if space is not None:
+            compat.set_colour_space(one, space)
+        return one
+
+    panorama = bring("panorama", name, fake_user, None)
+    if not panorama.is_float or memory["space"] == compat.DATA:
+        compat.set_colour_space(panorama, memory["space"])
+    others = {
+        what: bring(
+            what, f"{'.' * (what in HIDDEN)}{panorama.name} {what}", fake_user and what not in HIDDEN,
+            compat.DATA if what in VALUES else None,
+        )
+        for what in found["files"] if what != "panorama"
+    }  # fmt: skip
+    for what, one in others.items():
+        result.attach(panorama, what, one)
+    kept = {key: value for key, value in found.items() if key != "files"}
+    result.store(panorama, {**kept, "kind": kind, "settings": memory["settings"], "pictures": memory["pictures"]})
+    if last is not None:
+        _replace(last, panorama, others, name)
+    return panorama
+
+
+def _replace(
+    last: bpy.types.Image, panorama: bpy.types.Image, others: dict[str, bpy.types.Image], name: str
+) -> None:
+    """Puts a new preview where the last one was shown, under its name."""
+    for one in result.companions(last).values():
+        bpy.data.images.remove(one)
+    last.user_remap(panorama)
+    bpy.data.images.remove(last)
+    panorama.name = name
+    for what, one in others.items():
+        one.name = f"{'.' * (what in HIDDEN)}{name} {what}"
 
 
 def fill_matches(settings: Any, matches: dict[str, Any], edited: bool) -> None:
-    """The list shows what the stitch knows of each match. Edited ones stay as they are (all, if they were changed
-    meanwhile); new ones that the stitch left out are switched off, so that stitching with the list does the same."""
-    states, errors = matches["states"], matches["errors"]
+    """The list shows what the stitch knows of each match. Edited ones stay as they are, and those that were moved
+    meanwhile unmeasured; new ones that the stitch left out are switched off, so that stitching with the list does the
+    same."""
+    rows, states, errors = matches["rows"], matches["states"], matches["errors"]
     if edited:
-        if len(states) != len(settings.matches):
+        if len(rows) != len(settings.matches):
             return
     else:
         settings.matches.clear()
-        for (x, y, x2, y2), weight, state in zip(matches["rows"], matches["weights"], states, strict=True):
+        for (x, y, x2, y2), weight, state in zip(rows, matches["weights"], states, strict=True):
             match = settings.matches.add()
             match.x, match.y, match.x2, match.y2 = x, y, x2, y2
             match.weight, match.enabled = weight or 1.0, state == "USED"
         settings.match_index = -1
-    for match, error, state in zip(settings.matches, errors, states, strict=True):
-        match.error = -1.0 if error is None else error
-        match.state = state
+    for match, row, error, state in zip(settings.matches, rows, errors, states, strict=True):
+        if max(abs(match.x - row[0]), abs(match.y - row[1]), abs(match.x2 - row[2]), abs(match.y2 - row[3])) < 0.01:
+            match.error = -1.0 if error is None else error
+            match.state = state
 
 
 def show(context: bpy.types.Context, image: bpy.types.Image) -> None:

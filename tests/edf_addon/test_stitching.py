@@ -14,7 +14,17 @@ from edf_stitch.synthetic_scenes.two_planes import Pair
 
 bpy = pytest.importorskip("bpy")
 
-from edf_stitch.edf_addon import command, job, modal, operators, properties, result, status  # noqa: E402
+from edf_stitch.edf_addon import (  # noqa: E402
+    command,
+    images,
+    job,
+    modal,
+    operators,
+    properties,
+    result,
+    status,
+    stitching,
+)
 
 from . import picture_files  # noqa: E402
 
@@ -213,6 +223,35 @@ def test_cancel_at_every_stage_leaves_nothing(chosen, monkeypatch, stage):
     assert working.said == [("INFO", "Cancelled. Nothing was changed.")]
     assert working._job._process.returncode in (130, -signal.SIGINT), "it ended by itself"
     assert names() == before and not modal.is_working() and not status.now.running
+
+
+def test_a_result_that_cannot_be_taken_over_leaves_the_file_as_it_was(working, monkeypatch):
+    """The last of its pictures is damaged: nothing of the others stays either."""
+    before = names()
+    bring = images.bring
+
+    def damaged(path, name, pack, fake_user):
+        if path.stem == "difference":
+            path.write_bytes(b"no picture")
+        return bring(path, name, pack, fake_user)
+
+    monkeypatch.setattr(images, "bring", damaged)
+    assert working.until(lambda: False) == {"CANCELLED"}
+    assert working.said[0][0] == "ERROR" and "cannot be taken over" in working.said[0][1]
+    assert names() == before and bpy.context.scene.edf_stitch.result is None and status.now.failed
+
+
+def test_a_match_that_was_moved_meanwhile_stays_unmeasured(blender):
+    for _ in range(2):
+        match = blender.settings.matches.add()
+        match.x = 5
+    found = {"rows": [[5, 0, 0, 0]] * 2, "errors": [0.5, 0.5], "states": ["USED"] * 2, "weights": [1, 1]}
+    blender.settings.matches[1].x = 6
+    stitching.fill_matches(blender.settings, found, edited=True)
+    assert [match.error for match in blender.settings.matches] == [0.5, -1]
+    blender.settings.matches.add()
+    stitching.fill_matches(blender.settings, {**found, "errors": [3, 3]}, edited=True)
+    assert blender.settings.matches[0].error == 0.5, "the list is another one by now"
 
 
 def test_escape_cancels_and_other_keys_reach_blender(working):

@@ -122,6 +122,41 @@ def test_switching_off_and_on_again(home):
     assert "warning" not in (done.stdout + done.stderr).lower()
 
 
+ARTIST = """
+import bpy
+from pathlib import Path
+left, right, folder = map(Path, {paths!r})
+bpy.ops.edf.open_pair(directory=str(left.parent), files=[{{"name": left.name}}, {{"name": right.name}}])
+assert bpy.ops.edf.stitch() == {{"FINISHED"}}
+for kind in ("exr", "png"):
+    assert bpy.ops.edf.save(filepath=str(folder / f"panorama.{{kind}}")) == {{"FINISHED"}}
+bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+"""
+AGAIN = """
+import bpy
+panorama = bpy.context.scene.edf_stitch.result
+assert panorama.size[0] > 480 and panorama.packed_file, panorama
+assert bpy.ops.edf.restitch() == {"FINISHED"}
+assert bpy.context.scene.edf_stitch.result != panorama
+"""
+
+
+def test_an_artists_way_from_two_photographs_to_a_file_and_again_tomorrow(home, pair, tmp_path):
+    from edf_stitch.core.images import load_picture
+
+    code = ARTIST.format(paths=[*map(str, pair), str(tmp_path)])
+    done = home.run("--python-exit-code", "9", "--python-expr", code)
+    assert done.returncode == 0, done.stdout + done.stderr
+    light, shown = (load_picture(tmp_path / f"panorama.{kind}") for kind in ("exr", "png"))
+    assert np.abs(light.pixels - shown.pixels).max() < 1e-4
+    # the left of the reference, which the target does not see, is there as it was, the right way up
+    patch = load_picture(pair[0]).view[100:260, 10:60]
+    found = cv2.matchTemplate(shown.view, patch, cv2.TM_SQDIFF)
+    assert found.min() == 0 and shown.view.shape[1] > 480
+    done = home.run(tmp_path / "scene.blend", "--python-exit-code", "9", "--python-expr", AGAIN)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_the_add_ons_own_tests_inside_this_blender(home, python, tmp_path):
     """The same tests as those of bpy as a module, against what was installed."""
     tools = tmp_path / "tools"
