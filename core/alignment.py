@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from . import features
 from .cache import Cache
 from .camera import Camera, cameras_for
-from .displacement import Field
+from .dense import Dense, refine
+from .displacement import Field, StrictField
 from .errors import BadRequest, NoOverlap, TooFewMatches
 from .features import Matches
 from .fields import fit_field
@@ -27,6 +28,7 @@ from .masks import read_mask, read_painted, without
 from .match_files import read_matches
 from .options import StitchOptions
 from .projection import Projection, round_projection
+from .slack import SlackField
 from .two_view import MIN_MATCHES, TwoView, estimate
 from .warp import Warp, build_warp
 
@@ -41,7 +43,7 @@ class Alignment:
     """Where every canvas pixel is seen in the target, and why.
 
     cameras: as known before; matches: all found or given, in px of the (raw) pictures; two_view: the geometry, its
-    inliers among them; field; warp; warnings in plain words.
+    inliers among them; field; dense: its refinement, None where none was asked for; warp; warnings in plain words.
     """
 
     cameras: tuple[Camera, Camera]
@@ -50,6 +52,7 @@ class Alignment:
     field: Field
     warp: Warp
     warnings: tuple[str, ...]
+    dense: Dense | None = None
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,7 @@ def align(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> Alig
 
     Raises StitchError and its kinds.
     """
-    return lay(register(frames, options, steps), options, steps)
+    return lay(register(frames, options, steps), frames, options, steps)
 
 
 def register(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> Registration:
@@ -123,17 +126,36 @@ def register(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> R
     return Registration(cameras, matches, ideal, two_view, (*warnings, *two_view.warnings))
 
 
-def lay(registration: Registration, options: StitchOptions, steps: Steps) -> Alignment:
-    """Field and map of a pair whose geometry is known. Raises StitchError and its kinds."""
+def lay(
+    registration: Registration, frames: Sequence[Frame], options: StitchOptions, steps: Steps
+) -> Alignment:
+    """Field and map of the frames whose geometry is known. Raises StitchError and its kinds."""
     cameras, two_view = registration.cameras, registration.two_view
     steps("field", 0.0)
     inliers, sizes = registration.ideal.subset(two_view.inliers), (cameras[0].size, cameras[1].size)
     decided = (options.field, options.fade, two_view, inliers, *sizes, options.seed)
     field = Cache(options.cache).remember("field", decided, lambda: fit_field(*decided))
 
+    dense = None
+    if options.dense:
+        steps("dense", 0.0)
+        dense = _refined(field, field.two_view, inliers, frames, cameras)
+
     steps("warp", 0.0)
-    warp = build_warp(field, field.two_view, *cameras, _projection(options, field.two_view))
-    return Alignment(cameras, registration.matches, field.two_view, field, warp, registration.warnings)
+    relief = None if dense is None else dense.relief
+    warp = build_warp(field, field.two_view, *cameras, _projection(options, field.two_view), relief)
+    return Alignment(cameras, registration.matches, field.two_view, field, warp, registration.warnings, dense)
+
+
+def _refined(
+    field: Field, two_view: TwoView, inliers: Matches, frames: Sequence[Frame], cameras: tuple[Camera, Camera]
+) -> Dense:
+    """The field's dense refinement, or why there is none."""
+    if len(frames) > 1:
+        return Dense(None, "one smooth field serves all frames of a clip, so that nothing swims")
+    if not isinstance(field, (StrictField, SlackField)):
+        return Dense(None, f"the field {field.name!r} is shown as it is")
+    return refine(field, two_view, inliers, (frames[0].reference, frames[0].target), cameras)
 
 
 def size_of(picture: Picture) -> tuple[int, int]:

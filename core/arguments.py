@@ -7,12 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import BadRequest
-
 if TYPE_CHECKING:
     from .options import StitchOptions
 
-# What DESIGN names and what is not there yet is refused by name, so that nobody takes silence for success.
 FADE_CHOICES = ("plane", "infinity")
 FIELD_CHOICES = ("slack", "strict", "paper", "rew", "apap", "homography")
 PROJECTION_CHOICES = ("perspective", "cylindrical", "equirectangular")
@@ -69,7 +66,7 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         how.add_argument(
             "--field",
             default="slack",
-            type=_choice(FIELD_CHOICES, ()),
+            type=_choice(FIELD_CHOICES),
             metavar="FIELD",
             help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), "
             "paper, or one that knows no depth: rew, apap, homography",
@@ -77,7 +74,7 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
     how.add_argument(
         "--fade",
         default="plane",
-        type=_choice(FADE_CHOICES, ()),
+        type=_choice(FADE_CHOICES),
         metavar="FADE",
         help="what it fades to outside the overlap: plane (default: the scene's mean plane) or infinity",
     )
@@ -85,12 +82,12 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         "--dense",
         action=argparse.BooleanOptionalAction,
         default=False,
-        help="dense refinement in the overlap (yet to come)",
+        help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
     )
     how.add_argument(
         "--projection",
         default="perspective",
-        type=_choice(PROJECTION_CHOICES, ()),
+        type=_choice(PROJECTION_CHOICES),
         metavar="PROJECTION",
         help="perspective (default: REF keeps every pixel), cylindrical, or equirectangular (the whole sphere)",
     )
@@ -104,12 +101,12 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
     how.add_argument(
         "--blend",
         default="multiband",
-        type=_choice(BLEND_CHOICES, ()),
+        type=_choice(BLEND_CHOICES),
         metavar="BLEND",
         help="multiband (default: light evened out across the seam, detail cut), feather, or linear (plain average)",
     )
     how.add_argument(
-        "--seam", default="graphcut", type=_choice(SEAM_CHOICES, ()), metavar="SEAM",
+        "--seam", default="graphcut", type=_choice(SEAM_CHOICES), metavar="SEAM",
         help="graphcut (default: where the pictures look most alike) or none (midway between their borders)",
     )  # fmt: skip
     how.add_argument(
@@ -129,8 +126,6 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
 
 def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
     """What the parsed arguments ask for. Raises BadRequest."""
-    if args.dense:
-        raise BadRequest("--dense is yet to come")
     from .cache import default_folder
     from .camera import CameraRequest
     from .crop import parse_crop
@@ -150,6 +145,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         level=parse_level(args.level),
         scale=args.scale,
         crop=parse_crop(args.crop),
+        dense=args.dense,
         blend=args.blend,
         seam=args.seam,
         mask=args.mask,
@@ -167,10 +163,8 @@ def _numbers(text: str) -> tuple[float, ...]:
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 1200 or 1200,1180") from None
 
 
-def _choice(known: tuple[str, ...], to_come: tuple[str, ...]) -> Callable[[str], str]:
+def _choice(known: tuple[str, ...]) -> Callable[[str], str]:
     def parse(text: str) -> str:
-        if text in to_come:
-            raise argparse.ArgumentTypeError(f"{text!r} is yet to come; for now: {', '.join(known)}")
         if text not in known:
             raise argparse.ArgumentTypeError(f"{text!r} is not known; choose from: {', '.join(known)}")
         return text

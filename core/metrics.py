@@ -23,6 +23,8 @@ from .warp import Layer, Warp, fetch
 SSIM_C1, SSIM_C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
 # A field is smooth: about this many canvas pixels, evenly spread, say how far a map leaves the epipolar lines.
 SAMPLES = 20_000
+# What is occluded is known to 3 px.
+RIM = np.ones((7, 7), np.uint8)
 
 
 def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
@@ -177,13 +179,19 @@ def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
     return np.column_stack(out)
 
 
-def folds(warp: Warp, target_size: tuple[int, int]) -> float:
-    """Share of the pixels that show the target where the map turns over (its Jacobian changes sign)."""
+def folds(warp: Warp, target_size: tuple[int, int], hidden: NDArray[np.bool_] | None = None) -> float:
+    """Share of the pixels that show the target where the map turns over (its Jacobian changes sign).
+
+    hidden (H, W): what the target cannot see does not count, nor its rim: there one thing ends before another.
+    """
     x, y = warp.map_x, warp.map_y
     turn: NDArray = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1]) - (x[1:, :-1] - x[:-1, :-1]) * (
         y[:-1, 1:] - y[:-1, :-1]
     )
-    turn = turn[warp.inside(target_size)[:-1, :-1] & np.isfinite(turn)]
+    counts = warp.inside(target_size)[:-1, :-1] & np.isfinite(turn)
+    if hidden is not None:
+        counts &= cv2.dilate(hidden.astype(np.uint8), RIM)[:-1, :-1] == 0
+    turn = turn[counts]
     if turn.size == 0:
         return 0.0
     return float(np.mean(np.sign(turn) != np.sign(np.median(turn))))

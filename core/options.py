@@ -30,12 +30,13 @@ class StitchOptions:
     full pictures; ignore_reference, ignore_target: masks of what is to be kept out, files or arrays, white = ignored;
     projection: one of PROJECTIONS; level: how a cylindrical or equirectangular panorama is turned, one of LEVELS or
     yaw, pitch, roll of the reference camera in degrees (see `levelling`); scale: both pictures are resized by this
-    first, at most 1; crop: what of the panorama is kept (see `crop_box`); blend: one of BLENDS; seam: one of SEAMS, of
-    no matter for `linear`; mask: what an artist painted over the whole panorama, a file or array, black = from the
-    reference, white = from the target, gray or transparent = the seam decides; exposure: whether the target's is
-    matched to the reference's; seed: of every random choice; measure: whether the report also compares the pictures in
-    the overlap and holds matches back to see how far the field can be trusted; cache: the folder where features,
-    geometry and fields are kept for the next stitch of the same pictures, None for nowhere (the outcome is the same).
+    first, at most 1; crop: what of the panorama is kept (see `crop_box`); dense: whether every pixel of the overlap is
+    sought along its epipolar line; blend: one of BLENDS; seam: one of SEAMS, of no matter for `linear`; mask: what an
+    artist painted over the whole panorama, a file or array, black = from the reference, white = from the target, gray
+    or transparent = the seam decides; exposure: whether the target's is matched to the reference's; seed: of every
+    random choice; measure: whether the report also compares the pictures in the overlap and holds matches back to see
+    how far the field can be trusted; cache: the folder where features, geometry and fields are kept for the next stitch
+    of the same pictures, None for nowhere (the outcome is the same).
     """
 
     field: str = "slack"
@@ -48,6 +49,7 @@ class StitchOptions:
     level: Level = "auto"
     scale: float = 1.0
     crop: Crop = "full"
+    dense: bool = False
     blend: str = "multiband"
     seam: str = "graphcut"
     mask: Path | np.ndarray | None = None

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .colour import decode
 from .errors import BadRequest
 from .images import encode_picture, output_bits
 from .match_files import matches_csv
@@ -19,8 +20,8 @@ from .pipeline import StitchResult
 from .report import plain
 from .warp import Layer, cut
 
-# What lies beside the layers, white where it holds, by its name in the result.
-MASKS = ("occluded",)
+# What lies beside the layers, by its name in the result: masks, white where they hold, and shares 0..1.
+MASKS = ("occluded", "confidence")
 # Where the pictures meet, in the form that --mask takes; only where there is a seam.
 SEAM = "seam"
 
@@ -106,9 +107,11 @@ def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result
 
 
 def _mask_bytes(mask: np.ndarray, shown: np.ndarray | None = None) -> bytes:
-    """A PNG of a mask (H, W), white where it is True; transparent where nothing is shown (H, W)."""
+    """A gray PNG of a mask or of shares 0..1 (H, W), 1 white, plain numbers and no light; transparent where nothing is
+    shown (H, W)."""
+    levels = np.rint(255 * mask.astype(np.float32)).astype(np.uint8)
     alpha = None if shown is None else shown.astype(np.float32)
-    return encode_picture(mask[..., None].astype(np.float32), alpha, 8, ".png")[0]
+    return encode_picture(decode(levels[..., None]), alpha, 8, ".png")[0]
 
 
 def warp_bytes(result: StitchResult) -> bytes:

@@ -91,6 +91,13 @@ class StitchResult:
         )  # fmt: skip
 
     @property
+    def confidence(self) -> np.ndarray:
+        """(H, W) float32, 0..1: how sure dense refinement is of a pixel of the warp's canvas; 0 where it said
+        nothing."""
+        confidence = self.warp.confidence
+        return np.zeros(self.warp.map_x.shape, np.float32) if confidence is None else confidence
+
+    @property
     def bits(self) -> int:
         """Bits per channel of the deeper input (32: float)."""
         return max(self.reference.bits, self.target.bits)

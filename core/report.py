@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .canvas import Canvas
 from .held_out import held_out
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from .alignment import Alignment
     from .camera import Camera
     from .composition import Decided
+    from .dense import Dense
     from .images import Picture
     from .options import StitchOptions
     from .two_view import TwoView
@@ -40,14 +42,14 @@ def make_report(
     """
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
     field = alignment.field
-    measured = _measured(options, pictures, alignment) | appearance
+    measured = _measured(options, pictures, alignment, decided.hidden) | appearance
     report = {
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
         "options": {
-            "field": options.field, "fade": options.fade, "projection": options.projection, "level": options.level,
-            "scale": options.scale, "crop": options.crop, "blend": options.blend, "seam": options.seam,
-            "exposure": options.exposure, "seed": options.seed,
+            "field": options.field, "fade": options.fade, "dense": options.dense, "projection": options.projection,
+            "level": options.level, "scale": options.scale, "crop": options.crop, "blend": options.blend,
+            "seam": options.seam, "exposure": options.exposure, "seed": options.seed,
         },
         "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
         "two_view": {
@@ -61,7 +63,7 @@ def make_report(
             "kind": field.name, "smoothing": field.fit.smoothing, "centres": int(field.fit.kept.sum()),
             "pruned": int(two_view.inliers.sum() - field.fit.kept.sum()), "plane": field.plane,
             "fade_px": field.fit.fade_px, "residual_px": field.fit.residual_px, "held_out_px": field.fit.held_out_px,
-            "negative_share": field.fit.negative_share,
+            "negative_share": field.fit.negative_share, "dense": _dense_entry(alignment.dense),
         },
         "canvas": {
             "width": canvas.width, "height": canvas.height,
@@ -78,7 +80,7 @@ def make_report(
 
 
 def _measured(
-    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment
+    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment, hidden: NDArray[np.bool_]
 ) -> dict[str, float]:
     """The figures of an alignment; those that cost time only where options.measure asks for them. NaN: undefined."""
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
@@ -92,7 +94,7 @@ def _measured(
         "alignment_p95_px": float(np.percentile(error, 95)) if error.size else math.nan,
         "off_line_mean_px": off_line_mean(two_view.F, shown),
         "negative_share": field.fit.negative_share,
-        "folds": folds(warp, cameras[1].size),
+        "folds": folds(warp, cameras[1].size, hidden),
     }
     if not options.measure:
         return measured
@@ -103,7 +105,8 @@ def _measured(
     # pixels are compared in the reference's own frame, where only one of the two pictures is resampled
     framed = warp
     if warp.canvas.projection is not None:
-        framed = build_map(field, two_view, Canvas(*cameras[0].size, (0, 0)), *cameras)
+        relief = None if alignment.dense is None else alignment.dense.relief
+        framed = build_map(field, two_view, Canvas(*cameras[0].size, (0, 0)), *cameras, relief)
     return measured | overlap_quality(*pictures, framed) | {
         "projectivity_own_px": projectivity(two_view.F, shown),
         "projectivity_independent_px": projectivity(independent, shown),
@@ -160,6 +163,15 @@ def _picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:
         "camera": {
             "focal_px": camera.focal, "source": camera.source, "fixed": camera.fixed, "distortion": camera.distortion,
         },
+    }  # fmt: skip
+
+
+def _dense_entry(dense: Dense | None) -> dict[str, Any]:
+    if dense is None or dense.relief is None:
+        return {"used": False, "why": "not asked for" if dense is None else dense.why}
+    return {
+        "used": True, "reach_px": dense.reach_px, "found": dense.found, "moved_px": dense.moved_px,
+        "across_px": dense.across_px,
     }  # fmt: skip
 
 

@@ -24,6 +24,7 @@ from .two_view import TwoView
 
 if TYPE_CHECKING:
     from .images import Picture
+    from .relief import Relief
 
 # cv2.remap wants every side below 32767; tiles also keep its working memory small.
 TILE = 1024
@@ -37,17 +38,21 @@ MAX_FADE = 3.0
 @dataclass(frozen=True)
 class Warp:
     """map_x, map_y (H, W) float32: raw target pixel of each canvas pixel, NaN behind the camera; inverse_depth (H, W)
-    float32, NaN where the field knows none."""
+    float32, NaN where the field knows none; confidence (H, W) float32, 0..1, in what dense refinement found there, None
+    without it."""
 
     canvas: Canvas
     map_x: NDArray[np.float32]
     map_y: NDArray[np.float32]
     inverse_depth: NDArray[np.float32]
+    confidence: NDArray[np.float32] | None = None
 
     def within(self, box: Box) -> Warp:
-        """The part in a box (left, top, width, height) of the canvas; NaN where that reaches over its edges."""
-        maps = (cut(a, box, np.nan) for a in (self.map_x, self.map_y, self.inverse_depth))
-        return Warp(self.canvas.within(box), *maps)
+        """The part in a box (left, top, width, height) of the canvas; NaN, and no confidence, where that reaches over
+        its edges."""
+        map_x, map_y, inverse_depth = (cut(a, box, np.nan) for a in (self.map_x, self.map_y, self.inverse_depth))
+        confidence = None if self.confidence is None else cut(self.confidence, box)
+        return Warp(self.canvas.within(box), map_x, map_y, inverse_depth, confidence)
 
     def inside(self, target_size: tuple[int, int]) -> NDArray[np.bool_]:
         """Where the map falls inside a target of (W, H) px."""
@@ -84,9 +89,10 @@ def cut(array: NDArray, box: Box, beyond: float = 0.0) -> NDArray:
 
 
 def build_warp(
-    field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera, projection: Projection | None = None
-) -> Warp:
-    """The canvas that holds both pictures, flat or of a round projection, and its map.
+    field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera, projection: Projection | None = None,
+    relief: Relief | None = None,
+) -> Warp:  # fmt: skip
+    """The canvas that holds both pictures, flat or of a round projection, and its map, refined by a relief.
 
     Raises NoOverlap, OutputTooLarge, or BadRequest for a field that knows the reference's plane only.
     """
@@ -105,11 +111,13 @@ def build_warp(
         return distort(target if values.shift is None else target + values.shift, camera_prime)
 
     canvas = bounding_canvas(target_at, reference, camera_prime.size, reach, projection)
-    warp = build_map(field, two_view, replace(canvas, cropped=canvas.cropped or cropped), camera, camera_prime)
+    warp = build_map(field, two_view, replace(canvas, cropped=canvas.cropped or cropped), camera, camera_prime, relief)
     return _trimmed(warp, camera, camera_prime.size)
 
 
-def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, camera_prime: Camera) -> Warp:
+def build_map(
+    field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, camera_prime: Camera, relief: Relief | None = None
+) -> Warp:
     """The map of a given canvas, evaluated in strips."""
     left, top = -canvas.offset[0], -canvas.offset[1]
     grid = Grid.over(left, top, canvas.width, canvas.height)
@@ -117,12 +125,16 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
     shape = (canvas.height, canvas.width)
     map_x, map_y, inverse_depth = (np.empty(shape, np.float32) for _ in range(3))
     xs, ys, e = canvas.xs, canvas.ys, two_view.e_prime
+    confidence = None if relief is None else np.empty(shape, np.float32)
     rows = max(1, 1_000_000 // canvas.width)
     for start in range(0, canvas.height, rows):
         stop = min(canvas.height, start + rows)
         # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
         strip = (left, top + start, canvas.width, stop - start)
         d = grid.to_pixels(values.inverse_depth, *strip).astype(np.float64)
+        if relief is not None and confidence is not None:
+            more, sideways, confidence[start:stop] = _relief_at(relief, canvas, xs, ys[start:stop], camera)
+            d += more
         slide = d if e.any() else np.zeros_like(d)  # where nothing slides, depth may be unknown (NaN)
         infinite = canvas.through(two_view.H_inf, xs, ys[start:stop], camera)
         a, b, c = (part + slide * e[k] for k, part in enumerate(infinite))
@@ -131,10 +143,25 @@ def build_map(field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, c
         if values.shift is not None:
             x += grid.to_pixels(values.shift[..., 0], *strip)
             y += grid.to_pixels(values.shift[..., 1], *strip)
+        if relief is not None:
+            x += sideways[..., 0]
+            y += sideways[..., 1]
         if camera_prime.distortion.any():
             x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), camera_prime), -1, 0)
         map_x[start:stop], map_y[start:stop], inverse_depth[start:stop] = x, y, d
-    return Warp(canvas, map_x, map_y, inverse_depth)
+    return Warp(canvas, map_x, map_y, inverse_depth, confidence)
+
+
+def _relief_at(
+    relief: Relief, canvas: Canvas, xs: Array, ys: Array, camera: Camera
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """What a relief adds to inverse depth and to target pixels at canvas columns xs and lines ys, and its
+    confidence."""
+    if canvas.projection is None:  # canvas pixels are the reference's
+        return relief.at(*np.meshgrid(xs, ys))
+    places, ahead = canvas.on_reference(xs, ys, camera)
+    more, sideways, confidence = relief.at(places[..., 0], places[..., 1])
+    return more * np.nan_to_num(ahead).astype(np.float32), sideways, confidence
 
 
 def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> FieldValues:

@@ -39,4 +39,4 @@ def stitched(pair: RenderedPair, way: str, shared: Shared | None = None) -> Stit
         frame = read_frame(pair.reference, pair.target, options)
         shared[told] = frame, register([frame], options, steps)
     frame, registration = shared[told]
-    return compose(frame, lay(registration, options, steps), options, steps)
+    return compose(frame, lay(registration, [frame], options, steps), options, steps)

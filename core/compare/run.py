@@ -230,7 +230,7 @@ def _stitched(
     seconds: dict[str, float],
 ) -> StitchResult:  # fmt: skip
     chosen, start = replace(options, field=name), time.process_time()
-    alignment = lay(registration, chosen, watch)
+    alignment = lay(registration, [frame], chosen, watch)
     laid = time.process_time()
     result = compose(frame, alignment, chosen, watch)
     seconds |= {f"{name}: alignment": laid - start, f"{name}: composition": time.process_time() - laid}

@@ -70,6 +70,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--ignore-target", "b.png"], {"ignore_target": Path("b.png")}),
     (["--scale", "0.5", "--crop", "inscribed"], {"scale": 0.5, "crop": "inscribed"}),
     (["--crop", "3,4,50,60"], {"crop": (3, 4, 50, 60)}), (["--crop", "reference"], {"crop": "reference"}),
+    (["--dense"], {"dense": True}),
     (["--no-dense", "--no-exposure"], {"exposure": False}), (["--exposure", "--seam", "graphcut"], {}),
     (["--mask", "m.png"], {"mask": Path("m.png")}),
     (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {"blend": "feather"}),
@@ -81,22 +82,6 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
 ])  # fmt: skip
 def test_how_it_is_done(words: list[str], expected: dict) -> None:
     assert options(*words) == StitchOptions(measure=False, **expected)
-
-
-@pytest.mark.parametrize("words", [
-    ["--dense"],
-], ids=" ".join)  # fmt: skip
-def test_what_is_yet_to_come_is_refused_by_name(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    try:
-        options(*words)
-    except SystemExit as leaving:
-        said = capsys.readouterr().err
-        assert leaving.code == 2
-    except BadRequest as refused:
-        said = str(refused)
-    else:
-        pytest.fail("taken without a word")
-    assert "yet to come" in said and words[-1].lstrip("-") in said
 
 
 @pytest.mark.parametrize("words", [

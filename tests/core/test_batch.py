@@ -93,7 +93,7 @@ def test_a_list_that_is_wrong_stops_before_the_work(work: Path, said: Callable, 
 
 @pytest.mark.parametrize(("arguments", "code", "words"), [
     (["--format", "gif"], 2, ".png"), (["--shard", "3/2"], 2, "I/N"), (["--shard", "0/2"], 2, "I/N"),
-    (["--shard", "half"], 2, "2/3"), (["--dense"], 2, "yet to come"),
+    (["--shard", "half"], 2, "2/3"), (["--seam", "x"], 2, "not known"),
     (["--matches", "none.csv"], 4, "none.csv: no such"),
     (["--scale", "2"], 2, "scale"), (["--quiet", "--verbose"], 2, "not allowed"),
 ])  # fmt: skip
@@ -122,7 +122,7 @@ def test_layers_warp_and_the_kind_of_file(work: Path, quick: list) -> None:
     assert run(work, "--quiet", "--layers", "--warp", "--format", "jpg") == 0
     expected = {f"p1{suffix}" for suffix in (
         ".jpg", ".report.json", ".matches.csv", ".timing.json", ".warp.npz", ".layers/reference.png",
-        ".layers/target.png", ".layers/occluded.png", ".layers/seam.png")}  # fmt: skip
+        ".layers/target.png", ".layers/occluded.png", ".layers/confidence.png", ".layers/seam.png")}  # fmt: skip
     assert {name for name in files(work / "out") if name.startswith("p1")} == expected
 
 

@@ -86,7 +86,8 @@ def test_a_clip_has_one_alignment_and_nothing_swims(whole: Path) -> None:
         "batch.json", ".edf/shot.json", *(f".edf/shot/{name}.json" for name in made),
         *(f"shot.{kind}" for kind in ("report.json", "matches.csv", "timing.json", "warp.npz")),
         *(f"shot/{name}{one}" for name in made for one in (
-            ".png", ".layers/reference.png", ".layers/target.png", ".layers/occluded.png", ".layers/seam.png")),
+            ".png", ".layers/reference.png", ".layers/target.png", ".layers/occluded.png", ".layers/confidence.png",
+            ".layers/seam.png")),
     }  # fmt: skip
     (item,) = summary(out)["items"]
     assert (item["status"], item["panorama"], item["size"]) == ("done", "shot/shot_0007.png", [width, height])

@@ -80,7 +80,7 @@ def test_a_stitch_from_files_to_files(
     assert err.splitlines()[-1] == f"edf: {tmp_path / 'out.png'}: {width}×{height}"
     assert set(files(tmp_path)) == {
         "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-        "layers/target.png", "layers/occluded.png", "layers/seam.png"}
+        "layers/target.png", "layers/occluded.png", "layers/confidence.png", "layers/seam.png"}
     # the same as stitch() from Python gives
     expected, _ = encode_picture(small_result.pixels, small_result.alpha, 8, ".png")
     assert (tmp_path / "out.png").read_bytes() == expected
@@ -207,21 +207,11 @@ def test_the_demo_prints_its_figures_and_says_where_its_files_are(
 
 # --- refusals -------------------------------------------------------------------------------------------------------
 
-YET_TO_COME = [["--dense"]]
 WRONG = [
     ["--field", "nonsense"], ["--fade", "slowly"], ["--nonsense"], ["--seed", "x"], ["--seed", "-1"], ["--scale", "0"],
     ["--quiet", "--verbose"], ["--principal", "1"], ["--focal-px", "abc"], ["--focal-px", "0"], ["--focal-px"],
     ["--focal-mm", "35"], ["--crop", "tight"], ["--focal35", "28", "--cameras", "c.json"],
 ]  # fmt: skip
-
-
-@pytest.mark.parametrize("arguments", YET_TO_COME, ids=" ".join)
-def test_what_is_yet_to_come_is_refused_by_name(
-    pictures: list[str], tmp_path: Path, said: Callable, arguments: list[str]
-) -> None:
-    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *arguments]) == 2
-    out, err = said()
-    assert out == "" and "yet to come" in err and arguments[-1].lstrip("-") in err and files(tmp_path) == {}
 
 
 @pytest.mark.parametrize("arguments", WRONG, ids=" ".join)

@@ -59,7 +59,7 @@ def raw(path: Path) -> np.ndarray:
 def test_all_files_and_no_others_are_there(written: Path) -> None:
     assert set(everything(written)) == {
         "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-        "layers/target.png", "layers/occluded.png", "layers/seam.png"}
+        "layers/target.png", "layers/occluded.png", "layers/confidence.png", "layers/seam.png"}
 
 
 def test_only_the_panorama_where_nothing_else_was_asked_for(small_result: StitchResult, tmp_path: Path) -> None:
@@ -197,7 +197,7 @@ def test_layers_of_float_pictures_have_exr_beside_them(small_result: StitchResul
     assert set(everything(tmp_path)) == {
         "out.exr", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
         "layers/reference.exr", "layers/target.png", "layers/target.exr", "layers/occluded.png",
-        "layers/seam.png"}
+        "layers/confidence.png", "layers/seam.png"}
     for name, layer in (("reference", bright.reference_layer), ("target", bright.target_layer)):
         back = load_picture(tmp_path / "layers" / f"{name}.exr")
         assert back.pixels.max() > 1 and back.bits == 32
@@ -246,7 +246,7 @@ def test_an_unknown_kind_of_warp_is_refused_before_the_work(tmp_path: Path, name
 
 @pytest.mark.parametrize("name", [
     "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-    "layers/target.png", "layers/target.exr", "layers/occluded.png", "layers/seam.png",
+    "layers/target.png", "layers/target.exr", "layers/occluded.png", "layers/confidence.png", "layers/seam.png",
 ])  # fmt: skip
 def test_what_exists_is_refused_before_the_work_and_not_touched(
     small_result: StitchResult, tmp_path: Path, name: str
@@ -265,7 +265,7 @@ def test_what_exists_is_refused_before_the_work_and_not_touched(
 @pytest.mark.parametrize(("panorama", "report", "warp"), [
     ("a.png", "a.png", None), ("b.png", "a.npz", "a.npz"), ("b.png", "c/../a.npz", "a.npz"),
     ("layers/target.png", None, None), ("b.png", "layers/reference.png", None),
-    ("layers/occluded.png", None, None),
+    ("layers/occluded.png", None, None), ("layers/confidence.png", None, None),
 ])  # fmt: skip
 def test_two_outputs_of_one_name_are_refused_before_the_work(
     tmp_path: Path, panorama: str, report: str | None, warp: str | None

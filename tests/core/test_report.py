@@ -73,13 +73,14 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
     assert report["two_view"]["model"] == "general" and "epipolar" in report["two_view"]["why"]
     assert report["two_view"]["focal_source"] == "given in px"
     assert report["field"]["centres"] + report["field"]["pruned"] == view.inliers.sum()
+    assert report["field"]["dense"] == {"used": False, "why": "not asked for"}
     assert report["field"]["kind"] == "slack" and report["field"]["plane"] == list(result.field.plane)
     for entry, array in zip(report["pictures"], (result.reference, result.target), strict=True):
         assert (entry["height"], entry["width"]) == array.view.shape[:2]
         assert (entry["name"], entry["bits"], entry["alpha"], entry["icc"]) == ("array", 8, False, False)
         assert entry["camera"]["fixed"] and entry["camera"]["focal_px"] == view.K[0, 0]
     assert report["options"] == {
-        "field": "slack", "fade": "plane", "projection": "perspective", "level": "auto", "scale": 1.0,
+        "field": "slack", "fade": "plane", "dense": False, "projection": "perspective", "level": "auto", "scale": 1.0,
         "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": True, "seed": 0}
     assert report["composition"]["exposure_blocks"] > 100
     assert report["composition"]["exposure_gain"] == pytest.approx([1, 1, 1], abs=0.01)

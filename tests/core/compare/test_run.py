@@ -93,10 +93,10 @@ def test_a_field_that_fails_stops_no_other(
 ) -> None:
     real = run_module.lay
 
-    def lay(registration, options, steps):
+    def lay(registration, frames, options, steps):
         if options.field == "apap":
             raise DegenerateGeometry("nothing to hold on to")
-        return real(registration, options, steps)
+        return real(registration, frames, options, steps)
 
     monkeypatch.setattr(run_module, "lay", lay)
     summary, code = compared(folder, tmp_path, fields=("apap", "homography"))

@@ -1,0 +1,144 @@
+"""Where points of the reference are seen in the target by the fitted field, and where a move along their epipolar
+lines takes them: what dense refinement works on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera import Camera
+from .canvas import Box, Grid
+from .displacement import Field, target_points
+from .epipolar import Array
+from .lens import distort, undistort
+from .two_view import TwoView
+
+Plane = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class SparseMap:
+    """A field on the raw pixels of a box around the reference, which starts at pixel `start` (x, y): inverse_depth
+    (h, w), shift (h, w, 2) px."""
+
+    two_view: TwoView
+    camera: Camera
+    camera_prime: Camera
+    start: tuple[int, int]
+    inverse_depth: Plane
+    shift: Plane
+
+    @staticmethod
+    def around(field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera, margin: int) -> SparseMap:
+        """The field on the reference and a margin (px) around it."""
+        width, height = camera.size
+        box = (-margin, -margin, width + 2 * margin, height + 2 * margin)
+        grid = Grid.over(*box)
+        values = field.on_grid(grid, undistort(grid.points, camera) if camera.distortion.any() else None)
+        shift = np.zeros((box[3], box[2], 2), np.float32)
+        if values.shift is not None:
+            for k in (0, 1):
+                shift[..., k] = grid.to_pixels(values.shift[..., k], *box)
+        return SparseMap(two_view, camera, camera_prime, box[:2], grid.to_pixels(values.inverse_depth, *box), shift)
+
+    def smoothed(self, sigma: float, plane: Array) -> SparseMap:
+        """The field without bends finer than sigma px; plane m (3,): its affine part, which stays."""
+        if sigma < 1:
+            return self
+        height, width = self.inverse_depth.shape
+        small = max(8, round(8 * width / sigma)), max(8, round(8 * height / sigma))
+        xs, ys = (np.arange(n, dtype=np.float64) + s for n, s in zip((width, height), self.start, strict=True))
+        affine = (plane[0] * xs + plane[2]) + plane[1] * ys[:, None]
+        bend = cv2.resize((self.inverse_depth - affine).astype(np.float32), small, interpolation=cv2.INTER_AREA)
+        bend = cv2.GaussianBlur(bend, (0, 0), 8.0, borderType=cv2.BORDER_REPLICATE)
+        bend = cv2.resize(bend, (width, height), interpolation=cv2.INTER_CUBIC)
+        return replace(self, inverse_depth=(affine + bend).astype(np.float32))
+
+    def at(self, raw: Array) -> tuple[Plane, Plane]:
+        """Inverse depth (…) and shift (…, 2) at raw points (rows, columns, 2), between pixels by linear
+        interpolation."""
+        x, y = (np.ascontiguousarray(raw[..., k] - self.start[k], np.float32) for k in (0, 1))
+        return (
+            cv2.remap(self.inverse_depth, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
+            cv2.remap(self.shift, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
+        )
+
+    def target(self, ideal: Array) -> Array:
+        """Ideal target pixels (…, 2), shift included, of ideal points (rows, columns, 2); NaN behind the target."""
+        inverse_depth, shift = self.at(distort(ideal, self.camera))
+        return target_points(self.two_view, ideal, inverse_depth.astype(np.float64)) + shift
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Nodes (h, w) of the reference, `step` raw px apart, each with its epipolar line in the target.
+
+    ideal (h, w, 2): where they are; inverse_depth: by the field; base (h, w, 2): where that is seen, without shift;
+    shift; moved (h, w): inverse depth that moves what is seen by one px; third (h, w): by how much that changes x'₃,
+    relative; NaN where there is no line. All float32 but `ideal`.
+    """
+
+    box: Box
+    step: float
+    ideal: Array
+    inverse_depth: Plane
+    base: Plane
+    shift: Plane
+    moved: Plane
+    direction: Plane
+    third: Plane
+    camera_prime: Camera
+
+    @staticmethod
+    def over(sparse: SparseMap, box: Box, step: float) -> Lines:
+        """The lines of the pixels of a box (left, top, width, height), in cells of step × step."""
+        left, top, width, height = box
+        columns, rows = max(1, round(width / step)), max(1, round(height / step))
+        xs = left + (np.arange(columns) + 0.5) * (width / columns) - 0.5
+        ys = top + (np.arange(rows) + 0.5) * (height / rows) - 0.5
+        raw = np.stack(np.meshgrid(xs, ys), axis=-1)
+        inverse_depth, shift = sparse.at(raw)
+        ideal = undistort(raw, sparse.camera)
+        H, e = sparse.two_view.H_inf, sparse.two_view.e_prime
+        ray = [H[k, 0] * ideal[..., 0] + H[k, 1] * ideal[..., 1] + (H[k, 2] + e[k] * inverse_depth) for k in range(3)]
+        ray[2][ray[2] <= 1e-6 * np.maximum(np.abs(ray[0]), np.abs(ray[1]))] = np.nan
+        x, y = ray[0] / ray[2], ray[1] / ray[2]
+        slope_x, slope_y = (e[0] - x * e[2]) / ray[2], (e[1] - y * e[2]) / ray[2]
+        speed = np.maximum(np.hypot(slope_x, slope_y), 1e-12)
+        direction = np.stack([slope_x / speed, slope_y / speed], axis=-1).astype(np.float32)
+        return Lines(
+            box, step, ideal, inverse_depth, np.stack([x, y], axis=-1).astype(np.float32), shift,
+            (1 / speed).astype(np.float32), direction, (e[2] / ray[2] / speed).astype(np.float32), sparse.camera_prime,
+        )  # fmt: skip
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(h, w)."""
+        return self.moved.shape[0], self.moved.shape[1]
+
+    def target(self, along: Plane, across: Plane | None = None) -> tuple[Plane, Plane]:
+        """Raw target pixels x, y (h, w) after a move of `along` px on the line, as at its start, and of `across` px to
+        its side; NaN behind the target.
+
+        A move t changes d by t · moved, and π runs through base + t direction / (1 + t third).
+        """
+        share = along / (1 + along * self.third)
+        x = self.base[..., 0] + self.direction[..., 0] * share + self.shift[..., 0]
+        y = self.base[..., 1] + self.direction[..., 1] * share + self.shift[..., 1]
+        if across is not None:
+            x, y = x - across * self.direction[..., 1], y + across * self.direction[..., 0]
+        if self.camera_prime.distortion.any():
+            raw = distort(np.stack([x, y], axis=-1).astype(np.float64), self.camera_prime).astype(np.float32)
+            x, y = raw[..., 0], raw[..., 1]
+        return x, y
+
+    def along(self, target: Array) -> Plane:
+        """How far (h, w) px along their lines ideal target pixels (h, w, 2) lie, shift not counted: the inverse of
+        `target`."""
+        off = target - self.base
+        share = (off * self.direction).sum(axis=-1)
+        return (share / (1 - share * self.third)).astype(np.float32)
