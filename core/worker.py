@@ -8,8 +8,9 @@ started it; FOLDER goes then too. Exit status as the command's (DESIGN 5).
 job.json: `reference`, `target`: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as shown; "exif_of": a
 file whose EXIF (orientation included) belongs to the array. `options`: fields of StitchOptions, their `camera` those of
 CameraRequest. `cameras`: {"reference", "target"}: {"lens": fields of BlenderLens but the resolution, "matrix_world"}.
-`masks`: {"reference", "target"}: .npy of pictures, rows as shown. `matches`: .npy (N, 5) x, y, x2, y2, weight; weight 0
-leaves a match out. `take`: which of "layers", "masks", "depth" to leave as pictures. Relative paths start at FOLDER.
+`masks`: {"reference", "target"}: .npy of pictures, rows as shown; {"seam"}: over the whole panorama. `matches`: .npy
+(N, 5) x, y, x2, y2, weight; weight 0 leaves a match out. `take`: which of "layers", "masks", "depth" to leave as
+pictures. Relative paths start at FOLDER.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def _work(folder: Path) -> None:
         **{key: _tuples(value) for key, value in job["options"].items()}, camera=CameraRequest(**camera),
         matches=None if rows is None else rows[rows[:, 4] > 0],
         ignore_reference=_mask(folder, masks.get("reference"), turn),
-        ignore_target=_mask(folder, masks.get("target"), turn_prime),
+        ignore_target=_mask(folder, masks.get("target"), turn_prime), mask=_mask(folder, masks.get("seam"), 1),
         cache=default_folder(),
     )  # fmt: skip
     result = stitch(

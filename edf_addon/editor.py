@@ -29,14 +29,14 @@ def known(image: bpy.types.Image | None) -> dict[str, Any]:
 
 
 def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:
-    """What an image is in the stitch: REFERENCE or TARGET (also a mask that is painted for one of them), PANORAMA, or
+    """What an image is in the stitch: REFERENCE, TARGET or PANORAMA, also a mask that is painted over one of them, or
     None."""
     if image is None:
         return None
     for side in (REFERENCE, TARGET):
         if image in (getattr(settings, side), getattr(settings, f"ignore_{side}")):
             return side
-    return PANORAMA if result.read(image) is not None else None
+    return PANORAMA if image == settings.seam_mask or result.read(image) is not None else None
 
 
 def orientation(settings: Any, side: str) -> int:

@@ -15,7 +15,7 @@ MATCH_RADIUS, LINE_WIDTH = 3.5, 1.6
 LINE, POINTER = (1.0, 0.85, 0.2, 0.95), (1.0, 1.0, 1.0, 0.9)
 CHOSEN, WAITING = (1.0, 1.0, 1.0, 1.0), (0.2, 1.0, 0.9, 1.0)
 SHADE = (0.0, 0.0, 0.0, 0.55)
-PAINTED_OUT = (0.9, 0.08, 0.05, 0.6)
+PAINTED_OUT, FROM_TARGET = (0.9, 0.08, 0.05, 0.6), (1.0, 0.55, 0.1, 0.6)
 LONGEST_SIDE = 2048  # of a picture that lies under its mask
 
 # The draw handler, and the keymap items of the pointer.
@@ -98,7 +98,9 @@ def draw() -> None:
 
     gpu.state.blend_set("ALPHA")
     view = _View(context, settings, image, side)
-    if side == editor.PANORAMA:
+    if image == settings.seam_mask:
+        _draw_under_mask(view, editor.panorama(context), image)
+    elif side == editor.PANORAMA:
         _draw_cover(view, settings, image)
     elif image == getattr(settings, f"ignore_{side}"):
         _draw_under_mask(view, getattr(settings, side), image)
@@ -224,14 +226,16 @@ def _draw_cover(view: _View, settings: Any, image: bpy.types.Image) -> None:
 
 
 def _draw_under_mask(view: _View, picture: bpy.types.Image | None, mask: bpy.types.Image) -> None:
-    """The picture that a mask is painted for, and over it in red what is painted out."""
+    """The picture that a mask is painted over, and on it in red what is painted out; of a seam what comes from the
+    target in orange, darkened what comes from the reference."""
     import gpu
 
     if picture is None:
         return
     _textured(_texture_of_picture(picture), view.corners(), (1.0, 1.0, 1.0, 1.0))
-    gpu.state.blend_set("ADDITIVE")  # black adds nothing
-    _textured(gpu.texture.from_image(mask), view.corners(), PAINTED_OUT)
+    seam = view.side == editor.PANORAMA
+    gpu.state.blend_set("ALPHA" if seam else "ADDITIVE")  # black adds nothing
+    _textured(gpu.texture.from_image(mask), view.corners(), FROM_TARGET if seam else PAINTED_OUT)
     gpu.state.blend_set("ALPHA")
 
 

@@ -90,6 +90,8 @@ OUTPUT = (
     Row("level", shown=_is_round),
     Row("level_angles", shown=lambda settings: _is_round(settings) and settings.level == "ANGLES"),
     Row("blend"),
+    Row("seam", why_not=lambda settings: "An average has no seam" if settings.blend == "LINEAR" else ""),
+    Row("exposure"),
     Row("crop"),
     Row("crop_box", shown=lambda settings: settings.crop == "BOX"),
     Row("scale"),
@@ -273,13 +275,27 @@ class EDF_PT_masks(_Sub, bpy.types.Panel):  # noqa: N801
     def draw_rows(self, context: Any, settings: Any, width: float) -> None:
         layout = self.layout
         layout.use_property_split = False
-        for side, label, _ in mask_painting.SIDES:
+        for side, label, _ in mask_painting.SIDES[:2]:
             layout.label(text=f"Ignore in {label}")
             row = layout.row(align=True)
-            row.template_ID(settings, f"ignore_{side}", open="image.open")
+            row.template_ID(settings, mask_painting.MASKS[side], open="image.open")
             row.operator(Operator.MASK_PAINT, text="", icon="BRUSH_DATA").side = side
+        layout.label(text="Painted Seam")
+        layout.template_ID(settings, "seam_mask", open="image.open")
+        reason = mask_painting.why_not(context, "seam")
+        row = layout.row(align=True)
+        row.enabled = not reason
+        for text, black in (("From Reference", True), ("From Target", False)):
+            button = row.operator(Operator.MASK_PAINT, text=text)
+            button.side, button.black = "seam", black
+        if reason:
+            words(layout, reason, width, NOTE)
         if painted := mask_painting.painted_for(context):
-            words(layout, f"White is kept out of the {painted}; it is shown in red", width, NOTE)
+            said = (
+                "Orange comes from the target, dark from the reference" if painted == "seam"
+                else f"White is kept out of the {painted}; it is shown in red"
+            )  # fmt: skip
+            words(layout, said, width, NOTE)
             layout.operator(Operator.MASK_DONE, icon="CHECKMARK")
 
 

@@ -51,9 +51,13 @@ LEVELS = (
     ("ANGLES", "Angles", "Yaw, pitch and roll of the reference in the panorama"),
 )
 BLENDS = (
-    ("MULTIBAND", "Multi-band", "Along a seam: light is evened out across it, detail is cut"),
+    ("MULTIBAND", "Multiband", "Light is evened out across the seam, detail is cut at it: what hides a seam best"),
     ("FEATHER", "Feather", "A soft change from one picture to the other, across the whole overlap"),
     ("LINEAR", "Average", "The plain average of both: doubled edges show where they do not fit"),
+)
+SEAMS = (
+    ("GRAPHCUT", "Best Cut", "Where the two pictures look most alike, around things rather than through them"),
+    ("NONE", "Midway", "Midway between the borders of the two pictures"),
 )
 CROPS = (
     ("FULL", "Full", "All that either picture shows; transparent elsewhere"),
@@ -172,6 +176,16 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         "horizon, clockwise", size=3, unit="ROTATION", precision=2,
     )
     blend: EnumProperty(name="Blend", description="How the two pictures go over into each other", items=BLENDS)
+    seam: EnumProperty(name="Seam", description="Where one picture goes over into the other", items=SEAMS)
+    seam_mask: PointerProperty(
+        name="Painted Seam", type=bpy.types.Image,
+        description="An image of the whole panorama's shape: black comes from the reference, white "
+        "from the target; elsewhere the seam decides",
+    )
+    exposure: BoolProperty(
+        name="Match Exposure", description="Match the target's exposure and white balance to the reference's",
+        default=True,
+    )
     crop: EnumProperty(name="Crop", description="What of the panorama is kept", items=CROPS)
     crop_box: IntVectorProperty(
         name="Box", description="Left, top, width and height, in pixels of the full panorama, from its top left",
@@ -249,8 +263,8 @@ class EDF_PG_job(bpy.types.PropertyGroup):  # noqa: N801
 
 
 # The properties that are options of the engine under the same name: one word of several, or a plain value.
-CHOICES = ("field", "fade", "projection", "blend")
-VALUES = ("seed",)
+CHOICES = ("field", "fade", "projection", "seam", "blend")
+VALUES = ("exposure", "seed")
 # What changes places when reference and target do; the lenses only where each picture has its own.
 PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))

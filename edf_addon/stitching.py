@@ -59,6 +59,9 @@ def make_job(
         if mask is not None:
             np.save(folder / f"ignore_{side}.npy", images.read(mask))
             job["masks"][side] = f"ignore_{side}.npy"
+    if settings.seam_mask is not None:
+        np.save(folder / "seam.npy", images.read(settings.seam_mask))
+        job["masks"]["seam"] = "seam.npy"
     if settings.camera == "CAMERAS":
         job["cameras"] = cameras.describe_both(settings, scene, context.evaluated_depsgraph_get())
     if settings.edited_matches:
