@@ -108,12 +108,12 @@ def extent(projection: Projection, outline: Array, shows: Callable[[Array], bool
     """left, top, right, bottom (px of the plane) of what a closed outline of rays (N, 3) encloses.
 
     shows(ray): whether a ray lies inside. An outline that crosses the line behind, or goes round a pole, takes the
-    whole width.
+    whole width; round a pole it crosses that line, seen from which no step of it turns by half a circle.
     """
     points = projection.points(np.vstack([outline, outline[:1]]))
     left, top, right, bottom = projection.limits
     low, high = points.min(axis=0), points.max(axis=0)
     poles = [shows(sign * projection.rotation[:, 1]) for sign in (-1.0, 1.0)]
-    if any(poles) or np.abs(np.diff(points[:, 0])).max() > (right - left) / 2:
+    if np.abs(np.diff(points[:, 0])).max() > (right - left) / 2:
         low[0], high[0] = left, right
     return np.array([low[0], top if poles[0] else low[1], high[0], bottom if poles[1] else high[1]])

@@ -130,3 +130,26 @@ def test_what_an_outline_encloses_lies_within_its_extent(kind: str, rotation: np
     shown = (points >= limits[:2]).all(axis=1) & (points < limits[2:]).all(axis=1)
     # the outline is known at some points only: between two of them it bulges by up to a few px
     assert (points[shown] > (left - 8, top - 8)).all() and (points[shown] < (right + 8, bottom + 8)).all()
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_pole_just_inside_takes_the_whole_width(sign: float) -> None:
+    """Between two points of an outline the direction may swing by almost half a turn."""
+    K = np.array([[260.0, 0, 319.5], [0, 260.0, 239.5], [0, 0, 1]])
+    u = np.linspace(0, 1, 40, endpoint=False)
+    around = np.concatenate([np.column_stack(p) for p in ((u, 0 * u), (0 * u + 1, u), (1 - u, 0 * u + 1),
+                                                          (0 * u, 1 - u))])  # fmt: skip
+    ray = np.linalg.inv(K) @ (325.0, 4.0, 1.0)  # 4 px from the edge, between points 16 px apart
+    down = sign * ray / np.linalg.norm(ray)
+    ahead = np.cross(down, (1.0, 0, 0)) / np.linalg.norm(np.cross(down, (1.0, 0, 0)))
+    projection = made("equirectangular", np.column_stack([np.cross(down, ahead), down, ahead]))
+
+    def shows(ray: np.ndarray) -> bool:
+        p = K @ ray
+        return bool(p[2] > 0 and 0 <= p[0] / p[2] <= 639 and 0 <= p[1] / p[2] <= 479)
+
+    outline = homogeneous(around * (639, 479)) @ np.linalg.inv(K).T
+    left, top, right, bottom = extent(projection, outline, shows)
+    limits = projection.limits
+    assert (left, right) == (limits[0], limits[2])
+    assert (bottom == limits[3]) if sign > 0 else (top == limits[1])
