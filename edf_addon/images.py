@@ -105,19 +105,21 @@ def read(image: bpy.types.Image) -> NDArray[np.uint8] | NDArray[np.float32]:
         raise Unusable(f"“{image.name}” has no pixels: load it again, render it, or choose another image")
     flat = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(flat)
-    rgba = flat.reshape(height, width, 4)[::-1]
+    if not image.is_float:
+        flat *= 255  # in place: Blender's window waits for this
+        flat += 0.5
+    values: Any = flat if image.is_float else flat.astype(np.uint8)
+    rgba = values.reshape(height, width, 4)[::-1]
     alpha = rgba[..., 3:]
-    if image.depth in OPAQUE_DEPTHS or image.alpha_mode == "NONE" or bool((alpha == 1).all()):
-        pixels = rgba[..., :3]
-    elif image.is_float and is_premultiplied(image):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            pixels = np.where(alpha == 0, np.float32(0), rgba / alpha)
-        pixels[..., 3:] = alpha
-    else:
-        pixels = rgba
-    if image.is_float:
-        return np.ascontiguousarray(pixels)
-    return np.rint(np.clip(pixels, 0, 1) * np.float32(255)).astype(np.uint8)
+    is_opaque = image.depth in OPAQUE_DEPTHS or image.alpha_mode == "NONE"
+    if is_opaque or bool((alpha == (1 if image.is_float else 255)).all()):
+        return np.ascontiguousarray(rgba[..., :3])
+    if not image.is_float or not is_premultiplied(image):
+        return np.ascontiguousarray(rgba)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pixels = np.where(alpha == 0, np.float32(0), rgba / alpha)
+    pixels[..., 3:] = alpha
+    return pixels
 
 
 def is_premultiplied(image: bpy.types.Image) -> bool:

@@ -327,6 +327,7 @@ def test_a_scene_that_is_deleted_meanwhile(working):
         (lambda s: setattr(s, "ignore_reference", white(240, 180)), "invert the mask"),
         (lambda s: setattr(s, "target", white(240, 180)), "points of detail"),
         (lambda s: setattr(s, "target", bpy.data.images.load(s.reference.filepath)), "the same picture"),
+        (lambda s: setattr(s, "target", noise(240, 180)), "match"),
     ],
 )
 def test_what_cannot_be_stitched_is_said_in_words(chosen, change, words):
@@ -336,6 +337,14 @@ def test_what_cannot_be_stitched_is_said_in_words(chosen, change, words):
         bpy.ops.edf.stitch()
     assert status.now.failed and words in status.now.message
     assert not [name for name in names() - before if "panorama" in name]
+
+
+def noise(width: int, height: int):
+    """A picture that has nothing in common with any other."""
+    spots = np.kron(np.random.default_rng(1).random((height // 4, width // 4)), np.ones((4, 4)))
+    image = bpy.data.images.new("noise", width, height)
+    image.pixels.foreach_set(np.dstack([spots] * 3 + [np.ones_like(spots)]).astype(np.float32).ravel())
+    return image
 
 
 def white(width: int, height: int):
