@@ -55,7 +55,7 @@ def mixed(reference: Layer, target: Layer, share: NDArray[np.float32]) -> Layer:
     something; where one shows nothing the other is taken as it is."""
     shows, shows_too = reference.alpha > 0, target.alpha > 0
     pixels, alpha = target.pixels.copy(), np.where(shows, reference.alpha, target.alpha)
-    np.copyto(pixels, reference.pixels, where=shows[..., None])
+    copied_where(shows, reference.pixels, pixels)
     box = bounds(shows & shows_too)
     if box is not None:
         both = (shows & shows_too)[box]
@@ -69,10 +69,16 @@ def mixed(reference: Layer, target: Layer, share: NDArray[np.float32]) -> Layer:
     return Layer(pixels, alpha)
 
 
+def copied_where(mask: NDArray[np.bool_], source: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Puts the pixels (H, W, C) of a source where a mask (H, W) says so; `np.copyto` takes ten times as long."""
+    cv2.copyTo(source, np.ascontiguousarray(mask).view(np.uint8), out)
+
+
 def cut_hard(reference: Layer, target: Layer, from_target: NDArray[np.bool_]) -> Layer:
     """Each pixel from the picture that from_target (H, W) names, bit for bit; what one shows whole is not seen
     through."""
-    pixels = np.where(from_target[..., None], target.pixels, reference.pixels)
+    pixels = reference.pixels.copy()
+    copied_where(from_target, target.pixels, pixels)
     return Layer(pixels, np.maximum(reference.alpha, target.alpha))
 
 

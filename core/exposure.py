@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .overlap import bounds
 from .warp import Layer
 
 BLOCK = 8
@@ -36,7 +37,13 @@ class Exposure:
 
     def applied(self, target: Layer) -> Layer:
         """The target's layer as the reference's camera would have exposed it."""
-        return target if (self.gain == 1).all() else Layer(target.pixels * self.gain, target.alpha)
+        if (self.gain == 1).all():
+            return target
+        pixels = np.zeros_like(target.pixels)  # costs no memory where nothing is written
+        box = bounds(target.alpha > 0)
+        if box is not None:
+            np.multiply(target.pixels[box], self.gain, out=pixels[box])
+        return Layer(pixels, target.alpha)
 
 
 def unchanged(channels: int) -> Exposure:
@@ -54,10 +61,18 @@ def match_exposure(
     """
     channels = reference.pixels.shape[2]
     shown = (reference.alpha > 1 - 1 / 255) & (target.alpha > 1 - 1 / 255) & ~hidden
-    for layer, unclipped in zip((reference, target), floats, strict=True):
+    box = bounds(shown)
+    if box is None:
+        return unchanged(channels)
+    # whole blocks of the canvas
+    rows, columns = (slice(part.start - part.start % BLOCK, part.stop + -part.stop % BLOCK) for part in box)
+    shown = shown[rows, columns]
+    pixels, pixels_too = (layer.pixels[rows, columns] for layer in (reference, target))
+    for light, unclipped in zip((pixels, pixels_too), floats, strict=True):
         if not unclipped:
-            shown &= layer.pixels.max(axis=2) < CLIPPED
-    means, means_too = _block_means(reference.pixels, shown), _block_means(target.pixels, shown)
+            for k in range(channels):
+                shown &= light[..., k] < CLIPPED
+    means, means_too = _block_means(pixels, shown), _block_means(pixels_too, shown)
     bright = _bright(means) & _bright(means_too)
     if bright.sum() < LEAST_BLOCKS:
         return unchanged(channels)

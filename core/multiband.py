@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 # Tones less than this away from what they were are what they were.
 NOTHING = 1e-5
+# Rows at a time of what needs no neighbours.
+STRIP = 256
 # The width of the coarsest band, as a share of the canvas's diagonal.
 WIDTH = 1 / 50
 FEWEST, MOST = 3, 7
@@ -40,10 +42,12 @@ def correction(
     share = _from_nearest(from_target, shown).astype(np.float32)[..., None]
     blended = _masked_bands(light, share, bands)
     blended -= np.where(from_target[..., None], light, np.float32(0))
-    # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
-    whole = np.where(from_target[..., None], -light, light)
-    np.clip(blended, np.minimum(whole, 0), np.maximum(whole, 0), out=blended)
-    blended[np.abs(blended) < NOTHING] = 0
+    for start in range(0, len(blended), STRIP):
+        part, over = (values[start : start + STRIP] for values in (blended, from_target[..., None]))
+        # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
+        whole = np.where(over, -light[start : start + STRIP], light[start : start + STRIP])
+        np.clip(part, np.minimum(whole, 0), np.maximum(whole, 0), out=part)
+        part[np.abs(part) < NOTHING] = 0
     return blended
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -36,8 +35,8 @@ def pictures(gain: float = 1.0) -> tuple[Layer, Layer, Any]:
 def compose(first: Layer, second: Layer, warp: Any, decided: Decided | None = None, said: list | None = None,
             painted: np.ndarray | None = None, **options: Any) -> tuple[Layer, Layer, Decided]:
     steps = (lambda *step: None) if said is None else (lambda stage, share: said.append(stage))
-    return composed(first, second, SimpleNamespace(**vars(warp), confidence=None, inside=warp.inside), SIDEWAYS.view,
-                    TARGET, StitchOptions(**options), FLOATS, painted, steps, decided)  # fmt: skip
+    return composed(first, second, warp, SIDEWAYS.view, TARGET, StitchOptions(**options), FLOATS, painted, steps,
+                    decided)  # fmt: skip
 
 
 @pytest.mark.parametrize("options", [{}, {"blend": "feather"}, {"blend": "feather", "seam": "none"}, {"seam": "none"}])
