@@ -33,6 +33,7 @@ def facts(report: dict[str, Any]) -> list[tuple[str, str]]:
     out += [("Size", f"{report['canvas']['width']} × {report['canvas']['height']} px")]
     out += [("Matches", f"{found}"), ("Inliers", f"{inliers} ({_share(inliers, found)})")]
     out += focal_facts(view)
+    out += [("Dense", _dense(report["field"].get("dense") or {}))] if report["options"].get("dense") else []
     out += [("Alignment", _pixels(measured.get("alignment_median_px"), measured.get("alignment_p95_px")))]
     # an F of their own is measured only in a full run; that of the model is known in a preview too
     projectivity = measured.get("projectivity_independent_px")
@@ -67,6 +68,12 @@ def lines(text: str, width: float, character: float = 6.6) -> list[str]:
 def sentence(text: str) -> str:
     """As a sentence: the engine's messages begin small, as they stand behind a colon on the command line."""
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def _dense(told: dict[str, Any]) -> str:
+    if not told.get("used"):
+        return f"not used: {told.get('why', 'nothing was found')}"
+    return f"moved points by {told['moved_px']:.2f} px"
 
 
 def _share(part: int, whole: int) -> str:

@@ -84,7 +84,7 @@ CAMERA = (
     Row("reference_camera", shown=_camera_is("CAMERAS"), text="Reference"),
     Row("target_camera", shown=_camera_is("CAMERAS"), text="Target"),
 )
-FIELD = (Row("field"), Row("fade"))
+FIELD = (Row("field"), Row("fade"), Row("dense"))
 OUTPUT = (
     Row("projection", why_not=_projection_why_not),
     Row("level", shown=_is_round),

@@ -169,6 +169,10 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
 
     field: EnumProperty(name="Field", description="How the target may be bent to meet the reference", items=FIELDS)
     fade: EnumProperty(name="Outside", description="What the field becomes outside the overlap", items=FADES)
+    dense: BoolProperty(
+        name="Dense", description="Seek every pixel of the overlap along its epipolar line: sharper edges of near "
+        "things, at some more time",
+    )
     projection: EnumProperty(name="Projection", description="What the panorama is drawn on", items=PROJECTIONS)
     level: EnumProperty(name="Level", description="How a round panorama is turned", items=LEVELS)
     level_angles: FloatVectorProperty(
@@ -264,7 +268,7 @@ class EDF_PG_job(bpy.types.PropertyGroup):  # noqa: N801
 
 # The properties that are options of the engine under the same name: one word of several, or a plain value.
 CHOICES = ("field", "fade", "projection", "seam", "blend")
-VALUES = ("exposure", "seed")
+VALUES = ("dense", "exposure", "seed")
 # What changes places when reference and target do; the lenses only where each picture has its own.
 PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))

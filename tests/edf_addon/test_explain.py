@@ -29,6 +29,18 @@ def test_a_preview_measures_less_and_says_what_it_knows(small_result):
     assert facts["Projectivity"] == f"{measured['off_line_mean_px']:.2f} px"
 
 
+def test_dense_refinement_says_what_it_did_or_why_it_did_nothing(small_result):
+    report = small_result.report
+    assert "Dense" not in dict(explain.facts(report))
+    asked = {**report, "options": {**report["options"], "dense": True}}
+    for told, words in (
+        ({"used": True, "moved_px": 0.4321}, "moved points by 0.43 px"),
+        ({"used": False, "why": "the overlap is bare"}, "not used: the overlap is bare"),
+    ):
+        facts = dict(explain.facts({**asked, "field": {**report["field"], "dense": told}}))
+        assert facts["Dense"] == words
+
+
 def test_what_a_plane_lacks_is_left_out(small_result):
     report = small_result.report
     view = {**report["two_view"], "model": "plane", "focal_px": [None, None]}

@@ -1,6 +1,7 @@
 """The settings of a scene, and the engine's options that they become."""
 
 import dataclasses
+import math
 
 import pytest
 from edf_stitch.core.camera import CameraRequest
@@ -102,3 +103,18 @@ def test_what_goes_on_is_neither_saved_nor_undone(blender, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "x.blend"))
     job = bpy.context.window_manager.edf_stitch_job
     assert (job.running, job.message) == (False, "Stitched.")
+
+
+def test_every_option_of_the_engine_is_offered(blender):
+    """Those that come as files or images are added to a job by hand; two are nobody's wish."""
+    by_hand = {"matches", "ignore_reference", "ignore_target", "mask"}
+    options = {field.name for field in dataclasses.fields(StitchOptions)}
+    assert options - {"measure", "cache"} == set(properties.options_of(blender.settings)) | by_hand
+
+
+def test_a_round_panorama_is_turned_by_angles_in_degrees(blender):
+    settings = blender.settings
+    settings.level = "ANGLES"
+    assert properties.options_of(settings)["level"] == "auto", "a flat one is not turned"
+    settings.projection, settings.level_angles = "CYLINDRICAL", [math.radians(angle) for angle in (10, -5, 2)]
+    assert engine_options(settings).level == pytest.approx((10, -5, 2), abs=1e-5)
