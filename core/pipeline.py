@@ -85,8 +85,9 @@ class StitchResult:
         if (self.canvas.width, self.canvas.height) == (self.warp.canvas.width, self.warp.canvas.height):
             return self
         box = self.spread
+        from_target = None if self.from_target is None else cut(self.from_target, box)
         return replace(
-            self, warp=self.warp.within(box), occluded=cut(self.occluded, box),
+            self, warp=self.warp.within(box), occluded=cut(self.occluded, box), from_target=from_target,
             reference_layer=self.reference_layer.within(box), target_layer=self.target_layer.within(box),
         )  # fmt: skip
 

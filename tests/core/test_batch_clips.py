@@ -194,3 +194,14 @@ def test_from_python_with_one_inscribed_crop_for_all_frames(work: Path, whole: P
     shares = [share for _, share in told]
     assert shares == sorted(shares) and shares[0] == 0 and 0.9 < shares[-1] <= 1
     assert all(stage.startswith("[1/1] ") for stage, _ in told)
+
+
+def test_a_clip_on_a_sphere_keeps_one_inscribed_crop(work: Path, known: StitchOptions) -> None:
+    """A box of the whole sphere, found on the part of it that the pictures cover."""
+    options = replace(known, projection="equirectangular", crop="inscribed")
+    batch.run_batch(read_list(work / "clip.csv"), options, BatchRequest(work / "out"))
+    made = list(panoramas(work / "out").values())
+    assert len(made) == len(FRAMES) and len({picture.shape for picture in made}) == 1
+    assert made[0].shape[2] == 3 and 100 < made[0].shape[0] < made[0].shape[1] < 400, "nothing transparent"
+    report = json.loads((work / "out" / "shot.report.json").read_text("utf-8"))
+    assert (report["canvas"]["height"], report["canvas"]["width"]) == made[0].shape[:2]

@@ -208,7 +208,10 @@ def test_what_a_window_shows_of_a_round_panorama(results: dict[str, StitchResult
     for result in results.values():
         whole = result.spread_out()
         shape = result.alpha.shape
-        assert whole.warp.map_x.shape == whole.occluded.shape == whole.target_layer.alpha.shape == shape
+        assert whole.from_target is not None and result.from_target is not None
+        for part in (whole.warp.map_x, whole.occluded, whole.target_layer.alpha, whole.from_target, whole.confidence):
+            assert part.shape == shape
+        assert whole.from_target.sum() == result.from_target.sum() > 0
         assert (whole.target_layer.alpha > 0).sum() == (result.target_layer.alpha > 0).sum()
         geometry = full_geometry(whole)
         assert np.isnan(geometry["S"]).all() and geometry["canvas"] == shape[::-1]
