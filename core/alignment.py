@@ -139,7 +139,11 @@ def lay(
     dense = None
     if options.dense:
         steps("dense", 0.0)
-        dense = _refined(field, field.two_view, inliers, frames, cameras)
+        seen = tuple((p.view, p.alpha) for p in (frames[0].reference, frames[0].target))
+        dense = Cache(options.cache).remember(
+            "dense", (len(frames), field, inliers, seen, cameras),
+            lambda: _refined(field, field.two_view, inliers, frames, cameras),
+        )  # fmt: skip
 
     steps("warp", 0.0)
     relief = None if dense is None else dense.relief

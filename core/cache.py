@@ -7,7 +7,6 @@ entry. Entries are arrays and plain values of our own dataclasses, never pickles
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import secrets
@@ -20,7 +19,7 @@ from functools import lru_cache
 from hashlib import blake2b
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 import cv2
 import numpy as np
@@ -30,7 +29,7 @@ import scipy
 Kept = TypeVar("Kept")
 
 # Bytes of all entries together; the least recently used go first. Larger ones than a quarter are not kept at all.
-LIMIT = 1 << 30
+LIMIT = 2 << 30
 _PACKAGE = __name__.rpartition(".")[0]
 _PLAN = "plan.json"
 
@@ -78,14 +77,17 @@ class Cache:
         return made
 
     def _keep(self, path: Path, value: Any) -> None:
-        data = _packed(value, path.stem)
-        if len(data) > self._limit // 4:
+        arrays: list[np.ndarray] = []
+        plan = _plan(value, arrays)
+        size = sum(array.nbytes + 300 for array in arrays) + 1000
+        if size > self._limit // 4:
             return
         temporary = path.with_name(f".{secrets.token_hex(8)}.tmp")
         try:
             path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            self._make_room(len(data))
-            temporary.write_bytes(data)
+            self._make_room(size)
+            with open(temporary, "xb") as file:
+                _write(file, path.stem, plan, arrays)
             os.replace(temporary, path)
         except OSError:  # full, read-only, or cleared by somebody in this moment
             pass
@@ -119,8 +121,8 @@ class _Unknown(TypeError):
 def _read(path: Path) -> Any:
     """What an entry holds; None where there is none, or none that is sound."""
     try:
-        data = path.read_bytes()
-        value = _unpacked(data, path.stem)
+        with open(path, "rb") as file:
+            value = _unpacked(file, path.stem)
         os.utime(path)  # used just now
         return value
     except FileNotFoundError:
@@ -131,26 +133,24 @@ def _read(path: Path) -> Any:
         return None
 
 
-def _packed(value: Any, name: str) -> bytes:
-    """An .npz with a plan of the value in JSON, under the name that it will have."""
-    arrays: list[np.ndarray] = []
-    plan = {"name": name, "value": _plan(value, arrays)}
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
-        archive.writestr(_PLAN, json.dumps(plan))
+def _write(file: IO[bytes], name: str, plan: Any, arrays: list[np.ndarray]) -> None:
+    """An .npz with the plan of a value in JSON, which names the entry too."""
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr(_PLAN, json.dumps({"name": name, "value": plan}))
         for number, array in enumerate(arrays):
             with archive.open(f"{number}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)  # keeps the order of its axes too
-    return stream.getvalue()
 
 
-def _unpacked(data: bytes, name: str) -> Any:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:  # checks every member's checksum while reading
+def _unpacked(file: IO[bytes], name: str) -> Any:
+    with zipfile.ZipFile(file) as archive:  # checks every member's checksum while reading
         plan = json.loads(archive.read(_PLAN))
         if plan["name"] != name:
             raise ValueError("an entry under another's name")
-        numbers = range(len(archive.namelist()) - 1)
-        arrays = [np.lib.format.read_array(io.BytesIO(archive.read(f"{n}.npy")), allow_pickle=False) for n in numbers]
+        arrays = []
+        for number in range(len(archive.namelist()) - 1):
+            with archive.open(f"{number}.npy") as member:
+                arrays.append(np.lib.format.read_array(member, allow_pickle=False))
     return _value(plan["value"], arrays)
 
 

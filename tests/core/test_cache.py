@@ -10,12 +10,13 @@ import threading
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 import pytest
+from edf_stitch.core import alignment, features
 from edf_stitch.core import cache as cache_module
-from edf_stitch.core import features
-from edf_stitch.core.cache import Cache, _packed, _unpacked, default_folder
+from edf_stitch.core.cache import Cache, default_folder
 from edf_stitch.core.canvas import Grid
 from edf_stitch.core.cli import main
 from edf_stitch.core.features import Matches
@@ -25,6 +26,16 @@ from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 MATCHES = Matches(np.arange(6.0).reshape(3, 2), np.asfortranarray(np.eye(3)[:, :2]), 1.5, None, True)
+
+
+def packed(value: Any) -> bytes:
+    stream, arrays = io.BytesIO(), []
+    cache_module._write(stream, "name", cache_module._plan(value, arrays), arrays)
+    return stream.getvalue()
+
+
+def unpacked(data: bytes) -> Any:
+    return cache_module._unpacked(io.BytesIO(data), "name")
 
 
 def never() -> Matches:
@@ -43,9 +54,9 @@ def test_geometry_and_every_field_come_back_bit_by_bit(result: StitchResult, nam
     view, cameras = result.two_view, result.cameras
     used = result.matches.subset(view.inliers)
     field = fit_field(name, "plane", view, used, cameras[0].size, cameras[1].size)
-    packed = _packed((view, field, cameras, used), "key")
-    back = _unpacked(packed, "key")
-    assert _packed(back, "key") == packed, "as a whole, with the order of every array's axes"
+    data = packed((view, field, cameras, used))
+    back = unpacked(data)
+    assert packed(back) == data, "as a whole, with the order of every array's axes"
     assert [type(part) for part in back] == [type(view), type(field), tuple, Matches]
     grid = Grid.over(-40, -30, 500, 400)
     ours, theirs = field.on_grid(grid), back[1].on_grid(grid)
@@ -55,11 +66,11 @@ def test_geometry_and_every_field_come_back_bit_by_bit(result: StitchResult, nam
 
 def test_numbers_keep_their_kind() -> None:
     """NumPy 1 and 2 take a float32 array times a float or times a float64 differently."""
-    back = _unpacked(_packed(replace(MATCHES, scale=np.float64(1.5)), "a"), "a")
-    assert type(back.scale) is np.float64 and type(_unpacked(_packed(MATCHES, "a"), "a").scale) is float
+    back = unpacked(packed(replace(MATCHES, scale=np.float64(1.5))))
+    assert type(back.scale) is np.float64 and type(unpacked(packed(MATCHES)).scale) is float
     assert back.y.flags.f_contiguous and not back.y.flags.c_contiguous
     odd = (float("nan"), float("inf"), -0.0, 5e-324, True, 7, None, "ü", Path("a"), np.float32(0.1))
-    assert repr(_unpacked(_packed(odd, "a"), "a")) == repr(odd)
+    assert repr(unpacked(packed(odd))) == repr(odd)
 
 
 def test_made_once_and_found_afterwards(tmp_path: Path) -> None:
@@ -135,10 +146,10 @@ def test_an_entry_under_anothers_name_is_none(tmp_path: Path) -> None:
 def test_an_entry_runs_nothing(kind: list[str]) -> None:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
-        plan = f'{{"name": "a", "value": {{"class": {kind}, "fields": {{}}}}}}'.replace("'", '"')
+        plan = f'{{"name": "name", "value": {{"class": {kind}, "fields": {{}}}}}}'.replace("'", '"')
         archive.writestr("plan.json", plan)
     with pytest.raises((ValueError, AttributeError)):
-        _unpacked(stream.getvalue(), "a")
+        unpacked(stream.getvalue())
 
 
 def test_places_that_cannot_hold_anything(tmp_path: Path) -> None:
@@ -149,12 +160,11 @@ def test_places_that_cannot_hold_anything(tmp_path: Path) -> None:
 
 
 def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(path: Path, data: bytes) -> None:
-        with open(path, "wb") as file:
-            file.write(data[:10])
+    def full(file: IO[bytes], *_: object) -> None:
+        file.write(b"begun")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(cache_module, "_write", full)
     assert Cache(tmp_path).remember("matches", (), lambda: MATCHES) is MATCHES
     assert list(tmp_path.iterdir()) == []
 
@@ -232,11 +242,13 @@ def test_where_it_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def test_a_second_stitch_looks_for_nothing(
     small_pair: Pair, known: StitchOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    known = replace(known, dense=True)
     options = replace(known, cache=tmp_path)
     first = stitch(small_pair.reference, small_pair.target, options)
     plain = stitch(small_pair.reference, small_pair.target, known)
     monkeypatch.setattr(features, "detect", lambda *_: pytest.fail("features were looked for"))
-    for change in ({}, {"blend": "linear"}, {"crop": "inscribed"}, {"field": "strict"}):
+    monkeypatch.setattr(alignment, "refine", lambda *_: pytest.fail("was refined"))
+    for change in ({}, {"blend": "linear"}, {"crop": "inscribed"}, {"projection": "cylindrical"}):
         again = stitch(small_pair.reference, small_pair.target, replace(options, **change))
         if not change:
             for other in (first, plain):
