@@ -156,6 +156,12 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
             add(f"{side} layer", picture(layer.pixels, layer.alpha))
         if "masks" in take:
             add(f"{side} mask", _png((layer.alpha * 255).round().astype("uint8")), ".png")
+    if "masks" in take:
+        add("occluded", _png(result.occluded.astype("uint8") * 255), ".png")
+        if result.from_target is not None:
+            add("seam", _png(_painted(result.from_target, result.alpha > 0)), ".png")
+        if result.warp.confidence is not None:
+            add("confidence", _png((result.warp.confidence * 255).round().astype("uint8")), ".png")
     if "depth" in take and seen.has_depth(result.two_view):
         add("inverse depth", encode_picture(result.warp.inverse_depth[..., None], None, 32, ".exr")[0], ".exr")
     heat, heat_range = seen.heat_map(result)
@@ -176,6 +182,14 @@ def _png(values: Any) -> bytes:
     import cv2
 
     return cv2.imencode(".png", values if values.ndim == 2 else cv2.cvtColor(values, cv2.COLOR_RGBA2BGRA))[1].tobytes()
+
+
+def _painted(from_target: Any, shows: Any) -> Any:
+    """A seam in the form of a painted one: RGBA (H, W, 4), white from the target, transparent where nothing shows."""
+    import numpy as np
+
+    gray, alpha = (np.where(mask, 255, 0).astype(np.uint8) for mask in (from_target, shows))
+    return np.dstack([gray, gray, gray, alpha])
 
 
 def _unless_opaque(alpha: Any) -> Any:

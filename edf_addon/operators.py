@@ -141,6 +141,8 @@ class EDF_OT_open_pair(bpy.types.Operator):  # noqa: N801
                 self.report({"ERROR"}, f"{name} cannot be opened: {error}")
                 return {"CANCELLED"}
         settings = properties.settings_of(context.scene)
+        if loaded != [settings.reference, settings.target]:
+            settings.edited_matches = False  # they are those of other pictures
         settings.reference, settings.target = loaded
         stitching.show(context, loaded[0])
         return {"FINISHED"}

@@ -225,7 +225,10 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
     take_layers: BoolProperty(
         name="Layers", description="Both pictures on the panorama's canvas, with alpha, before they are blended"
     )
-    take_masks: BoolProperty(name="Masks", description="Where each of the two pictures shows something, as images")
+    take_masks: BoolProperty(
+        name="Masks", description="Where each picture shows something, what the target cannot see, and which picture "
+        "each point comes from (which can be painted on, as the seam), as images",
+    )
     take_depth: BoolProperty(
         name="Inverse Depth", description="The panorama's inverse depth, in units of the distance between the cameras"
     )

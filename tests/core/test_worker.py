@@ -55,7 +55,7 @@ def test_a_job_gives_the_panorama_that_the_pipeline_gives(job, tmp_path, small_r
     assert shares == sorted(shares) and 0.9 < shares[-1] < 1
     assert set(index["files"]) == {
         "panorama", "reference layer", "target layer", "reference mask", "target mask", "inverse depth", "heat",
-        "difference",
+        "difference", "occluded", "seam",
     }  # fmt: skip
     made = load_picture(tmp_path / "job" / index["files"]["panorama"])
     assert made.bits == 8 and np.abs(made.pixels - small_result.pixels).max() < 5e-3

@@ -82,7 +82,7 @@ def test_a_script_gets_the_panorama(chosen, pixels_of):
     assert len(kept["matches"]["rows"]) == len(settings.matches) > 50
     others = result.companions(panorama)
     assert set(others) == {"reference layer", "target layer", "reference mask", "target mask", "inverse depth", "heat",
-                           "difference"}  # fmt: skip
+                           "difference", "occluded", "seam"}  # fmt: skip
     assert {tuple(image.size) for image in others.values()} == {tuple(panorama.size)}
     assert others["inverse depth"].is_float and others["heat"].name.startswith(".")
     assert "px in" in status.now.message and not status.now.failed and not modal.is_working()
@@ -435,3 +435,13 @@ def test_a_broken_library_is_told_in_words(chosen, monkeypatch):
     monkeypatch.undo()
     bpy.ops.edf.stitch()
     assert health.problem() == ""
+
+
+def test_another_pair_does_not_inherit_the_edited_matches(chosen, folder):
+    files = [{"name": "reference.png"}, {"name": "target.png"}]
+    chosen.settings.edited_matches = True
+    bpy.ops.edf.open_pair(directory=str(folder), files=files)
+    assert chosen.settings.edited_matches, "the same pair again"
+    chosen.settings.target = bpy.data.images.new("other", 8, 8)
+    bpy.ops.edf.open_pair(directory=str(folder), files=files)
+    assert not chosen.settings.edited_matches
