@@ -14,7 +14,7 @@ from .errors import BadRequest
 LEVELS = ("auto", "none")
 Level = str | tuple[float, float, float]
 # How far from level people hold cameras (degrees): they see a tilted horizon, and look up and down on purpose.
-ROLL_SIGMA, PITCH_SIGMA = 2.0, 15.0
+ROLL_SIGMA, PITCH_SIGMA = 1.5, 20.0
 ROUNDS = 50
 
 
