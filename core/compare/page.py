@@ -31,7 +31,7 @@ BLINK = "\n".join([
     ".blink { margin: 0.8rem 0; }",
     ".blink input { margin: 0 0.25rem 0 0.75rem; }",
     ".blink .stacks > div { display: none; position: relative; margin-top: 0.5rem; }",
-    ".blink img { width: 100%; aspect-ratio: auto; background: none; border-radius: 0; }",
+    ".blink img { width: auto; max-width: 100%; aspect-ratio: auto; background: none; border-radius: 0; }",
     ".blink img + img { position: absolute; inset: 0; animation: blink 1.2s steps(1) infinite; }",
     ".blink .stacks > div:hover img + img { animation-play-state: paused; }",
     "@keyframes blink { 0% { opacity: 1; } 50% { opacity: 0; } }",
