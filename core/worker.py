@@ -10,7 +10,7 @@ file whose EXIF (orientation included) belongs to the array. `options`: fields o
 CameraRequest. `cameras`: {"reference", "target"}: {"lens": fields of BlenderLens but the resolution, "matrix_world"}.
 `masks`: {"reference", "target"}: .npy of pictures, rows as shown; {"seam"}: over the whole panorama. `matches`: .npy
 (N, 5) x, y, x2, y2, weight; weight 0 leaves a match out. `take`: which of "layers", "masks", "depth" to leave as
-pictures. Relative paths start at FOLDER.
+pictures. Relative paths start at FOLDER. Or `try` alone: load the libraries, and no more.
 """
 
 from __future__ import annotations
@@ -23,12 +23,15 @@ import signal
 import sys
 import threading
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 SIDES = ("reference", "target")
 # Of the whole work; the rest is encoding what the window wants to have.
 STITCH_SHARE = 0.9
+# All that a stitch may load sooner or later, besides the standard library.
+LIBRARIES = ("numpy", "cv2", "scipy.linalg", "scipy.optimize", "poselib", "OpenEXR", "exifread")
 
 
 def main(folder: Path) -> int:
@@ -66,6 +69,11 @@ def _work(folder: Path) -> None:
 
     _say({"stage": "read", "share": 0.0})
     job = json.loads((folder / "job.json").read_text("utf-8"))
+    if job.get("try"):
+        for name in LIBRARIES:
+            import_module(name)
+        (folder / "result.json").write_text("{}")
+        return
     (reference, turn), (target, turn_prime) = (_picture(folder, job[side]) for side in SIDES)
     camera = {key: _tuples(value) for key, value in job["options"].pop("camera", {}).items()}
     if job.get("cameras"):

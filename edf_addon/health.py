@@ -1,26 +1,60 @@
-"""Whether the libraries that the engine needs can be found, asked without loading any of them into Blender.
+"""Whether the libraries that the engine needs work, asked without loading any of them into Blender.
 
-They are loaded in the worker process only. Whether one that is there works, shows when the first worker starts: its
-words about a broken one are remembered here for the panel.
+They are loaded in worker processes only. One of these tries them all, once, when the tab is first drawn; the panel
+shows its words about a library that is missing, broken, or made for another processor.
 """
 
 from __future__ import annotations
 
-from functools import cache
-from importlib.util import find_spec
+import bpy
 
-LIBRARIES = {"numpy": "NumPy", "cv2": "OpenCV", "scipy": "SciPy", "poselib": "PoseLib", "OpenEXR": "OpenEXR",
-             "exifread": "ExifRead"}  # fmt: skip
-ADVICE = "reinstall EDF Stitch from its zip, and switch off other add-ons that bring their own copies"
+from . import job
+
 # Kind of the worker's message about a library that cannot be loaded.
 BROKEN = "Broken"
+# Seconds between two looks at the worker that tries them.
+TICK = 0.3
 
 _said: list[str] = []
+_trials: list[job.Job] = []
+_asked = False
 
 
 def problem() -> str:
-    """What is wrong, in words for the panel; "" where nothing is known to be."""
-    return _said[-1] if _said else _absent()
+    """What is wrong, in words for the panel; "" where nothing is known to be. Starts the trial; never waits."""
+    if not _asked and not bpy.app.background:
+        begin_trial()
+    return _said[-1] if _said else ""
+
+
+def begin_trial() -> None:
+    """Let a worker load the libraries; a timer listens for how that ends."""
+    global _asked
+    _asked = True
+    try:
+        folder = job.new_folder(bpy.app.tempdir)
+        _trials.append(job.start({"try": True}, folder))
+    except OSError as error:
+        remember(job.sentence(f"no worker process can be started: {error}"))
+        return
+    bpy.app.timers.register(listen, first_interval=TICK, persistent=True)
+
+
+def listen() -> float | None:
+    """Seconds until the next look at the trial, as Blender's timers want it; None when it is over."""
+    if not _trials:
+        return None
+    outcome = _trials[-1].poll()
+    if outcome is None:
+        return TICK
+    _trials.pop().close()
+    if outcome.kind != job.DONE:
+        remember(outcome.words)
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR":
+                area.tag_redraw()
+    return None
 
 
 def remember(message: str) -> None:
@@ -33,7 +67,11 @@ def forget() -> None:
     _said.clear()
 
 
-@cache
-def _absent() -> str:
-    missing = [words for name, words in LIBRARIES.items() if find_spec(name) is None]
-    return f"{', '.join(missing)} cannot be found: {ADVICE}" if missing else ""
+def stop() -> None:
+    """End a trial that is going on; the next time that the tab is drawn there is another one."""
+    global _asked
+    _asked = False
+    while _trials:
+        _trials.pop().close()
+    if bpy.app.timers.is_registered(listen):
+        bpy.app.timers.unregister(listen)

@@ -189,5 +189,6 @@ def register() -> None:
 def unregister() -> None:
     """End whatever is at work."""
     stop("Cancelled. Nothing was changed.")
+    health.stop()
     if _before_loading in bpy.app.handlers.load_pre:
         bpy.app.handlers.load_pre.remove(_before_loading)
