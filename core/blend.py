@@ -89,10 +89,11 @@ def in_bands(reference: Layer, target: Layer, from_target: NDArray[np.bool_], ov
     region = seam_region(from_target, out.alpha > 0, 4 << bands)
     if region is None or overlap is None:
         return out
-    difference = _on_region(overlap.difference, overlap.box, region)
-    same = _on_region(overlap.same, overlap.box, region)
     shown = out.alpha[region] > 0
-    change = correction(difference, same, from_target[region], shown, bands)
+    change = correction(
+        _on_region(overlap.difference, overlap.box, region), _on_region(overlap.same, overlap.box, region),
+        from_target[region], shown, bands,
+    )  # fmt: skip
     touched = change.any(axis=2) & shown
     pixels = out.pixels[region]
     before, tones = pixels[touched], to_tones(pixels[touched])

@@ -39,11 +39,12 @@ def correction(
     """
     # on the far side of the seam: what the picture of this side would show there, had it the other's light
     light = filled(difference, same)
+    del difference  # as large as the overlap: the peak of memory is here
     share = _from_nearest(from_target, shown).astype(np.float32)[..., None]
     blended = _masked_bands(light, share, bands)
-    blended -= np.where(from_target[..., None], light, np.float32(0))
     for start in range(0, len(blended), STRIP):
         part, over = (values[start : start + STRIP] for values in (blended, from_target[..., None]))
+        part -= np.where(over, light[start : start + STRIP], np.float32(0))
         # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
         whole = np.where(over, -light[start : start + STRIP], light[start : start + STRIP])
         np.clip(part, np.minimum(whole, 0), np.maximum(whole, 0), out=part)
@@ -71,16 +72,19 @@ def filled(values: NDArray[np.float32], known: NDArray[np.bool_]) -> NDArray[np.
 
 
 def _filled(sums: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
+    # sums are written over, for there is little else as large in memory
     whole = np.minimum(weight, 1)
-    own = sums / np.maximum(weight, np.float32(1e-6))[..., None]
     if min(weight.shape) <= 2 or whole.min() == 1:
+        own = sums / np.maximum(weight, np.float32(1e-6))[..., None]
         mean = sums.sum(axis=(0, 1)) / max(float(weight.sum()), 1e-6)
         return own * whole[..., None] + mean.astype(np.float32) * (1 - whole)[..., None]
     # weights grow on the way up: a cell with a quarter of it known is known
     coarser = _filled(4 * _down(sums), 4 * _down(weight[..., None])[..., 0])
     out = _up(coarser, weight.shape)
     out *= (1 - whole)[..., None]
-    out += own * whole[..., None]
+    sums /= np.maximum(weight, np.float32(1e-6))[..., None]
+    sums *= whole[..., None]
+    out += sums
     return out
 
 
