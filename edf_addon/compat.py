@@ -55,6 +55,13 @@ def saving_scene(file_format: str, bits: int) -> Iterator[bpy.types.Scene]:
         bpy.data.scenes.remove(scene)
 
 
+def node_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
+    """The nodes of a new material or world; since 5.0 they are there from the start."""
+    if owner.node_tree is None:
+        owner.use_nodes = True
+    return owner.node_tree
+
+
 def make_panoramic(
     camera: bpy.types.Camera, kind: str, headings: tuple[float, float], elevations: tuple[float, float]
 ) -> None:

@@ -204,7 +204,7 @@ def _ready(layout: Any, settings: Any, job: Any, width: float) -> None:
     elif settings.edited_matches:
         words(layout, "With the matches of the list; none are searched for", width, NOTE)
     if job.message:
-        words(layout, explain.sentence(job.message), width, WARNING if job.failed else "CHECKMARK")
+        words(layout, job.message, width, WARNING if job.failed else "CHECKMARK")
 
 
 def _working(layout: Any, _settings: Any, job: Any, width: float) -> None:

@@ -242,8 +242,8 @@ def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
         camera = np.array(rig.matrix_world) @ camera
     turn = world_rotation(camera, scene_geometry.matrix(known["report"]["canvas"]["projection"]["rotation"]))
     world = bpy.data.worlds.new(image.name)
-    world.use_nodes = True
-    nodes, link = world.node_tree.nodes, world.node_tree.links.new
+    tree = compat.node_tree(world)
+    nodes, link = tree.nodes, tree.links.new
     nodes.clear()
     kinds = ("TexCoord", "Mapping", "TexEnvironment", "Background", "OutputWorld")
     where, mapping, texture, background, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
@@ -261,8 +261,8 @@ def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
 def emission(image: bpy.types.Image) -> bpy.types.Material:
     """A material that shows an image as it is, whatever the lights; transparent where the image is."""
     material = bpy.data.materials.new(image.name)
-    material.use_nodes = True
-    nodes, link = material.node_tree.nodes, material.node_tree.links.new
+    tree = compat.node_tree(material)
+    nodes, link = tree.nodes, tree.links.new
     nodes.clear()
     kinds = ("TexImage", "Emission", "BsdfTransparent", "MixShader", "OutputMaterial")
     texture, shine, clear, mix, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
