@@ -31,10 +31,12 @@ def test_every_wheel_is_locked_by_its_hash_and_every_dependency_is_among_them():
 
 
 def test_the_versions_that_are_tested_are_those_that_ship():
+    """On Intel Macs poselib is one release older, the last that has a wheel for them."""
     constraints = (ROOT / ".ci" / "constraints.txt").read_text("utf-8").lower()
     for line in (ROOT / ".ci" / "wheels.lock").read_text("utf-8").splitlines()[1:]:
-        name, version = LOCKED.fullmatch(line)[1].replace("_", "-"), LOCKED.fullmatch(line)[2]
-        assert f"{name}=={version}" in constraints
+        name, version, wheel = LOCKED.fullmatch(line).groups()
+        on_intel_macs = name == "poselib" and re.search(r"-macosx_\d+_\d+_x86_64$", wheel)
+        assert on_intel_macs or f"{name.replace('_', '-')}=={version}" in constraints
 
 
 def test_the_extension_asks_for_files_and_nothing_else():

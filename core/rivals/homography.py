@@ -76,6 +76,8 @@ def _settled(H: Array, matches: Matches) -> tuple[Array, NDArray[np.bool_]]:
     if matches.given:
         return direct_linear(matches.x, matches.y, matches.weights), np.full(len(matches), True)
     H = H / np.linalg.norm(H)
+    if np.sum(transfer_error(H, matches) < REACH_PX * matches.scale) < LEAST_MATCHES:  # of other matches altogether
+        H = direct_linear(matches.x, matches.y, matches.weights)
     for _ in range(REWEIGHTINGS):
         off = transfer_error(H, matches) / (REACH_PX * matches.scale)
         weight = matches.weights * np.square(1 - np.square(np.minimum(off, 1.0)))

@@ -53,7 +53,8 @@ def rows_of(result: StitchResult) -> np.ndarray:
 # --- matches --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("field", FIELDS)
+# One homography, and REW that begins with one, weigh matches by how far they are off: those that are given count alike.
+@pytest.mark.parametrize("field", [name for name in FIELDS if name not in ("rew", "homography")])
 @pytest.mark.parametrize("focal", ["given", "estimated"])
 def test_exported_matches_given_back_make_the_same_warp(
     small_pair: Pair, quick: StitchOptions, field: str, focal: str

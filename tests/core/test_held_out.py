@@ -16,6 +16,7 @@ from edf_stitch.core.features import Matches
 from edf_stitch.core.fields import FIELDS, fit_field
 from edf_stitch.core.held_out import HeldOut, held_out
 from edf_stitch.core.metrics import Shown, look_up
+from edf_stitch.core.rivals.homography import LEAST_MATCHES
 from edf_stitch.core.two_view import TwoView
 from edf_stitch.core.warp import build_warp
 
@@ -52,6 +53,10 @@ def matches_of(view: TwoView, depths: Depths, count: int = 400, noise: float = 0
 
 def fitted(name: str, view: TwoView, matches: Matches) -> Field:
     return fit_field(name, "plane", view, matches, SIZE, SIZE)
+
+
+def missed(field: Field, matches: Matches) -> np.ndarray:
+    return np.linalg.norm(field.sends(matches.x) - matches.y, axis=1)
 
 
 def overhang(*direction: float) -> Shown:
@@ -168,7 +173,8 @@ def test_outliers_that_the_whole_fit_dropped_take_no_part(view: TwoView) -> None
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_too_few_or_badly_placed_matches_give_nan_without_a_word(name: str, view: TwoView) -> None:
-    few = matches_of(view, planar, MIN_CENTRES)
+    # APAP begins with the strict field, and so with more matches than its own homographies need: it is never short
+    few = matches_of(view, planar, LEAST_MATCHES if name == "homography" else MIN_CENTRES)
     # 38 on one line, 8 off it: without the strip only a line is left
     x = np.concatenate([np.column_stack([np.full(38, 100.0), np.linspace(20, 280, 38)]),
                         np.column_stack([np.full(8, 300.0), np.linspace(20, 280, 8)])])  # fmt: skip
@@ -176,7 +182,7 @@ def test_too_few_or_badly_placed_matches_give_nan_without_a_word(name: str, view
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         found = held_out(fitted(name, view, few), few, RIGHT)
-        assert np.isnan([found.rms_px, found.median_px, found.towards_rms_px]).all()
+        assert name == "apap" or np.isnan([found.rms_px, found.median_px, found.towards_rms_px]).all()
         found = held_out(fitted(name, view, lined), lined, RIGHT)
         assert np.isfinite(found.rms_px) and np.isnan(found.towards_rms_px)
 
@@ -189,7 +195,7 @@ def test_a_field_sends_points_where_its_map_does(name: str, view: TwoView, camer
     matches = matches_of(view, curved, 300, noise=0.3)
     field = fitted(name, view, matches)
     points = matches.x[(np.abs(matches.x - (250, 150)) < (100, 100)).all(axis=1)]
-    shown = look_up(build_warp(field, view, camera, camera), points)
+    shown = look_up(build_warp(field, field.two_view, camera, camera), points)
     assert len(points) > 50 and np.abs(field.sends(points) - shown).max() < 0.05
 
 
@@ -198,7 +204,8 @@ def test_fitted_again_to_the_same_a_field_is_the_same(name: str, view: TwoView) 
     matches = replace(matches_of(view, curved, 200, noise=0.3), given=True, weight=np.linspace(0.5, 2, 200))
     field = fitted(name, view, matches)
     again = field.refitted(matches)
-    assert field.fit.kept.all() and again.fit.kept.all() and again.fit.smoothing == field.fit.smoothing
+    assert field.fit.kept.all() and again.fit.kept.all()
+    assert np.array_equal(again.fit.smoothing, field.fit.smoothing, equal_nan=True)
     assert again.name == name and np.abs(again.sends(matches.x) - field.sends(matches.x)).max() < 1e-6
 
 
@@ -206,9 +213,11 @@ def test_fitted_again_to_the_same_a_field_is_the_same(name: str, view: TwoView) 
 def test_fitted_again_a_field_follows_the_new_matches(name: str, view: TwoView) -> None:
     field = fitted(name, view, matches_of(view, curved, 200))
     new = matches_of(view, lambda x: curved(x) + 0.05, 150, seed=1)
-    assert np.linalg.norm(field.sends(new.x) - new.y, axis=1).min() > 5
+    assert missed(field, new).min() > 5
     again = field.refitted(new)
-    assert len(again.fit.kept) == 150 and np.median(np.linalg.norm(again.sends(new.x) - new.y, axis=1)) < 0.5
+    # one homography leaves what bends: it has to be as near as one that never saw the first matches
+    within = 0.5 if name != "homography" else 1.01 * np.median(missed(fitted(name, view, new), new))
+    assert len(again.fit.kept) == 150 and np.median(missed(again, new)) < within
 
 
 def test_matches_on_a_line_refit_nothing(view: TwoView) -> None:
