@@ -82,8 +82,8 @@ def test_a_storm_of_cancels(chosen, tmp_path, monkeypatch):
 
 PIECES = (
     *(b"{", b"}", b"[", b"\n", b"\xff", b"\0", b'"stage"', b'"share"', b":", b"0.5", b"1e999", b"null", b","),
-    *(b'"done"', b"true", b'"error"', b"[" * 5000, b"x" * 100_000, b'{"stage": "field", "share": 0.5}\n', b'{"done": 1}\n'),
-    *(b'{"error": ["x"], "kind": 3}\n', b'{"error": null}\n', b'{"done": true}\n'),
+    *(b'"done"', b"true", b'"error"', b"[" * 5000, b"x" * 100_000, b'{"stage": "field", "share": 0.5}\n'),
+    *(b'{"done": 1}\n', b'{"error": ["x"], "kind": 3}\n', b'{"error": null}\n', b'{"done": true}\n'),
 )
 
 
