@@ -212,6 +212,8 @@ def test_cancel_at_every_stage_leaves_nothing(chosen, monkeypatch, stage):
     """The worker stops to think at the stage, so that it is there when it is cancelled."""
     pause = f"import time; say = worker._say\ndef pausing(line):\n say(line)\n if line.get('stage') == {stage!r}: "
     worker_that(monkeypatch, pause + "time.sleep(60)\nworker._say = pausing")
+    chosen.settings.dense = chosen.settings.exposure = True  # with all that has a stage of its own
+    chosen.settings.seam = "GRAPHCUT"
     working = Modal()
     assert working._start(bpy.context)
     before = names()
