@@ -73,7 +73,7 @@ def sentence(text: str) -> str:
 def _dense(told: dict[str, Any]) -> str:
     if not told.get("used"):
         return f"not used: {told.get('why', 'nothing was found')}"
-    return f"moved points by {told['moved_px']:.2f} px"
+    return f"moved by {told['moved_px']:.2f} px"
 
 
 def _share(part: int, whole: int) -> str:

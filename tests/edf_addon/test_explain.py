@@ -34,7 +34,7 @@ def test_dense_refinement_says_what_it_did_or_why_it_did_nothing(small_result):
     assert "Dense" not in dict(explain.facts(report))
     asked = {**report, "options": {**report["options"], "dense": True}}
     for told, words in (
-        ({"used": True, "moved_px": 0.4321}, "moved points by 0.43 px"),
+        ({"used": True, "moved_px": 0.4321}, "moved by 0.43 px"),
         ({"used": False, "why": "the overlap is bare"}, "not used: the overlap is bare"),
     ):
         facts = dict(explain.facts({**asked, "field": {**report["field"], "dense": told}}))
