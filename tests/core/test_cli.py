@@ -211,6 +211,8 @@ WRONG = [
     ["--field", "nonsense"], ["--fade", "slowly"], ["--nonsense"], ["--seed", "x"], ["--seed", "-1"], ["--scale", "0"],
     ["--quiet", "--verbose"], ["--principal", "1"], ["--focal-px", "abc"], ["--focal-px", "0"], ["--focal-px"],
     ["--focal-mm", "35"], ["--crop", "tight"], ["--focal35", "28", "--cameras", "c.json"],
+    ["--projection", "fisheye"], ["--projection", "cylindrical", "--field", "paper"], ["--level=1,2,3"],
+    ["--projection", "equirectangular", "--level", "north"],
 ]  # fmt: skip
 
 
