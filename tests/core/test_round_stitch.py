@@ -170,6 +170,8 @@ def test_crops(small_pair: Pair, known: StitchOptions, results: dict[str, Stitch
         assert np.array_equal(part.pixels, full.pixels[y : y + h, x : x + w]), crop
         assert np.array_equal(part.alpha, full.alpha[y : y + h, x : x + w])
         assert part.report["canvas"]["width"] == w
+        assert part.warp.map_x.shape <= (h, w) and part.warp.map_x.size <= h * w, "no more is kept than is shown"
+        assert np.array_equal(part.spread_out().reference_layer.alpha > 0, own[y : y + h, x : x + w])
         assert np.allclose(
             np.array(part.report["canvas"]["projection"]["centre"]) + (x, y),
             full.report["canvas"]["projection"]["centre"],
