@@ -12,7 +12,7 @@ from .blend import averaged, distance_labels, feathered, feathered_across, in_ba
 from .exposure import Exposure, match_exposure, pooled, unchanged
 from .occlusion import occluded
 from .options import StitchOptions
-from .overlap import Overlap, overlap_of
+from .overlap import Overlap, of_consequence, overlap_of
 from .seam import find_seam, known_labels, seam_cost
 from .two_view import TwoView
 from .warp import Layer, Warp
@@ -96,7 +96,8 @@ def _with_seam(
 ) -> Decided:
     if not options.has_seam:
         return so_far
-    known = known_labels(reference, target, so_far.hidden, painted)
+    hidden = so_far.hidden if overlap is None else of_consequence(so_far.hidden, overlap)
+    known = known_labels(reference, target, hidden, painted)
     if overlap is None:
         return replace(so_far, from_target=known == 1)
     if options.seam == "none":

@@ -16,6 +16,8 @@ WHOLE = 1 - 1 / 255
 SAME_TONE, SAME_SIGMAS = 0.06, 4.0
 # Pixels around what the target cannot see in which its edge may still lie.
 EDGE = 3
+# Narrower than this is a speck.
+SPECK = 7
 SAMPLES = 100_000
 
 
@@ -48,6 +50,14 @@ def overlap_of(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Ov
     edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) > 0
     same = both & ~edge
     return Overlap(box, both, difference, same & _alike(difference, same))
+
+
+def of_consequence(hidden: NDArray[np.bool_], overlap: Overlap) -> NDArray[np.bool_]:
+    """Of what the target cannot see (H, W) that which is more than a speck, or looks different in the two pictures: a
+    few uncertain pixels that look alike are no reason to patch the panorama."""
+    out = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8)) > 0
+    out[overlap.box] |= hidden[overlap.box] & (np.abs(overlap.difference).max(axis=2) > 2 * SAME_TONE)
+    return out
 
 
 def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.bool_]:

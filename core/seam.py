@@ -22,6 +22,8 @@ SEAMS = ("graphcut", "none")
 COARSE, BANDED = 12_000, 80_000
 # Half the width of the band, in pixels of its level.
 BAND = 3
+# A reference with less than this share of it to itself is held at its core: so far from its border (1: the middle).
+SURROUNDED, CORE = 0.1, 0.2
 # Price (of 1, for opposite tones) of a step in depth by a pixel of parallax, of no confidence, and of length alone.
 DEPTH, DOUBT, LENGTH = 0.1, 0.1, 0.004
 # Price of each pixel of the target where both could be shown: the reference is exact, the target is warped.
@@ -43,6 +45,11 @@ def known_labels(
     whole, whole_too = reference.alpha >= WHOLE, target.alpha >= WHOLE
     known[shows & (~shows_too | hidden | (whole & ~whole_too))] = FIRST
     known[shows_too & (~shows | (whole_too & ~whole & ~hidden))] = SECOND
+    alone = int((shows & ~shows_too).sum())
+    if shows.any() and alone < SURROUNDED * int(shows.sum()):
+        # all round it is the target: the cheapest cut would leave nothing of the reference
+        inner = cv2.distanceTransform(np.pad(shows.astype(np.uint8), 1), cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]
+        known[(known == FREE) & (inner > CORE * inner.max())] = FIRST
     if painted is not None:
         known[(painted < 0) & shows] = FIRST
         known[(painted > 0) & shows_too] = SECOND
@@ -56,9 +63,8 @@ def seam_cost(overlap: Overlap, warp: Warp) -> NDArray[np.float32]:
         step = np.abs(np.diff(overlap.difference, axis=axis)).mean(axis=2)
         cost += np.maximum(_padded(step, axis, 0, 1), _padded(step, axis, 1, 0))
         cost += np.float32(DEPTH) * np.minimum(_jumps(warp, overlap.box, axis), np.float32(1))
-    confidence = getattr(warp, "confidence", None)
-    if confidence is not None:
-        cost += np.float32(DOUBT) * (1 - confidence[overlap.box])
+    if warp.confidence is not None:
+        cost += np.float32(DOUBT) * (1 - warp.confidence[overlap.box])
     cost += np.float32(LENGTH)
     return np.minimum(cost, np.float32(1), out=cost)
 

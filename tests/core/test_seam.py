@@ -123,6 +123,13 @@ def test_holes_and_islands_of_one_picture() -> None:
     assert labels[:, :200].sum() < 300, "a target inside the reference shows nothing but what it alone has"
 
 
+def test_a_reference_inside_the_target_does_not_vanish() -> None:
+    first, second = layer(slice(60, 240), gray()), layer(slice(0, 300), gray())
+    first.alpha[:30] = first.alpha[170:] = 0
+    labels = cut(first, second)
+    assert not labels[80:120, 110:190].any() and labels[first.alpha == 0].all()
+
+
 def test_pieces_at_many_places_stay_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     """More border than any band may hold: then the coarse labels stay, and what is settled is still right."""
     monkeypatch.setattr(seam, "BANDED", 50)
