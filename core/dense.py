@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .canvas import Box
 from .displacement import StrictField
-from .edge_aware import broken, edge_weights, smoothed
+from .edge_aware import broken, edge_weights, smoothed, tied
 from .features import Matches
 from .images import Picture
 from .line_map import Lines, Plane, SparseMap
@@ -25,6 +25,7 @@ from .polish import polish
 from .relief import MOST_FADE, Relief, raised
 from .slack import SlackField
 from .two_view import TwoView
+from .unfolding import unfolded
 from .warp import fetch
 
 # Pixels of the overlap that are searched and polished at most: beyond, both pictures are shrunk.
@@ -35,6 +36,9 @@ LEAST_REACH, MOST_REACH = 24.0, 96.0
 EDGE, FIRST_SMOOTHNESS, FIELD_SHARE = 4.0, 5.0, 1e-2
 # px between neighbours that are a depth edge
 JUMP = 0.3
+# Squared gradient along the line (gray levels per px) of half a texture; how much more neighbours without any hold
+# together, and how little they count.
+TEXTURE, TIE, PLAIN_DOUBT = 1.0, 15.0, 0.9
 # Nodes, a side, that say where the overlap is; overlaps with fewer pixels a side are left alone.
 LOOK, LEAST_SIDE = 64, 32
 
@@ -76,19 +80,23 @@ def refine(
     step, fine = (max(1.0, float(np.sqrt(box[2] * box[3] / most))) for most in (SEARCHED, POLISHED))
     base, reach = search_base(sparse, matches.subset(field.fit.kept), field.plane, MOST_REACH * step)
     reach = float(np.clip(reach, LEAST_REACH * step, MOST_REACH * step))
-    lines = Lines.over(sparse, box, fine)
+    lines = Lines.over(base, box, fine)
+    field_at = (lines.at(sparse) - lines.inverse_depth) / lines.moved
     coarse_views, views = ([View.of(p.view, p.alpha, s) for p in pictures] for s in (step, fine))
     along, found = search(lines, base, coarse_views[0], coarse_views[1], step, reach)
     weights = edge_weights(_guide(pictures[0].view, lines), EDGE)
-    weights = broken(weights, along, found, JUMP)
-    along = smoothed(along, found.astype(np.float32), weights, FIRST_SMOOTHNESS, FIELD_SHARE)
+    plain = _plain(lines, sparse, views[0])
+    weights = tied(broken(weights, along, found, JUMP), plain, TIE)
+    share = np.maximum(found * (1 - np.float32(PLAIN_DOUBT) * plain), np.float32(FIELD_SHARE))
+    along = smoothed(np.where(found, along, field_at), share, weights, FIRST_SMOOTHNESS)
     polished = polish(lines, views[0], views[1], along, weights, slack)
     confidence = np.clip(polished.likeness, 0, 1) * cv2.blur(found.astype(np.float32), (9, 9))
     there = _there(lines, polished.along, polished.across, pictures)
     if not there.any():
         return Dense(None, "the overlap is too small")
-    relief = raised(lines, sparse, polished.along, polished.across, confidence, there)
-    moved, across = (float(np.sqrt(np.square(v[there]).mean())) for v in (polished.along, polished.across))
+    along = unfolded(lines, two_view, cameras[1].size, polished.along, polished.across) - field_at
+    relief = raised(lines, base, along, polished.across, confidence, there)
+    moved, across = (float(np.sqrt(np.square(v[there]).mean())) for v in (along, polished.across))
     return Dense(relief, "", reach, float(found[there].mean()), moved, across)
 
 
@@ -118,6 +126,20 @@ def _guide(view: NDArray[np.uint8], lines: Lines) -> NDArray[np.float32]:
     if (rows, columns) != part.shape[:2]:
         part = cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
     return cv2.GaussianBlur(part, (0, 0), 1.0).astype(np.float32)
+
+
+def _plain(lines: Lines, sparse: SparseMap, reference: View) -> Plane:
+    """How little (h, w) 0..1 the reference shows around the nodes that a move along their lines would change."""
+    epipole = np.linalg.svd(sparse.two_view.F)[2][2]
+    away = lines.ideal * epipole[2] - epipole[:2]
+    away /= np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-12)
+    gray = cv2.GaussianBlur(reference.gray, (0, 0), 1.0)
+    x, y = lines.nodes
+    slope = np.zeros(lines.shape, np.float32)
+    for k in (0, 1):
+        gradient = cv2.Scharr(gray, cv2.CV_32F, 1 - k, k) / 32
+        slope += reference.sample(gradient, x, y)[0] * away[..., k].astype(np.float32)
+    return TEXTURE / (TEXTURE + cv2.blur(slope * slope, (7, 7)))
 
 
 def _there(lines: Lines, along: Plane, across: Plane, pictures: tuple[Picture, Picture]) -> NDArray[np.bool_]:

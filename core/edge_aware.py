@@ -6,11 +6,15 @@ Min, Choi, Lu, Ham, Sohn and Do, "Fast global image smoothing based on weighted 
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 # Attenuation of λ from pass to pass (the paper's eq. 11 for its three passes).
 PASSES, ATTENUATION = 3, 4.0
+# An edge of the guide is known to so many pixels.
+NEAR = 7
+MOST = 20.0
 
 
 def edge_weights(guide: NDArray[np.float32], sigma: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -24,13 +28,25 @@ def broken(
     weights: tuple[NDArray[np.float32], NDArray[np.float32]], values: NDArray[np.float32], known: NDArray[np.bool_],
     step: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The weights, lowered where known values (H, W) of neighbours differ by more than about `step`."""
+    """The weights, lowered where known values (H, W) of neighbours differ by more than about `step`, if the guide has
+    an edge there too (within NEAR pixels): a jump in the middle of a plain surface is an error."""
     out = []
     for axis, weight in zip((1, 0), weights, strict=True):
         both = known.take(range(1, known.shape[axis]), axis) & known.take(range(known.shape[axis] - 1), axis)
-        jump = np.abs(np.diff(values, axis=axis)) * both
-        out.append(weight / (1 + np.square(jump / np.float32(step))))
+        jump = np.square(np.abs(np.diff(values, axis=axis)) * both / np.float32(step))
+        edge = 1 - cv2.erode(weight, np.ones((NEAR, NEAR), np.uint8))
+        out.append(weight / (1 + jump * edge))
     return out[0], out[1]
+
+
+def tied(
+    weights: tuple[NDArray[np.float32], NDArray[np.float32]], plain: NDArray[np.float32], strength: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The weights, stronger between neighbours that tell little: 1 + `strength` times at plain (H, W) = ½, up to MOST
+    times that at 1."""
+    odds = plain / (1 - plain + np.float32(1 / MOST))
+    across, down = (odds[:, 1:] + odds[:, :-1]) / 2, (odds[1:] + odds[:-1]) / 2
+    return weights[0] * (1 + np.float32(strength) * across), weights[1] * (1 + np.float32(strength) * down)
 
 
 def smoothed(

@@ -120,6 +120,20 @@ class Lines:
         """(h, w)."""
         return self.moved.shape[0], self.moved.shape[1]
 
+    def at(self, field: SparseMap) -> Plane:
+        """Inverse depth (h, w) that a field has at the nodes."""
+        return field.at(np.stack(self.nodes, axis=-1))[0]
+
+    @property
+    def nodes(self) -> tuple[Plane, Plane]:
+        """x and y (h, w) of the nodes, raw px of the reference."""
+        left, top, width, height = self.box
+        rows, columns = self.shape
+        x = left + (np.arange(columns) + 0.5) * (width / columns) - 0.5
+        y = top + (np.arange(rows) + 0.5) * (height / rows) - 0.5
+        x, y = np.meshgrid(x.astype(np.float32), y.astype(np.float32))
+        return x, y
+
     def target(self, along: Plane, across: Plane | None = None) -> tuple[Plane, Plane]:
         """Raw target pixels x, y (h, w) after a move of `along` px on the line, as at its start, and of `across` px to
         its side; NaN behind the target.

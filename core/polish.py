@@ -46,7 +46,7 @@ def polish(
     """Starts at moves `along` (h, w) px. weights: see `edge_weights`; slack: whether the lines may be left."""
     across = np.zeros_like(along)
     start = along
-    nodes = _raw_nodes(lines)
+    nodes = lines.nodes
     steps_px = target.gray.shape[1] / target.size[0], target.gray.shape[0] / target.size[1]
     for blur, count in SCHEDULE:
         first, shown = reference.sample(cv2.GaussianBlur(reference.gray, (0, 0), blur), *nodes)
@@ -74,15 +74,6 @@ def polish(
     there = (inside & shown).astype(np.float32)
     _, _, _, likeness = _alike(first, fetched, there)
     return Polished(along, across, likeness * there, share)
-
-
-def _raw_nodes(lines: Lines) -> tuple[Plane, Plane]:
-    left, top, width, height = lines.box
-    rows, columns = lines.shape
-    x = left + (np.arange(columns) + 0.5) * (width / columns) - 0.5
-    y = top + (np.arange(rows) + 0.5) * (height / rows) - 0.5
-    x, y = np.meshgrid(x.astype(np.float32), y.astype(np.float32))
-    return x, y
 
 
 def _mean(values: Plane, side: int) -> Plane:

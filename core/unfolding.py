@@ -1,0 +1,67 @@
+"""Folds that mean nothing, taken out of a dense map.
+
+Where a near thing hides a far one the map has to jump back, and what it jumps over is occluded. Wherever else it turns
+over, noise does it: there the moves are smoothed until it no longer does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .canvas import Canvas
+from .line_map import Lines, Plane
+from .occlusion import occluded
+from .two_view import TwoView
+from .warp import Warp
+
+# How often occlusion is looked at, and how often moves are smoothed each time.
+LOOKS, SMOOTHINGS = 2, 10
+# px over which they are smoothed at first; what does not help is done more widely
+LEAST_SIGMA = 1.5
+# The area (share of the usual) that is left at a place not folded; px around what is occluded that are left alone.
+LEAST_TURN, RIM = 0.1, 5
+
+
+def unfolded(lines: Lines, two_view: TwoView, target_size: tuple[int, int], along: Plane, across: Plane) -> Plane:
+    """The moves (h, w) along the lines without folds outside what is occluded and its rim."""
+    around = np.ones((RIM, RIM), np.uint8)
+    for _ in range(LOOKS):
+        keep = cv2.dilate(_hidden(lines, two_view, target_size, along, across).astype(np.uint8), around) > 0
+        for number in range(SMOOTHINGS):
+            folded = _turns_over(*lines.target(along, across)) & ~keep
+            if not folded.any():
+                break
+            sigma = LEAST_SIGMA * 2 ** (number / 6)
+            reach = np.ones((2 * int(sigma) + 3,) * 2, np.uint8)
+            near = (cv2.dilate(folded.astype(np.uint8), reach) > 0) & ~keep
+            along = np.where(near, cv2.GaussianBlur(along, (0, 0), sigma), along)
+    return along
+
+
+def _turns_over(x: Plane, y: Plane) -> NDArray[np.bool_]:
+    turn = np.gradient(x, axis=1) * np.gradient(y, axis=0) - np.gradient(x, axis=0) * np.gradient(y, axis=1)
+    known = turn[np.isfinite(turn)]
+    if not known.size:
+        return np.zeros(turn.shape, bool)
+    usual = float(np.median(known))
+    with np.errstate(invalid="ignore"):
+        return turn * np.sign(usual) <= LEAST_TURN * abs(usual)
+
+
+def _hidden(
+    lines: Lines, two_view: TwoView, target_size: tuple[int, int], along: Plane, across: Plane
+) -> NDArray[np.bool_]:
+    """Which nodes (h, w) the target cannot see."""
+    rows, columns = lines.shape
+    x, y = lines.target(along, across)
+    left, top, width, height = lines.box
+    sx, sy = width / columns, height / rows
+    # nodes as the pixels of a canvas of their own
+    to_reference = np.array([[sx, 0, left + (sx - 1) / 2], [0, sy, top + (sy - 1) / 2], [0, 0, 1]])
+    depth = lines.inverse_depth + along * lines.moved
+    warp = Warp(Canvas(columns, rows, (0, 0)), x, y, depth.astype(np.float32))
+    return occluded(warp, replace(two_view, H_inf=two_view.H_inf @ to_reference), target_size)
