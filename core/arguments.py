@@ -81,7 +81,7 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
     how.add_argument(
         "--dense",
         action=argparse.BooleanOptionalAction,
-        default=False,
+        default=True,
         help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
     )
     how.add_argument(

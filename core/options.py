@@ -49,7 +49,7 @@ class StitchOptions:
     level: Level = "auto"
     scale: float = 1.0
     crop: Crop = "full"
-    dense: bool = False
+    dense: bool = True
     blend: str = "multiband"
     seam: str = "graphcut"
     mask: Path | np.ndarray | None = None

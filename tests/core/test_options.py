@@ -23,7 +23,7 @@ def test_the_defaults_are_the_designs() -> None:
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore_reference": None,
         "ignore_target": None, "projection": "perspective", "level": "auto", "scale": 1.0, "crop": "full",
-        "dense": False, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "seed": 0,
+        "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "seed": 0,
         "measure": True, "cache": None,
     }  # fmt: skip
 

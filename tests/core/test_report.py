@@ -75,18 +75,19 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
     assert report["two_view"]["model"] == "general" and "epipolar" in report["two_view"]["why"]
     assert report["two_view"]["focal_source"] == "given in px"
     assert report["field"]["centres"] + report["field"]["pruned"] == view.inliers.sum()
-    assert report["field"]["dense"] == {"used": False, "why": "not asked for"}
+    dense = report["field"]["dense"]
+    assert dense["used"] and 0.5 < dense["found"] <= 1 and dense["across_px"] < 0.5 < dense["reach_px"]
     assert report["field"]["kind"] == "slack" and report["field"]["plane"] == list(result.field.plane)
     for entry, array in zip(report["pictures"], (result.reference, result.target), strict=True):
         assert (entry["height"], entry["width"]) == array.view.shape[:2]
         assert (entry["name"], entry["bits"], entry["alpha"], entry["icc"]) == ("array", 8, False, False)
         assert entry["camera"]["fixed"] and entry["camera"]["focal_px"] == view.K[0, 0]
     assert report["options"] == {
-        "field": "slack", "fade": "plane", "dense": False, "projection": "perspective", "level": "auto", "scale": 1.0,
+        "field": "slack", "fade": "plane", "dense": True, "projection": "perspective", "level": "auto", "scale": 1.0,
         "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": True, "seed": 0}
     assert report["composition"]["exposure_blocks"] > 100
     assert report["composition"]["exposure_gain"] == pytest.approx([1, 1, 1], abs=0.01)
-    assert report["composition"]["occluded_px"] == 0
+    assert report["composition"]["occluded_px"] < 20
     assert report["warnings"] == list(result.warnings)
 
 
@@ -202,7 +203,7 @@ def test_the_overlap_is_measured_on_the_8_bit_views(result: StitchResult) -> Non
     x, y = result.warp.canvas.offset
     assert measured["overlap_px"] == shown[y : y + 300, x : x + 400].sum()
     assert 20 < measured["overlap_psnr_db"] < 60 and 0.5 < measured["overlap_ssim"] <= 1
-    assert measured["folds"] == 0
+    assert measured["folds"] < 1e-3
 
 
 def test_a_good_stitch_has_no_warnings(result: StitchResult) -> None:
