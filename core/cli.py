@@ -265,7 +265,7 @@ def _stitch(args: argparse.Namespace) -> int:
         check(outputs, files)
         with _progress_shown(args.quiet) as show:
             result = stitch(args.reference, args.target[0], options, progress=show)
-            show("write", 0.95)
+            show("write", 0.98)
             warnings = [*result.warnings, *write(result, outputs, files)]
         _too_late_to_interrupt()
     for warning in warnings:
