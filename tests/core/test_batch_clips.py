@@ -163,7 +163,7 @@ def test_an_interrupted_clip_goes_on_where_it_was(
         patch.setattr(batch, "compose", compose)
         assert clip(work) == 130
     assert list(panoramas(work / "out")) == ["shot_0007", "shot_0008"]
-    assert len(files(work / "out")) == 2 * 5 + 4 + 3 + 1, "two frames with layers, the report's, stamps, batch.json"
+    assert len(files(work / "out")) == 2 * 6 + 4 + 3 + 1, "two frames with layers, the report's, stamps, batch.json"
     times = {path: path.stat().st_mtime_ns for path in (work / "out").rglob("shot*") if path.is_file()}
     said()
     assert clip(work, "--resume") == 0 and "2 frames done, 2 skipped" in said()[0]
