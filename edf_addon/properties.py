@@ -171,7 +171,7 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
     fade: EnumProperty(name="Outside", description="What the field becomes outside the overlap", items=FADES)
     dense: BoolProperty(
         name="Dense", description="Seek every pixel of the overlap along its epipolar line: sharper edges of near "
-        "things, at some more time",
+        "things, at some more time", default=True,
     )
     projection: EnumProperty(name="Projection", description="What the panorama is drawn on", items=PROJECTIONS)
     level: EnumProperty(name="Level", description="How a round panorama is turned", items=LEVELS)

@@ -30,7 +30,8 @@ def frame_of(pair: Pair, options: StitchOptions) -> Frame:
 
 @pytest.fixture(scope="module")
 def quick(known: StitchOptions) -> StitchOptions:
-    return replace(known, measure=False)
+    """Without dense refinement, which clips do not have."""
+    return replace(known, measure=False, dense=False)
 
 
 @pytest.fixture(scope="module")
@@ -195,6 +196,17 @@ def test_frames_of_other_sizes_are_refused(clip: list[Pair], quick: StitchOption
     ):
         with pytest.raises(BadRequest, match="differ in size"):
             align([frame_of(clip[0], quick), frame], quick, silent)
+
+
+def test_a_pair_is_refined_and_a_clip_says_why_not(clip: list[Pair], quick: StitchOptions) -> None:
+    asked, said = replace(quick, dense=True), []
+    pair = align([frame_of(clip[0], asked)], asked, lambda stage, _: said.append(stage))
+    assert pair.dense is not None and pair.dense.relief is not None and pair.warp.confidence is not None
+    assert list(dict.fromkeys(said)) == ["features", "geometry", "field", "dense", "warp"]
+    several = align([frame_of(one, asked) for one in clip[:2]], asked, silent)
+    assert several.dense is not None and several.dense.relief is None and "swims" in several.dense.why
+    plain = align([frame_of(one, quick) for one in clip[:2]], quick, silent)
+    assert plain.dense is None and np.array_equal(several.warp.map_x, plain.warp.map_x, equal_nan=True)
 
 
 def test_each_stage_is_told_and_features_climb(clip: list[Pair], quick: StitchOptions) -> None:

@@ -30,6 +30,12 @@ def quick(known: StitchOptions) -> StitchOptions:
     return replace(known, measure=False)
 
 
+@pytest.fixture(scope="module")
+def smooth(quick: StitchOptions) -> StitchOptions:
+    """Without dense refinement: what matches do to the field is seen, and pixels do not make good for bad ones."""
+    return replace(quick, dense=False)
+
+
 def in_reference(result: StitchResult, size: tuple[int, int] = (WIDTH, HEIGHT)) -> tuple[np.ndarray, np.ndarray]:
     """The map (H, W, 2) where the reference lies, and where it falls inside the target."""
     x, y = result.warp.canvas.offset
@@ -57,9 +63,9 @@ def rows_of(result: StitchResult) -> np.ndarray:
 @pytest.mark.parametrize("field", [name for name in FIELDS if name not in ("rew", "homography")])
 @pytest.mark.parametrize("focal", ["given", "estimated"])
 def test_exported_matches_given_back_make_the_same_warp(
-    small_pair: Pair, quick: StitchOptions, field: str, focal: str
+    small_pair: Pair, smooth: StitchOptions, field: str, focal: str
 ) -> None:
-    options = replace(quick, field=field, camera=quick.camera if focal == "given" else CameraRequest())
+    options = replace(smooth, field=field, camera=smooth.camera if focal == "given" else CameraRequest())
     first = stitch(small_pair.reference, small_pair.target, options)
     again = stitch(small_pair.reference, small_pair.target, replace(options, matches=rows_of(first)))
     assert len(again.matches) == len(first.used_matches) and again.matches.given
@@ -144,11 +150,11 @@ def of_the_thing(pixels: np.ndarray) -> np.ndarray:
 
 
 def test_a_thing_that_moved_disturbs_unless_it_is_masked(
-    passer_by: tuple[Pair, Mask, Mask], small_result: StitchResult, quick: StitchOptions
+    passer_by: tuple[Pair, Mask, Mask], small_result: StitchResult, smooth: StitchOptions
 ) -> None:
     pair, first, second = passer_by
-    masked = replace(quick, ignore_reference=first, ignore_target=second)
-    open_eyed, blind = (stitch(pair.reference, pair.target, options) for options in (quick, masked))
+    masked = replace(smooth, ignore_reference=first, ignore_target=second)
+    open_eyed, blind = (stitch(pair.reference, pair.target, options) for options in (smooth, masked))
     spoilt, clean, best = (errors_beside(pair, one, first) for one in (open_eyed, blind, small_result))
     assert np.median(best) < 0.2 and np.median(spoilt) > 2, "it is large enough to lead astray"
     assert np.median(clean) < 0.3 and np.percentile(clean, 75) < 0.75
@@ -284,9 +290,9 @@ def test_half_the_scale_is_the_same_panorama_at_half_the_size(pair: Pair, field:
     assert np.abs(small - light).max() < 1e-5
 
 
-def test_given_matches_and_a_crop_go_with_a_scale(small_pair: Pair, quick: StitchOptions) -> None:
+def test_given_matches_and_a_crop_go_with_a_scale(small_pair: Pair, smooth: StitchOptions) -> None:
     """Matches are px of the full pictures, a crop px of the panorama that comes out."""
-    strict = replace(quick, field="strict")
+    strict = replace(smooth, field="strict")
     full = stitch(small_pair.reference, small_pair.target, strict)
     both = replace(strict, matches=rows_of(full), scale=0.5)
     half = stitch(small_pair.reference, small_pair.target, both)

@@ -50,12 +50,12 @@ def test_a_job_gives_the_panorama_that_the_pipeline_gives(job, tmp_path, small_r
     status, said, index = run(tmp_path / "job", {**job, "take": ["layers", "masks", "depth"]})
     assert status == 0 and said[-1] == {"done": True}
     stages = list(dict.fromkeys(line["stage"] for line in said[:-1]))
-    assert stages == ["read", "features", "geometry", "field", "warp", *stages[5:-2], "blend", "write"]
+    assert stages == ["read", "features", "geometry", "field", "dense", "warp", *stages[6:-2], "blend", "write"]
     shares = [line["share"] for line in said[:-1]]
     assert shares == sorted(shares) and 0.9 < shares[-1] < 1
     assert set(index["files"]) == {
         "panorama", "reference layer", "target layer", "reference mask", "target mask", "inverse depth", "heat",
-        "difference", "occluded", "seam",
+        "difference", "occluded", "seam", "confidence",
     }  # fmt: skip
     made = load_picture(tmp_path / "job" / index["files"]["panorama"])
     assert made.bits == 8 and np.abs(made.pixels - small_result.pixels).max() < 5e-3

@@ -46,7 +46,8 @@ def test_folds_count_outside_what_is_occluded_and_its_rim(small_result: StitchRe
     assert turned_over(folded) > turned_over(small_result) + 1e-4
     occluded = small_result.occluded.copy()
     occluded[y + row - 4 : y + row + 4, x + column - 4 : x + column + 4] = True
-    assert turned_over(replace(folded, occluded=occluded)) <= turned_over(small_result) + 1e-9
+    # the spot and its rim leave the whole too, by which the share of what else turns over grows
+    assert turned_over(replace(folded, occluded=occluded)) < 1.02 * turned_over(small_result) + 1e-9
 
 
 def test_every_figure_has_a_name_and_digits(small_result: StitchResult) -> None:
