@@ -68,6 +68,7 @@ def test_a_script_gets_the_panorama(chosen, pixels_of):
     settings = chosen.settings
     settings.take_layers = settings.take_masks = settings.take_depth = True
     settings.crop = "REFERENCE"
+    settings.blend = "FEATHER"  # multi-band evens light out a little way into the part that only the reference shows
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     panorama = settings.result
     assert panorama.name == "reference panorama" and panorama.use_fake_user and panorama.packed_file
@@ -82,7 +83,7 @@ def test_a_script_gets_the_panorama(chosen, pixels_of):
     assert len(kept["matches"]["rows"]) == len(settings.matches) > 50
     others = result.companions(panorama)
     assert set(others) == {"reference layer", "target layer", "reference mask", "target mask", "inverse depth", "heat",
-                           "difference", "occluded", "seam"}  # fmt: skip
+                           "difference", "occluded", "seam", "confidence"}  # fmt: skip
     assert {tuple(image.size) for image in others.values()} == {tuple(panorama.size)}
     assert others["inverse depth"].is_float and others["heat"].name.startswith(".")
     assert "px in" in status.now.message and not status.now.failed and not modal.is_working()
