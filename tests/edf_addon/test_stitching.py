@@ -211,14 +211,16 @@ def worker_that(monkeypatch, prepare: str) -> None:
 @pytest.mark.parametrize("stage", STAGES)
 def test_cancel_at_every_stage_leaves_nothing(chosen, monkeypatch, stage):
     """The worker stops to think at the stage, so that it is there when it is cancelled."""
-    pause = f"import time; say = worker._say\ndef pausing(line):\n say(line)\n if line.get('stage') == {stage!r}: "
-    worker_that(monkeypatch, pause + "time.sleep(60)\nworker._say = pausing")
+    pause = f"import time; say = worker._say\ndef pausing(line):\n say(line)\n if line.get('stage') == {stage!r}:"
+    pause += "\n  (Path(sys.argv[1]) / 'paused').touch()\n  time.sleep(60)\nworker._say = pausing"
+    worker_that(monkeypatch, pause)
     chosen.settings.dense = chosen.settings.exposure = True  # with all that has a stage of its own
     chosen.settings.seam = "GRAPHCUT"
     working = Modal()
     assert working._start(bpy.context)
     before = names()
-    working.until(lambda: status.now.stage == stage)
+    # the first stage is taken for granted while Python starts up, and cancelled then it ends in another way
+    working.until(lambda: status.now.stage == stage and (working._job.folder / "paused").exists())
     assert status.now.running and status.now.stage == stage
     modal.cancel()
     assert status.now.cancelling
