@@ -26,7 +26,7 @@ from .relief import MOST_FADE, Relief, raised
 from .slack import SlackField
 from .two_view import TwoView
 from .unfolding import unfolded
-from .warp import fetch
+from .warp import REMAP_LIMIT, fetch
 
 # Pixels of the overlap that are searched and polished at most: beyond, both pictures are shrunk.
 SEARCHED, POLISHED = 1.5e6, 3e6
@@ -73,6 +73,8 @@ def refine(
     slack = isinstance(field, SlackField)
     side = max(cameras[0].size)
     margin = int(MOST_FADE * side) + 16
+    if max(side, *cameras[1].size) + 2 * margin > REMAP_LIMIT:
+        return Dense(None, f"a picture with a side of {max(side, *cameras[1].size)} px is too long to be searched")
     sparse = SparseMap.around(field, two_view, *cameras, margin)
     box = _overlap(sparse, cameras[1].size)
     if box is None:
