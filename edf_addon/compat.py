@@ -62,6 +62,11 @@ def node_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree
     return owner.node_tree
 
 
+def sees_cylinders() -> bool:
+    """Whether Cycles has a cylindrical lens: since 4.3."""
+    return bpy.app.version >= (4, 3, 0)
+
+
 def make_panoramic(
     camera: bpy.types.Camera, kind: str, headings: tuple[float, float], elevations: tuple[float, float]
 ) -> None:

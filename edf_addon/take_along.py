@@ -66,7 +66,10 @@ class EDF_OT_create_cameras(_OfAPanorama, bpy.types.Operator):  # noqa: N801
         except ValueError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        if self.look:
+        if "PANORAMA" not in made:
+            words = "Blender has cylindrical lenses from 4.3 on: the panorama's own camera is left out"
+            self.report({"WARNING"}, words)
+        elif self.look:
             look_through(context.scene, made["PANORAMA"])
         if "TARGET" not in made:
             self.report({"WARNING"}, "The target's camera is not known: one plane does not tell where it stood")
@@ -173,7 +176,8 @@ def usual_baseline(scene: bpy.types.Scene, image: bpy.types.Image) -> float:
 
 
 def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> dict[str, bpy.types.Object]:
-    """The cameras of a panorama, by role; those that are there already are set anew. Raises ValueError."""
+    """The cameras of a panorama, by role; those that are there already are set anew. The panorama's own is missing
+    where Blender has no lens like it. Raises ValueError."""
     from . import scene_geometry
 
     settings = properties.settings_of(scene)
@@ -182,6 +186,8 @@ def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: flo
     made = {}
     for placed in scene_geometry.placed_cameras(editor.known(image), baseline):
         role, lens = placed.name.upper(), placed.lens
+        if isinstance(lens, scene_geometry.RoundLens) and lens.kind == "cylindrical" and not compat.sees_cylinders():
+            continue
         camera = find(image, role) or _link(scene, image, role, bpy.data.cameras.new(f"{placed.name} of {image.name}"))
         data = camera.data
         if isinstance(lens, scene_geometry.RoundLens):

@@ -6,7 +6,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from edf_stitch.core.epipolar import homogeneous, project, rotation_from_vector  # noqa: E402
-from edf_stitch.edf_addon import result, take_along  # noqa: E402
+from edf_stitch.edf_addon import compat, result, take_along  # noqa: E402
 
 SIZE, SIZE_PRIME, CANVAS = (400, 300), (320, 480), (560, 360)
 COLUMNS, ROWS = 15, 10
@@ -176,6 +176,15 @@ def sphere(stitched):
     stitched["report"]["canvas"]["projection"] = told
     stitched["geometry"]["canvas"] = (720, 360)
     return stitched
+
+
+def test_a_blender_without_a_cylindrical_lens_leaves_out_that_camera(sphere, monkeypatch):
+    sphere["report"]["canvas"]["projection"]["kind"] = "cylindrical"
+    monkeypatch.setattr(compat, "sees_cylinders", lambda: False)
+    assert bpy.ops.edf.create_cameras() == {"FINISHED"}
+    panorama = bpy.context.scene.edf_stitch.result
+    assert take_along.find(panorama, "PANORAMA") is None
+    assert take_along.find(panorama, "REFERENCE") is not None and take_along.find(panorama, "TARGET") is not None
 
 
 def test_a_sphere_surrounds_the_scene_as_its_cameras_see_it(sphere):
