@@ -76,7 +76,8 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         default="plane",
         type=_choice(FADE_CHOICES),
         metavar="FADE",
-        help="what it fades to outside the overlap: plane (default: the scene's mean plane) or infinity",
+        help="what it fades to outside the overlap: plane (default; the one that carries on beyond the border) or "
+        "infinity",
     )
     how.add_argument(
         "--dense",

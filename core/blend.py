@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .multiband import bands_for, correction
-from .overlap import Overlap, bounds
+from .overlap import Overlap, bounds, distance_inside, distance_to_border
 from .tone import to_light, to_tones
 from .warp import Layer
 
@@ -24,7 +24,7 @@ def averaged(reference: Layer, target: Layer) -> Layer:
 def feathered(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Layer:
     """Each picture counts by the distance to its own border, so that neither shows an edge; what the target cannot see
     (hidden) comes from the reference."""
-    inner, inner_too = _distance_to_border(reference.alpha > 0), _distance_to_border(target.alpha > 0)
+    inner, inner_too = distance_to_border(reference.alpha > 0), distance_to_border(target.alpha > 0)
     share = inner / np.maximum(inner + inner_too, 1e-6)
     share[hidden & (reference.alpha > 0)] = 1
     return mixed(reference, target, share)
@@ -32,7 +32,7 @@ def feathered(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Lay
 
 def distance_labels(reference: Layer, target: Layer) -> NDArray[np.bool_]:
     """The seam that distances alone give (H, W): True, for the target, where its border is further away."""
-    return _distance_to_border(reference.alpha > 0) < _distance_to_border(target.alpha > 0)
+    return distance_to_border(reference.alpha > 0) < distance_to_border(target.alpha > 0)
 
 
 def feathered_across(
@@ -44,7 +44,7 @@ def feathered_across(
         return cut_hard(reference, target, from_target)
     share = np.where(from_target, np.float32(0), np.float32(1))
     here = from_target[overlap.box]
-    past = _distance(here) - _distance(~here)
+    past = distance_inside(here) - distance_inside(~here)
     ramp = np.clip(0.5 - past / np.float32(1 << bands_for(from_target)), 0, 1)
     share[overlap.box] = np.where(overlap.same, ramp, share[overlap.box])
     return mixed(reference, target, share)
@@ -133,13 +133,3 @@ def _on_region(
         there = tuple(slice(a - part.start, b - part.start) for a, b, part in zip(low, high, box, strict=True))
         out[here] = values[there]
     return out
-
-
-def _distance_to_border(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Distance in px to the nearest pixel outside the mask; what lies beyond the canvas is outside."""
-    return _distance(np.pad(mask, 1))[1:-1, 1:-1]
-
-
-def _distance(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Distance in px to the nearest pixel outside the mask, however far."""
-    return cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)

@@ -192,10 +192,18 @@ def fade_share(
     if not inside.any():
         return np.zeros(inside.shape)
     # a node beside the last inside one may touch the overlap: distances count from one cell on
+    return fade_outside(inside, fade_px, grid.step)
+
+
+def fade_outside(inside: NDArray[np.bool_], width: float, step: int = 1) -> Array:
+    """1 in a mask (h, w) and beside it, smoothly to 0 over `width` px beyond; step: px from cell to cell.
+
+    Not for a mask that is empty.
+    """
     steps = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # OpenCV's root has other last bits from call to call; squared distances are whole numbers
     steps = np.sqrt(np.rint(np.square(steps, dtype=np.float64)))
-    u = np.clip((steps - 1) * grid.step / fade_px, 0.0, 1.0)
+    u = np.clip((steps - 1) * step / width, 0.0, 1.0)
     return 1 - u * u * (3 - 2 * u)
 
 

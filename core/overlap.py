@@ -79,3 +79,13 @@ def bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice] | None:
     if not rows.size:
         return None
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def distance_to_border(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Distance in px (H, W) to the nearest pixel outside a mask; what lies beyond the canvas is outside."""
+    return distance_inside(np.pad(mask, 1))[1:-1, 1:-1]
+
+
+def distance_inside(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Distance in px (H, W) to the nearest pixel outside a mask, however far."""
+    return cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .canvas import Box
+from .displacement import fade_outside
 from .line_map import Lines, Plane, SparseMap
 from .warp import fetch
 
@@ -55,7 +56,8 @@ def raised(
     moved = cv2.copyMakeBorder(moved, *[margin] * 4, cv2.BORDER_CONSTANT)
     inside = np.pad(inside, margin)
     box = (left - margin, top - margin, width + 2 * margin, height + 2 * margin)
-    moved = carried_on(moved, inside.astype(np.float32)) * _fade(inside, fade)[..., None]
+    share = fade_outside(inside, fade).astype(np.float32) if inside.any() else np.zeros(inside.shape, np.float32)
+    moved = carried_on(moved, inside.astype(np.float32)) * share[..., None]
     smooth = Lines.over(sparse, box, COARSE)
     per_px, *direction = (
         np.nan_to_num(_resized(np.ascontiguousarray(v), box))
@@ -83,19 +85,7 @@ def carried_on(values: NDArray[np.float32], known: Plane) -> NDArray[np.float32]
     return values * weight + up * (1 - weight)
 
 
-def _fade(inside: NDArray[np.bool_], width: float) -> Plane:
-    """1 inside, smoothly to 0 over `width` px outside."""
-    if not inside.any():
-        return np.zeros(inside.shape, np.float32)
-    away = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    # OpenCV's root has other last bits from call to call; squared distances are whole numbers
-    away = np.sqrt(np.rint(np.square(away, dtype=np.float64)))
-    u = np.clip((away - 1) / width, 0, 1)
-    return (1 - u * u * (3 - 2 * u)).astype(np.float32)
-
-
 def _resized(values: Plane, box: Box) -> Plane:
     """Node values as pixels of their box, linear."""
     size = box[2], box[3]
     return values if values.shape[::-1] == size else cv2.resize(values, size, interpolation=cv2.INTER_LINEAR)
-

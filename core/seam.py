@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
-from .overlap import WHOLE, Overlap
+from .overlap import WHOLE, Overlap, distance_to_border
 from .warp import Layer, Warp
 
 SEAMS = ("graphcut", "none")
@@ -48,7 +48,7 @@ def known_labels(
     alone = int((shows & ~shows_too).sum())
     if shows.any() and alone < SURROUNDED * int(shows.sum()):
         # all round it is the target: the cheapest cut would leave nothing of the reference
-        inner = cv2.distanceTransform(np.pad(shows.astype(np.uint8), 1), cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]
+        inner = distance_to_border(shows)
         known[(known == FREE) & (inner > CORE * inner.max())] = FIRST
     if painted is not None:
         known[(painted < 0) & shows] = FIRST

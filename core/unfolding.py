@@ -16,7 +16,7 @@ from .canvas import Canvas
 from .line_map import Lines, Plane
 from .occlusion import occluded
 from .two_view import TwoView
-from .warp import Warp
+from .warp import Warp, jacobian
 
 # How often occlusion is looked at, and how often moves are smoothed each time.
 LOOKS, SMOOTHINGS = 2, 10
@@ -43,7 +43,7 @@ def unfolded(lines: Lines, two_view: TwoView, target_size: tuple[int, int], alon
 
 
 def _turns_over(x: Plane, y: Plane) -> NDArray[np.bool_]:
-    turn = np.gradient(x, axis=1) * np.gradient(y, axis=0) - np.gradient(x, axis=0) * np.gradient(y, axis=1)
+    turn = jacobian(x, y)
     known = turn[np.isfinite(turn)]
     if not known.size:
         return np.zeros(turn.shape, bool)

@@ -59,6 +59,12 @@ class Warp:
         return _inside(self.map_x, self.map_y, target_size)
 
 
+def jacobian(x: NDArray, y: NDArray) -> NDArray:
+    """Area (H, W) that a map's (x, y) takes up for each of its pixels, by central differences; its sign changes where
+    the map turns over. NaN beside what is not finite."""
+    return np.gradient(x, axis=1) * np.gradient(y, axis=0) - np.gradient(x, axis=0) * np.gradient(y, axis=1)
+
+
 @dataclass(frozen=True)
 class Layer:
     """One picture on the canvas: pixels (H, W, C) float32 scene-linear, straight alpha (H, W) in [0, 1], 0 where it

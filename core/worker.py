@@ -40,8 +40,18 @@ def main(folder: Path) -> int:
     for name in ("SIGINT", "SIGTERM", "SIGBREAK"):  # whatever the parent had them set to
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.default_int_handler)
+    orphaned = threading.Event()
     try:
-        threading.Thread(target=_end_with_parent, args=(folder,), daemon=True).start()
+        return _status(folder, orphaned)
+    finally:
+        # here and not in the thread that noticed: only now nothing writes or reads there any more
+        if orphaned.is_set():
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _status(folder: Path, orphaned: threading.Event) -> int:
+    try:
+        threading.Thread(target=_end_with_parent, args=(orphaned,), daemon=True).start()
         _work(folder)
     except KeyboardInterrupt:
         return _fail("Cancelled", "cancelled", 130)
@@ -218,12 +228,12 @@ def _fail(kind: str, words: str, exit_code: int) -> int:
     return exit_code
 
 
-def _end_with_parent(folder: Path) -> None:
+def _end_with_parent(orphaned: threading.Event) -> None:
     # not sys.stdin.buffer: Python aborts on its way out when a thread still holds that one's lock
     while os.read(0, 4096):
         pass
+    orphaned.set()
     _thread.interrupt_main()
-    shutil.rmtree(folder, ignore_errors=True)
 
 
 if __name__ == "__main__":

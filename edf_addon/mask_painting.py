@@ -114,13 +114,4 @@ def _set_brush(context: Any, gray: float) -> None:
 CLASSES = (EDF_OT_mask_paint, EDF_OT_mask_done)
 
 
-def register() -> None:
-    """Make the operators known."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them away again."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -239,13 +239,4 @@ CLASSES = (
 )  # fmt: skip
 
 
-def register() -> None:
-    """Make list, menu and operators known."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them away again."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

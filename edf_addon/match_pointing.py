@@ -220,13 +220,4 @@ def _to_picture(
 CLASSES = (EDF_OT_match_edit,)
 
 
-def register() -> None:
-    """Make the operator known."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take it away again."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -387,13 +387,4 @@ CLASSES = (
 )  # fmt: skip
 
 
-def register() -> None:
-    """Put the tab into the sidebar."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take it away again."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -56,13 +56,4 @@ def names() -> list[str]:
 CLASSES = (EDF_MT_presets, EDF_PT_presets, EDF_OT_preset_add)
 
 
-def register() -> None:
-    """Offer the presets."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them away again; the files stay."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -339,13 +339,4 @@ def _put_behind(data: bpy.types.Camera, image: bpy.types.Image | None) -> None:
 CLASSES = (EDF_OT_create_cameras, EDF_OT_depth_mesh, EDF_OT_look_through, EDF_OT_use_as_world)
 
 
-def register() -> None:
-    """Make the operators known."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them away again."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

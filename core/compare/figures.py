@@ -11,6 +11,7 @@ from ..held_out import held_out
 from ..metrics import canvas_quality, off_line_mean, overlap_quality, shown_points
 from ..pipeline import StitchResult
 from ..projectivity import projectivity
+from ..warp import jacobian
 
 # What people call a figure, its unit, digits, and whether more is better (None: neither).
 FIGURES: dict[str, tuple[str, str, int, bool | None]] = {
@@ -67,8 +68,7 @@ def figures_of(result: StitchResult, registration: Registration, independent: Ar
 def turned_over(result: StitchResult) -> float:
     """Share of the overlap, away from what is occluded, where the map turns over."""
     warp = result.warp
-    x, y = warp.map_x.astype(np.float64), warp.map_y.astype(np.float64)
-    turn = np.gradient(x, axis=1) * np.gradient(y, axis=0) - np.gradient(x, axis=0) * np.gradient(y, axis=1)
+    turn = jacobian(warp.map_x.astype(np.float64), warp.map_y.astype(np.float64))
     near = cv2.dilate(result.occluded.astype(np.uint8), RIM) > 0
     overlap = (result.reference_layer.alpha > 0) & warp.inside(result.cameras[1].size)
     turn = turn[overlap & ~near & np.isfinite(turn)]

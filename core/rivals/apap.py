@@ -23,7 +23,7 @@ SIGMA, GAMMA = 0.05, 0.0025
 # Points are solved in slabs of about this many weights, so that memory stays bounded.
 SLAB = 4_000_000
 # Nothing is shown of what lies less than this in front of the target camera, relative to its lengths.
-LEAST_AHEAD = 1e-3
+LEAST_AHEAD = 1e-6
 
 
 @dataclass(frozen=True)
@@ -90,5 +90,5 @@ def _field(two_view: TwoView, matches: Matches, sigma: float, gamma: float, kept
 
 def _in_front(rays: Array) -> Array:
     """π of rays (N, 3), those that run behind the camera or close by as if they were just in front: far outside."""
-    least = LEAST_AHEAD * np.abs(rays[:, :2]).max(axis=1) / 1e3
+    least = LEAST_AHEAD * np.abs(rays[:, :2]).max(axis=1)
     return rays[:, :2] / np.maximum(rays[:, 2], np.maximum(least, 1e-300))[:, None]
