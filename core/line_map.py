@@ -82,7 +82,7 @@ class Lines:
     relative; NaN where there is no line. All float32 but `ideal`.
     """
 
-    box: Box
+    box: Box | tuple[float, float, float, float]
     step: float
     ideal: Array
     inverse_depth: Plane
@@ -94,7 +94,7 @@ class Lines:
     camera_prime: Camera
 
     @staticmethod
-    def over(sparse: SparseMap, box: Box, step: float) -> Lines:
+    def over(sparse: SparseMap, box: Box | tuple[float, float, float, float], step: float) -> Lines:
         """The lines of the pixels of a box (left, top, width, height), in cells of step × step."""
         left, top, width, height = box
         columns, rows = max(1, round(width / step)), max(1, round(height / step))

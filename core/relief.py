@@ -1,4 +1,4 @@
-"""The relief: what dense refinement adds to a field, on the reference's own pixels and a margin around them.
+"""The relief: what dense refinement adds to a field, on the nodes it was found at and a margin around them.
 
 Inverse depth takes it up as it is, so that x' ~ H_inf p + d e' stays the whole warp. Beyond the overlap it goes on
 smoothly and fades to nothing.
@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .canvas import Box
 from .displacement import fade_outside
+from .epipolar import Array
 from .line_map import Lines, Plane, SparseMap
 from .warp import fetch
 
@@ -25,21 +25,69 @@ COARSE = 8
 
 @dataclass(frozen=True)
 class Relief:
-    """A box of raw reference pixels from `start` (x, y): inverse_depth (h, w) to be added to the field's, shift
-    (h, w, 2) px to be added in the target, confidence (h, w) 0..1 in it; all 0 at its rim, float32."""
+    """Nodes over a part of the reference: the first (column, row) lies at raw px `start` (x, y), `step` (x, y) px lie
+    from each to the next.
 
-    start: tuple[int, int]
+    inverse_depth (h, w) to be added to the field's, shift (h, w, 2) px to be added in the target, confidence (h, w)
+    0..1 in it; all 0 at the rim, float32.
+    """
+
+    start: tuple[float, float]
+    step: tuple[float, float]
     inverse_depth: Plane
     shift: Plane
     confidence: Plane
 
     def at(self, x: NDArray, y: NDArray) -> tuple[Plane, Plane, Plane]:
-        """inverse_depth (…), shift (…, 2) and confidence (…) at reference px (rows, columns); exact on pixels, linear
+        """inverse_depth (…), shift (…, 2) and confidence (…) at reference px (rows, columns); exact on nodes, linear
         between them, 0 outside."""
-        x, y = (np.asarray(v - s, np.float32) for v, s in zip((x, y), self.start, strict=True))
+        x, y = (
+            np.asarray((v - s) / step, np.float32) for v, s, step in zip((x, y), self.start, self.step, strict=True)
+        )
         parts = (self.inverse_depth[..., None], self.shift, self.confidence[..., None])
         inverse_depth, shift, confidence = (fetch(part, x, y, cv2.INTER_LINEAR) for part in parts)
         return inverse_depth[..., 0], shift, confidence[..., 0]
+
+    def over(self, xs: Array, ys: Array) -> tuple[Plane, Plane, Plane]:
+        """The same at every crossing of columns xs and lines ys, which are evenly spaced, rising reference px."""
+        rows, columns = self.inverse_depth.shape
+        left, share, across = _between((xs - self.start[0]) / self.step[0], columns)
+        top, share_down, down = _between((ys - self.start[1]) / self.step[1], rows)
+        out = [np.zeros((len(ys), len(xs), *part.shape[2:]), np.float32) for part in self.parts]
+        if left.size and top.size:
+            near = slice(int(top[0]), int(top[-1]) + 2)
+            for part, to in zip(self.parts, out, strict=True):
+                lines = _mixed(part[near], left, share, 1)
+                to[down, across] = _mixed(lines, top - near.start, share_down, 0)
+        inverse_depth, shift, confidence = out
+        return inverse_depth, shift, confidence
+
+    @property
+    def parts(self) -> tuple[Plane, Plane, Plane]:
+        """inverse_depth, shift and confidence."""
+        return self.inverse_depth, self.shift, self.confidence
+
+
+def _between(places: Array, count: int) -> tuple[NDArray[np.intp], NDArray[np.float32], slice]:
+    """Of places on nodes 0 … count − 1 those that lie on them (a slice), the node before each, and how far (0..1) the
+    way to the next it is."""
+    here = np.flatnonzero((places >= 0) & (places <= count - 1))
+    if not here.size:
+        return here, here.astype(np.float32), slice(0, 0)
+    places = places[here]
+    before = np.minimum(places.astype(np.intp), max(0, count - 2))
+    return before, (places - before).astype(np.float32), slice(int(here[0]), int(here[-1]) + 1)
+
+
+def _mixed(values: Plane, before: NDArray[np.intp], share: NDArray[np.float32], axis: int) -> Plane:
+    first = np.take(values, before, axis=axis)
+    if not share.any():  # nodes are pixels
+        return first
+    more = np.take(values, before + 1, axis=axis)
+    more -= first
+    more *= share.reshape([-1 if k == axis else 1 for k in range(values.ndim)])
+    first += more
+    return first
 
 
 def raised(
@@ -47,25 +95,29 @@ def raised(
 ) -> Relief:
     """The relief of moves (h, w) px along and across the lines of the nodes; there (h, w): the overlap."""
     left, top, width, height = lines.box
-    inside = _resized(there.astype(np.float32), lines.box) > 0.5
-    moved = np.stack([_resized(np.where(there, v, np.float32(0)), lines.box) for v in (along, across)], axis=-1)
+    rows, columns = there.shape
+    step = width / columns, height / rows
+    moved = np.stack([np.where(there, v, np.float32(0)) for v in (along, across)], axis=-1)
     near = np.abs(along[there])
     limit = MOST_FADE * max(sparse.camera.size)
     fade = float(np.clip(FADE * np.percentile(near, 98) if near.size else 0.0, LEAST_FADE, max(limit, LEAST_FADE)))
+    fade /= min(step)
     margin = int(np.ceil(fade)) + 1
     moved = cv2.copyMakeBorder(moved, *[margin] * 4, cv2.BORDER_CONSTANT)
-    inside = np.pad(inside, margin)
-    box = (left - margin, top - margin, width + 2 * margin, height + 2 * margin)
+    inside = np.pad(there, margin)
     share = fade_outside(inside, fade).astype(np.float32) if inside.any() else np.zeros(inside.shape, np.float32)
     moved = carried_on(moved, inside.astype(np.float32)) * share[..., None]
-    smooth = Lines.over(sparse, box, COARSE)
+    more = margin * step[0], margin * step[1]
+    smooth = Lines.over(sparse, (left - more[0], top - more[1], width + 2 * more[0], height + 2 * more[1]),
+                        COARSE * min(step))
     per_px, *direction = (
-        np.nan_to_num(_resized(np.ascontiguousarray(v), box))
+        np.nan_to_num(_resized(np.ascontiguousarray(v), inside.shape))
         for v in (smooth.moved, smooth.direction[..., 0], smooth.direction[..., 1])
     )
     shift = np.stack([-moved[..., 1] * direction[1], moved[..., 1] * direction[0]], axis=-1)
-    sure = np.pad(_resized(np.where(there, confidence, np.float32(0)), lines.box), margin)
-    return Relief(box[:2], moved[..., 0] * per_px, shift, np.clip(sure, 0, 1))
+    sure = np.pad(np.where(there, confidence, np.float32(0)), margin)
+    start = left + (step[0] - 1) / 2 - more[0], top + (step[1] - 1) / 2 - more[1]
+    return Relief(start, step, moved[..., 0] * per_px, shift, np.clip(sure, 0, 1))
 
 
 def carried_on(values: NDArray[np.float32], known: Plane) -> NDArray[np.float32]:
@@ -85,7 +137,6 @@ def carried_on(values: NDArray[np.float32], known: Plane) -> NDArray[np.float32]
     return values * weight + up * (1 - weight)
 
 
-def _resized(values: Plane, box: Box) -> Plane:
-    """Node values as pixels of their box, linear."""
-    size = box[2], box[3]
-    return values if values.shape[::-1] == size else cv2.resize(values, size, interpolation=cv2.INTER_LINEAR)
+def _resized(values: Plane, shape: tuple[int, ...]) -> Plane:
+    """Values of cells over the same box, for so many (rows, columns), linear."""
+    return cv2.resize(values, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR)

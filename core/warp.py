@@ -164,7 +164,7 @@ def _relief_at(
     """What a relief adds to inverse depth and to target pixels at canvas columns xs and lines ys, and its
     confidence."""
     if canvas.projection is None:  # canvas pixels are the reference's
-        return relief.at(*np.meshgrid(xs, ys))
+        return relief.over(xs, ys)
     places, ahead = canvas.on_reference(xs, ys, camera)
     more, sideways, confidence = relief.at(places[..., 0], places[..., 1])
     return more * np.nan_to_num(ahead).astype(np.float32), sideways, confidence
