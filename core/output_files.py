@@ -237,10 +237,12 @@ def undisturbed() -> Iterator[None]:
         yield
         return
     came: list[int] = []
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     # a handler of None is not Python's and could not be put back: Blender's
-    numbers = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not None]
-    before = {number: signal.signal(number, lambda number, _frame: came.append(number)) for number in numbers}
-    try:
+    before = {number: handler for number, handler in before.items() if handler is not None}
+    try:  # from here on: the first one's handler is put back where the second one comes just now
+        for number in before:
+            signal.signal(number, lambda number, _frame: came.append(number))
         yield
     finally:
         for number, handler in before.items():

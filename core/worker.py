@@ -37,41 +37,67 @@ LIBRARIES = ("numpy", "cv2", "scipy.linalg", "scipy.optimize", "poselib", "OpenE
 def main(folder: Path) -> int:
     """Does the job in a folder; returns the exit status."""
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before NumPy loads: the same bytes for any number of cores
+    stop = _Stop()
     for name in ("SIGINT", "SIGTERM", "SIGBREAK"):  # whatever the parent had them set to
         if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.default_int_handler)
-    orphaned = threading.Event()
+            signal.signal(getattr(signal, name), stop)
     try:
-        return _status(folder, orphaned)
+        return _status(folder, stop)
+    except BrokenPipeError:  # nobody listens: the parent has ended, and stdin was not yet found closed
+        stop.orphaned = True
+        return 130
     finally:
         # here and not in the thread that noticed: only now nothing writes or reads there any more
-        if orphaned.is_set():
+        if stop.orphaned:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _status(folder: Path, orphaned: threading.Event) -> int:
+class _Stop:
+    """The handler of signals that ask to stop. It breaks into the work once, and never into what tidies up after it."""
+
+    def __init__(self) -> None:
+        self.asked = self.orphaned = False
+        self.may_break_in = True
+
+    def __call__(self, _number: int, _frame: object) -> None:
+        self.asked = True
+        if self.may_break_in:
+            self.may_break_in = False
+            raise KeyboardInterrupt
+
+
+def _status(folder: Path, stop: _Stop) -> int:
     try:
-        threading.Thread(target=_end_with_parent, args=(orphaned,), daemon=True).start()
-        _work(folder)
-    except KeyboardInterrupt:
-        return _fail("Cancelled", "cancelled", 130)
-    except ImportError as error:
-        return _fail("Broken", f"a library of EDF Stitch cannot be loaded ({error}); reinstall EDF Stitch", 3)
-    except MemoryError:
-        return _fail("OutOfMemory", "not enough memory for pictures of this size; stitch them at a smaller scale", 3)
-    except Exception as error:
-        exit_code = getattr(error, "exit_code", None)
-        if exit_code is None:
-            return _fail("Bug", f"internal error, please report it: {type(error).__name__}: {error}", 3)
-        return _fail(type(error).__name__, str(error), exit_code)
+        threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
+        try:
+            _work(folder, stop)
+        finally:
+            stop.may_break_in = False
+    except (KeyboardInterrupt, Exception) as error:
+        # a library that is interrupted while it loads makes an ImportError of it
+        return _told(KeyboardInterrupt() if stop.asked else error)
     _say({"done": True})
     return 0
 
 
-def _work(folder: Path) -> None:
+def _told(error: BaseException) -> int:
+    """Says why there is no result; returns the exit status."""
+    if isinstance(error, KeyboardInterrupt):
+        return _fail("Cancelled", "cancelled", 130)
+    if isinstance(error, ImportError):
+        return _fail("Broken", f"a library of EDF Stitch cannot be loaded ({error}); reinstall EDF Stitch", 3)
+    if isinstance(error, MemoryError):
+        return _fail("OutOfMemory", "not enough memory for pictures of this size; stitch them at a smaller scale", 3)
+    exit_code = getattr(error, "exit_code", None)
+    if exit_code is None:
+        return _fail("Bug", f"internal error, please report it: {type(error).__name__}: {error}", 3)
+    return _fail(type(error).__name__, str(error), exit_code)
+
+
+def _work(folder: Path, stop: _Stop) -> None:
     from .output_files import undisturbed
 
-    with undisturbed():  # a library that is interrupted while it loads seems to be broken
+    with undisturbed():  # NumPy prints a traceback of its own where a signal breaks into its loading
         from .cache import default_folder
         from .camera import CameraRequest
         from .options import StitchOptions
@@ -98,8 +124,9 @@ def _work(folder: Path) -> None:
         cache=default_folder(),
     )  # fmt: skip
     result = stitch(
-        reference, target, options, progress=lambda stage, share: _say({"stage": stage, "share": share * STITCH_SHARE})
-    )
+        reference, target, options, lambda stage, share: _say({"stage": stage, "share": share * STITCH_SHARE}),
+        lambda: stop.asked,  # where Python swallowed the interruption, as it does in what tidies up after an object
+    )  # fmt: skip
     _write(folder, result.spread_out(), rows, job.get("take", []), (turn, turn_prime))
 
 
@@ -228,11 +255,11 @@ def _fail(kind: str, words: str, exit_code: int) -> int:
     return exit_code
 
 
-def _end_with_parent(orphaned: threading.Event) -> None:
+def _end_with_parent(stop: _Stop) -> None:
     # not sys.stdin.buffer: Python aborts on its way out when a thread still holds that one's lock
     while os.read(0, 4096):
         pass
-    orphaned.set()
+    stop.orphaned = True
     _thread.interrupt_main()
 
 

@@ -82,13 +82,14 @@ def _signals_held() -> Iterator[Callable[[subprocess.Popen], None]]:
     asked: list[int] = []
 
     def handle(number: int, _frame: FrameType | None) -> None:
-        asked.append(number)
+        if not workers:
+            asked.append(number)
         for worker in workers:
             ask_to_stop(worker)
 
     def forward_to(worker: subprocess.Popen) -> None:
         workers.append(worker)
-        if asked:
+        if asked:  # before it was known; what comes from now on it has got already
             ask_to_stop(worker)
 
     previous = {number: signal.signal(number, handle) for number in STOPPING}

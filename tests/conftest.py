@@ -21,6 +21,18 @@ from edf_stitch.core.images import encode_picture, picture_from_array
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.two_view import TwoView
 from edf_stitch.synthetic_scenes.two_planes import Pair, make_pair
+from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
+
+# The same examples on every machine, and no verdict by the clock: a busy one is slow, not wrong.
+settings.register_profile(
+    "edf", derandomize=True, deadline=None, database=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)  # fmt: skip
+settings.load_profile("edf")
+# Hypothesis also tries numbers that it finds in our sources, as far as they are loaded: then the examples would depend
+# on which tests ran before, and on every constant that somebody tunes.
+providers.is_local_module_file = lambda _path: False
 
 # No test finds what another has left, and none leaves anything at home: no folder can be made there.
 os.environ["EDF_CACHE"] = os.devnull

@@ -228,15 +228,25 @@ def test_cancelled_from_outside(work: Path) -> None:
     assert asked > 5 and set(files(work / "out")) == {"batch.json", *of_pairs("p1")}
 
 
+# `edf` that stops to think before the second pair: so it is there when the signal comes.
+THINKING = """
+import sys, time
+from edf_stitch.core import batch, cli
+stitch = batch.stitch
+batch.stitch = lambda reference, *more: stitch(reference, *more) if "1" in reference.name else time.sleep(600)
+sys.exit(cli.main())
+"""
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 def test_a_signal_in_the_middle_keeps_what_is_finished(work: Path, number: signal.Signals) -> None:
-    line = [sys.executable, "-m", "edf_stitch", "batch", str(work / "good.csv"), "-o", str(work / "out"), *FOCAL]
+    line = [sys.executable, "-c", THINKING, "batch", str(work / "good.csv"), "-o", str(work / "out"), *FOCAL]
     with subprocess.Popen(line, cwd=work, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as job:
         assert job.stderr is not None
         assert job.stderr.readline().startswith("edf: [1/3] p1: ")
         job.send_signal(number)
-        out, err = job.communicate(timeout=60)
+        out, err = job.communicate(timeout=300)
     assert job.returncode == 130 and out == "" and "Traceback" not in err
     assert err.splitlines() == ["edf: interrupted; what is finished is kept, and --resume goes on with the rest"]
     assert set(files(work / "out")) == {"batch.json", *of_pairs("p1")}

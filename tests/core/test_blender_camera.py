@@ -104,7 +104,7 @@ def test_a_camera_without_a_turn_looks_down_with_y_up() -> None:
     assert np.allclose(pose_of(away)[1], [-1, 2, 3])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     st.floats(50, 9000), st.integers(10, 5000), st.integers(10, 5000), st.floats(-500, 5000), st.floats(-500, 5000),
     st.floats(4, 50),
@@ -121,7 +121,7 @@ def test_what_blender_has_no_lens_for(K: list) -> None:
         lens_for(np.array(K, float), (100, 100))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(vectors, vectors, st.floats(0.1, 10))
 def test_poses_go_there_and_back_whatever_the_scale(omega: np.ndarray, t: np.ndarray, scale: float) -> None:
     R = rotation_from_vector(3 * omega)

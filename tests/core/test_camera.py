@@ -233,7 +233,7 @@ def test_an_unknown_picture_borrows_the_focal_length_of_the_other(known_first: b
     assert borrows.size == (2000, 1500) and borrows.K[:2, 2].tolist() == [999.5, 749.5]
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.floats(8, 300), st.integers(400, 9000), st.integers(400, 9000), st.floats(0.2, 3))
 def test_scaling_or_turning_a_picture_scales_its_focal_length(f35: float, w: int, h: int, factor: float) -> None:
     exif = Exif(focal35_mm=f35)

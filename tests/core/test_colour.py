@@ -151,7 +151,7 @@ def test_channels_of_a_profile() -> None:
     assert [icc_channels(one) for one in (icc(), icc(b"GRAY"), icc(b"CMYK"), b"", bytes(200))] == [3, 1, 0, 0, 0]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.lists(st.tuples(st.integers(0, 470), st.integers(0, 255)), min_size=1, max_size=6), st.integers(0, 480))
 def test_damaged_profiles_never_raise(changes: list[tuple[int, int]], length: int) -> None:
     damaged = bytearray(icc())

@@ -74,7 +74,7 @@ def test_inscribed_is_the_largest_of_all_rectangles(seed: int) -> None:
     assert width * height == largest_area(mask)
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(arrays.arrays(bool, st.tuples(st.integers(1, 9), st.integers(1, 9))))
 def test_inscribed_on_any_mask(mask: np.ndarray) -> None:
     if not mask.any():

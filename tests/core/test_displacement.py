@@ -35,7 +35,7 @@ from hypothesis import strategies as st
 
 SIZE = (1200, 900)
 Depths = Callable[[np.ndarray], np.ndarray]
-properties = settings(derandomize=True, deadline=None, max_examples=30)
+properties = settings(max_examples=30)
 
 
 def view(R: np.ndarray, t: tuple[float, ...], focals: tuple[float, float] = (1000.0, 1000.0)) -> TwoView:

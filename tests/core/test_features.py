@@ -151,7 +151,7 @@ def test_the_alpha_of_a_shrunk_picture_lies_where_the_picture_does() -> None:
 # --- spreading -----------------------------------------------------------------------------------------------------
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3000), st.integers(1, 800))
 def test_spreading_keeps_the_budget_and_is_repeatable(seed: int, count: int, budget: int) -> None:
     random = np.random.default_rng(seed)

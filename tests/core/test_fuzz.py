@@ -24,11 +24,10 @@ from edf_stitch.core.match_files import read_matches
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-FEW = {"deadline": None, "derandomize": True, "database": None}
 SOAK = int(os.environ.get("EDF_SOAK_STITCHES", 300))
 PLACE = tempfile.TemporaryDirectory()
 SIZES = ((640, 480), (600, 500))
@@ -63,7 +62,7 @@ tables = st.tuples(lines, st.sampled_from((",", ";", "\t", " ", ", ", "|"))).map
 contents = st.one_of(tables, st.text(max_size=300), st.binary(max_size=300))
 
 
-@settings(max_examples=200, **FEW)
+@settings(max_examples=200)
 @given(contents)
 @example("x,y,x2,y2\n1,2,3,4")
 @example("x;y;x2;y2;weight\n1,5;2;3;4;1e308\n9;9;9;9;1e308")
@@ -74,7 +73,7 @@ def test_files_of_matches(content: str | bytes) -> None:
         assert np.isfinite(matches.x).all() and np.isfinite(matches.y).all() and (matches.weights > 0).all()
 
 
-@settings(max_examples=100, **FEW)
+@settings(max_examples=100)
 @given(contents)
 @example("reference,target\na.png,b.png")
 @example("a_%04d.png,b_%04d.png\n")
@@ -102,7 +101,7 @@ camera_files = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=150, **FEW)
+@settings(max_examples=150)
 @given(camera_files)
 def test_camera_files(content: str | bytes) -> None:
     cameras = ends(lambda: read_camera_file(text_file(content), ("a", "b"), SIZES))
@@ -120,7 +119,7 @@ words = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], **FEW)
+@settings(max_examples=150)
 @given(st.sampled_from(("stitch", "batch", "compare", "x")), st.lists(words, max_size=8))
 def test_command_lines(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, command: str, arguments: list[str]
@@ -143,14 +142,14 @@ odd_arrays = st.one_of(
 )
 
 
-@settings(max_examples=40, **FEW)
+@settings(max_examples=40)
 @given(odd_arrays, odd_arrays)
 def test_arrays_as_pictures(first: np.ndarray, second: np.ndarray) -> None:
     with np.errstate(all="ignore"):
         assert ends(lambda: stitch(first, second)) is None, "nothing in them to hold on to"
 
 
-@settings(max_examples=60, **FEW)
+@settings(max_examples=60)
 @given(odd_arrays)
 def test_arrays_as_masks_and_matches(array: np.ndarray) -> None:
     with np.errstate(all="ignore"):
@@ -244,7 +243,7 @@ def tried(pair: Pair, how: dict[str, Any]) -> None:
         sound(result)
 
 
-@settings(max_examples=8, **FEW)
+@settings(max_examples=8)
 @given(changes())
 def test_sound_pairs_maltreated(small_pair: Pair, how: dict[str, Any]) -> None:
     tried(small_pair, how)
@@ -252,7 +251,7 @@ def test_sound_pairs_maltreated(small_pair: Pair, how: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.soak
-@settings(max_examples=SOAK, **FEW)
+@settings(max_examples=SOAK)
 @given(changes())
 def test_many_sound_pairs_maltreated(small_pair: Pair, how: dict[str, Any]) -> None:
     tried(small_pair, how)

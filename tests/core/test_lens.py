@@ -125,7 +125,7 @@ def test_neighbours_in_the_picture_stay_neighbours(lens: tuple[tuple[float, ...]
 tangential = st.floats(-2e-3, 2e-3)
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.floats(-0.15, 0.15), st.floats(-0.03, 0.03), tangential, tangential, st.floats(0.9, 3))
 def test_usual_lenses_agree_with_opencv_and_invert(k1: float, k2: float, p1: float, p2: float, focal: float) -> None:
     cam = camera((k1, k2, p1, p2, 0), focal)

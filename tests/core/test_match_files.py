@@ -10,7 +10,7 @@ import pytest
 from edf_stitch.core.errors import BadRequest, UnreadableImage
 from edf_stitch.core.features import Matches
 from edf_stitch.core.match_files import matches_csv, read_matches
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 SIZE, SIZE_PRIME = (640, 480), (320, 200)
@@ -158,7 +158,7 @@ def inside(size: tuple[int, int]) -> st.SearchStrategy[tuple[float, float]]:
 
 
 @settings(
-    derandomize=True, deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=100
 )  # fmt: skip
 @given(st.lists(
     st.tuples(inside(SIZE), inside(SIZE_PRIME), st.floats(0, exclude_min=True, allow_infinity=False)), min_size=1,

@@ -189,7 +189,7 @@ def test_foreign_formats_are_named(start: bytes, suffix: str, kind: str) -> None
     assert foreign_kind(start, suffix) == kind
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.sampled_from(sorted(ENCODED)), st.integers(0, 10**6),
        st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), max_size=8))
 def test_damage_never_raises(kind: str, length: int, changes: list[tuple[int, int]]) -> None:

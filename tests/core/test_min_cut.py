@@ -20,7 +20,7 @@ def price(labels: np.ndarray, cost: np.ndarray, known: np.ndarray, bias: float) 
     return total
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.05]))
 def test_no_labelling_is_cheaper(seed: int, bias: float) -> None:
     random = np.random.default_rng(seed)

@@ -109,7 +109,7 @@ def test_the_nearest_to_the_target_owns_the_pixel_not_the_nearest_to_the_referen
     assert np.allclose(near, 1 / there, rtol=1e-4)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(
     st.floats(-60, 60), st.floats(-60, 60), st.floats(1.5, 20), st.floats(0.3, 3), st.integers(0, 2**16),
 )  # fmt: skip

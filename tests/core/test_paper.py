@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from .test_displacement import SIDE, SIZE, VIEWS, curved, every_view, planar, some_matches
 
-properties = settings(derandomize=True, deadline=None, max_examples=25)
+properties = settings(max_examples=25)
 
 
 def paper_of(two_view: TwoView, matches: Matches, fade: str = "plane") -> PaperField:

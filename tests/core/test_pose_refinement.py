@@ -158,7 +158,7 @@ def test_the_normal_matrix_is_made_of_the_residuals_derivatives(log_sigma: float
     assert np.abs((normal - expected) / scale).max() < 1e-6
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1))
 def test_a_step_stays_among_the_poses(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -200,7 +200,7 @@ def test_the_principal_point_is_free_only_where_one_unknown_sensor_took_both_pic
 # --- descent -------------------------------------------------------------------------------------------------------
 
 
-@settings(derandomize=True, deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32 - 1), st.floats(0, 90), st.sampled_from([0.0, 0.05, ASSUMED_SIGMA]), st.booleans())
 def test_the_cost_never_rises(seed: int, degrees: float, log_sigma: float, zoom: bool) -> None:
     matches, true = scene(seed, 60, noise=1.0)

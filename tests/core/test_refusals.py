@@ -15,7 +15,7 @@ import pytest
 from edf_stitch.core.errors import UnreadableImage
 from edf_stitch.core.images import Picture, encode_picture, load_picture
 from edf_stitch.core.metadata import Exif
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 OpenEXR = pytest.importorskip("OpenEXR")
@@ -157,7 +157,7 @@ def mutated(seed: int, length: int, changes: list[tuple[int, int]]) -> tuple[byt
     return bytes(data[: length % len(data)] if length else data), suffix
 
 
-@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=250)
 @given(st.integers(0, 11), st.one_of(st.just(0), st.integers(0, 10**5)),
        st.lists(st.tuples(st.integers(0, 10**5), st.sampled_from([0, 1, 2, 127, 128, 254, 255]) | st.integers(0, 255)),
                 max_size=6))

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-properties = settings(derandomize=True, deadline=None, max_examples=30)
+properties = settings(max_examples=30)
 seeds = st.integers(0, 2**32 - 1)
 WIDTH, HEIGHT = 1200.0, 900.0
 UNIT = float(np.sqrt(WIDTH * HEIGHT))

@@ -145,7 +145,7 @@ def some(*calibrations: str) -> st.SearchStrategy[int]:
 
 
 # Without shrinking: there is no simpler problem than another, and looking for one takes minutes.
-FEW = settings(max_examples=5, deadline=None, derandomize=True, phases=[Phase.generate])
+FEW = settings(max_examples=5, phases=[Phase.generate])
 BORDER = st.tuples(*[st.integers(0, 300)] * 4)
 
 

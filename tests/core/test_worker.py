@@ -109,6 +109,19 @@ def until_features(worker: subprocess.Popen) -> None:
     for line in worker.stdout:
         if json.loads(line)["stage"] == "features":
             return
+    raise AssertionError("it never came to the features")
+
+
+# A worker that does as PREPARE says, with its module at hand as `worker`.
+PREPARED = "import sys\nfrom pathlib import Path\nfrom edf_stitch.core import worker\n"
+
+
+def prepared(folder: Path, job: dict, code: str) -> subprocess.Popen:
+    folder.mkdir()
+    (folder / "job.json").write_text(json.dumps(job))
+    line = [sys.executable, "-P", "-c", f"{PREPARED}{code}\nsys.exit(worker.main(Path(sys.argv[1])))", str(folder)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(line, cwd=folder, start_new_session=True, **pipes)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
@@ -118,7 +131,7 @@ def test_a_signal_ends_it_in_words(job, tmp_path, number):
         until_features(worker)
         worker.send_signal(number)
         said = [json.loads(line) for line in worker.stdout]
-        assert worker.wait(timeout=30) == 130
+        assert worker.wait(timeout=300) == 130
     assert said[-1]["kind"] == "Cancelled"
     assert not (tmp_path / "job" / "result.json").exists()
 
@@ -127,5 +140,53 @@ def test_it_ends_with_whoever_started_it_and_takes_its_folder_along(job, tmp_pat
     with start(tmp_path / "job", job) as worker:
         until_features(worker)
         worker.stdin.close()  # what happens when Blender dies
-        assert worker.wait(timeout=30) != 0
+        assert worker.wait(timeout=300) != 0
+    assert not (tmp_path / "job").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+def test_only_the_first_interruption_breaks_in(job, tmp_path):
+    """Two more come while it tells of the first and while the folder goes."""
+    code = (
+        "import os, signal, shutil\n"
+        "def again(call):\n"
+        " def disturbed(*args, **options):\n"
+        "  os.kill(os.getpid(), signal.SIGINT)\n"
+        "  return call(*args, **options)\n"
+        " return disturbed\n"
+        "worker._fail, shutil.rmtree = again(worker._fail), again(shutil.rmtree)"
+    )
+    with prepared(tmp_path / "job", job, code) as worker:
+        until_features(worker)
+        worker.stdin.close()
+        said = [json.loads(line) for line in worker.stdout]
+        assert worker.wait(timeout=300) == 130 and worker.stderr.read() == b""
+    assert said[-1]["kind"] == "Cancelled" and not (tmp_path / "job").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+@pytest.mark.parametrize("swallowed", ["pass", "raise ImportError('half a library')"])
+def test_an_interruption_that_gets_lost_on_the_way_stops_it_all_the_same(job, tmp_path, swallowed):
+    code = (
+        "import os, signal\n"
+        "say = worker._say\n"
+        "def lossy(line):\n"
+        " say(line)\n"
+        " if line.get('stage') == 'features':\n"
+        "  try: os.kill(os.getpid(), signal.SIGINT)\n"
+        f"  except KeyboardInterrupt: {swallowed}\n"
+        "worker._say = lossy"
+    )
+    with prepared(tmp_path / "job", job, code) as worker:
+        said = [json.loads(line) for line in worker.stdout]
+        assert worker.wait(timeout=300) == 130
+    assert said[-1]["kind"] == "Cancelled"
+
+
+def test_where_nobody_listens_any_more_its_folder_goes_too(job, tmp_path):
+    """Of a parent that dies stdout may be gone a moment before stdin is."""
+    with prepared(tmp_path / "job", job, "") as worker:
+        worker.stdout.close()
+        assert worker.wait(timeout=300) != 0
+        worker.stdin.close()
     assert not (tmp_path / "job").exists()

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from ..test_displacement import SIDE, SIZE
 
-properties = settings(derandomize=True, deadline=None, max_examples=30)
+properties = settings(max_examples=30)
 small = st.floats(-0.2, 0.2)
 
 
