@@ -164,7 +164,7 @@ def _refined(
 
 def size_of(picture: Picture) -> tuple[int, int]:
     """(W, H) px of a picture."""
-    height, width = picture.pixels.shape[:2]
+    height, width = picture.light.shape[:2]
     return width, height
 
 

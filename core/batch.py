@@ -330,7 +330,7 @@ def _without_light(frame: Frame) -> Frame:
     """The frame without its float pixels, most of its memory: alignment looks at the views only."""
 
     def bare(picture: Picture) -> Picture:
-        return replace(picture, pixels=np.broadcast_to(np.float32(np.nan), picture.pixels.shape))
+        return replace(picture, light=np.broadcast_to(np.float32(np.nan), picture.light.shape))
 
     return replace(frame, reference=bare(frame.reference), target=bare(frame.target))
 

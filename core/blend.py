@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .light import AnyLight, Light, Part, bounds, meet, within
 from .multiband import bands_for, correction
-from .overlap import Overlap, bounds, distance_inside, distance_to_border
+from .overlap import Overlap, distance_inside, distance_to_border
 from .tone import to_light, to_tones
 from .warp import Layer
 
@@ -18,7 +21,7 @@ HALF, DARK = np.float32(0.5), np.float32(0.02)
 
 def averaged(reference: Layer, target: Layer) -> Layer:
     """Both count alike wherever both show something: the plain average of the literature, which hides nothing."""
-    return mixed(reference, target, np.full(reference.alpha.shape, 0.5, np.float32))
+    return mixed(reference, target, np.broadcast_to(np.float32(0.5), reference.alpha.shape))
 
 
 def feathered(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Layer:
@@ -54,19 +57,40 @@ def mixed(reference: Layer, target: Layer, share: NDArray[np.float32]) -> Layer:
     """One layer from two on the same canvas, straight alpha: share (H, W) is the reference's weight where both show
     something; where one shows nothing the other is taken as it is."""
     shows, shows_too = reference.alpha > 0, target.alpha > 0
-    pixels, alpha = target.pixels.copy(), np.where(shows, reference.alpha, target.alpha)
-    copied_where(shows, reference.pixels, pixels)
-    box = bounds(shows & shows_too)
-    if box is not None:
-        both = (shows & shows_too)[box]
-        weight, weight_too = share[box] * reference.alpha[box], (1 - share[box]) * target.alpha[box]
-        total = weight + weight_too
-        mix = reference.pixels[box] * weight[..., None] + target.pixels[box] * weight_too[..., None]
-        mix /= np.maximum(total, 1e-12)[..., None]
-        np.copyto(pixels[box], mix, where=both[..., None])
-        # what one picture shows whole is not seen through, however soft the other's edge
-        np.maximum(alpha[box], target.alpha[box], out=alpha[box], where=both)
-    return Layer(pixels, alpha)
+    both = shows & shows_too
+    alpha = np.where(shows, reference.alpha, target.alpha)
+    # what one picture shows whole is not seen through, however soft the other's edge
+    np.maximum(alpha, target.alpha, out=alpha, where=both)
+    return Layer(Mixed(reference, target, share), alpha)
+
+
+@dataclass(frozen=True, eq=False)
+class Mixed(Light):
+    """Two layers by the share (H, W) of the first (see `mixed`)."""
+
+    first: Layer
+    second: Layer
+    share: NDArray[np.float32]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.first.light.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        alpha, alpha_too = self.first.alpha[part], self.second.alpha[part]
+        shows, both = alpha > 0, (alpha > 0) & (alpha_too > 0)
+        light = self.first.light[part]
+        pixels = self.second.light[part].copy()
+        copied_where(shows, light, pixels)
+        box = bounds(both)
+        if box is not None:
+            share = self.share[part][box]
+            weight, weight_too = share * alpha[box], (1 - share) * alpha_too[box]
+            mix = light[box] * weight[..., None] + self.second.light[part][box] * weight_too[..., None]
+            mix /= np.maximum(weight + weight_too, 1e-12)[..., None]
+            copied_where(both[box], mix, pixels[box])
+        return pixels
 
 
 def copied_where(mask: NDArray[np.bool_], source: NDArray[np.float32], out: NDArray[np.float32]) -> None:
@@ -77,9 +101,35 @@ def copied_where(mask: NDArray[np.bool_], source: NDArray[np.float32], out: NDAr
 def cut_hard(reference: Layer, target: Layer, from_target: NDArray[np.bool_]) -> Layer:
     """Each pixel from the picture that from_target (H, W) names, bit for bit; what one shows whole is not seen
     through."""
-    pixels = reference.pixels.copy()
-    copied_where(from_target, target.pixels, pixels)
-    return Layer(pixels, np.maximum(reference.alpha, target.alpha))
+    return Layer(Cut(reference.light, target.light, from_target), np.maximum(reference.alpha, target.alpha))
+
+
+@dataclass(frozen=True, eq=False)
+class Cut(Light):
+    """Light of the second where from_second (H, W) says so, else of the first."""
+
+    first: AnyLight
+    second: AnyLight
+    from_second: NDArray[np.bool_]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.first.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        second = self.from_second[part]
+        box = bounds(second)
+        out = self.first[part]
+        if box is None:
+            return out
+        out = out.copy()
+        rows, columns = (
+            slice(one.start + inner.start, one.start + inner.stop)
+            for one, inner in zip(within(part, self.shape), box, strict=True)
+        )
+        copied_where(second[box], self.second[rows, columns], out[box])
+        return out
 
 
 def in_bands(reference: Layer, target: Layer, from_target: NDArray[np.bool_], overlap: Overlap | None) -> Layer:
@@ -95,13 +145,40 @@ def in_bands(reference: Layer, target: Layer, from_target: NDArray[np.bool_], ov
         from_target[region], shown, bands,
     )  # fmt: skip
     touched = change.any(axis=2) & shown
-    pixels = out.pixels[region]
-    before, tones = pixels[touched], to_tones(pixels[touched])
-    # what brighter neighbours differ by is too much for the dark: it stays dark, and no light turns negative
-    most = HALF * np.abs(tones) + DARK
-    after = to_light(tones + np.clip(change[touched], -most, most))
-    pixels[touched] = np.maximum(after, np.minimum(before, 0))
-    return out
+    return Layer(Evened(out.light, (region[0].start, region[1].start), change, touched), out.alpha)
+
+
+@dataclass(frozen=True, eq=False)
+class Evened(Light):
+    """Light with a change (h, w, C) of its tones from `at` (row, column) on, where touched (h, w)."""
+
+    light: AnyLight
+    at: tuple[int, int]
+    change: NDArray[np.float32]
+    touched: NDArray[np.bool_]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.light.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        out = self.light[part]
+        meeting = meet(part, self.shape, self.at, self.change.shape)
+        if meeting is None:
+            return out
+        here, there = meeting
+        touched = self.touched[there]
+        if not touched.any():
+            return out
+        out = out.copy()
+        before = out[here][touched]
+        tones = to_tones(before)
+        # what brighter neighbours differ by is too much for the dark: it stays dark, and no light turns negative
+        most = HALF * np.abs(tones) + DARK
+        after = to_light(tones + np.clip(self.change[there][touched], -most, most))
+        out[here][touched] = np.maximum(after, np.minimum(before, 0))
+        return out
 
 
 def seam_region(

@@ -57,7 +57,7 @@ def composed(
     elif options.exposure:
         exposure = match_exposure(reference, target, hidden, floats)
     else:
-        exposure = unchanged(target.pixels.shape[2])
+        exposure = unchanged(target.light.shape[2])
     target = exposure.applied(target)
 
     steps("seam", 0.0)
@@ -111,4 +111,4 @@ def _with_seam(
 def _without_holes(target: Layer, hidden: NDArray[np.bool_], reference: Layer) -> Layer:
     """The target without what it shows beyond the reference though it cannot see it: a hole, and known to be one."""
     holes = hidden & (reference.alpha == 0) & (target.alpha > 0)
-    return Layer(target.pixels, np.where(holes, np.float32(0), target.alpha)) if holes.any() else target
+    return Layer(target.light, np.where(holes, np.float32(0), target.alpha)) if holes.any() else target

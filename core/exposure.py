@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .overlap import bounds
+from .light import AnyLight, Light, Part, bounds
 from .warp import Layer
 
 BLOCK = 8
@@ -39,11 +39,23 @@ class Exposure:
         """The target's layer as the reference's camera would have exposed it."""
         if (self.gain == 1).all():
             return target
-        pixels = np.zeros_like(target.pixels)  # costs no memory where nothing is written
-        box = bounds(target.alpha > 0)
-        if box is not None:
-            np.multiply(target.pixels[box], self.gain, out=pixels[box])
-        return Layer(pixels, target.alpha)
+        return Layer(Exposed(target.light, self.gain), target.alpha)
+
+
+@dataclass(frozen=True, eq=False)
+class Exposed(Light):
+    """Light times a gain (C,)."""
+
+    light: AnyLight
+    gain: NDArray[np.float32]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.light.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        return self.light[part] * self.gain
 
 
 def unchanged(channels: int) -> Exposure:
@@ -59,7 +71,7 @@ def match_exposure(
     hidden (H, W): where the target shows something else; floats: whether reference and target come from float pictures,
     which do not clip.
     """
-    channels = reference.pixels.shape[2]
+    channels = reference.light.shape[2]
     shown = (reference.alpha > 1 - 1 / 255) & (target.alpha > 1 - 1 / 255) & ~hidden
     box = bounds(shown)
     if box is None:
@@ -67,7 +79,7 @@ def match_exposure(
     # whole blocks of the canvas
     rows, columns = (slice(part.start - part.start % BLOCK, part.stop + -part.stop % BLOCK) for part in box)
     shown = shown[rows, columns]
-    pixels, pixels_too = (layer.pixels[rows, columns] for layer in (reference, target))
+    pixels, pixels_too = (layer.light[rows, columns] for layer in (reference, target))
     for light, unclipped in zip((pixels, pixels_too), floats, strict=True):
         if not unclipped:
             for k in range(channels):

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .errors import UnreadableImage
+from .light import AnyLight, strips
 from .metadata import SOFTWARE, Exif
 
 
@@ -119,7 +120,7 @@ def _in_display_window(layer: _Layer) -> tuple[np.ndarray, np.ndarray | None]:
     return whole, whole_alpha
 
 
-def write_exr(pixels: np.ndarray, alpha: np.ndarray | None, exif: Exif) -> bytes:
+def write_exr(pixels: AnyLight, alpha: np.ndarray | None, exif: Exif) -> bytes:
     """A 32-bit ZIP-compressed EXR file in memory.
 
     pixels: float32 H×W×C (1 or 3), scene-linear in Rec. 709 primaries, straight; stored premultiplied. alpha: float32
@@ -127,9 +128,13 @@ def write_exr(pixels: np.ndarray, alpha: np.ndarray | None, exif: Exif) -> bytes
     """
     import OpenEXR
 
-    stored = pixels if alpha is None else pixels * alpha[..., None]
     names = "RGB" if pixels.shape[2] == 3 else "Y"
-    channels = {name: np.ascontiguousarray(stored[..., index], np.float32) for index, name in enumerate(names)}
+    channels = {name: np.empty(pixels.shape[:2], np.float32) for name in names}
+    for rows in strips(pixels.shape):
+        part = pixels[rows, 0 : pixels.shape[1]]
+        stored = part if alpha is None else part * alpha[rows][..., None]
+        for index, name in enumerate(names):
+            channels[name][rows] = stored[..., index]
     if alpha is not None:
         channels["A"] = np.ascontiguousarray(alpha, np.float32)
     texts = {

@@ -13,11 +13,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from .colour import Curve, decode, encode, icc_channels, parse_icc, srgb_curve
+from .colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from .containers import foreign_kind, read_structure
 from .decoding import PHOTOGRAPH, check_size, decode_exr, decode_file, quiet_opencv, read_file, turn
 from .errors import BadRequest, UnreadableImage, UnwritableOutput
 from .exr import write_exr
+from .light import AnyLight, Coded, strips, whole
 from .metadata import Exif, embed, read_exif
 from .output_files import OutputFiles
 
@@ -40,14 +41,15 @@ _JPEG_QUALITY = 95
 class Picture:
     """A picture from outside, upright (any EXIF orientation has been applied), row 0 on top.
 
-    pixels: float32 H×W×C, C = 1 or 3 (R, G, B), scene-linear, straight (not multiplied by alpha), in the primaries of
-    `icc` or, where that is None, of sRGB. alpha: float32 H×W in [0, 1], None when opaque everywhere. view: uint8 H×W×C,
+    light: float32 H×W×C, C = 1 or 3 (R, G, B), scene-linear, straight (not multiplied by alpha), in the primaries of
+    `icc` or, where that is None, of sRGB; of 8 and 16 bits it is worked out where it is asked for (see `light`), of all
+    pixels as `pixels`. alpha: float32 H×W in [0, 1], None when opaque everywhere. view: uint8 H×W×C,
     the display-encoded picture that features and photometric metrics see. bits: 8, 16 or 32 (float) of the source.
     exif: see `Exif.upright`; its orientation is the source's and is done with. icc: the embedded profile or None. name:
     file name or "array". warnings: what the user should know.
     """
 
-    pixels: np.ndarray
+    light: AnyLight
     alpha: np.ndarray | None
     view: np.ndarray
     bits: int
@@ -55,6 +57,11 @@ class Picture:
     icc: bytes | None
     name: str
     warnings: tuple[str, ...] = ()
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """All of its light as an array (H, W, C) float32."""
+        return whole(self.light)
 
 
 def load_picture(path: str | Path, pixels_per_byte: int = PHOTOGRAPH) -> Picture:
@@ -122,6 +129,7 @@ def _picture(
     """raw: upright H×W×1..4 in R, G, B, A order; associated: the colours are multiplied by alpha as stored."""
     channels = 1 if raw.shape[2] < 3 else 3
     colour, stored_alpha = raw[..., :channels], raw[..., channels] if raw.shape[2] > channels else None
+    light: AnyLight
     alpha = None
     if stored_alpha is not None:
         full = 1.0 if raw.dtype == np.float32 else float(np.iinfo(raw.dtype).max)
@@ -135,20 +143,20 @@ def _picture(
         warnings = [*warnings, "its colour profile does not fit its pixels; taken as sRGB"]
         icc = None
     if raw.dtype == np.float32:
-        pixels, alpha, share = _finite(colour, alpha)
+        light, alpha, share = _finite(colour, alpha)
         if share > _MOST_NOT_FINITE:
             raise UnreadableImage(f"{share:.0%} of the pixels are not finite numbers; render or export it again")
         if share > 0:
             warnings = [*warnings, f"{share:.2%} of the pixels are not finite numbers; they are taken as transparent"]
-        view = _float_view(pixels, _exposure(pixels, alpha))
+        view = _float_view(light, _exposure(light, alpha))
     else:
-        pixels = decode(colour, _curves(icc, channels))
+        light = Coded(colour, _curves(icc, channels))
         # 65535 / 255 = 257; OpenCV rounds
         view = colour if raw.dtype == np.uint8 else cv2.convertScaleAbs(colour, alpha=1 / 257).reshape(colour.shape)
     if alpha is not None and (alpha >= 1.0).all():
         alpha = None
     icc = icc if icc is not None and icc_channels(icc) == channels else None
-    return Picture(pixels, alpha, view, raw.dtype.itemsize * 8, exif, icc, name, tuple(warnings))
+    return Picture(light, alpha, view, raw.dtype.itemsize * 8, exif, icc, name, tuple(warnings))
 
 
 def _straight(colour: np.ndarray, alpha: np.ndarray) -> np.ndarray:
@@ -202,7 +210,7 @@ def _curves(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
 
 def resized(picture: Picture, scale: float) -> Picture:
     """The picture made smaller by `scale` (at most 1), each new pixel the mean light of what it covers."""
-    height, width = picture.pixels.shape[:2]
+    height, width = picture.light.shape[:2]
     size = max(1, round(width * scale)), max(1, round(height * scale))
     if size == (width, height):
         return picture
@@ -211,10 +219,10 @@ def resized(picture: Picture, scale: float) -> Picture:
         return cv2.resize(array, size, interpolation=cv2.INTER_AREA).reshape(size[1], size[0], *array.shape[2:])
 
     if picture.alpha is None:
-        return replace(picture, pixels=shrink(picture.pixels), view=shrink(picture.view))
+        return replace(picture, light=shrink(picture.pixels), view=shrink(picture.view))
     alpha = shrink(picture.alpha)
     pixels = shrink(picture.pixels * picture.alpha[..., None]) / np.maximum(alpha, 1e-6)[..., None]
-    return replace(picture, pixels=pixels, alpha=alpha, view=shrink(picture.view))
+    return replace(picture, light=pixels, alpha=alpha, view=shrink(picture.view))
 
 
 def in_same_colour_space(a: Picture, b: Picture) -> tuple[Picture, Picture]:
@@ -226,7 +234,7 @@ def in_same_colour_space(a: Picture, b: Picture) -> tuple[Picture, Picture]:
     """
     if a.icc != b.icc:
         a, b = _to_srgb(a), _to_srgb(b)
-    if a.pixels.shape[2] != b.pixels.shape[2]:
+    if a.light.shape[2] != b.light.shape[2]:
         a, b = _three_channels(a), _three_channels(b)
     if a.bits == b.bits == 32:
         ours, theirs = _exposure(a.pixels, a.alpha), _exposure(b.pixels, b.alpha)
@@ -248,13 +256,18 @@ def _to_srgb(picture: Picture) -> Picture:
         return replace(picture, icc=None)
     pixels = cv2.transform(picture.pixels, profile.to_srgb.astype(np.float32))
     view = _float_view(pixels, _exposure(pixels, picture.alpha)) if picture.bits == 32 else encode(pixels, 8)
-    return replace(picture, pixels=pixels, view=view, icc=None)
+    return replace(picture, light=pixels, view=view, icc=None)
 
 
 def _three_channels(picture: Picture) -> Picture:
-    if picture.pixels.shape[2] == 3:
+    if picture.light.shape[2] == 3:
         return picture
-    return replace(picture, pixels=np.repeat(picture.pixels, 3, axis=2), view=np.repeat(picture.view, 3, axis=2))
+    light = picture.light
+    if isinstance(light, Coded) and len(light.curves) == 1:
+        light = Coded(np.repeat(light.levels, 3, axis=2), light.curves)
+    else:
+        light = np.repeat(whole(light), 3, axis=2)
+    return replace(picture, light=light, view=np.repeat(picture.view, 3, axis=2))
 
 
 def output_bits(bits: Iterable[int], suffix: str) -> int:
@@ -274,14 +287,15 @@ def _writable(suffix: str) -> tuple[str, int]:
 
 
 def encode_picture(
-    pixels: np.ndarray, alpha: np.ndarray | None, bits: int, suffix: str, icc: bytes | None = None,
+    pixels: AnyLight, alpha: np.ndarray | None, bits: int, suffix: str, icc: bytes | None = None,
     exif: Exif | None = None,
 ) -> tuple[bytes, tuple[str, ...]]:
     """The bytes of a picture file, and warnings.
 
-    pixels, alpha, icc, exif: as in Picture; bits: the deepest input's (8, 16 or 32); suffix: .png, .jpg, .jpeg, .tif,
-    .tiff or .exr. JPEG gets black where alpha says so, the others keep alpha. EXR holds linear sRGB, premultiplied.
-    Raises BadRequest for other suffixes, UnwritableOutput where the picture does not fit into the kind of file.
+    pixels: light as in Picture; alpha, icc, exif: as there; bits: the deepest input's (8, 16 or 32); suffix: .png,
+    .jpg, .jpeg, .tif, .tiff or .exr. JPEG gets black where alpha says so, the others keep alpha. EXR holds linear sRGB,
+    premultiplied. Raises BadRequest for other suffixes, UnwritableOutput where the picture does not fit into the kind
+    of file.
     """
     kind, _ = _writable(suffix)
     depth = output_bits((bits,), suffix)
@@ -289,28 +303,20 @@ def encode_picture(
     profile = parse_icc(icc) if icc is not None else None
     if kind == "exr":
         if profile is not None and pixels.shape[2] == 3:
-            pixels = cv2.transform(np.ascontiguousarray(pixels, np.float32), profile.to_srgb.astype(np.float32))
+            pixels = cv2.transform(np.ascontiguousarray(whole(pixels), np.float32), profile.to_srgb.astype(np.float32))
         return write_exr(pixels, alpha, exif), ()
     height, width = pixels.shape[:2]
     if kind == "jpeg" and max(width, height) > _JPEG_LONGEST_SIDE:
         raise UnwritableOutput(f"JPEG holds {_JPEG_LONGEST_SIDE} pixels a side, not {width} × {height}; use .png")
     warnings: tuple[str, ...] = ()
+    # OpenCV writes no gray with alpha
+    channels = 3 if alpha is not None and kind != "jpeg" else pixels.shape[2]
+    if icc is not None and icc_channels(icc) != channels:
+        icc = None
+    coded, clipped = _levels(pixels, alpha, depth, _curves(icc, channels), kind == "jpeg")
     if bits == 32:
-        clipped = float((pixels > 1.0).any(axis=2).mean())
         lost = f", and {clipped:.2%} of its pixels, brighter than white, were clipped" if clipped else ""
         warnings = (f"float input was written display-encoded with {depth} bits{lost}; .exr keeps it",)
-    if kind == "jpeg" and alpha is not None:
-        pixels, alpha = pixels * alpha[..., None], None
-    if pixels.shape[2] == 1 and alpha is not None:
-        pixels = np.repeat(pixels, 3, axis=2)  # OpenCV writes no gray with alpha
-    if icc is not None and icc_channels(icc) != pixels.shape[2]:
-        icc = None
-    coded = encode(pixels, depth, _curves(icc, pixels.shape[2]))
-    if alpha is not None:
-        most = np.iinfo(coded.dtype).max
-        coded = np.dstack([coded, np.rint(np.clip(alpha, 0, 1) * np.float32(most)).astype(coded.dtype)])
-    if coded.shape[2] > 1:
-        coded = cv2.cvtColor(coded, cv2.COLOR_RGB2BGR if coded.shape[2] == 3 else cv2.COLOR_RGBA2BGRA)
     options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if kind == "jpeg" else []
     try:
         with quiet_opencv():
@@ -319,7 +325,29 @@ def encode_picture(
         done = False
     if not done:
         raise UnwritableOutput(f"{width} × {height} pixels do not fit into a {suffix} file; use .exr or a smaller size")
-    return embed(encoded.tobytes(), kind, exif, icc, straight_alpha=alpha is not None), warnings
+    return embed(encoded.tobytes(), kind, exif, icc, straight_alpha=coded.shape[2] == 4), warnings
+
+
+def _levels(
+    light: AnyLight, alpha: np.ndarray | None, bits: int, curves: tuple[Curve, ...], flat: bool
+) -> tuple[np.ndarray, float]:
+    """Light as OpenCV writes it: (H, W, 1, 3 or 4) levels of 8 or 16 bits, in B, G, R, A order; and the share of pixels
+    brighter than white. flat: black where alpha says so, instead of alpha."""
+    height, width, channels = light.shape
+    sees_through, most = alpha is not None and not flat, np.float32(255 if bits == 8 else 65535)
+    channels = 3 if sees_through else channels
+    out = np.empty((height, width, channels + sees_through), np.uint8 if bits == 8 else np.uint16)
+    beyond = 0
+    for rows in strips(light.shape):
+        part = light[rows, 0:width]
+        beyond += int((part > 1.0).any(axis=2).sum())
+        if flat and alpha is not None:
+            part = part * alpha[rows][..., None]
+        coded = encode(part, bits, curves)
+        out[rows, :, :channels] = coded[..., ::-1]
+        if sees_through and alpha is not None:
+            out[rows, :, -1] = np.rint(np.clip(alpha[rows], 0, 1) * most)
+    return out, beyond / max(1, height * width)
 
 
 def save_picture(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from .decoding import DRAWING
 from .errors import BadRequest
 from .images import Picture, load_picture, picture_from_array
+from .light import extent
 
 # Less than this of a picture left is a mask that means something else.
 LEAST_LEFT = 0.01
@@ -82,7 +83,7 @@ def _picture(source: str | Path | np.ndarray, label: str) -> Picture:
 
 def _refuse_labels(picture: Picture, label: str) -> None:
     """Masks of 0 and 1 look black and would ignore nothing, without a word."""
-    if picture.bits < 32 and picture.alpha is None and picture.view.max() <= 1 and picture.pixels.max() > 0:
+    if picture.bits < 32 and picture.alpha is None and picture.view.max() <= 1 and extent(picture.light)[1] > 0:
         raise BadRequest(f"{label} holds nothing but black and almost black; save what is to be ignored as white (255)")
 
 

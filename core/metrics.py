@@ -15,7 +15,7 @@ from .colour import encode
 from .epipolar import Array, distance_to_line
 from .images import Picture
 from .lens import undistort
-from .overlap import bounds
+from .light import bounds
 from .tone import to_tones
 from .warp import Layer, Warp, fetch
 
@@ -126,7 +126,7 @@ def appearance(
         return {"source_fidelity_mean": math.nan, "source_fidelity_p5": math.nan, "seam_visibility": math.nan}
     # what else is there may be missing for want of room in 8 bit: light beyond white is looked at as tones
     levels = [
-        np.float32(255) * to_tones(part.pixels[box]) if any(floats) else encode(part.pixels[box], 8).astype(np.float32)
+        np.float32(255) * to_tones(part.light[box]) if any(floats) else encode(part.light[box], 8).astype(np.float32)
         for part in (panorama, reference, target)
     ]
     both = ((reference.alpha > 0) & (target.alpha > 0))[box]

@@ -69,7 +69,7 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     exif = result.reference.exif
     icc = result.reference.icc
     alpha = None if result.alpha.min() >= 1.0 else result.alpha
-    data, warned = encode_picture(result.pixels, alpha, result.bits, request.panorama.suffix, icc, exif)
+    data, warned = encode_picture(result.panorama.light, alpha, result.bits, request.panorama.suffix, icc, exif)
     files.add(request.panorama, data)
     warnings = list(warned)
     if request.layers is not None:
@@ -100,10 +100,10 @@ def add_report(
 def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result: StitchResult) -> None:
     icc, exif = result.reference.icc, result.reference.exif
     files.add_to_folder(
-        folder, f"{name}.png", encode_picture(layer.pixels, layer.alpha, result.bits, ".png", icc, exif)[0]
+        folder, f"{name}.png", encode_picture(layer.light, layer.alpha, result.bits, ".png", icc, exif)[0]
     )
     if result.bits == 32:
-        files.add_to_folder(folder, f"{name}.exr", encode_picture(layer.pixels, layer.alpha, 32, ".exr", icc, exif)[0])
+        files.add_to_folder(folder, f"{name}.exr", encode_picture(layer.light, layer.alpha, 32, ".exr", icc, exif)[0])
 
 
 def _mask_bytes(mask: np.ndarray, shown: np.ndarray | None = None) -> bytes:

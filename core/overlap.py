@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .light import bounds
 from .tone import to_tones
 from .warp import Layer
 
@@ -44,8 +45,8 @@ def overlap_of(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Ov
     if box is None:
         return None
     both = both[box]
-    difference = to_tones(target.pixels[box])
-    difference -= to_tones(reference.pixels[box])
+    difference = to_tones(target.light[box])
+    difference -= to_tones(reference.light[box])
     difference *= both[..., None]
     edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) > 0
     same = both & ~edge
@@ -71,14 +72,6 @@ def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray
     # a little blurred: noise is no content
     away = np.abs(cv2.blur(difference, (3, 3)).reshape(difference.shape) - middle)
     return (away <= np.maximum(SAME_SIGMAS * sigma, SAME_TONE)).all(axis=2)
-
-
-def bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice] | None:
-    """Rows and columns of the smallest box that holds all of a mask (H, W); None where it is empty."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not rows.size:
-        return None
-    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
 def distance_to_border(mask: NDArray[np.bool_]) -> NDArray[np.float32]:

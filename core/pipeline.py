@@ -35,7 +35,8 @@ Source = str | Path | np.ndarray | Picture
 class StitchResult:
     """A finished panorama and everything it was made of.
 
-    pixels (H, W, C) float32 scene-linear and alpha (H, W), straight, of `canvas`; the two layers, the warp, occluded
+    panorama: what is shown on `canvas`, its light worked out where it is asked for (see `light`), as arrays `pixels`
+    (H, W, C) float32 scene-linear and alpha (H, W), straight; the two layers, the warp, occluded
     (H, W) bool (what the target cannot see though the map falls inside it) and from_target (H, W) bool (which side of
     the seam a pixel lies on, None without a seam) on `warp.canvas`, which is the same, but of a whole sphere the part
     that the pictures cover (see `spread`); what was decided on the whole canvas; the geometry, the field, the matches
@@ -44,8 +45,7 @@ class StitchResult:
     the pictures as they came.
     """
 
-    pixels: np.ndarray
-    alpha: np.ndarray
+    panorama: Layer
     canvas: Canvas
     reference: Picture
     target: Picture
@@ -63,6 +63,16 @@ class StitchResult:
     report: dict[str, Any]
     seconds: dict[str, float]
     full_sizes: tuple[tuple[int, int], tuple[int, int]]
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """The panorama's light (H, W, C) float32, scene-linear."""
+        return self.panorama.pixels
+
+    @property
+    def alpha(self) -> np.ndarray:
+        """The panorama's alpha (H, W) float32, straight."""
+        return self.panorama.alpha
 
     @property
     def used_matches(self) -> Matches:
@@ -162,7 +172,7 @@ def compose(
     report["warnings"] = list(warnings)
     steps("write", 0.5)
     return StitchResult(
-        panorama.pixels, panorama.alpha, shown, first, second, base, layer, warp, hidden, from_target, found,
+        panorama, shown, first, second, base, layer, warp, hidden, from_target, found,
         alignment.two_view, alignment.field, alignment.matches, alignment.cameras, warnings, report, steps.seconds,
         frame.full_sizes,
     )  # fmt: skip

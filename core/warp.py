@@ -19,6 +19,7 @@ from .displacement import Field, FieldValues, target_of
 from .epipolar import Array, homogeneous, project
 from .errors import BadRequest, NoOverlap
 from .lens import distort, undistort
+from .light import AnyLight, Light, Placed, Weighed, bounds, extent, strips, whole
 from .projection import Projection
 from .two_view import TwoView
 
@@ -67,15 +68,23 @@ def jacobian(x: NDArray, y: NDArray) -> NDArray:
 
 @dataclass(frozen=True)
 class Layer:
-    """One picture on the canvas: pixels (H, W, C) float32 scene-linear, straight alpha (H, W) in [0, 1], 0 where it
-    shows nothing."""
+    """One picture on the canvas: light (H, W, C) float32 scene-linear, as an array or worked out where it is asked for
+    (see `light`), straight alpha (H, W) in [0, 1], 0 where it shows nothing."""
 
-    pixels: NDArray[np.float32]
+    light: AnyLight
     alpha: NDArray[np.float32]
+
+    @property
+    def pixels(self) -> NDArray[np.float32]:
+        """All of its light as an array."""
+        return whole(self.light)
 
     def within(self, box: Box) -> Layer:
         """The part in a box (left, top, width, height) of the canvas; nothing where that reaches over its edges."""
-        return Layer(cut(self.pixels, box), cut(self.alpha, box))
+        left, top, width, height = box
+        if (left, top, height, width) == (0, 0, *self.alpha.shape):
+            return self
+        return Layer(Placed(self.light, (-top, -left), (height, width)), cut(self.alpha, box))
 
 
 def cut(array: NDArray, box: Box, beyond: float = 0.0) -> NDArray:
@@ -272,13 +281,11 @@ def reference_layer(picture: Picture, canvas: Canvas, camera: Camera | None = No
     """
     if canvas.projection is not None:
         return _fetched_layer(picture, *reference_map(canvas, camera))
-    height, width, channels = picture.pixels.shape
+    height, width, _ = picture.light.shape
     x, y = canvas.offset
-    pixels = np.zeros((canvas.height, canvas.width, channels), np.float32)
     alpha = np.zeros((canvas.height, canvas.width), np.float32)
-    pixels[y : y + height, x : x + width] = picture.pixels
     alpha[y : y + height, x : x + width] = 1.0 if picture.alpha is None else picture.alpha
-    return Layer(pixels, alpha)
+    return Layer(Placed(picture.light, (y, x), (canvas.height, canvas.width)), alpha)
 
 
 def target_layer(picture: Picture, warp: Warp) -> Layer:
@@ -291,22 +298,29 @@ def _fetched_layer(picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[
     Colours are weighted by alpha while interpolating, so that transparent pixels never bleed. Bicubic overshoot is held
     to the range of the picture itself: a black edge never turns negative.
     """
-    height, width = picture.pixels.shape[:2]
-    source = picture.pixels if picture.alpha is None else picture.pixels * picture.alpha[..., None]
+    height, width, channels = picture.light.shape
+    inside = _inside(map_x, map_y, (width, height))
+    alpha = inside.astype(np.float32)
+    box = bounds(inside)
+    if box is None:
+        return Layer(np.zeros((*alpha.shape, channels), np.float32), alpha)
+    map_x, map_y = map_x[box], map_y[box]
+    source = picture.light if picture.alpha is None else Weighed(picture.light, picture.alpha)
     pixels = fetch(source, map_x, map_y)
-    alpha = _inside(map_x, map_y, (width, height)).astype(np.float32)
     if picture.alpha is not None:
         # both overshoot alike: divided before alpha is clipped
         fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
         pixels /= np.maximum(fetched, LEAST_ALPHA)[..., None]
-        alpha *= np.where(fetched > LEAST_ALPHA, np.minimum(fetched, 1.0), 0)
-    np.clip(pixels, float(picture.pixels.min()), float(picture.pixels.max()), out=pixels)
-    np.multiply(pixels, (alpha > 0)[..., None], out=pixels)
-    return Layer(pixels, alpha)
+        alpha[box] *= np.where(fetched > LEAST_ALPHA, np.minimum(fetched, 1.0), 0)
+    np.clip(pixels, *extent(picture.light), out=pixels)
+    for rows in strips(pixels.shape):
+        pixels[rows] *= (alpha[box][rows] > 0)[..., None]
+    return Layer(Placed(pixels, (box[0].start, box[1].start), (alpha.shape[0], alpha.shape[1])), alpha)
 
 
 def fetch(
-    source: NDArray, map_x: NDArray[np.float32], map_y: NDArray[np.float32], interpolation: int = cv2.INTER_CUBIC
+    source: NDArray | Light, map_x: NDArray[np.float32], map_y: NDArray[np.float32],
+    interpolation: int = cv2.INTER_CUBIC,
 ) -> NDArray:
     """Samples (H, W, C) of a source (h, w, C) at map positions, in tiles, of the source's type; 0 where the map leaves
     the picture."""
@@ -319,7 +333,7 @@ def fetch(
 
 
 def _fetch_tile(
-    source: NDArray, x: NDArray[np.float32], y: NDArray[np.float32], out: NDArray, interpolation: int
+    source: NDArray | Light, x: NDArray[np.float32], y: NDArray[np.float32], out: NDArray, interpolation: int
 ) -> None:
     height, width = source.shape[:2]
     with np.errstate(invalid="ignore"):

@@ -195,10 +195,10 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
     def picture(pixels: Any, alpha: Any) -> bytes:
         return encode_picture(pixels, alpha, result.bits, kind, result.reference.icc, result.reference.exif)[0]
 
-    add("panorama", picture(result.pixels, _unless_opaque(result.alpha)))
+    add("panorama", picture(result.panorama.light, _unless_opaque(result.alpha)))
     for side, layer in zip(SIDES, (result.reference_layer, result.target_layer), strict=True):
         if "layers" in take:
-            add(f"{side} layer", picture(layer.pixels, layer.alpha))
+            add(f"{side} layer", picture(layer.light, layer.alpha))
         if "masks" in take:
             add(f"{side} mask", _png((layer.alpha * 255).round().astype("uint8")), ".png")
     if "masks" in take:

@@ -190,7 +190,7 @@ def test_alpha_is_zero_in_the_mask_and_stays_elsewhere() -> None:
     hidden = without(opaque, MASK)
     assert hidden.alpha is not None and hidden.alpha.dtype == np.float32
     assert np.array_equal(hidden.alpha, np.where(MASK, 0, 1)) and opaque.alpha is None
-    assert replace(hidden, alpha=None) is not opaque and hidden.pixels is opaque.pixels
+    assert replace(hidden, alpha=None) is not opaque and hidden.light is opaque.light
     soft = replace(opaque, alpha=np.full((24, 36), 0.25, np.float32))
     assert np.array_equal(without(soft, MASK).alpha, np.where(MASK, 0, np.float32(0.25)))
     assert soft.alpha is not None and (soft.alpha == 0.25).all(), "the given picture stays as it is"

@@ -21,6 +21,7 @@ from edf_stitch.core.output_files import OutputFiles
 from edf_stitch.core.outputs import OutputRequest, check, json_bytes, npz_bytes, warp_bytes, write
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.progress import STAGES
+from edf_stitch.core.warp import Layer
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 NPZ = {
@@ -184,10 +185,11 @@ def test_the_seam_is_a_mask_to_paint_on(small_result: StitchResult, written: Pat
 def as_float(result: StitchResult) -> StitchResult:
     """The same result as if it came from float pictures twice as bright."""
     layers = {
-        name: replace(getattr(result, name), pixels=2 * getattr(result, name).pixels)
+        name: replace(getattr(result, name), light=2 * getattr(result, name).pixels)
         for name in ("reference_layer", "target_layer")
     }
-    return replace(result, pixels=2 * result.pixels, reference=replace(result.reference, bits=32), **layers)
+    brighter = Layer(2 * result.pixels, result.alpha)
+    return replace(result, panorama=brighter, reference=replace(result.reference, bits=32), **layers)
 
 
 def test_layers_of_float_pictures_have_exr_beside_them(small_result: StitchResult, tmp_path: Path) -> None:

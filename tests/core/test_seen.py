@@ -82,7 +82,7 @@ def test_the_difference_is_black_where_the_pictures_agree(half: StitchResult):
     same = replace(half, target_layer=half.reference_layer)
     shown = seen.difference(same)
     assert not shown[..., :3].any() and (shown[..., 3] == 255).all()
-    other = replace(half.reference_layer, pixels=1 - half.reference_layer.pixels)
+    other = replace(half.reference_layer, light=1 - half.reference_layer.pixels)
     assert seen.difference(replace(half, target_layer=other))[..., :3].mean() > 40
     nothing = replace(half.target_layer, alpha=np.zeros_like(half.target_layer.alpha))
     assert not seen.difference(replace(half, target_layer=nothing))[..., 3].any()

@@ -27,7 +27,7 @@ def new_camera(scene, name: str, random) -> "bpy.types.Object":
 
 def picture(name: str, size: tuple[int, int]) -> SimpleNamespace:
     """All of a picture that counts here."""
-    return SimpleNamespace(name=name, pixels=np.empty((size[1], size[0], 0)))
+    return SimpleNamespace(name=name, light=np.empty((size[1], size[0], 0)))
 
 
 def by_blender(camera, size: tuple[int, int], points: np.ndarray) -> np.ndarray:

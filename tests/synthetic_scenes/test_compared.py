@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pipeline import StitchResult, stitch
+from edf_stitch.core.warp import Layer
 from edf_stitch.synthetic_scenes.compared import RenderedTruth, truth_beside
 from edf_stitch.synthetic_scenes.measures import figures, hidden_quality, truth_of
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
@@ -40,7 +41,7 @@ def test_whole_pictures_are_compared_over_what_all_show(truth: RenderedTruth, st
     less = stitched.alpha.copy()
     less[:, : less.shape[1] // 2] = 0
     alone = truth.figures({"a": stitched})["a"]["truth_whole_psnr_db"]
-    both = truth.figures({"a": stitched, "b": replace(stitched, alpha=less)})
+    both = truth.figures({"a": stitched, "b": replace(stitched, panorama=Layer(stitched.pixels, less))})
     assert both["a"]["truth_whole_psnr_db"] == both["b"]["truth_whole_psnr_db"] != alone
 
 

@@ -9,6 +9,7 @@ import pytest
 from edf_stitch.core.epipolar import infinite_homography, rotation_from_vector
 from edf_stitch.core.fields import RIVALS
 from edf_stitch.core.pipeline import StitchResult
+from edf_stitch.core.warp import Layer
 from edf_stitch.synthetic_scenes.measures import Truth, figures, on_the_wide_canvas, truth_of, whole_picture
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
 from edf_stitch.synthetic_scenes.scene_pictures import scene_pictures
@@ -36,7 +37,7 @@ def perfect(result: StitchResult, truth: Truth) -> StitchResult:
     warp = replace(result.warp, canvas=canvas, map_x=x, map_y=y, inverse_depth=np.zeros_like(x))
     alpha = (truth.in_target | truth.in_reference).astype(np.float32)
     pixels = np.zeros((height, width, 3), np.float32)
-    return replace(result, two_view=view, warp=warp, alpha=alpha, pixels=pixels)
+    return replace(result, two_view=view, warp=warp, panorama=Layer(pixels, alpha))
 
 
 def test_the_truth_scores_nothing_off(perfect: StitchResult, truth: Truth) -> None:
@@ -86,7 +87,8 @@ def test_what_is_not_covered_is_missed(perfect: StitchResult, truth: Truth) -> N
     only = truth.in_target & ~truth.in_reference
     rows, columns = np.nonzero(only)
     alpha[rows[::2], columns[::2]] = 0
-    assert figures(replace(perfect, alpha=alpha), truth)["covered"] == pytest.approx(0.5, abs=0.01)
+    less = replace(perfect, panorama=Layer(perfect.pixels, alpha))
+    assert figures(less, truth)["covered"] == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_real_stitch_is_close(result: StitchResult, truth: Truth) -> None:

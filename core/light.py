@@ -1,0 +1,160 @@
+"""Light that is worked out where it is asked for, so that no canvas is ever held in float.
+
+Whatever has a shape (H, W, C) and gives float32 scene-linear light for slices of rows and columns will do: an array,
+or one of the kinds below, which are made of others. They give the same bits however the picture is cut up.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .colour import Curve, decode
+
+# Pixels that are worked out at a time.
+STRIP = 1_000_000
+
+# Rows and columns, with bounds that lie in the picture.
+Part: TypeAlias = tuple[slice, slice]
+
+
+class Light(ABC):
+    """A picture (H, W, C) that is worked out part by part."""
+
+    dtype = np.dtype(np.float32)
+
+    @property
+    @abstractmethod
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+
+    @abstractmethod
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        """The light (h, w, C) of rows and columns."""
+
+
+AnyLight: TypeAlias = "NDArray[np.float32] | Light"
+
+
+def strips(shape: tuple[int, ...]) -> Iterator[slice]:
+    """The rows of a picture (H, W, …), some at a time."""
+    rows = max(1, STRIP // max(1, shape[1]))
+    for top in range(0, shape[0], rows):
+        yield slice(top, min(shape[0], top + rows))
+
+
+def bounds(mask: NDArray[np.bool_]) -> Part | None:
+    """Rows and columns of the smallest box that holds all of a mask (H, W); None where it is empty."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return None
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def within(part: Part, shape: tuple[int, ...]) -> Part:
+    """The same rows and columns of a picture (H, W, …), none beyond its edges."""
+    rows, columns = (slice(*one.indices(side)[:2]) for one, side in zip(part, shape, strict=False))
+    return rows, columns
+
+
+def meet(
+    part: Part, shape: tuple[int, ...], at: tuple[int, int], inner: tuple[int, ...]
+) -> tuple[Part, Part] | None:
+    """Where a part of a picture (H, W, …) meets another (h, w, …) whose first pixel lies `at` (row, column) of it: rows
+    and columns of what the part gives, and of the other; None where they do not meet."""
+    part = within(part, shape)
+    ends = [(max(p.start, a), min(p.stop, a + side)) for p, a, side in zip(part, at, inner, strict=False)]
+    if any(low >= high for low, high in ends):
+        return None
+    (rows, columns), (rows_there, columns_there) = (
+        [slice(low - start, high - start) for (low, high), start in zip(ends, starts, strict=True)]
+        for starts in ((part[0].start, part[1].start), at)
+    )
+    return (rows, columns), (rows_there, columns_there)
+
+
+def whole(light: AnyLight) -> NDArray[np.float32]:
+    """All of it as an array."""
+    if isinstance(light, np.ndarray):
+        return light
+    out = np.empty(light.shape, np.float32)
+    for rows in strips(light.shape):
+        out[rows] = light[rows, 0 : light.shape[1]]
+    return out
+
+
+def extent(light: AnyLight) -> tuple[float, float]:
+    """The least and the most of all its values."""
+    if isinstance(light, Coded):
+        # curves never fall
+        low, high = (decode(how(light.levels, axis=(0, 1), keepdims=True), light.curves) for how in (np.min, np.max))
+        return float(low.min()), float(high.max())
+    if isinstance(light, np.ndarray):
+        return float(light.min()), float(light.max())
+    ends = [extent(light[rows, 0 : light.shape[1]]) for rows in strips(light.shape)]
+    return min(low for low, _ in ends), max(high for _, high in ends)
+
+
+@dataclass(frozen=True, eq=False)
+class Coded(Light):
+    """Display-encoded levels (H, W, C) uint8 or uint16, and the curves that make light of them (see `decode`)."""
+
+    levels: NDArray
+    curves: tuple[Curve, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.levels.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        return decode(self.levels[part], self.curves)
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed(Light):
+    """Light times a weight (H, W) of each pixel."""
+
+    light: AnyLight
+    weight: NDArray[np.float32]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.light.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        return self.light[part] * self.weight[part][..., None]
+
+
+@dataclass(frozen=True, eq=False)
+class Placed(Light):
+    """Light whose first pixel lies at `at` (row, column) of a larger or smaller frame of `size` (H, W); black where it
+    does not reach."""
+
+    light: AnyLight
+    at: tuple[int, int]
+    size: tuple[int, int]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return *self.size, self.light.shape[2]
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        height, width = (one.stop - one.start for one in within(part, self.shape))
+        meeting = meet(part, self.shape, self.at, self.light.shape)
+        if meeting is None:
+            return np.zeros((height, width, self.shape[2]), np.float32)
+        here, there = meeting
+        light = self.light[there]
+        if light.shape[:2] == (height, width):
+            return light
+        out = np.zeros((height, width, self.shape[2]), np.float32)
+        out[here] = light
+        return out
