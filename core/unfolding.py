@@ -22,6 +22,9 @@ from .warp import Warp, jacobian
 LOOKS, SMOOTHINGS = 2, 10
 # px over which they are smoothed at first; what does not help is done more widely
 LEAST_SIGMA = 1.5
+# More px than noise moves a node by: smoothing that would move any of a patch further has met the edge of a near thing
+# whose rim was not told, and the patch stays as it was.
+MOST_MOVED = 6.0
 # The area (share of the usual) that is left at a place not folded; px around what is occluded that are left alone.
 LEAST_TURN, RIM = 0.1, 5
 
@@ -30,6 +33,7 @@ def unfolded(lines: Lines, two_view: TwoView, target_size: tuple[int, int], alon
     """The moves (h, w) along the lines without folds outside what is occluded and its rim."""
     around = np.ones((RIM, RIM), np.uint8)
     for _ in range(LOOKS):
+        start = along
         keep = cv2.dilate(_hidden(lines, two_view, target_size, along, across).astype(np.uint8), around) > 0
         for number in range(SMOOTHINGS):
             folded = _turns_over(*lines.target(along, across)) & ~keep
@@ -39,7 +43,20 @@ def unfolded(lines: Lines, two_view: TwoView, target_size: tuple[int, int], alon
             reach = np.ones((2 * int(sigma) + 3,) * 2, np.uint8)
             near = (cv2.dilate(folded.astype(np.uint8), reach) > 0) & ~keep
             along = np.where(near, cv2.GaussianBlur(along, (0, 0), sigma), along)
+        along = _where_little_moved(along, start)
     return along
+
+
+def _where_little_moved(along: Plane, start: Plane) -> Plane:
+    """The moves, those of patches in which any is further from its start than noise goes put back."""
+    moved = np.abs(along - start)
+    if not (moved > MOST_MOVED).any():
+        return along
+    count, patch = cv2.connectedComponents((moved > 0).astype(np.uint8))
+    most = np.zeros(count, np.float32)
+    np.maximum.at(most, patch.ravel(), moved.ravel())
+    most[0] = 0
+    return np.where(most[patch] > MOST_MOVED, start, along)
 
 
 def _turns_over(x: Plane, y: Plane) -> NDArray[np.bool_]:

@@ -1,0 +1,164 @@
+"""Where along their lines things are sought and found: rendered pairs whose depth is known, around a field that is
+wrong by some px."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.displacement import target_points
+from edf_stitch.core.features import Matches
+from edf_stitch.core.line_map import SparseMap
+from edf_stitch.core.line_search import View, in_tones_of, search, search_base
+
+from .line_scenes import MARGIN, MOTIONS, SIZE, Field, Scene, scene
+
+REACH = 40.0
+
+
+# --- views ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("step", [1.0, 2.0, 2.6])
+def test_a_view_is_asked_at_px_of_the_full_picture(step: float) -> None:
+    x, y = np.meshgrid(np.arange(120.0), np.arange(90.0))
+    view = View.of((40 + x + 0.5 * y).astype(np.uint8)[..., None], None, step)
+    assert view.size == (120, 90) and view.gray.shape == (round(90 / step), round(120 / step))
+    at = np.float32(np.linspace(12, 100, 40))[None], np.float32(np.linspace(10, 75, 40))[None]
+    found, shown = view.sample(view.gray, *at)
+    assert shown.all() and np.abs(found - (40 + at[0] + 0.5 * at[1] - 0.25)).max() < 0.5
+
+
+def test_colours_become_gray_as_the_eye_weighs_them() -> None:
+    view = View.of(np.full((8, 9, 3), (200, 100, 50), np.uint8), None, 1.0)
+    assert np.abs(view.gray - (0.299 * 200 + 0.587 * 100 + 0.114 * 50)).max() <= 1 and view.shown.all()
+
+
+@pytest.mark.parametrize("step", [1.0, 2.0])
+def test_nothing_is_shown_outside_nor_where_there_is_no_picture(step: float) -> None:
+    alpha = np.ones((40, 60), np.float32)
+    alpha[:, 40:] = 0
+    view = View.of(np.full((40, 60, 3), 99, np.uint8), alpha, step)
+    x = np.array([[-3, 10, 38.0 - step, 39.2 + step, 50, 63, 10, 10, np.nan]], np.float32)
+    y = np.array([[10, 10, 10, 10, 10, 10, -3, 43, 10]], np.float32)
+    found, shown = view.sample(view.gray, x, y)
+    assert shown.tolist() == [[False, True, True, False, False, False, False, False, False]]
+    assert np.isfinite(found).all()
+
+
+def test_tones_follow_the_curve_between_the_pictures() -> None:
+    """Whatever monotone curve it is, and what only one of them shows has no say."""
+    first = cv2.GaussianBlur(np.random.default_rng(2).random((120, 160)).astype(np.float32) * 255, (0, 0), 2)
+    first = (first - first.min()) / (first.max() - first.min()) * 200 + 20
+    second = (255 * (first / 255) ** 0.5 * 0.8 + 10).astype(np.float32)
+    both = np.ones(first.shape, bool)
+    both[:, :40] = False
+    second[:, :30] = 255
+    found = in_tones_of(first, second, both)
+    assert np.abs(found - first)[both].max() < 6 and np.median(np.abs(found - first)[both]) < 1
+    assert in_tones_of(first, second, np.zeros(first.shape, bool)) is second
+
+
+# --- the search -----------------------------------------------------------------------------------------------------
+
+
+def searched(pair: Scene, step: float = 1.0, target: View | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How far off the moves are (h, w) px, where something was found, and where something is to be found."""
+    field = pair.field()
+    lines = pair.lines(field)
+    views = pair.views(step)
+    along, found = search(lines, field, views[0], target or views[1], step, REACH)
+    assert along.shape == found.shape == lines.shape and not along[~found].any()
+    return along - pair.truth(lines), found, pair.visible(lines)
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("step", [1.0, 1.5])
+def test_it_finds_what_is_to_be_found(motion: str, step: float) -> None:
+    pair = scene(motion)
+    off, found, visible = searched(pair, step)
+    wrong = np.abs(pair.truth(pair.lines(pair.field())))[visible]
+    assert np.median(wrong) > 0.7 and wrong.max() > 4, "else there is nothing to seek"
+    assert found[visible].mean() > 0.5
+    assert (np.abs(off[found & visible]) < step).mean() > 0.9
+    assert np.median(np.abs(off[found & visible])) < 0.35 * step
+
+
+def test_another_exposure_changes_little() -> None:
+    pair = scene("sideways")
+    off, found, visible = searched(pair)
+    dark = View.of(np.rint(255 * (pair.target / 255.0) ** 1.6 * 0.7).astype(np.uint8), None, 1.0)
+    off_dark, found_dark, _ = searched(pair, target=dark)
+    assert found_dark[visible].mean() > 0.85 * found[visible].mean()
+    assert np.median(np.abs(off_dark[found_dark & visible])) < np.median(np.abs(off[found & visible])) + 0.1
+
+
+def test_what_a_picture_does_not_show_is_not_found() -> None:
+    """Transparent: the target's left half, and a corner of the reference."""
+    pair = scene("sideways")
+    field = pair.field()
+    lines = pair.lines(field)
+    first, second = (np.ones(SIZE[::-1], np.float32) for _ in range(2))
+    first[:60, -60:] = 0
+    second[:, :100] = 0
+    views = View.of(pair.reference, first, 1.0), View.of(pair.target, second, 1.0)
+    along, found = search(lines, field, *views, 1.0, REACH)
+    x, _ = lines.target(along)
+    assert found.mean() > 0.1 and not found[:60, -60:].any()
+    assert x[found].min() > 98.5
+
+
+def test_no_further_than_it_is_told() -> None:
+    pair = scene("sideways")
+    field = SparseMap.around(
+        Field(lambda points: pair.depth(points) + 0.25), pair.view, *pair.cameras, MARGIN
+    )  # some fifty px off everywhere
+    lines = pair.lines(field)
+    right = np.abs(pair.truth(lines))
+    along, found = search(lines, field, *pair.views(), 1.0, 8.0)
+    assert np.median(right) > 25 and np.abs(along).max() < 12
+    far, found_far = search(lines, field, *pair.views(), 1.0, 64.0)
+    good = np.abs(far - pair.truth(lines)) < 1
+    assert (good & found_far).mean() > 0.2 and (found & (np.abs(along - pair.truth(lines)) < 1)).mean() < 0.02
+
+
+# --- around which field ---------------------------------------------------------------------------------------------
+
+
+def test_it_searches_around_the_smoothest_field_that_will_do() -> None:
+    """A thing 60 px wide that is some 30 px off the plane: seen over, where so much can be searched, else followed."""
+    pair = scene("sideways")
+    m = pair.plane
+
+    def depth(points: np.ndarray) -> np.ndarray:
+        return points @ m[:2] + m[2] + 0.12 * np.exp(-((points - (100, 75)) ** 2).sum(axis=-1) / (2 * 25.0**2))
+
+    field = SparseMap.around(Field(depth), pair.view, *pair.cameras, MARGIN)
+    x = np.random.default_rng(5).uniform((4, 4), (SIZE[0] - 5, SIZE[1] - 5), (400, 2))
+    matches = Matches(x, target_points(pair.view, x, depth(x)))
+
+    def bend(base: SparseMap) -> float:
+        plane = SparseMap.around(Field(lambda p: p @ m[:2] + m[2]), pair.view, *pair.cameras, MARGIN)
+        return float(np.abs(base.inverse_depth - plane.inverse_depth).max())
+
+    bases = [search_base(field, matches, m, most) for most in (200.0, 18.0, 0.0)]
+    assert bend(bases[0][0]) < bend(bases[1][0]) < bend(bases[2][0]) + 1e-9
+    assert bases[2][0] is field, "nothing will do: the field as it is"
+    for (base, reach), most in zip(bases[:2], (200.0, 18.0), strict=True):
+        lines = pair.lines(base)
+        move = np.abs((depth(lines.ideal) - lines.inverse_depth) / lines.moved)
+        assert reach <= most and np.percentile(move, 99) <= reach, "what it leaves lies within the search"
+
+
+def test_a_few_matches_that_are_wrong_do_not_widen_the_search() -> None:
+    pair = scene("sideways")
+    field = pair.field(truth=True)
+    x = np.random.default_rng(6).uniform((4, 4), (SIZE[0] - 5, SIZE[1] - 5), (600, 2))
+    y = target_points(pair.view, x, pair.depth(x))
+    _, reach = search_base(field, Matches(x, y), pair.plane, 1e9)
+    spoiled = y.copy()
+    spoiled[:2] += 300
+    _, reach_too = search_base(field, replace(Matches(x, y), y=spoiled), pair.plane, 1e9)
+    assert reach_too == pytest.approx(reach, rel=0.3)
