@@ -13,7 +13,7 @@ from .exposure import Exposure, match_exposure, pooled, unchanged
 from .occlusion import occluded
 from .options import StitchOptions
 from .overlap import Overlap, of_consequence, overlap_of
-from .seam import find_seam, known_labels, seam_cost
+from .seam import find_seam, known_labels, seam_cost, target_price
 from .two_view import TwoView
 from .warp import Layer, Warp
 
@@ -26,7 +26,8 @@ class Decided:
     """What was decided before a pixel was mixed; the frames of a clip share it.
 
     hidden (H, W): what the target cannot see; exposure: the target's; from_target (H, W): which side of the seam a
-    pixel lies on, None without a seam; known, cost, box: what the seam was cut by (see `find_seam`), None without one.
+    pixel lies on, None without a seam; known, cost, price, box: what the seam was cut by (see `find_seam`), None if it
+    was not.
     """
 
     hidden: NDArray[np.bool_]
@@ -34,6 +35,7 @@ class Decided:
     from_target: NDArray[np.bool_] | None = None
     known: NDArray[np.int8] | None = None
     cost: NDArray[np.float32] | None = None
+    price: NDArray[np.float32] | None = None
     box: tuple[slice, slice] | None = None
 
 
@@ -85,9 +87,13 @@ def pooled_decision(decisions: Sequence[Decided]) -> Decided:
     exposure = pooled([decision.exposure for decision in decisions])
     if first.known is None or first.box is None:
         return replace(first, exposure=exposure)
-    costs = [decision.cost for decision in decisions if decision.cost is not None and decision.box == first.box]
-    cost = np.mean(np.stack(costs), axis=0)
-    return replace(first, exposure=exposure, cost=cost, from_target=find_seam(first.known, cost, first.box))
+    alike = [decision for decision in decisions if decision.box == first.box]
+    cost, price = (
+        np.mean(np.stack([values for values in parts if values is not None]), axis=0)
+        for parts in ([decision.cost for decision in alike], [decision.price for decision in alike])
+    )
+    from_target = find_seam(first.known, cost, price, first.box)
+    return replace(first, exposure=exposure, cost=cost, price=price, from_target=from_target)
 
 
 def _with_seam(
@@ -96,16 +102,16 @@ def _with_seam(
 ) -> Decided:
     if not options.has_seam:
         return so_far
-    hidden = so_far.hidden if overlap is None else of_consequence(so_far.hidden, overlap)
-    known = known_labels(reference, target, hidden, painted)
+    cuts = options.seam != "none" and overlap is not None
+    known = known_labels(reference, target, of_consequence(so_far.hidden) if cuts else so_far.hidden, painted)
     if overlap is None:
         return replace(so_far, from_target=known == 1)
     if options.seam == "none":
         nearest = distance_labels(reference, target)
         return replace(so_far, from_target=np.where(known == 0, nearest, known == 1))
-    cost = seam_cost(overlap, warp)
-    from_target = find_seam(known, cost, overlap.box)
-    return replace(so_far, from_target=from_target, known=known, cost=cost, box=overlap.box)
+    cost, price = seam_cost(overlap, warp), target_price(overlap, so_far.hidden)
+    from_target = find_seam(known, cost, price, overlap.box)
+    return replace(so_far, from_target=from_target, known=known, cost=cost, price=price, box=overlap.box)
 
 
 def _without_holes(target: Layer, hidden: NDArray[np.bool_], reference: Layer) -> Layer:

@@ -13,13 +13,15 @@ UNITS = 10_000
 FIRST, SECOND, FREE, NOWHERE = -1, 1, 0, 2
 
 
-def min_cut(cost: NDArray[np.float32], known: NDArray[np.int8], bias: float = 0.0) -> NDArray[np.bool_]:
+def min_cut(
+    cost: NDArray[np.float32], known: NDArray[np.int8], price: NDArray[np.float32] | None = None
+) -> NDArray[np.bool_]:
     """Labels (H, W), True for the second picture, such that the sum over all borders between neighbours (4) of their
-    mean cost, plus `bias` for every free pixel of the second, is least.
+    mean cost, plus the price of every free pixel of the second, is least.
 
-    cost (H, W) in [0, 1]; known (H, W): FIRST, SECOND, FREE or NOWHERE (labelled False). Of equal cuts the one with the
-    most of the first picture. Time grows with the free pixels to the power of 1.5 or so: keep them below 20000 in a
-    block, or in a narrow band.
+    cost (H, W) in [0, 1]; known (H, W): FIRST, SECOND, FREE or NOWHERE (labelled False); price (H, W) ≥ 0, none: 0. Of
+    equal cuts the one with the most of the first picture. Time grows with the free pixels to the power of 1.5 or so:
+    keep them below 20000 in a block, or in a narrow band.
     """
     free = np.flatnonzero(known == FREE)
     out = known == SECOND
@@ -28,7 +30,7 @@ def min_cut(cost: NDArray[np.float32], known: NDArray[np.int8], bias: float = 0.
     count, (source, sink) = free.size, (free.size, free.size + 1)
     width = known.shape[1] + 2
     states = np.pad(known, 1, constant_values=NOWHERE).ravel()
-    prices = np.pad(cost, 1).ravel()
+    costs = np.pad(cost, 1).ravel()
     at = free + width + 1 + 2 * (free // known.shape[1])
     node = np.full(states.size, -1, np.int32)
     node[at] = np.arange(count, dtype=np.int32)
@@ -43,12 +45,13 @@ def min_cut(cost: NDArray[np.float32], known: NDArray[np.int8], bias: float = 0.
 
     for step in (1, -1, width, -width):
         there = states[at + step]
-        units = 1 + np.rint((UNITS / 2) * (prices[at] + prices[at + step]))
+        units = 1 + np.rint((UNITS / 2) * (costs[at] + costs[at + step]))
         connect(node[at[there == FREE]], node[at[there == FREE] + step], units[there == FREE])
         connect(source, node[at[there == FIRST]], units[there == FIRST])
         connect(node[at[there == SECOND]], sink, units[there == SECOND])
-    if round(UNITS * bias) > 0:
-        connect(source, np.arange(count), np.full(count, round(UNITS * bias)))
+    if price is not None:
+        units = np.rint(UNITS * price.ravel()[free])
+        connect(source, np.flatnonzero(units), units[units > 0])
     edges = np.concatenate(tails), np.concatenate(heads)
     graph = csr_matrix((np.concatenate(capacities), edges), shape=(count + 2, count + 2), dtype=np.int32)
     if not (graph.indices == sink).any():  # nothing belongs to the second picture

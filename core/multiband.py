@@ -40,7 +40,9 @@ def correction(
     # on the far side of the seam: what the picture of this side would show there, had it the other's light
     light = filled(difference, same)
     del difference  # as large as the overlap: the peak of memory is here
-    share = _from_nearest(from_target, shown).astype(np.float32)[..., None]
+    # a pixel's width to either side, or else the finest band is cut with a pair of scissors
+    share = cv2.blur(_from_nearest(from_target, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
+    share = share[..., None]
     blended = _masked_bands(light, share, bands)
     for start in range(0, len(blended), STRIP):
         part, over = (values[start : start + STRIP] for values in (blended, from_target[..., None]))

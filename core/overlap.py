@@ -53,12 +53,9 @@ def overlap_of(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Ov
     return Overlap(box, both, difference, same & _alike(difference, same))
 
 
-def of_consequence(hidden: NDArray[np.bool_], overlap: Overlap) -> NDArray[np.bool_]:
-    """Of what the target cannot see (H, W) that which is more than a speck, or looks different in the two pictures: a
-    few uncertain pixels that look alike are no reason to patch the panorama."""
-    out = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8)) > 0
-    out[overlap.box] |= hidden[overlap.box] & (np.abs(overlap.difference).max(axis=2) > 2 * SAME_TONE)
-    return out
+def of_consequence(hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Of what the target cannot see (H, W) that which is more than a speck."""
+    return cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8)) > 0
 
 
 def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.bool_]:

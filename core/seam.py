@@ -26,8 +26,11 @@ BAND = 3
 SURROUNDED, CORE = 0.1, 0.2
 # Price (of 1, for opposite tones) of a step in depth by a pixel of parallax, of no confidence, and of length alone.
 DEPTH, DOUBT, LENGTH = 0.1, 0.1, 0.004
-# Price of each pixel of the target where both could be shown: the reference is exact, the target is warped.
-BIAS = 2e-5
+# Price of the target where both could be shown, by how far across the overlap it comes (1: from corner to corner): the
+# reference is exact, the target is fetched by an uncertain map.
+WARPED = 0.5
+# Price of a pixel of what the target cannot see, for opposite tones: thinner than two or three, its border costs more.
+GHOST = 2.0
 
 
 def known_labels(
@@ -35,7 +38,7 @@ def known_labels(
 ) -> NDArray[np.int8]:
     """What is settled before any seam (H, W): FIRST from the reference, SECOND from the target, FREE, NOWHERE.
 
-    What only one shows whole comes from it, what the target cannot see from the reference where that shows something.
+    What only one shows whole comes from it, what is hidden from the target from the reference where that shows it.
     painted (H, W): -1 and 1 where the artist has decided, 0 elsewhere; it wins wherever the picture shows something.
     """
     shows, shows_too = reference.alpha > 0, target.alpha > 0
@@ -79,10 +82,21 @@ def _padded(values: NDArray[np.float32], axis: int, before: int, after: int) -> 
     return np.pad(values, [(before, after) if k == axis else (0, 0) for k in range(2)])
 
 
-def find_seam(known: NDArray[np.int8], cost: NDArray[np.float32], box: tuple[slice, slice]) -> NDArray[np.bool_]:
+def target_price(overlap: Overlap, hidden: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """What each pixel of the overlap's box (h, w) costs if it comes from the target; hidden (H, W): what the target
+    cannot see costs by how different it looks."""
+    price = np.where(hidden[overlap.box], np.float32(GHOST) * np.abs(overlap.difference).mean(axis=2), np.float32(0))
+    price += np.float32(WARPED / math.hypot(*price.shape))
+    return price
+
+
+def find_seam(
+    known: NDArray[np.int8], cost: NDArray[np.float32], price: NDArray[np.float32], box: tuple[slice, slice]
+) -> NDArray[np.bool_]:
     """Where (H, W) the panorama comes from the target, by the cheapest seam.
 
-    known (H, W): see `known_labels`; cost (h, w) in the overlap's box of rows and columns.
+    known (H, W): see `known_labels`; cost and price (h, w): of a seam and of the target, in the overlap's box of rows
+    and columns.
     """
     out = known == SECOND
     free = int((known == FREE).sum())
@@ -96,23 +110,24 @@ def find_seam(known: NDArray[np.int8], cost: NDArray[np.float32], box: tuple[sli
     ]
     margins = [(part.start - far.start, far.stop - part.stop) for part, far in zip(box, around, strict=True)]
     here = around[0], around[1]
-    out[here] = _cut(known[here], np.pad(cost, margins), 1)
+    out[here] = _cut(known[here], np.pad(cost, margins), np.pad(price, margins))
     return out
 
 
-def _cut(known: NDArray[np.int8], cost: NDArray[np.float32], scale: int) -> NDArray[np.bool_]:
+def _cut(known: NDArray[np.int8], cost: NDArray[np.float32], price: NDArray[np.float32]) -> NDArray[np.bool_]:
     """The cut at one level, from that at half the size where this one is too large to be cut at once."""
     free = known == FREE
     if free.sum() <= COARSE:
-        return min_cut(_continued(cost, free), known, BIAS * scale)
-    coarse = _cut(_halved_labels(known), _halved(cost, free), 2 * scale)
+        return min_cut(_continued(cost, free), known, price)
+    # four pixels have a cell's area, but two its side
+    coarse = _cut(_halved_labels(known), _halved(cost, free), 2 * _halved(price, free))
     labels = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[: known.shape[0], : known.shape[1]]
     labels = np.where(known == FREE, labels, known == SECOND)
     for reach in (BAND, 1):
         settled = np.where(_near_border(labels, known != NOWHERE, reach), known, np.where(labels, SECOND, FIRST))
         settled[known == NOWHERE] = NOWHERE
         if (settled == FREE).sum() <= BANDED:
-            return min_cut(_continued(cost, free), settled.astype(np.int8), BIAS * scale)
+            return min_cut(_continued(cost, free), settled.astype(np.int8), price)
     return labels
 
 

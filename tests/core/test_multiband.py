@@ -40,6 +40,17 @@ def test_a_step_of_light_becomes_a_slope() -> None:
     assert (steps > -0.003).all() and steps.max() < 0.03, "cut hard it would be 0.3"
 
 
+def test_the_finest_detail_changes_over_within_a_few_pixels_and_without_a_step() -> None:
+    a = np.full((H, W, 3), 0.5, np.float32)
+    b = a.copy()
+    b[::2, ::2] += 0.02
+    b[1::2, 1::2] += 0.02
+    out = blended(a, b).pixels[100:200, :, 0]
+    detail = np.abs(np.diff(out, axis=0)).mean(axis=0) / 0.02
+    assert np.abs(np.diff(detail)).max() < 0.3, "cut with scissors it would be more than a half"
+    assert (detail[: SEAM - 24] < 0.05).all() and (detail[SEAM + 24 :] > 0.95).all()
+
+
 def test_beyond_the_band_every_bit_stays() -> None:
     a, b = texture(0.01, 1000, 1), texture(0.01, 1000, 2)
     out = blended(a, b).pixels
