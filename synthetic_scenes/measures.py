@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.blend import averaged
 from ..core.colour import encode
+from ..core.composition import composed
 from ..core.epipolar import Array, distance_to_line
-from ..core.metrics import overlap_quality, psnr, shown_points, ssim
+from ..core.metrics import appearance, overlap_quality, psnr, shown_points, ssim
+from ..core.options import StitchOptions
 from ..core.pipeline import StitchResult
+from ..core.warp import Layer
 from .ground_truth import TrueGeometry, pose_errors, seen_from, visible
 from .rendered import RenderedPair
 
@@ -109,6 +113,36 @@ def whole_picture(picture: NDArray[np.uint8], shown: NDArray[np.bool_], truth: T
     """whole_psnr_db and whole_ssim of a panorama on the wide canvas against the true one, over a mask (H, W)."""
     return {
         "whole_psnr_db": psnr(picture, truth.picture, shown), "whole_ssim": ssim(picture, truth.picture, shown),
+    }  # fmt: skip
+
+
+def composition(result: StitchResult, truth: Truth) -> dict[str, float]:
+    """What seam, bands and exposure are worth: the panorama that the defaults make of a stitch's two layers, beside the
+    plain average of the same two, equally exposed.
+
+    composed_psnr_db, composed_ssim: of the whole picture against the true panorama; over_average_db, over_average_ssim:
+    by how much that is better than the average's, over the same pixels; overlap_over_average_db: the same in what both
+    layers show alone, for beyond it the two pictures do not differ; source_fidelity_mean, source_fidelity_p5,
+    seam_visibility (NaN without a seam): see `metrics.appearance`.
+    """
+    floats = (result.reference.bits == 32, result.target.bits == 32)
+    reference = result.reference_layer
+    panorama, target, found = composed(
+        reference, result.target_layer, result.warp, result.two_view, result.cameras[1].size, StitchOptions(), floats,
+        None, lambda *_: None,
+    )  # fmt: skip
+    average = averaged(reference, target)
+    both = ((reference.alpha > 0.5) & (target.alpha > 0.5) & (panorama.alpha > 0.5)).astype(np.float32)
+    ours, shown = on_the_wide_canvas(replace(result, panorama=panorama), truth)
+    theirs, shown_too = on_the_wide_canvas(replace(result, panorama=average), truth)
+    _, overlap = on_the_wide_canvas(replace(result, panorama=Layer(panorama.light, both)), truth)
+    mine, others = (whole_picture(picture, shown & shown_too, truth) for picture in (ours, theirs))
+    return {
+        "composed_psnr_db": mine["whole_psnr_db"], "composed_ssim": mine["whole_ssim"],
+        "over_average_db": mine["whole_psnr_db"] - others["whole_psnr_db"],
+        "over_average_ssim": mine["whole_ssim"] - others["whole_ssim"],
+        "overlap_over_average_db": psnr(ours, truth.picture, overlap) - psnr(theirs, truth.picture, overlap),
+        **appearance(panorama, reference, target, found.from_target, floats),
     }  # fmt: skip
 
 

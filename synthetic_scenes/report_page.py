@@ -21,6 +21,14 @@ MEASURES = {
     "beyond_px": ("outside the overlap, median", "px", 3), "overlap_psnr_db": ("overlap PSNR", "dB", 2),
     "overlap_ssim": ("overlap SSIM", "", 4), "covered": ("share of the target's own part shown", "", 3),
     "whole_psnr_db": ("whole picture PSNR", "dB", 2), "whole_ssim": ("whole picture SSIM", "", 4),
+    "composed_psnr_db": ("composed: whole picture PSNR", "dB", 2),
+    "composed_ssim": ("composed: whole picture SSIM", "", 4),
+    "over_average_db": ("composed: ahead of the plain average", "dB", 3),
+    "over_average_ssim": ("composed: SSIM ahead of the plain average", "", 5),
+    "overlap_over_average_db": ("composed: ahead of the plain average in the overlap", "dB", 2),
+    "source_fidelity_mean": ("source fidelity, mean", "", 4),
+    "source_fidelity_p5": ("source fidelity, 5th percentile", "", 4),
+    "seam_visibility": ("seam visibility", "levels", 2),
 }  # fmt: skip
 OTHER_NAMES = {
     "lead_db": "whole picture's lead over the best rival", "model": "model", "status": "status",

@@ -16,15 +16,15 @@ from ..core.fields import RIVALS
 from ..core.output_files import OutputFiles
 from ..core.outputs import json_bytes
 from ..core.report import plain
-from .measures import figures, on_the_wide_canvas, truth_of, whole_picture
+from .measures import composition, figures, on_the_wide_canvas, truth_of, whole_picture
 from .recipes import parse_scene
 from .rendered import rendered_pair
 from .scene_pictures import scene_pictures
 from .stitches import WAYS, Shared, stitched
 
 SCHEMA = 1
-# The stitch that the report shows.
-SHOWN = "known/strict"
+# The stitch that the report shows, and that whose composition is judged: of the default field.
+SHOWN, COMPOSED = "known/strict", "known/slack"
 
 
 def file_name(scene: str) -> str:
@@ -58,6 +58,8 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
         measured = figures(result, truth)
         if common is not None:
             measured |= whole_picture(placed[way][0], common, truth)
+        if way == COMPOSED:
+            measured |= composition(result, truth)
         said = any("not determined" in text for text in (view.focal_source, *result.warnings))
         # in a rival's hands the model is no decision
         model = None if way.endswith(RIVALS) else view.model

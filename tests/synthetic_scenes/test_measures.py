@@ -6,11 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from edf_stitch.core.blend import averaged
 from edf_stitch.core.epipolar import infinite_homography, rotation_from_vector
 from edf_stitch.core.fields import RIVALS
 from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.warp import Layer
-from edf_stitch.synthetic_scenes.measures import Truth, figures, on_the_wide_canvas, truth_of, whole_picture
+from edf_stitch.synthetic_scenes.measures import (
+    Truth,
+    composition,
+    figures,
+    on_the_wide_canvas,
+    truth_of,
+    whole_picture,
+)
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
 from edf_stitch.synthetic_scenes.scene_pictures import scene_pictures
 from edf_stitch.synthetic_scenes.stitches import WAYS, Shared, stitched
@@ -100,6 +108,16 @@ def test_a_real_stitch_is_close(result: StitchResult, truth: Truth) -> None:
     shifted = np.roll(picture, 3, axis=1)
     assert whole_picture(shifted, shown, truth)["whole_psnr_db"] < 0.9 * whole_picture(picture, shown, truth)[
         "whole_psnr_db"]
+
+
+def test_a_composition_is_held_against_the_plain_average(result: StitchResult, truth: Truth) -> None:
+    found = composition(result, truth)
+    average = averaged(result.reference_layer, result.target_layer)
+    plain, shown = on_the_wide_canvas(replace(result, panorama=average), truth)
+    assert found["over_average_db"] > 0 and found["overlap_over_average_db"] > found["over_average_db"]
+    there = found["composed_psnr_db"] - found["over_average_db"]
+    assert there == pytest.approx(whole_picture(plain, shown, truth)["whole_psnr_db"], abs=0.1)
+    assert found["source_fidelity_mean"] > 0.97 and found["seam_visibility"] < 2
 
 
 @pytest.fixture(scope="module")

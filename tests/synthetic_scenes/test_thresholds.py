@@ -14,7 +14,8 @@ from edf_stitch.synthetic_scenes.thresholds import MODEL_RUNS, RIVALS, Check, ju
 WAYS = ("known/strict", "known/slack", *RIVALS, "unknown/strict", "unknown/slack")
 FIGURES = {
     "rotation_deg": 0.01, "focal_percent": -0.5, "h_inf_px": 0.2, "projectivity_px": 0.05, "alignment_px": 0.2,
-    "whole_psnr_db": 30.0, "whole_ssim": 0.9,
+    "whole_psnr_db": 30.0, "whole_ssim": 0.9, "over_average_db": 1.0, "over_average_ssim": 0.01,
+    "overlap_over_average_db": 9.0, "source_fidelity_mean": 0.99, "source_fidelity_p5": 0.95, "seam_visibility": 0.5,
 }  # fmt: skip
 PROOF = {
     "position_px": 0.001, "depth_relative": 1e-7, "ray_cast_relative": 1e-6, "f_px": 0.001, "warp_psnr_db": 40.0,
@@ -57,6 +58,9 @@ SCENE_LIMITS = [
     ("proof", "f_px", 0.01, 1), ("proof", "warp_psnr_db", 35.0, -1), ("proof", "wide_psnr_db", 35.0, -1),
     ("known/strict", "rotation_deg", 0.15, 1), ("known/strict", "h_inf_px", 5.0, 1),
     ("known/strict", "projectivity_px", 1.5, 1), ("known/strict", "alignment_px", 2.0, 1),
+    ("known/slack", "over_average_db", 0.0, -1), ("known/slack", "over_average_ssim", 0.0, -1),
+    ("known/slack", "source_fidelity_mean", 0.97, -1), ("known/slack", "source_fidelity_p5", 0.85, -1),
+    ("known/slack", "seam_visibility", 2.0, 1),
 ]  # fmt: skip
 SUITE_LIMITS = [
     ("known/strict", "rotation_deg", 0.03), ("known/strict", "h_inf_px", 1.0), ("known/strict", "projectivity_px", 0.3),
@@ -79,6 +83,13 @@ def test_a_scenes_limits_flip_where_they_stand(run: str, measure: str, limit: fl
     assert failures(with_figure(run, measure, beyond)) == [("street", run, measure)]
     (check,) = judge([with_figure(run, measure, beyond)], False).failed
     assert check.value == beyond and f"{limit:g}" in check.limit and check.limit[0] == ("≤" if worse > 0 else "≥")
+
+
+@pytest.mark.parametrize("model", ["rotation", "plane"])
+def test_a_composition_is_judged_without_parallax_too(model: str) -> None:
+    result = good(model=model)
+    result["runs"]["known/slack"]["figures"] |= {"over_average_db": -0.01, "seam_visibility": 2.1}
+    assert {failure[2] for failure in failures(result)} == {"over_average_db", "seam_visibility"}
 
 
 def test_half_a_pixel_must_cost_a_decibel() -> None:
@@ -123,7 +134,7 @@ def test_medians_are_of_scenes_with_parallax_the_focal_lengths_of_those_that_det
         for way in ("known/strict", "unknown/strict"):
             result["runs"][way]["figures"].update(bad if not result["parallax"] else {"focal_percent": 50.0})
     assert judge([good(), *others], True).passed
-    assert [middle.scenes for middle in medians([good(), *others])] == [2, 2, 2, 2, 1, 2, 2]
+    assert [middle.scenes for middle in medians([good(), *others])] == [2, 2, 2, 2, 1, 2, 2, 2]
 
 
 @pytest.mark.parametrize("model", ["general", "rotation", "plane"])
@@ -200,7 +211,7 @@ def test_an_empty_list_fails() -> None:
 
 def test_a_suite_without_parallax_has_no_medians_to_pass() -> None:
     assert judge([good(model="rotation")], False).passed
-    assert len(failures(good(model="rotation"), complete=True)) == 7
+    assert len(failures(good(model="rotation"), complete=True)) == 8
 
 
 def test_judging_changes_nothing() -> None:

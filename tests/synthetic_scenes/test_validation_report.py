@@ -22,6 +22,8 @@ VOID = {"meta", "img", "br", "link", "hr", "input"}
 def scene(name: str, model: str = "general", **changed: Any) -> dict[str, Any]:
     figures = {"rotation_deg": 0.0123, "focal_percent": -0.5, "h_inf_px": 0.2, "projectivity_px": 0.05,
                "alignment_px": 0.2, "beyond_px": None, "overlap_psnr_db": 31.0, "whole_psnr_db": 30.0,
+               "over_average_db": 1.0, "over_average_ssim": 0.01, "overlap_over_average_db": 9.0,
+               "source_fidelity_mean": 0.99, "source_fidelity_p5": 0.95, "seam_visibility": 0.5,
                "new_figure": 7.0}  # fmt: skip
     runs = {
         way: {"model": None if way.endswith("homography") else model, "undetermined_said": False, "refused": "",
