@@ -27,7 +27,7 @@ class Decided:
 
     hidden (H, W): what the target cannot see; exposure: the target's; from_target (H, W): which side of the seam a
     pixel lies on, None without a seam; known, cost, price, box: what the seam was cut by (see `find_seam`), None if it
-    was not.
+    was not. holes: pixels that the target cannot see and the reference does not show: transparent, but in an average.
     """
 
     hidden: NDArray[np.bool_]
@@ -37,6 +37,7 @@ class Decided:
     cost: NDArray[np.float32] | None = None
     price: NDArray[np.float32] | None = None
     box: tuple[slice, slice] | None = None
+    holes: int = 0
 
 
 def composed(
@@ -67,9 +68,11 @@ def composed(
         found = Decided(hidden, exposure)
         steps("blend", 0.0)
         return averaged(reference, target), target, found
-    seen = _without_holes(target, hidden, reference)
+    holes = hidden & (reference.alpha == 0) & (target.alpha > 0)
+    seen = Layer(target.light, np.where(holes, np.float32(0), target.alpha)) if holes.any() else target
     overlap = overlap_of(reference, seen, hidden) if options.has_seam else None
-    found = decided or _with_seam(Decided(hidden, exposure), reference, seen, overlap, warp, options, painted)
+    so_far = Decided(hidden, exposure, holes=int(holes.sum()))
+    found = decided or _with_seam(so_far, reference, seen, overlap, warp, options, painted)
 
     steps("blend", 0.0)
     if found.from_target is None:
@@ -112,9 +115,3 @@ def _with_seam(
     cost, price = seam_cost(overlap, warp), target_price(overlap, so_far.hidden)
     from_target = find_seam(known, cost, price, overlap.box)
     return replace(so_far, from_target=from_target, known=known, cost=cost, price=price, box=overlap.box)
-
-
-def _without_holes(target: Layer, hidden: NDArray[np.bool_], reference: Layer) -> Layer:
-    """The target without what it shows beyond the reference though it cannot see it: a hole, and known to be one."""
-    holes = hidden & (reference.alpha == 0) & (target.alpha > 0)
-    return Layer(target.light, np.where(holes, np.float32(0), target.alpha)) if holes.any() else target

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 SCHEMA = 1
 # More inliers than this behind infinity means that the focal length, hence H_inf, is doubtful.
 NEGATIVE_SHARE = 0.02
+# Holes that take up more of the canvas than this can be seen in the panorama as a whole.
+HOLES = 1e-4
 
 
 def make_report(
@@ -37,7 +39,8 @@ def make_report(
 ) -> tuple[dict[str, Any], list[str]]:
     """The report of a stitch that shows `canvas`, and warnings in plain words drawn from it.
 
-    decided: about its composition; appearance: of the panorama (see `metrics.appearance`).
+    decided: about its composition (hole_px: pixels that neither picture sees, beyond the reference and behind something
+    near); appearance: of the panorama (see `metrics.appearance`).
     No seconds, no dates: the same input gives the same report.
     """
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
@@ -73,10 +76,17 @@ def make_report(
         "composition": {
             "exposure_gain": decided.exposure.gain, "exposure_spread": decided.exposure.spread,
             "exposure_blocks": decided.exposure.blocks, "occluded_px": int(decided.hidden.sum()),
+            "hole_px": decided.holes,
         },
         "measured": measured,
     }  # fmt: skip
-    return plain(report), _warnings(alignment, measured["folds"])
+    warnings = _warnings(alignment, measured["folds"])
+    if decided.holes > HOLES * alignment.warp.map_x.size:
+        warnings.append(
+            f"{decided.holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
+            "transparent there (black in a JPEG); --crop reference shows none of them"
+        )
+    return plain(report), warnings
 
 
 def _measured(

@@ -51,6 +51,15 @@ def test_numbers_json_has_no_word_for_become_null() -> None:
         "nan": None, "inf": [None, None], "array": [[1.5, None], [None, 2.0]], "deep": [{"tuple": [None, 1]}]}
 
 
+def test_holes_are_counted_and_said_where_they_matter(small_result: StitchResult) -> None:
+    pixels = small_result.warp.map_x.size
+    for holes, said in ((0, False), (int(5e-5 * pixels), False), (int(2e-4 * pixels) + 1, True)):
+        decided = replace(small_result.decided, holes=holes)
+        report, spoken = report_of(replace(small_result, decided=decided))
+        assert report["composition"]["hole_px"] == holes
+        assert any(f"{holes} pixels were seen by neither camera" in line for line in spoken) == said
+
+
 def test_numpys_numbers_become_pythons() -> None:
     value = plain({"i": np.int64(3), "b": np.bool_(True), "f": np.float32(0.5), "a": np.arange(2), "s": "word",
                    "n": None, "t": True, "flags": np.array([True]), "scalar": np.array(4.0)})  # fmt: skip
