@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .around import roll_for, rolled, rolled_layer, rolled_maps
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
 from .exposure import Exposure, match_exposure, pooled, unchanged
 from .occlusion import occluded
@@ -27,7 +28,8 @@ class Decided:
 
     hidden (H, W): what the target cannot see; exposure: the target's; from_target (H, W): which side of the seam a
     pixel lies on, None without a seam; known, cost, price, box: what the seam was cut by (see `find_seam`), None if it
-    was not. holes: pixels that the target cannot see and the reference does not show: transparent, but in an average.
+    was not; roll: by how many columns those four are rolled (see `around`). holes: pixels that the target cannot see
+    and the reference does not show: transparent, but in an average.
     """
 
     hidden: NDArray[np.bool_]
@@ -37,6 +39,7 @@ class Decided:
     cost: NDArray[np.float32] | None = None
     price: NDArray[np.float32] | None = None
     box: tuple[slice, slice] | None = None
+    roll: int = 0
     holes: int = 0
 
 
@@ -70,17 +73,25 @@ def composed(
         return averaged(reference, target), target, found
     holes = hidden & (reference.alpha == 0) & (target.alpha > 0)
     seen = Layer(target.light, np.where(holes, np.float32(0), target.alpha)) if holes.any() else target
-    overlap = overlap_of(reference, seen, hidden) if options.has_seam else None
-    so_far = Decided(hidden, exposure, holes=int(holes.sum()))
-    found = decided or _with_seam(so_far, reference, seen, overlap, warp, options, painted)
+    roll = decided.roll if decided else roll_for(warp.canvas, reference, seen)
+    reference, seen, hidden_there = rolled_layer(reference, roll), rolled_layer(seen, roll), rolled(hidden, roll)
+    overlap = overlap_of(reference, seen, hidden_there) if options.has_seam else None
+    if decided:
+        found = decided
+    else:
+        start = Decided(hidden_there, exposure, roll=roll, holes=int(holes.sum()))
+        painted = None if painted is None else rolled(painted, roll)
+        found = _with_seam(start, reference, seen, overlap, rolled_maps(warp, roll), options, painted)
+        side = None if found.from_target is None else rolled(found.from_target, -roll)
+        found = replace(found, hidden=hidden, from_target=side)
 
     steps("blend", 0.0)
     if found.from_target is None:
-        return feathered(reference, seen, hidden), target, found
+        return rolled_layer(feathered(reference, seen, hidden_there), -roll), target, found
     # the frames of a clip need not show the same everywhere
-    side = (found.from_target & (seen.alpha > 0)) | (reference.alpha == 0)
+    side = (rolled(found.from_target, roll) & (seen.alpha > 0)) | (reference.alpha == 0)
     blended = in_bands if options.blend == "multiband" else feathered_across
-    return blended(reference, seen, side, overlap), target, found
+    return rolled_layer(blended(reference, seen, side, overlap), -roll), target, found
 
 
 def pooled_decision(decisions: Sequence[Decided]) -> Decided:
@@ -90,12 +101,12 @@ def pooled_decision(decisions: Sequence[Decided]) -> Decided:
     exposure = pooled([decision.exposure for decision in decisions])
     if first.known is None or first.box is None:
         return replace(first, exposure=exposure)
-    alike = [decision for decision in decisions if decision.box == first.box]
+    alike = [one for one in decisions if (one.box, one.roll) == (first.box, first.roll)]
     cost, price = (
         np.mean(np.stack([values for values in parts if values is not None]), axis=0)
         for parts in ([decision.cost for decision in alike], [decision.price for decision in alike])
     )
-    from_target = find_seam(first.known, cost, price, first.box)
+    from_target = rolled(find_seam(first.known, cost, price, first.box), -first.roll)
     return replace(first, exposure=exposure, cost=cost, price=price, from_target=from_target)
 
 
