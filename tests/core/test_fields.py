@@ -135,7 +135,7 @@ def test_in_the_overlap_nothing_fades_and_far_away_only_the_end_is_left(fade: st
     distance = grid.step * cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     far = distance > field.fit.fade_px + 2 * grid.step
     assert far.mean() > 0.1
-    assert np.array_equal(d[far], end[far])
+    np.testing.assert_allclose(d[far], end[far], rtol=1e-12)
     # in between it never leaves the range between the two; where they meet, nothing can be told
     apart = 1000 * np.abs(whole - end) > 0.1
     share = (d - end)[apart] / (whole - end)[apart]
@@ -174,7 +174,8 @@ def test_the_field_hardly_depends_on_the_grid(fade: str) -> None:
 @every_fade
 def test_where_the_grid_misses_the_overlap_the_end_is_all(fade: str) -> None:
     field, grid = strict_of(fade), Grid((-9000, -9000), 10, 30, 30)
-    assert np.array_equal(field.on_grid(grid).inverse_depth, whole_and_end(field, grid)[1])
+    # summed in another order, and with fused multiply-add on some processors
+    np.testing.assert_allclose(field.on_grid(grid).inverse_depth, whole_and_end(field, grid)[1], rtol=1e-12)
 
 
 def test_it_fades_over_five_times_what_fades() -> None:

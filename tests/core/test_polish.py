@@ -88,6 +88,15 @@ def test_light_that_changes_over_the_picture_does_not_lead_it_away() -> None:
     assert np.median(off(pair, lines, lit.along)) < np.median(off(pair, lines, plain.along)) + 0.05
 
 
+def test_half_the_contrast_does_not_lead_it_away() -> None:
+    pair = scene("sideways")
+    lines = pair.lines(pair.field())
+    start = nearly(lines, pair)
+    flat = View.of((vivid(pair.target) * 0.55 + 60).astype(np.uint8), None, 1.0)
+    found = polished(pair, lines, start, views=(View.of(vivid(pair.reference), None, 1.0), flat))
+    assert np.median(off(pair, lines, found.along)) < 0.55 * np.median(off(pair, lines, start))
+
+
 def test_with_slack_an_offset_across_the_lines_is_found_and_else_it_is_left() -> None:
     """As lens distortion and an F that is a little wrong make it."""
     pair = scene("sideways")
@@ -101,6 +110,7 @@ def test_with_slack_an_offset_across_the_lines_is_found_and_else_it_is_left() ->
     loose = polished(pair, lines, start, slack=True)
     assert np.abs(np.median(loose.across[here]) - missed) < 0.15
     assert loose.across[here].std() < 0.15, "very smooth"
+    assert max(np.abs(np.diff(loose.across, axis=k)).max() for k in (0, 1)) < 0.05
     assert np.median(np.abs(loose.along[here])) < 0.12
     strict = polished(pair, lines, start)
     assert not strict.across.any()

@@ -57,3 +57,13 @@ def test_the_margin_lies_before_and_behind() -> None:
     near, wide = (EpipolarRows.over(np.array([-400.0, 100.0, 1.0]), BOX, 1.0, margin) for margin in (0.0, 40.0))
     assert wide.shape[0] == near.shape[0] and abs(wide.shape[1] - near.shape[1] - 80) <= 1
     assert near.start[0] - wide.start[0] == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize("far", [2e8, 1e10])
+def test_an_epipole_far_away_is_looked_for_from_the_middle_of_the_box(far: float) -> None:
+    """Wherever the box lies: rows run from it to the epipole, and are as long as the box is that way."""
+    box = BOX + [3e5, 3e5, 3e5, 3e5]
+    rows = EpipolarRows.over(np.array([3e5 + 170, 3e5 + 140 - far, 1.0]), box, 1.0, 0.0)
+    assert abs(rows.shape[0] - 320) <= 3 and abs(rows.shape[1] - 240) <= 3
+    way = np.diff(rows.point(np.array([0.0, 100]), np.full(2, 10.0)), axis=0)[0]
+    assert np.abs(way - [0, 100]).max() < 0.01

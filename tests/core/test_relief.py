@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.relief import Relief
+from edf_stitch.core.displacement import target_points
+from edf_stitch.core.line_map import Lines, SparseMap
+from edf_stitch.core.relief import Relief, carried_on, raised
+
+from .line_scenes import Scene, scene
 
 
 @pytest.fixture(params=[1.0, 2.75])
@@ -51,3 +55,73 @@ def test_scattered_points_get_the_same(relief: Relief) -> None:
     xs, ys = np.arange(-2.0, 15.0), np.arange(12.0, 24.0)
     for plane, points in zip(relief.over(xs, ys), relief.at(*np.meshgrid(xs, ys)), strict=True):
         assert np.abs(plane - points).max() < (1e-6 if relief.step[0] == 1 else 0.15)
+
+
+# --- made of moves --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["sideways", "aslant"])
+def made(request: pytest.FixtureRequest) -> tuple[Scene, SparseMap, Lines, np.ndarray, np.ndarray, Relief]:
+    """Moves of some px on a part of the picture: pair, field, lines, along, across, relief."""
+    pair = scene(request.param)
+    sparse = pair.field(shift=(0.3, 0.2))
+    lines = Lines.over(sparse, (40, 30, 120, 90), 1.5)
+    rows, columns = lines.shape
+    y, x = np.mgrid[:rows, :columns].astype(np.float32)
+    along, across = 2 + np.sin(x / 9) + y / 60, 0.4 * np.cos(y / 7)
+    return pair, sparse, lines, along, across, raised(lines, sparse, along, across, *everywhere(lines))
+
+
+def everywhere(lines: Lines) -> tuple[np.ndarray, np.ndarray]:
+    return np.full(lines.shape, 0.7, np.float32), np.ones(lines.shape, bool)
+
+
+def test_on_its_nodes_it_does_what_the_moves_do(made: tuple) -> None:
+    """As inverse depth along the line, and as a shift beside it: x' = π(H_inf p + (d + more) e') + shifts."""
+    pair, sparse, lines, along, across, relief = made
+    x, y = lines.nodes
+    more, shift, sure = relief.at(x, y)
+    sent = target_points(pair.view, lines.ideal, lines.inverse_depth + more.astype(float)) + lines.shift + shift
+    np.testing.assert_allclose(sent, np.stack(lines.target(along, across), axis=-1), atol=0.05)
+    np.testing.assert_allclose(sure, 0.7, atol=1e-6)
+
+
+def test_beyond_its_nodes_it_goes_on_smoothly_and_ends_in_nothing(made: tuple) -> None:
+    pair, sparse, lines, along, across, relief = made
+    for part in (relief.inverse_depth[..., None], relief.shift, relief.confidence[..., None]):
+        for rim in (part[0], part[-1], part[:, 0], part[:, -1]):
+            assert not rim.any()
+    margin = (relief.confidence.shape[0] - lines.shape[0]) // 2
+    inner = np.s_[margin:-margin, margin:-margin]
+    assert margin >= 6 and (relief.confidence > 0).sum() == lines.moved.size, "sure of nothing beyond"
+    known = relief.inverse_depth[inner]
+    steps = max(np.abs(np.diff(known, axis=k)).max() for k in (0, 1))
+    for k in (0, 1):
+        assert np.abs(np.diff(relief.inverse_depth, axis=k)).max() < 4 * steps + known.max() / margin * 2
+    beside = relief.inverse_depth[margin - 1, margin:-margin] / relief.inverse_depth[margin, margin:-margin]
+    assert np.abs(beside - 1).max() < 0.25, "no step at the border"
+
+
+def test_what_lies_outside_the_overlap_has_no_say(made: tuple) -> None:
+    pair, sparse, lines, along, across, _ = made
+    there = np.ones(lines.shape, bool)
+    there[:, :20] = False
+    spoiled = along.copy()
+    spoiled[:, :20] = 500
+    confidence = np.full(lines.shape, 0.7, np.float32)
+    one, other = (raised(lines, sparse, v, across, confidence, there) for v in (along, spoiled))
+    for part, part_too in zip(one.parts, other.parts, strict=True):
+        assert np.array_equal(part, part_too)
+    assert not one.at(*(v[:, :19] for v in lines.nodes))[2].any()
+
+
+def test_gaps_are_filled_from_around_and_what_is_known_stays() -> None:
+    y, x = np.mgrid[:50, :70].astype(np.float32)
+    values = np.stack([3 + 0.02 * x, 0 * x - 1], axis=-1)
+    known = np.ones((50, 70), np.float32)
+    known[20:32, 25:45] = 0
+    known[:, 60:] = 0
+    filled = carried_on(np.where(known[..., None] > 0, values, np.float32(99)), known)
+    assert np.array_equal(filled[known > 0], values[known > 0])
+    assert np.abs(filled - values)[20:32, 25:45].max() < 0.15 and np.abs(filled[..., 1] + 1).max() < 1e-4
+    assert np.abs(filled[:, 60:, 0] - values[:, 59:60, 0]).max() < 0.3

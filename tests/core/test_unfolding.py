@@ -57,6 +57,7 @@ def test_noise_that_turns_the_map_over_is_smoothed_and_nothing_else(made: tuple[
     view, lines = made
     along = np.zeros(lines.shape, np.float32)
     along[50:80, 100:140] = noise((30, 40), 1.5, 1.0)
+    along[20:40, 100:140] = noise((20, 40), 1.8, 1.6)  # coarser
     assert noisy(view, lines, along) > 80
     found = unfolded(lines, view, SIZE, along, np.zeros_like(along))
     assert found.dtype == np.float32 and noisy(view, lines, found) <= 1
