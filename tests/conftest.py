@@ -5,7 +5,12 @@ Everything of session scope is shared: read it, never write to it.
 
 from __future__ import annotations
 
+# ruff: noqa: E402, I001
 import os
+
+# Before NumPy loads, as the command does it: with several threads BLAS may give other last bits from call to call.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
