@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Diagonal of the 36 × 24 mm frame that "35 mm equivalent" refers to.
 FULL_FRAME_DIAGONAL = float(np.hypot(36.0, 24.0))
+# Where the axis meets the sensor is not its middle: about so far off, in units of the longer side.
+PRINCIPAL_SIGMA = 0.01
 # Beliefs, as standard deviations of log f. Phone makers round and measure before distortion correction: 2-7 % off seen.
 EXIF_SIGMA, CROPPED_SIGMA, ASSUMED_SIGMA = 0.05, 0.2, 0.4
 
@@ -27,7 +29,8 @@ class Camera:
     """One picture's camera as known before matching.
 
     K (3, 3) px with integer pixel centres; size (W, H) px; source in words; log_sigma: standard deviation of log f
-    (0: fixed); distortion (5,) OpenCV's k1, k2, p1, p2, k3; pose (R, t) world to camera, where given.
+    (0: fixed); distortion (5,) OpenCV's k1, k2, p1, p2, k3; pose (R, t) world to camera, where given; principal_sigma:
+    standard deviation of the principal point in units of the longer side (0: fixed).
     """
 
     K: NDArray[np.float64]
@@ -36,6 +39,7 @@ class Camera:
     log_sigma: float
     distortion: NDArray[np.float64] = field(default_factory=lambda: np.zeros(5))
     pose: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    principal_sigma: float = 0.0
 
     @property
     def focal(self) -> float:
@@ -190,13 +194,13 @@ def _from_35mm(focal35: float, size: tuple[int, int]) -> float:
 
 def _camera(focal: float, size: tuple[int, int], source: str, log_sigma: float) -> Camera:
     K = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1.0]])
-    return Camera(K, size, source, log_sigma)
+    return Camera(K, size, source, log_sigma, principal_sigma=PRINCIPAL_SIGMA)
 
 
 def _moved(camera: Camera, principal: tuple[float, ...]) -> Camera:
     K = camera.K.copy()
     K[:2, 2] = principal
-    return replace(camera, K=K)
+    return replace(camera, K=K, principal_sigma=0.0)
 
 
 def read_camera_file(

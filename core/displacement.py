@@ -139,14 +139,16 @@ class StrictField:
     def with_fade(
         self, grid: Grid, ideal: Array | None = None, bend: Array | None = None
     ) -> tuple[Array, Array]:
-        """Inverse depth and the fade α, each (rows, columns), at a grid's nodes; bend: the spline there, if known."""
+        """Inverse depth, and how many px outside the overlap, each (rows, columns), at a grid's nodes; bend: the spline
+        there, if known."""
         points = grid.points if ideal is None else ideal
         plane = points @ self.plane[:2] + self.plane[2]
         if bend is None:
             bend = on_nodes(self.spline, grid, ideal)
         target = target_points(self.two_view, points, plane + bend)
-        alpha = fade_share(grid, target, self.size, self.target_size, self.fit.fade_px)
-        return (alpha * (plane + bend) if self.fade == "infinity" else plane + alpha * bend), alpha
+        away = outside_overlap(grid, target, self.size, self.target_size)
+        alpha = fading(away, self.fit.fade_px)
+        return (alpha * (plane + bend) if self.fade == "infinity" else plane + alpha * bend), away
 
     def at(self, points: Array) -> Array:
         """Inverse depth (N,) at points (N, 2) of the overlap, where nothing fades."""
@@ -178,10 +180,8 @@ def on_nodes(spline: ThinPlateSpline, grid: Grid, ideal: Array | None) -> Array:
     return values.reshape(*ideal.shape[:2], *values.shape[1:])
 
 
-def fade_share(
-    grid: Grid, target: Array, size: tuple[int, int], target_size: tuple[int, int], fade_px: float
-) -> Array:
-    """α (rows, columns): 1 in the overlap, smoothly to 0 over fade_px outside it.
+def outside_overlap(grid: Grid, target: Array, size: tuple[int, int], target_size: tuple[int, int]) -> Array:
+    """How many px (rows, columns) a grid's nodes lie outside the overlap; inf where there is none.
 
     target (rows, columns, 2): where the field, not faded, sends the nodes; a node belongs to the overlap when it lies
     in the reference and that in the target.
@@ -189,21 +189,25 @@ def fade_share(
     inside = (grid.points >= 0).all(axis=-1) & (grid.points <= np.array(size) - 1).all(axis=-1)
     with np.errstate(invalid="ignore"):
         inside &= (target >= 0).all(axis=-1) & (target <= np.array(target_size) - 1).all(axis=-1)
-    if not inside.any():
-        return np.zeros(inside.shape)
-    # a node beside the last inside one may touch the overlap: distances count from one cell on
-    return fade_outside(inside, fade_px, grid.step)
+    return outside(inside, grid.step)
 
 
-def fade_outside(inside: NDArray[np.bool_], width: float, step: int = 1) -> Array:
-    """1 in a mask (h, w) and beside it, smoothly to 0 over `width` px beyond; step: px from cell to cell.
+def outside(inside: NDArray[np.bool_], step: int = 1) -> Array:
+    """How many px the cells of a mask (h, w) lie outside it, inf where it is empty; step: px from cell to cell.
 
-    Not for a mask that is empty.
+    A cell beside the last inside one may still touch what is meant: distances count from one cell on.
     """
+    if not inside.any():
+        return np.full(inside.shape, np.inf)
     steps = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # OpenCV's root has other last bits from call to call; squared distances are whole numbers
     steps = np.sqrt(np.rint(np.square(steps, dtype=np.float64)))
-    u = np.clip((steps - 1) * step / width, 0.0, 1.0)
+    return np.maximum(steps - 1, 0.0) * step
+
+
+def fading(away: Array, width: float) -> Array:
+    """α: 1 where `away` is 0, smoothly to 0 where it is `width`."""
+    u = np.minimum(away / width, 1.0)
     return 1 - u * u * (3 - 2 * u)
 
 
@@ -394,6 +398,10 @@ def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> f
     """
     parts = [problem.held_out(part, SMOOTHING_LADDER) for part in np.atleast_2d(g.T)]
     error = np.linalg.norm(parts, axis=0) * sensitivity
+    return float(SMOOTHING_LADDER[int(np.argmin(robust_mean(error)))])
+
+
+def robust_mean(error: Array) -> Array:
+    """Mean square of each row (n,) of errors (n, N) ≥ 0, in which large ones count in proportion."""
     knee = 3 * np.median(error, axis=1, keepdims=True) + 1e-12
-    score = np.where(error < knee, error**2, knee * (2 * error - knee)).mean(axis=1)
-    return float(SMOOTHING_LADDER[int(np.argmin(score))])
+    return np.where(error < knee, error**2, knee * (2 * error - knee)).mean(axis=1)

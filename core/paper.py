@@ -12,7 +12,16 @@ import numpy as np
 import scipy.linalg
 
 from .canvas import Grid
-from .displacement import FieldValues, Fit, StrictField, best_smoothing, fade_share, fade_width, target_points
+from .displacement import (
+    FieldValues,
+    Fit,
+    StrictField,
+    best_smoothing,
+    fade_width,
+    fading,
+    outside_overlap,
+    target_points,
+)
 from .epipolar import Array
 from .errors import DegenerateGeometry
 from .features import Matches
@@ -50,7 +59,8 @@ class PaperField:
         points = grid.points if ideal is None else ideal
         c, radial, affine = (part.reshape(points.shape) for part in self._parts(points.reshape(-1, 2)))
         field = self.strict
-        alpha = fade_share(grid, c + radial + affine, field.size, field.target_size, self.fit.fade_px)[..., None]
+        away = outside_overlap(grid, c + radial + affine, field.size, field.target_size)
+        alpha = fading(away, self.fit.fade_px)[..., None]
         shift = alpha * (radial + affine) if field.fade == "infinity" else alpha * radial + affine
         return FieldValues(np.zeros(points.shape[:2]), shift)
 

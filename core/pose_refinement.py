@@ -32,8 +32,6 @@ EFFECTIVE_MATCHES = 300
 SYSTEMATIC_PX, SYSTEMATIC_GUESS_PX = 0.5, 0.15
 # Where infinity is seen depends on the whole calibration: distortion moves it by this much.
 BEYOND_PX = 2.0
-# Where the axis meets the sensor is not its middle: about so far off, in units of the longer side.
-PRINCIPAL_SIGMA = 0.01
 TAILS = 3.0
 NEGLIGIBLE = 1e-3
 
@@ -137,9 +135,10 @@ class _Problem:
         self.sigma_beyond = BEYOND_PX * matches.scale
         self.focal_free = not (camera.fixed or camera_prime.fixed)
         self.zoom = zoom and self.focal_free
-        # for self-calibration only, and one sensor behind both pictures: where they differ in size, who knows
-        self.principal_free = self.focal_free and camera.assumed and camera.size == camera_prime.size
-        self.principal_sigma = PRINCIPAL_SIGMA * max(camera.size)
+        # one sensor behind both pictures: where they differ in size, who knows
+        believed_off = min(camera.principal_sigma, camera_prime.principal_sigma)
+        self.principal_free = believed_off > 0 and camera.size == camera_prime.size
+        self.principal_sigma = believed_off * max(camera.size)
         self.size = 5 + self.focal_free + self.zoom + 2 * self.principal_free
         # against the prior, residuals count as if none were smaller than what a lens leaves in them
         believed = max(sigma, (SYSTEMATIC_GUESS_PX if camera.assumed else SYSTEMATIC_PX) * matches.scale)
@@ -183,14 +182,13 @@ class _Problem:
     def priors(self, pose: Pose) -> list[tuple[float, Array]]:
         """Residuals of the prior with their derivatives by the unknowns; the second focal's ratio to the first is kept
         near what the files say."""
-        if not self.focal_free:
-            return []
-        size = self.size
+        size, out = self.size, []
         off = np.log(pose.K[0, 0] / self.camera.focal)
-        at, slope = self._focal_prior(off)
-        d_first = np.zeros(size)
-        d_first[0] = slope
-        out = [(at, d_first)]
+        if self.focal_free:
+            at, slope = self._focal_prior(off)
+            d_first = np.zeros(size)
+            d_first[0] = slope
+            out.append((at, d_first))
         if self.zoom:
             ratio = np.log(pose.K_prime[0, 0] / self.camera_prime.focal) - off
             d_ratio = np.zeros(size)

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .displacement import fade_outside
+from .displacement import fading, outside
 from .epipolar import Array
 from .line_map import Lines, Plane, SparseMap
 from .warp import fetch
@@ -105,7 +105,7 @@ def raised(
     margin = int(np.ceil(fade)) + 1
     moved = cv2.copyMakeBorder(moved, *[margin] * 4, cv2.BORDER_CONSTANT)
     inside = np.pad(there, margin)
-    share = fade_outside(inside, fade).astype(np.float32) if inside.any() else np.zeros(inside.shape, np.float32)
+    share = fading(outside(inside), fade).astype(np.float32)
     moved = carried_on(moved, inside.astype(np.float32)) * share[..., None]
     more = margin * step[0], margin * step[1]
     smooth = Lines.over(sparse, (left - more[0], top - more[1], width + 2 * more[0], height + 2 * more[1]),

@@ -15,6 +15,7 @@ from .lens import undistort
 from .levelling import angles_of
 from .metrics import folds, look_up, off_line_mean, overlap_quality, shown_points
 from .projectivity import independent_fundamental, projectivity
+from .slack import SlackField
 from .warp import build_map
 
 if TYPE_CHECKING:
@@ -66,7 +67,9 @@ def make_report(
             "kind": field.name, "smoothing": field.fit.smoothing, "centres": int(field.fit.kept.sum()),
             "pruned": int(two_view.inliers.sum() - field.fit.kept.sum()), "plane": field.plane,
             "fade_px": field.fit.fade_px, "residual_px": field.fit.residual_px, "held_out_px": field.fit.held_out_px,
-            "negative_share": field.fit.negative_share, "dense": _dense_entry(alignment.dense),
+            "negative_share": field.fit.negative_share,
+            "slack_px": field.slack_px if isinstance(field, SlackField) else 0.0,
+            "dense": _dense_entry(alignment.dense),
         },
         "canvas": {
             "width": canvas.width, "height": canvas.height,

@@ -31,8 +31,10 @@ def stitched(pair: RenderedPair, way: str, shared: Shared | None = None) -> Stit
     Raises StitchError.
     """
     told, field = way.split("/")
-    focal = tuple(float(pair.cameras[name].K[0, 0]) for name in ("reference", "target"))
-    camera = CameraRequest(focal_px=focal) if told == "known" else CameraRequest()
+    K, K_prime = (pair.cameras[name].K for name in ("reference", "target"))
+    middles = tuple(float(v) for v in (*K[:2, 2], *K_prime[:2, 2]))
+    known = CameraRequest(focal_px=(float(K[0, 0]), float(K_prime[0, 0])), principal=middles)
+    camera = known if told == "known" else CameraRequest()
     options = replace(PLAIN, field=field, camera=camera)
     shared, steps = {} if shared is None else shared, Stopwatch(Progress())
     if told not in shared:

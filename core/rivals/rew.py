@@ -22,8 +22,9 @@ from ..displacement import (
     Fit,
     StrictField,
     best_smoothing,
-    fade_share,
     fade_width,
+    fading,
+    outside_overlap,
     refuse_no_spread,
     target_points,
 )
@@ -64,7 +65,7 @@ class RewField:
         """Shift from π(H p) at a grid's nodes; no depth."""
         points = grid.points if ideal is None else ideal
         c, bend = (part.reshape(points.shape) for part in self._parts(points.reshape(-1, 2)))
-        alpha = fade_share(grid, c + bend, self.size, self.target_size, self.fit.fade_px)
+        alpha = fading(outside_overlap(grid, c + bend, self.size, self.target_size), self.fit.fade_px)
         return FieldValues(np.full(points.shape[:2], np.nan), alpha[..., None] * bend)
 
     def sends(self, points: Array) -> Array:

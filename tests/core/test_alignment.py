@@ -253,7 +253,8 @@ def test_given_matches_are_used_as_they_are(
 def test_given_matches_follow_the_scale(small_pair: Pair, alone: list[Alignment], quick: StitchOptions) -> None:
     """They are px of the full pictures, whatever is worked on."""
     rows = rows_of(alone[0])
-    full, half = (replace(quick, matches=rows, scale=scale) for scale in (1.0, 0.5))
+    camera = replace(quick.camera, principal=((WIDTH - 1) / 2, (HEIGHT - 1) / 2))
+    full, half = (replace(quick, camera=camera, matches=rows, scale=scale) for scale in (1.0, 0.5))
     at_full, at_half = (align([frame_of(small_pair, one)], one, silent) for one in (full, half))
     assert np.allclose(np.column_stack([at_half.matches.x, at_half.matches.y]), (rows + 0.5) / 2 - 0.5, atol=1e-12)
     ideal = at_full.two_view.K.copy()

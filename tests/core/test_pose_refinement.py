@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.camera import ASSUMED_SIGMA, Camera
+from edf_stitch.core.camera import ASSUMED_SIGMA, PRINCIPAL_SIGMA, Camera
 from edf_stitch.core.epipolar import (
     homogeneous,
     in_front,
@@ -21,7 +21,6 @@ from edf_stitch.core.features import Matches
 from edf_stitch.core.pose_refinement import (
     BEYOND_PX,
     EFFECTIVE_MATCHES,
-    PRINCIPAL_SIGMA,
     SYSTEMATIC_PX,
     TAILS,
     Pose,
@@ -44,8 +43,11 @@ def intrinsics(focal: float) -> np.ndarray:
     return np.array([[focal, 0, 599.5], [0, focal, 449.5], [0, 0, 1]])
 
 
-def camera(focal: float = FOCAL, log_sigma: float = 0.0) -> Camera:
-    return Camera(intrinsics(focal), SIZE, "test", log_sigma)
+def camera(focal: float = FOCAL, log_sigma: float = 0.0, principal_sigma: float | None = None) -> Camera:
+    """Its principal point is as unknown as its focal length, if not said otherwise."""
+    if principal_sigma is None:
+        principal_sigma = PRINCIPAL_SIGMA if log_sigma == ASSUMED_SIGMA else 0.0
+    return Camera(intrinsics(focal), SIZE, "test", log_sigma, principal_sigma=principal_sigma)
 
 
 def scene(
@@ -81,11 +83,13 @@ def nudged(pose: Pose, degrees: float, factor: float = 1.0, seed: int = 0) -> Po
 # --- derivatives ---------------------------------------------------------------------------------------------------
 
 KINDS = {
-    "fixed": (0.0, False, 5),
-    "one focal length": (0.2, False, 6),
-    "two focal lengths": (0.2, True, 7),
-    "assumed, so with a principal point": (ASSUMED_SIGMA, False, 8),
-    "assumed, two focal lengths": (ASSUMED_SIGMA, True, 9),
+    "fixed": (0.0, False, 0.0, 5),
+    "one focal length": (0.2, False, 0.0, 6),
+    "two focal lengths": (0.2, True, 0.0, 7),
+    "assumed, so with a principal point": (ASSUMED_SIGMA, False, PRINCIPAL_SIGMA, 8),
+    "assumed, two focal lengths": (ASSUMED_SIGMA, True, PRINCIPAL_SIGMA, 9),
+    "focal length from EXIF, and a principal point": (0.05, False, PRINCIPAL_SIGMA, 8),
+    "a principal point alone": (0.0, False, PRINCIPAL_SIGMA, 7),
 }
 
 
@@ -98,11 +102,13 @@ def numeric_gradient(problem: _Problem, pose: Pose) -> np.ndarray:
     ])  # fmt: skip
 
 
-@pytest.mark.parametrize("log_sigma, zoom, size", KINDS.values(), ids=KINDS.keys())
+@pytest.mark.parametrize("log_sigma, zoom, principal, size", KINDS.values(), ids=KINDS.keys())
 @pytest.mark.parametrize("seed", range(4))
-def test_the_gradient_is_that_of_half_the_cost(log_sigma: float, zoom: bool, size: int, seed: int) -> None:
+def test_the_gradient_is_that_of_half_the_cost(
+    log_sigma: float, zoom: bool, principal: float, size: int, seed: int
+) -> None:
     matches, true = scene(seed, 400, noise=2.0)
-    cam = camera(1.1 * FOCAL, log_sigma)
+    cam = camera(1.1 * FOCAL, log_sigma, principal)
     pose = nudged(true, 3.0, 0.9, seed)
     problem = _Problem(matches, cam, cam, 1.0, zoom)
     _, gradient = problem.normal_equations(pose)
@@ -125,11 +131,13 @@ def test_the_gradient_also_counts_points_beyond_infinity(outliers: int) -> None:
     assert np.allclose(gradient, numeric, rtol=1e-3, atol=1e-4 * np.abs(numeric).max())
 
 
-@pytest.mark.parametrize("log_sigma, zoom, size", KINDS.values(), ids=KINDS.keys())
-def test_the_normal_matrix_is_made_of_the_residuals_derivatives(log_sigma: float, zoom: bool, size: int) -> None:
+@pytest.mark.parametrize("log_sigma, zoom, principal, size", KINDS.values(), ids=KINDS.keys())
+def test_the_normal_matrix_is_made_of_the_residuals_derivatives(
+    log_sigma: float, zoom: bool, principal: float, size: int
+) -> None:
     """JᵀWJ with J by finite differences of the Sampson distances themselves."""
     matches, true = scene(2, 100, noise=0.7)
-    cam = camera(1.05 * FOCAL, log_sigma)
+    cam = camera(1.05 * FOCAL, log_sigma, principal)
     pose = nudged(true, 0.5, 1.0)
     sigma = 0.8
     problem = _Problem(matches, cam, cam, sigma, zoom)
@@ -144,7 +152,8 @@ def test_the_normal_matrix_is_made_of_the_residuals_derivatives(log_sigma: float
         out = [] if log_sigma == 0 else [first / log_sigma]
         if log_sigma == ASSUMED_SIGMA:
             out = [np.sign(first) * np.sqrt(TAILS * np.log1p((first / log_sigma) ** 2 / TAILS))]
-            out += list((moved.K - cam.K)[:2, 2] / (PRINCIPAL_SIGMA * SIZE[0]))
+        if principal:
+            out += list((moved.K - cam.K)[:2, 2] / (principal * SIZE[0]))
         return np.array(out + ([(second - first) / 0.3] if zoom else []))
 
     h = 1e-6
@@ -183,11 +192,14 @@ def test_a_step_stays_among_the_poses(seed: int) -> None:
     assert np.allclose(small, [0] * 7 + [1e-4] * 2, atol=1e-7)
 
 
-def test_the_principal_point_is_free_only_where_one_unknown_sensor_took_both_pictures() -> None:
+def test_the_principal_point_is_free_only_where_it_is_unknown_and_one_sensor_took_both_pictures() -> None:
     matches, true = scene(0, 100, noise=1.0)
     for first, second, free in (
         (camera(FOCAL, ASSUMED_SIGMA), camera(FOCAL, ASSUMED_SIGMA), True),
         (camera(FOCAL, 0.05), camera(FOCAL, 0.05), False),
+        (camera(FOCAL, 0.05, PRINCIPAL_SIGMA), camera(FOCAL, 0.05, PRINCIPAL_SIGMA), True),
+        (camera(FOCAL, 0.0, PRINCIPAL_SIGMA), camera(FOCAL, 0.0, PRINCIPAL_SIGMA), True),
+        (camera(FOCAL, 0.0, PRINCIPAL_SIGMA), camera(), False),
         (camera(), camera(), False),
         (camera(FOCAL, ASSUMED_SIGMA), replace(camera(FOCAL, ASSUMED_SIGMA), size=(900, 1200)), False),
     ):

@@ -15,7 +15,8 @@ def half(pair: Pair) -> StitchResult:
     """The 400 × 300 pair at half its size, cropped to the reference's frame."""
     from edf_stitch.core.camera import CameraRequest
 
-    camera = CameraRequest(focal_px=(float(pair.reference_camera.K[0, 0]),))
+    K = pair.reference_camera.K
+    camera = CameraRequest(focal_px=(float(K[0, 0]),), principal=(float(K[0, 2]), float(K[1, 2])))
     options = StitchOptions(camera=camera, scale=0.5, crop="reference", measure=False)
     return stitch(pair.reference, pair.target, options)
 
