@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from .around import roll_for, rolled, rolled_layer, rolled_maps
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
 from .exposure import Exposure, match_exposure, pooled, unchanged
-from .occlusion import occluded
+from .metrics import folds
+from .occlusion import occluded, turned_over
 from .options import StitchOptions
 from .overlap import Overlap, of_consequence, overlap_of
 from .seam import find_seam, known_labels, seam_cost, target_price
@@ -26,10 +27,11 @@ Steps = Callable[[str, float], None]
 class Decided:
     """What was decided before a pixel was mixed; the frames of a clip share it.
 
-    hidden (H, W): what the target cannot see; exposure: the target's; from_target (H, W): which side of the seam a
-    pixel lies on, None without a seam; known, cost, price, box: what the seam was cut by (see `find_seam`), None if it
-    was not; roll: by how many columns those four are rolled (see `around`). holes: pixels that the target cannot see
-    and the reference does not show: transparent, but in an average.
+    hidden (H, W): what the target cannot see, or would show mirrored; exposure: the target's; from_target (H, W): which
+    side of the seam a pixel lies on, None without a seam; known, cost, price, box: what the seam was cut by (see
+    `find_seam`), None if it was not; roll: by how many columns those four are rolled (see `around`); holes: pixels that
+    the target cannot see and the reference does not show: transparent, but in an average; folds: `metrics.folds` away
+    from what is hidden behind something near.
     """
 
     hidden: NDArray[np.bool_]
@@ -41,6 +43,7 @@ class Decided:
     box: tuple[slice, slice] | None = None
     roll: int = 0
     holes: int = 0
+    folds: float = 0.0
 
 
 def composed(
@@ -55,7 +58,13 @@ def composed(
     of the same two cameras, kept to.
     """
     steps("occlusion", 0.0)
-    hidden = decided.hidden if decided else occluded(warp, two_view, target_size)
+    if decided:
+        hidden, folded = decided.hidden, decided.folds
+    else:
+        hidden = occluded(warp, two_view, target_size)
+        folded = folds(warp, target_size, hidden)
+        # what is mirrored comes from the reference, too, where that shows anything
+        hidden |= turned_over(warp, target_size) & (reference.alpha > 0)
 
     steps("exposure", 0.0)
     if decided:
@@ -68,7 +77,7 @@ def composed(
 
     steps("seam", 0.0)
     if options.blend == "linear":
-        found = Decided(hidden, exposure)
+        found = Decided(hidden, exposure, folds=folded)
         steps("blend", 0.0)
         return averaged(reference, target), target, found
     holes = hidden & (reference.alpha == 0) & (target.alpha > 0)
@@ -79,7 +88,7 @@ def composed(
     if decided:
         found = decided
     else:
-        start = Decided(hidden_there, exposure, roll=roll, holes=int(holes.sum()))
+        start = Decided(hidden_there, exposure, roll=roll, holes=int(holes.sum()), folds=folded)
         painted = None if painted is None else rolled(painted, roll)
         found = _with_seam(start, reference, seen, overlap, rolled_maps(warp, roll), options, painted)
         side = None if found.from_target is None else rolled(found.from_target, -roll)

@@ -50,6 +50,32 @@ def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDA
     return closed & warp.inside(target_size)
 
 
+def turned_over(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Where (H, W) the map turns over: it would show the target mirrored, which no surface in view does.
+
+    That is how a map jumps back from the rim of a near thing that it knows too little of to know what the rim hides.
+    target_size: (W, H) px.
+    """
+    height, width = warp.map_x.shape
+    rows = max(2, STRIP // width)
+    strips = [(top, min(top + rows + 1, height)) for top in range(0, height - 1, rows)]
+
+    def turns(sign: int) -> NDArray[np.bool_]:
+        out = np.zeros((height, width), bool)
+        for top, bottom in strips:
+            strip = warp.within((0, top, width, bottom - top))
+            x, y = strip.map_x, strip.map_y
+            with np.errstate(invalid="ignore"):
+                area = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1])
+                area = area - (x[1:, :-1] - x[:-1, :-1]) * (y[:-1, 1:] - y[:-1, :-1])
+                out[top : bottom - 1, :-1] = (sign * area < 0) & strip.inside(target_size)[:-1, :-1]
+        return out
+
+    out = turns(1)
+    # where one picture is a mirror image, not being mirrored is what stands out
+    return out if 2 * int(out.sum()) <= int(warp.inside(target_size).sum()) else turns(-1)
+
+
 def _contested(
     warp: Warp, two_view: TwoView, target_size: tuple[int, int]
 ) -> tuple[NDArray[np.intp], NDArray[np.float32]]:

@@ -7,13 +7,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .canvas import Canvas
 from .held_out import held_out
 from .lens import undistort
 from .levelling import angles_of
-from .metrics import folds, look_up, off_line_mean, overlap_quality, shown_points
+from .metrics import look_up, off_line_mean, overlap_quality, shown_points
 from .projectivity import independent_fundamental, projectivity
 from .slack import SlackField
 from .warp import build_map
@@ -46,7 +45,7 @@ def make_report(
     """
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
     field = alignment.field
-    measured = _measured(options, pictures, alignment, decided.hidden) | appearance
+    measured = _measured(options, pictures, alignment) | {"folds": decided.folds} | appearance
     report = {
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
@@ -93,7 +92,7 @@ def make_report(
 
 
 def _measured(
-    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment, hidden: NDArray[np.bool_]
+    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment
 ) -> dict[str, float]:
     """The figures of an alignment; those that cost time only where options.measure asks for them. NaN: undefined."""
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
@@ -107,7 +106,6 @@ def _measured(
         "alignment_p95_px": float(np.percentile(error, 95)) if error.size else math.nan,
         "off_line_mean_px": off_line_mean(two_view.F, shown),
         "negative_share": field.fit.negative_share,
-        "folds": folds(warp, cameras[1].size, hidden),
     }
     if not options.measure:
         return measured

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from ..alignment import Registration
@@ -11,7 +10,6 @@ from ..held_out import held_out
 from ..metrics import canvas_quality, off_line_mean, overlap_quality, shown_points
 from ..pipeline import StitchResult
 from ..projectivity import projectivity
-from ..warp import jacobian
 
 # What people call a figure, its unit, digits, and whether more is better (None: neither).
 FIGURES: dict[str, tuple[str, str, int, bool | None]] = {
@@ -61,18 +59,8 @@ def figures_of(result: StitchResult, registration: Registration, independent: Ar
         "held_out_rms_px": unseen.rms_px, "held_out_towards_rms_px": unseen.towards_rms_px,
         "alignment_median_px": _number(measured["alignment_median_px"]),
         "alignment_p95_px": _number(measured["alignment_p95_px"]),
-        "folds": turned_over(result), "occluded": float(hidden.sum() / max(1, inside.sum())),
+        "folds": _number(measured["folds"]), "occluded": float(hidden.sum() / max(1, inside.sum())),
     }  # fmt: skip
-
-
-def turned_over(result: StitchResult) -> float:
-    """Share of the overlap, away from what is occluded, where the map turns over."""
-    warp = result.warp
-    turn = jacobian(warp.map_x.astype(np.float64), warp.map_y.astype(np.float64))
-    near = cv2.dilate(result.occluded.astype(np.uint8), RIM) > 0
-    overlap = (result.reference_layer.alpha > 0) & warp.inside(result.cameras[1].size)
-    turn = turn[overlap & ~near & np.isfinite(turn)]
-    return float(np.mean(np.sign(turn) != np.sign(np.median(turn)))) if turn.size else 0.0
 
 
 def _number(value: float | None) -> float:

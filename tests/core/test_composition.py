@@ -129,3 +129,14 @@ def test_specks_are_of_no_consequence() -> None:
     hidden[100:103, 200:203] = hidden[20:60, 100:160] = True
     kept = of_consequence(hidden)
     assert kept[20:60, 100:160].all() and not kept[100:103, 200:203].any()
+
+
+def test_what_turns_over_comes_from_the_reference_and_still_counts_as_a_fold() -> None:
+    first, second, warp = pictures()
+    row, column = np.argwhere((first.alpha > 0) & (second.alpha > 0) & warp.inside(TARGET)).mean(axis=0).astype(int)
+    spot = np.s_[row - 3 : row + 3, column - 3 : column + 3]
+    map_x = warp.map_x.copy()
+    map_x[spot] = map_x[spot][:, ::-1]
+    _, _, plain = compose(first, second, warp)
+    _, _, found = compose(first, second, replace(warp, map_x=map_x))
+    assert found.folds > plain.folds and found.hidden[spot][1:-1, 1:-1].mean() > 0.8

@@ -11,7 +11,7 @@ import pytest
 from edf_stitch.core import occlusion
 from edf_stitch.core.canvas import Canvas
 from edf_stitch.core.epipolar import homogeneous, infinite_homography
-from edf_stitch.core.occlusion import inverse_depth_in_target, occluded
+from edf_stitch.core.occlusion import inverse_depth_in_target, occluded, turned_over
 from edf_stitch.core.warp import Warp
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -174,3 +174,21 @@ def test_only_what_falls_into_the_target_counts() -> None:
     x[:, :150] = np.nan
     found = occluded(replace(warp, map_x=x), SIDEWAYS.view, TARGET)
     assert not found[:, :150].any() and not (found & ~warp.inside(TARGET)).any()
+
+
+# --- what turns over ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("strip", [10**6, 700])  # in one piece, and in strips of two rows
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_what_turns_over_is_found_and_nothing_else(
+    monkeypatch: pytest.MonkeyPatch, strip: int, mirrored: bool
+) -> None:
+    monkeypatch.setattr(occlusion, "STRIP", strip)
+    y, x = np.mgrid[0:60, 0:350].astype(np.float32)
+    x[20:31, 100:120] = 219 - x[20:31, 100:120]
+    warp = Warp(Canvas(350, 60, (0, 0)), 349 - x if mirrored else x, y, np.zeros_like(x))
+    found = turned_over(warp, (350, 60))
+    assert found[20:30, 100:119].all() and not found[:18].any() and not found[33:].any()
+    assert found.sum() < 20 * 22
+    assert not turned_over(Warp(warp.canvas, x * 0 - 9, y, warp.inverse_depth), (350, 60)).any(), "outside the target"

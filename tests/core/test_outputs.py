@@ -219,8 +219,9 @@ def test_jpeg_is_black_where_nothing_is_shown(small_result: StitchResult, tmp_pa
         write(small_result, OutputRequest(tmp_path / "out.jpg"), files)
     image = raw(tmp_path / "out.jpg")
     outside = small_result.alpha == 0
-    outside = cv2.erode(outside.astype(np.uint8), np.ones((25, 25))) > 0  # further than a block of JPEG's
-    assert image.shape[2] == 3 and outside.any() and image[outside].max() <= 2
+    outside = cv2.erode(outside.astype(np.uint8), np.ones((25, 25))) > 0
+    # a block of colour is 16 px wide and may reach a few px further, with a few levels of what it shows there
+    assert image.shape[2] == 3 and outside.any() and image[outside].max() <= 4
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tif", ".TIFF", ".exr", ".jpeg", ".JPG"])

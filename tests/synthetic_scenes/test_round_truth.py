@@ -37,10 +37,10 @@ def rendered_by_blender(job: dict[str, Any], folder: Path) -> np.ndarray:
 
 
 def panorama_options(pair: RenderedPair, **options: Any) -> StitchOptions:
-    focal = (float(pair.cameras["reference"].K[0, 0]), float(pair.cameras["target"].K[0, 0]))
-    return StitchOptions(
-        projection="equirectangular", camera=CameraRequest(focal_px=focal), measure=False, **options
-    )  # fmt: skip
+    K, K_prime = (pair.cameras[name].K for name in ("reference", "target"))
+    middles = tuple(float(v) for v in (*K[:2, 2], *K_prime[:2, 2]))
+    camera = CameraRequest(focal_px=(float(K[0, 0]), float(K_prime[0, 0])), principal=middles)
+    return StitchOptions(projection="equirectangular", camera=camera, measure=False, **options)
 
 
 def apart(a: np.ndarray, b: np.ndarray) -> float:
