@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .around import roll_for, rolled, rolled_layer, rolled_maps
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
 from .exposure import Exposure, match_exposure, pooled, unchanged
+from .light import Weighed
 from .metrics import folds
 from .occlusion import occluded, turned_over
 from .options import StitchOptions
@@ -81,7 +82,7 @@ def composed(
         steps("blend", 0.0)
         return averaged(reference, target), target, found
     holes = hidden & (reference.alpha == 0) & (target.alpha > 0)
-    seen = Layer(target.light, np.where(holes, np.float32(0), target.alpha)) if holes.any() else target
+    seen = _without(target, holes) if holes.any() else target
     roll = decided.roll if decided else roll_for(warp.canvas, reference, seen)
     reference, seen, hidden_there = rolled_layer(reference, roll), rolled_layer(seen, roll), rolled(hidden, roll)
     overlap = overlap_of(reference, seen, hidden_there) if options.has_seam else None
@@ -117,6 +118,12 @@ def pooled_decision(decisions: Sequence[Decided]) -> Decided:
     )
     from_target = rolled(find_seam(first.known, cost, price, first.box), -first.roll)
     return replace(first, exposure=exposure, cost=cost, price=price, from_target=from_target)
+
+
+def _without(layer: Layer, holes: NDArray[np.bool_]) -> Layer:
+    """A layer that shows nothing in holes (H, W), and has no colour there either: files keep it under the alpha."""
+    keep = (~holes).astype(np.float32)
+    return Layer(Weighed(layer.light, keep), layer.alpha * keep)
 
 
 def _with_seam(

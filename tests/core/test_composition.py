@@ -53,6 +53,7 @@ def test_what_the_target_cannot_see_never_comes_from_it(options: dict) -> None:
     assert away.max() <= 2 * SAME_TONE and np.percentile(away, 95) < 0.03, "specks that look alike apart"
     holes = found.hidden & (first.alpha == 0)
     assert holes.any() and not out.alpha[holes].any(), "nobody sees it: transparent, not filled"
+    assert not out.pixels[holes].any(), "a file would keep its colour under the alpha"
     assert found.holes == (holes & (second.alpha > 0)).sum() > 0
 
 
