@@ -17,7 +17,7 @@ from .images import Picture
 from .lens import undistort
 from .light import bounds
 from .tone import to_tones
-from .warp import Layer, Warp, fetch
+from .warp import Layer, Warp, cell_areas, fetch
 
 # Constants of the structural similarity index for 8 bit (Wang et al., IEEE TIP 2004, section III-B).
 SSIM_C1, SSIM_C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
@@ -184,10 +184,7 @@ def folds(warp: Warp, target_size: tuple[int, int], hidden: NDArray[np.bool_] | 
 
     hidden (H, W): what the target cannot see does not count, nor its rim: there one thing ends before another.
     """
-    x, y = warp.map_x, warp.map_y
-    turn: NDArray = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1]) - (x[1:, :-1] - x[:-1, :-1]) * (
-        y[:-1, 1:] - y[:-1, :-1]
-    )
+    turn = cell_areas(warp.map_x, warp.map_y)
     counts = warp.inside(target_size)[:-1, :-1] & np.isfinite(turn)
     if hidden is not None:
         counts &= cv2.dilate(hidden.astype(np.uint8), RIM)[:-1, :-1] == 0

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .two_view import TwoView
-from .warp import Warp
+from .warp import Warp, cell_areas
 
 # Cells of the z-buffer are 2^level px wide: as wide as the canvas samples the target there, within this margin.
 COARSEST, MARGIN = 4, 1.1
@@ -64,11 +64,9 @@ def turned_over(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_]:
         out = np.zeros((height, width), bool)
         for top, bottom in strips:
             strip = warp.within((0, top, width, bottom - top))
-            x, y = strip.map_x, strip.map_y
             with np.errstate(invalid="ignore"):
-                area = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1])
-                area = area - (x[1:, :-1] - x[:-1, :-1]) * (y[:-1, 1:] - y[:-1, :-1])
-                out[top : bottom - 1, :-1] = (sign * area < 0) & strip.inside(target_size)[:-1, :-1]
+                area = sign * cell_areas(strip.map_x, strip.map_y)
+                out[top : bottom - 1, :-1] = (area < 0) & strip.inside(target_size)[:-1, :-1]
         return out
 
     out = turns(1)

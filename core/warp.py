@@ -66,6 +66,13 @@ def jacobian(x: NDArray, y: NDArray) -> NDArray:
     return np.gradient(x, axis=1) * np.gradient(y, axis=0) - np.gradient(x, axis=0) * np.gradient(y, axis=1)
 
 
+def cell_areas(x: NDArray, y: NDArray) -> NDArray:
+    """Signed area (H − 1, W − 1) that a map (x, y) (H, W) spans between each pixel and its right and lower neighbours;
+    its sign changes where the map turns over. NaN beside what is not finite."""
+    turn: NDArray = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1])
+    return turn - (x[1:, :-1] - x[:-1, :-1]) * (y[:-1, 1:] - y[:-1, :-1])
+
+
 @dataclass(frozen=True)
 class Layer:
     """One picture on the canvas: light (H, W, C) float32 scene-linear, as an array or worked out where it is asked for
