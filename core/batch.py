@@ -343,7 +343,7 @@ def _frame(unit: Unit, locked: _Locked, steps: Stopwatch) -> tuple[tuple[int, in
         found, needed = (" and ".join(f"{w}×{h}" for w, h in sizes) for sizes in (frame.full_sizes, locked.sizes))
         raise BadRequest(f"the pictures have {found} pixels, the clip {needed}: one alignment is for one camera each")
     result: StitchResult = compose(frame, locked.alignment, locked.options, steps, locked.decided)
-    height, width = result.alpha.shape
+    height, width = result.panorama.alpha.shape
     return (width, height), unit.write(result)
 
 

@@ -271,7 +271,7 @@ def _stitch(args: argparse.Namespace) -> int:
     for warning in warnings:
         print(f"edf: warning: {warning}", file=sys.stderr)
     if not args.quiet:
-        height, width = result.alpha.shape
+        height, width = result.panorama.alpha.shape
         print(f"edf: {args.output}: {width}×{height}", file=sys.stderr)
     if args.verbose:
         _tell(result.report, result.seconds)

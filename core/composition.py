@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from .around import roll_for, rolled, rolled_layer, rolled_maps
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
-from .exposure import Exposure, match_exposure, pooled, unchanged
-from .light import Weighed
+from .exposure import BLOCK, Exposure, match_exposure, pooled, unchanged
+from .light import Weighed, around, bounds
 from .metrics import folds
 from .occlusion import occluded, turned_over
 from .options import StitchOptions
@@ -68,6 +68,9 @@ def composed(
         hidden |= turned_over(warp, target_size) & (reference.alpha > 0)
 
     steps("exposure", 0.0)
+    box = bounds((reference.alpha > 0) & (target.alpha > 0))
+    if box is not None:
+        target = target.held(around(box, BLOCK, reference.alpha.shape))
     if decided:
         exposure = decided.exposure
     elif options.exposure:
@@ -122,8 +125,7 @@ def pooled_decision(decisions: Sequence[Decided]) -> Decided:
 
 def _without(layer: Layer, holes: NDArray[np.bool_]) -> Layer:
     """A layer that shows nothing in holes (H, W), and has no colour there either: files keep it under the alpha."""
-    keep = (~holes).astype(np.float32)
-    return Layer(Weighed(layer.light, keep), layer.alpha * keep)
+    return Layer(Weighed(layer.light, ~holes), np.where(holes, layer.alpha.dtype.type(0), layer.alpha))
 
 
 def _with_seam(

@@ -346,7 +346,7 @@ def _levels(
         coded = encode(part, bits, curves)
         out[rows, :, :channels] = coded[..., ::-1]
         if sees_through and alpha is not None:
-            out[rows, :, -1] = np.rint(np.clip(alpha[rows], 0, 1) * most)
+            out[rows, :, -1] = np.rint(np.clip(alpha[rows].astype(np.float32), 0, 1) * most)
     return out, beyond / max(1, height * width)
 
 

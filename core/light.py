@@ -1,7 +1,8 @@
 """Light that is worked out where it is asked for, so that no canvas is ever held in float.
 
 Whatever has a shape (H, W, C) and gives float32 scene-linear light for slices of rows and columns will do: an array,
-or one of the kinds below, which are made of others. They give the same bits however the picture is cut up.
+or one of the kinds below, which are made of others. They give the same bits however the picture is cut up. Planes
+(H, W) of numbers are treated alike.
 """
 
 from __future__ import annotations
@@ -60,6 +61,12 @@ def within(part: Part, shape: tuple[int, ...]) -> Part:
     """The same rows and columns of a picture (H, W, …), none beyond its edges."""
     rows, columns = (slice(*one.indices(side)[:2]) for one, side in zip(part, shape, strict=False))
     return rows, columns
+
+
+def around(part: Part, margin: int, shape: tuple[int, ...]) -> Part:
+    """The same rows and columns and a margin around them, none beyond the edges of a picture (H, W, …)."""
+    rows, columns = (slice(max(0, one.start - margin), one.stop + margin) for one in part)
+    return within((rows, columns), shape)
 
 
 def meet(
@@ -121,7 +128,7 @@ class Weighed(Light):
     """Light times a weight (H, W) of each pixel."""
 
     light: AnyLight
-    weight: NDArray[np.float32]
+    weight: NDArray[np.float32] | NDArray[np.bool_]
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -134,27 +141,49 @@ class Weighed(Light):
 
 @dataclass(frozen=True, eq=False)
 class Placed(Light):
-    """Light whose first pixel lies at `at` (row, column) of a larger or smaller frame of `size` (H, W); black where it
-    does not reach."""
+    """Light whose first pixel lies at `at` (row, column) of a larger or smaller frame of `size` (H, W); black, or
+    `beyond`, where it does not reach."""
 
     light: AnyLight
     at: tuple[int, int]
     size: tuple[int, int]
+    beyond: float = 0.0
 
     @property
     def shape(self) -> tuple[int, ...]:
         """(H, W, C)."""
-        return *self.size, self.light.shape[2]
+        return *self.size, *self.light.shape[2:]
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         height, width = (one.stop - one.start for one in within(part, self.shape))
         meeting = meet(part, self.shape, self.at, self.light.shape)
-        if meeting is None:
-            return np.zeros((height, width, self.shape[2]), np.float32)
-        here, there = meeting
-        light = self.light[there]
-        if light.shape[:2] == (height, width):
+        light = None if meeting is None else self.light[meeting[1]]
+        if light is not None and light.shape[:2] == (height, width):
             return light
-        out = np.zeros((height, width, self.shape[2]), np.float32)
-        out[here] = light
+        out = np.zeros((height, width, *self.shape[2:]), np.float32)  # untouched memory is free
+        if self.beyond:
+            out[:] = self.beyond
+        if meeting is not None and light is not None:
+            out[meeting[0]] = light
         return out
+
+
+@dataclass(frozen=True, eq=False)
+class Held(Light):
+    """Light of which a part, from `at` (row, column) on, is kept as an array, for it is asked for more than once."""
+
+    light: AnyLight
+    at: tuple[int, int]
+    kept: NDArray[np.float32]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.light.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        rows, columns = within(part, self.shape)
+        (top, left), (height, width) = self.at, self.kept.shape[:2]
+        if top <= rows.start and left <= columns.start and rows.stop <= top + height and columns.stop <= left + width:
+            return self.kept[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
+        return self.light[part]

@@ -68,7 +68,7 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     """Stages every requested file; returns warnings about what a file kind could not hold."""
     exif = result.reference.exif
     icc = result.reference.icc
-    alpha = None if result.alpha.min() >= 1.0 else result.alpha
+    alpha = None if result.panorama.alpha.min() >= 1.0 else result.panorama.alpha
     data, warned = encode_picture(result.panorama.light, alpha, result.bits, request.panorama.suffix, icc, exif)
     files.add(request.panorama, data)
     warnings = list(warned)
@@ -79,7 +79,7 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
             mask = cut(getattr(result, name), result.spread)
             files.add_to_folder(request.layers, f"{name}.png", _mask_bytes(mask))
         if result.from_target is not None:
-            seam = _mask_bytes(cut(result.from_target, result.spread), result.alpha > 0)
+            seam = _mask_bytes(cut(result.from_target, result.spread), result.panorama.alpha > 0)
             files.add_to_folder(request.layers, f"{SEAM}.png", seam)
     if request.warp is not None:
         files.add(request.warp, warp_bytes(result))

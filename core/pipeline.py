@@ -72,7 +72,7 @@ class StitchResult:
     @property
     def alpha(self) -> np.ndarray:
         """The panorama's alpha (H, W) float32, straight."""
-        return self.panorama.alpha
+        return self.panorama.alpha.astype(np.float32)
 
     @property
     def used_matches(self) -> Matches:

@@ -66,8 +66,8 @@ def seam_cost(overlap: Overlap, warp: Warp) -> NDArray[np.float32]:
         step = np.abs(np.diff(overlap.difference, axis=axis)).mean(axis=2)
         cost += np.maximum(_padded(step, axis, 0, 1), _padded(step, axis, 1, 0))
         cost += np.float32(DEPTH) * np.minimum(_jumps(warp, overlap.box, axis), np.float32(1))
-    if warp.confidence is not None:
-        cost += np.float32(DOUBT) * (1 - warp.confidence[overlap.box])
+    if warp.sureness is not None:
+        cost += np.float32(DOUBT) * (1 - warp.sureness[overlap.box])
     cost += np.float32(LENGTH)
     return np.minimum(cost, np.float32(1), out=cost)
 

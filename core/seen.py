@@ -134,14 +134,14 @@ def difference(result: StitchResult) -> NDArray[np.uint8]:
 def depth_grid(result: StitchResult) -> dict[str, Any]:
     """The inverse depth at nodes over the canvas, corner to corner: `columns`, `rows`, `inverse_depth` and `shows`
     (whether the panorama shows something there), both row by row from the top."""
-    height, width = result.alpha.shape
+    height, width = result.panorama.alpha.shape
     longest = max(width, height)
     columns, rows = (max(2, round(LONGEST_GRID * side / longest)) for side in (width, height))
     x, y = (np.rint(np.linspace(0, side - 1, n)).astype(int) for side, n in ((width, columns), (height, rows)))
     depth = result.warp.inverse_depth[np.ix_(y, x)].ravel()
     return {
         "columns": columns, "rows": rows, "inverse_depth": [float(f"{d:.5g}") for d in depth],
-        "shows": (result.alpha[np.ix_(y, x)] > 0).astype(int).ravel(),
+        "shows": (result.panorama.alpha[np.ix_(y, x)] > 0).astype(int).ravel(),
     }  # fmt: skip
 
 

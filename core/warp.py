@@ -19,7 +19,7 @@ from .displacement import Field, FieldValues, target_of
 from .epipolar import Array, homogeneous, project
 from .errors import BadRequest, NoOverlap
 from .lens import distort, undistort
-from .light import AnyLight, Light, Placed, Weighed, bounds, extent, strips, whole
+from .light import AnyLight, Held, Light, Part, Placed, Weighed, bounds, extent, strips, whole, within
 from .projection import Projection
 from .two_view import TwoView
 
@@ -38,22 +38,34 @@ MAX_FADE = 3.0
 
 @dataclass(frozen=True)
 class Warp:
-    """map_x, map_y (H, W) float32: raw target pixel of each canvas pixel, NaN behind the camera; inverse_depth (H, W)
-    float32, NaN where the field knows none; confidence (H, W) float32, 0..1, in what dense refinement found there, None
-    without it."""
+    """map_x, map_y (H, W) float32: raw target pixel of each canvas pixel, NaN behind the camera; depth (H, W) float32:
+    the inverse depth, NaN where the field knows none; sureness (H, W) float32, 0..1, of what dense refinement found
+    there, None without it. These two are worked out where they are asked for (see `light`)."""
 
     canvas: Canvas
     map_x: NDArray[np.float32]
     map_y: NDArray[np.float32]
-    inverse_depth: NDArray[np.float32]
-    confidence: NDArray[np.float32] | None = None
+    depth: AnyLight
+    sureness: AnyLight | None = None
+
+    @property
+    def inverse_depth(self) -> NDArray[np.float32]:
+        """All of the inverse depth (H, W) float32."""
+        return whole(self.depth)
+
+    @property
+    def confidence(self) -> NDArray[np.float32] | None:
+        """All of the confidence (H, W) float32, None without dense refinement."""
+        return None if self.sureness is None else whole(self.sureness)
 
     def within(self, box: Box) -> Warp:
         """The part in a box (left, top, width, height) of the canvas; NaN, and no confidence, where that reaches over
         its edges."""
-        map_x, map_y, inverse_depth = (cut(a, box, np.nan) for a in (self.map_x, self.map_y, self.inverse_depth))
-        confidence = None if self.confidence is None else cut(self.confidence, box)
-        return Warp(self.canvas.within(box), map_x, map_y, inverse_depth, confidence)
+        left, top, width, height = box
+        map_x, map_y = (cut(a, box, np.nan) for a in (self.map_x, self.map_y))
+        depth = Placed(self.depth, (-top, -left), (height, width), np.nan)
+        sureness = None if self.sureness is None else Placed(self.sureness, (-top, -left), (height, width))
+        return Warp(self.canvas.within(box), map_x, map_y, depth, sureness)
 
     def inside(self, target_size: tuple[int, int]) -> NDArray[np.bool_]:
         """Where the map falls inside a target of (W, H) px."""
@@ -76,10 +88,11 @@ def cell_areas(x: NDArray, y: NDArray) -> NDArray:
 @dataclass(frozen=True)
 class Layer:
     """One picture on the canvas: light (H, W, C) float32 scene-linear, as an array or worked out where it is asked for
-    (see `light`), straight alpha (H, W) in [0, 1], 0 where it shows nothing."""
+    (see `light`); straight alpha (H, W), float32 in [0, 1] or, where nothing is half seen through, bool; 0 where it
+    shows nothing."""
 
     light: AnyLight
-    alpha: NDArray[np.float32]
+    alpha: NDArray[np.float32] | NDArray[np.bool_]
 
     @property
     def pixels(self) -> NDArray[np.float32]:
@@ -92,6 +105,10 @@ class Layer:
         if (left, top, height, width) == (0, 0, *self.alpha.shape):
             return self
         return Layer(Placed(self.light, (-top, -left), (height, width)), cut(self.alpha, box))
+
+    def held(self, part: Part) -> Layer:
+        """The same, with the light of a part, which is asked for more than once, kept as an array."""
+        return Layer(Held(self.light, (part[0].start, part[1].start), self.light[part]), self.alpha)
 
 
 def cut(array: NDArray, box: Box, beyond: float = 0.0) -> NDArray:
@@ -145,18 +162,13 @@ def build_map(
     grid = Grid.over(left, top, canvas.width, canvas.height)
     values = _node_values(field, grid, canvas, camera)
     shape = (canvas.height, canvas.width)
-    map_x, map_y, inverse_depth = (np.empty(shape, np.float32) for _ in range(3))
+    map_x, map_y = (np.empty(shape, np.float32) for _ in range(2))
     xs, ys, e = canvas.xs, canvas.ys, two_view.e_prime
-    confidence = None if relief is None else np.empty(shape, np.float32)
-    rows = max(1, 1_000_000 // canvas.width)
-    for start in range(0, canvas.height, rows):
-        stop = min(canvas.height, start + rows)
-        # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
+    depth = Depth(canvas, camera, grid, values.inverse_depth, relief)
+    for part in strips(shape):
+        start, stop = part.start, part.stop
         strip = (left, top + start, canvas.width, stop - start)
-        d = grid.to_pixels(values.inverse_depth, *strip).astype(np.float64)
-        if relief is not None and confidence is not None:
-            more, sideways, confidence[start:stop] = _relief_at(relief, canvas, xs, ys[start:stop], camera)
-            d += more
+        d, sideways = depth.strip(part)
         slide = d if e.any() else np.zeros_like(d)  # where nothing slides, depth may be unknown (NaN)
         infinite = canvas.through(two_view.H_inf, xs, ys[start:stop], camera)
         a, b, c = (part + slide * e[k] for k, part in enumerate(infinite))
@@ -165,13 +177,69 @@ def build_map(
         if values.shift is not None:
             x += grid.to_pixels(values.shift[..., 0], *strip)
             y += grid.to_pixels(values.shift[..., 1], *strip)
-        if relief is not None:
+        if sideways is not None:
             x += sideways[..., 0]
             y += sideways[..., 1]
         if camera_prime.distortion.any():
             x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), camera_prime), -1, 0)
-        map_x[start:stop], map_y[start:stop], inverse_depth[start:stop] = x, y, d
-    return Warp(canvas, map_x, map_y, inverse_depth, confidence)
+        map_x[part], map_y[part] = x, y
+    return Warp(canvas, map_x, map_y, depth, None if relief is None else Sureness(canvas, camera, relief))
+
+
+@dataclass(frozen=True, eq=False)
+class Depth(Light):
+    """The inverse depth (H, W) of a canvas, from a field's at the nodes of a grid and a relief."""
+
+    canvas: Canvas
+    camera: Camera
+    grid: Grid
+    nodes: Array
+    relief: Relief | None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W)."""
+        return self.canvas.height, self.canvas.width
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        rows, columns = within(part, self.shape)
+        out = np.empty((rows.stop - rows.start, columns.stop - columns.start), np.float32)
+        # whole strips, as the map was made of: BLAS has other last bits for other shapes
+        for strip in strips(self.shape):
+            low, high = max(rows.start, strip.start), min(rows.stop, strip.stop)
+            if low < high:
+                d, _ = self.strip(strip)
+                out[low - rows.start : high - rows.start] = d[low - strip.start : high - strip.start, columns]
+        return out
+
+    def strip(self, rows: slice) -> tuple[Array, NDArray[np.float32] | None]:
+        """Whole rows of it, and px that the relief adds in the target."""
+        canvas = self.canvas
+        left, top = -canvas.offset[0], rows.start - canvas.offset[1]
+        # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
+        d = self.grid.to_pixels(self.nodes, left, top, canvas.width, rows.stop - rows.start).astype(np.float64)
+        if self.relief is None:
+            return d, None
+        more, sideways, _ = _relief_at(self.relief, canvas, canvas.xs, canvas.ys[rows], self.camera)
+        return d + more, sideways
+
+
+@dataclass(frozen=True, eq=False)
+class Sureness(Light):
+    """How sure (H, W) a relief is on a canvas."""
+
+    canvas: Canvas
+    camera: Camera
+    relief: Relief
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W)."""
+        return self.canvas.height, self.canvas.width
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        rows, columns = within(part, self.shape)
+        return _relief_at(self.relief, self.canvas, self.canvas.xs[columns], self.canvas.ys[rows], self.camera)[2]
 
 
 def _relief_at(
@@ -290,8 +358,8 @@ def reference_layer(picture: Picture, canvas: Canvas, camera: Camera | None = No
         return _fetched_layer(picture, *reference_map(canvas, camera))
     height, width, _ = picture.light.shape
     x, y = canvas.offset
-    alpha = np.zeros((canvas.height, canvas.width), np.float32)
-    alpha[y : y + height, x : x + width] = 1.0 if picture.alpha is None else picture.alpha
+    alpha = np.zeros((canvas.height, canvas.width), bool if picture.alpha is None else np.float32)
+    alpha[y : y + height, x : x + width] = True if picture.alpha is None else picture.alpha
     return Layer(Placed(picture.light, (y, x), (canvas.height, canvas.width)), alpha)
 
 
@@ -301,28 +369,63 @@ def target_layer(picture: Picture, warp: Warp) -> Layer:
 
 
 def _fetched_layer(picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32]) -> Layer:
-    """A picture through a map of its raw pixels (H, W), bicubic in scene-linear float.
-    Colours are weighted by alpha while interpolating, so that transparent pixels never bleed. Bicubic overshoot is held
-    to the range of the picture itself: a black edge never turns negative.
-    """
+    """A picture through a map of its raw pixels (H, W)."""
     height, width, channels = picture.light.shape
     inside = _inside(map_x, map_y, (width, height))
-    alpha = inside.astype(np.float32)
     box = bounds(inside)
     if box is None:
-        return Layer(np.zeros((*alpha.shape, channels), np.float32), alpha)
-    map_x, map_y = map_x[box], map_y[box]
-    source = picture.light if picture.alpha is None else Weighed(picture.light, picture.alpha)
-    pixels = fetch(source, map_x, map_y)
-    if picture.alpha is not None:
-        # both overshoot alike: divided before alpha is clipped
-        fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
-        pixels /= np.maximum(fetched, LEAST_ALPHA)[..., None]
-        alpha[box] *= np.where(fetched > LEAST_ALPHA, np.minimum(fetched, 1.0), 0)
-    np.clip(pixels, *extent(picture.light), out=pixels)
-    for rows in strips(pixels.shape):
-        pixels[rows] *= (alpha[box][rows] > 0)[..., None]
-    return Layer(Placed(pixels, (box[0].start, box[1].start), (alpha.shape[0], alpha.shape[1])), alpha)
+        return Layer(np.broadcast_to(np.float32(0), (*inside.shape, channels)), inside)
+    light, alpha = Fetched.through(picture, map_x[box], map_y[box], inside[box])
+    placed = Placed(light, (box[0].start, box[1].start), (inside.shape[0], inside.shape[1]))
+    if picture.alpha is None:
+        return Layer(placed, inside)
+    whole_alpha = np.zeros(inside.shape, np.float32)
+    whole_alpha[box] = alpha
+    return Layer(placed, whole_alpha)
+
+
+@dataclass(frozen=True, eq=False)
+class Fetched(Light):
+    """A picture (h, w, C) through a map of its raw pixels (H, W), bicubic in scene-linear float.
+
+    Colours are weighted by alpha while interpolating, so that transparent pixels never bleed. Bicubic overshoot is held
+    to the range of the picture itself: a black edge never turns negative. shows (H, W): where it shows anything.
+    """
+
+    picture: Picture
+    map_x: NDArray[np.float32]
+    map_y: NDArray[np.float32]
+    shows: NDArray[np.bool_]
+    range: tuple[float, float]
+
+    @staticmethod
+    def through(
+        picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32], inside: NDArray[np.bool_]
+    ) -> tuple[Fetched, NDArray]:
+        """A picture through a map, and its alpha (H, W); inside (H, W): where the map falls inside the picture."""
+        alpha: NDArray = inside
+        if picture.alpha is not None:
+            fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
+            alpha = inside * np.where(fetched > LEAST_ALPHA, np.minimum(fetched, 1.0), np.float32(0))
+        return Fetched(picture, map_x, map_y, alpha > 0, extent(picture.light)), alpha
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return *self.map_x.shape, self.picture.light.shape[2]
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        alpha, shows = self.picture.alpha, self.shows[part]
+        if not shows.any():
+            return np.zeros((*shows.shape, self.shape[2]), np.float32)
+        map_x, map_y = self.map_x[part], self.map_y[part]
+        pixels = fetch(self.picture.light if alpha is None else Weighed(self.picture.light, alpha), map_x, map_y)
+        if alpha is not None:
+            # both overshoot alike: divided before alpha is clipped
+            pixels /= np.maximum(fetch(alpha[..., None], map_x, map_y)[..., 0], LEAST_ALPHA)[..., None]
+        np.clip(pixels, *self.range, out=pixels)
+        pixels *= shows[..., None]
+        return pixels
 
 
 def fetch(

@@ -195,16 +195,16 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
     def picture(pixels: Any, alpha: Any) -> bytes:
         return encode_picture(pixels, alpha, result.bits, kind, result.reference.icc, result.reference.exif)[0]
 
-    add("panorama", picture(result.panorama.light, _unless_opaque(result.alpha)))
+    add("panorama", picture(result.panorama.light, _unless_opaque(result.panorama.alpha)))
     for side, layer in zip(SIDES, (result.reference_layer, result.target_layer), strict=True):
         if "layers" in take:
             add(f"{side} layer", picture(layer.light, layer.alpha))
         if "masks" in take:
-            add(f"{side} mask", _png((layer.alpha * 255).round().astype("uint8")), ".png")
+            add(f"{side} mask", _png((layer.alpha.astype("float32") * 255).round().astype("uint8")), ".png")
     if "masks" in take:
         add("occluded", _png(result.occluded.astype("uint8") * 255), ".png")
         if result.from_target is not None:
-            add("seam", _png(_painted(result.from_target, result.alpha > 0)), ".png")
+            add("seam", _png(_painted(result.from_target, result.panorama.alpha > 0)), ".png")
         if result.warp.confidence is not None:
             add("confidence", _png((result.warp.confidence * 255).round().astype("uint8")), ".png")
     if "depth" in take and seen.has_depth(result.two_view):

@@ -7,7 +7,7 @@ import pytest
 from edf_stitch.core.blend import Cut, Evened, Mixed
 from edf_stitch.core.colour import decode, srgb_curve
 from edf_stitch.core.exposure import Exposed
-from edf_stitch.core.light import AnyLight, Coded, Placed, Weighed, extent, meet, whole, within
+from edf_stitch.core.light import AnyLight, Coded, Held, Placed, Weighed, around, extent, meet, whole, within
 from edf_stitch.core.warp import Layer
 from hypothesis import given
 from hypothesis import strategies as st
@@ -34,6 +34,7 @@ def kinds(channels: int) -> dict[str, AnyLight]:
     return {
         "coded": Coded(levels, (srgb_curve(),)), "deep": Coded(levels.astype(np.uint16) * 257, (srgb_curve(),)),
         "weighed": Weighed(light, np.clip(numbers(H, W), 0, 1)), "exposed": Exposed(light, numbers(channels)),
+        "held": Held(light, (4, 6), light[4:20, 6:].copy()),
         "placed": Placed(numbers(9, 12, channels), (5, 7), (H, W)),
         "beyond": Placed(numbers(40, 12, channels), (-5, 25), (H, W)),
         "mixed": Mixed(layer(), layer(), np.clip(numbers(H, W), 0, 1)),
@@ -95,5 +96,13 @@ def test_where_parts_meet(part: tuple[slice, slice], top: int, left: int, side: 
     assert np.array_equal(frame[part][here], inner[there]) and (frame[part] > 0).sum() == inner[there].size
 
 
+def test_what_is_held_is_not_asked_for_again_and_planes_may_have_no_number_beyond() -> None:
+    held = Held(np.zeros((H, W, 3), np.float32), (4, 6), np.ones((9, 12, 3), np.float32))
+    assert (held[5:13, 6:18] == 1).all() and (held[3:13, 6:18] == 0).all() and (held[5:13, 6:19] == 0).all()
+    plane = whole(Placed(np.ones((4, 5), np.float32), (-1, 2), (6, 9), np.nan))
+    assert np.isfinite(plane).sum() == 15 and (plane[:3, 2:7] == 1).all()
+
+
 def test_no_part_reaches_beyond_the_picture() -> None:
     assert within((slice(2, 90), slice(None, 4)), (12, 15)) == (slice(2, 12), slice(0, 4))
+    assert around((slice(2, 9), slice(3, 4)), 4, (12, 15)) == (slice(0, 12), slice(0, 8))

@@ -155,17 +155,17 @@ def test_where_the_map_folds_is_all_that_has_to_be_looked_at(
 def test_infinity_and_beyond_are_one_depth() -> None:
     warp, _ = SIDEWAYS.truth()
     d = warp.inverse_depth - 0.3  # the wall and most of the cards behind infinity
-    far = replace(warp, inverse_depth=np.minimum(d, 0).astype(np.float32))
+    far = replace(warp, depth=np.minimum(d, 0).astype(np.float32))
     assert not occluded(far, SIDEWAYS.view, TARGET).any()
     assert (inverse_depth_in_target(far, SIDEWAYS.view) == 0).all()
 
 
 def test_without_depth_nothing_is_hidden() -> None:
     warp, _ = SIDEWAYS.truth()
-    unknown = replace(warp, inverse_depth=np.full(SHAPE, np.nan, np.float32))
+    unknown = replace(warp, depth=np.full(SHAPE, np.nan, np.float32))
     assert not occluded(unknown, SIDEWAYS.view, TARGET).any()
     same_place = SimpleNamespace(H_inf=SIDEWAYS.view.H_inf, e_prime=np.zeros(3))
-    assert not occluded(replace(warp, inverse_depth=np.zeros(SHAPE, np.float32)), same_place, TARGET).any()
+    assert not occluded(replace(warp, depth=np.zeros(SHAPE, np.float32)), same_place, TARGET).any()
 
 
 def test_only_what_falls_into_the_target_counts() -> None:

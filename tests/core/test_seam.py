@@ -30,7 +30,7 @@ def gray() -> np.ndarray:
 
 def flat_warp(**more: Any) -> Any:
     x, y = np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32))
-    return SimpleNamespace(**({"map_x": x, "map_y": y, "confidence": None} | more))
+    return SimpleNamespace(**({"map_x": x, "map_y": y, "sureness": None} | more))
 
 
 def cut(first: Layer, second: Layer, hidden: np.ndarray = NOTHING, painted: np.ndarray | None = None, **warp: Any
@@ -136,7 +136,7 @@ def test_it_keeps_away_from_edges_of_depth_and_from_doubt() -> None:
     assert ((~sides).sum(axis=1) <= 207).all()
     confidence = np.ones((H, W), np.float32)
     confidence[:, 190:] = 0
-    assert ((~cut(layer(LEFT, gray()), layer(RIGHT, gray()), confidence=confidence)).sum(axis=1) <= 192).all()
+    assert ((~cut(layer(LEFT, gray()), layer(RIGHT, gray()), sureness=confidence)).sum(axis=1) <= 192).all()
 
 
 def test_soft_edges_give_way_to_what_is_whole() -> None:

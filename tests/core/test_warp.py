@@ -14,6 +14,7 @@ from edf_stitch.core.displacement import FieldValues
 from edf_stitch.core.epipolar import distance_to_line
 from edf_stitch.core.errors import NoOverlap
 from edf_stitch.core.images import Picture, picture_from_array
+from edf_stitch.core.relief import Relief
 from edf_stitch.core.warp import Warp, build_map, build_warp, fetch, reference_layer, target_layer
 
 SIZE = (320, 240)
@@ -186,7 +187,9 @@ def test_the_reference_is_an_exact_paste(by_hand: SimpleNamespace) -> None:
         outside = np.ones((50, 70), bool)
         outside[box] = False
         assert not layer.alpha[outside].any() and not layer.pixels[outside].any()
-        assert layer.pixels.dtype == layer.alpha.dtype == np.float32
+        assert layer.pixels.dtype == np.float32 and layer.alpha.dtype == (
+            bool if picture.alpha is None else np.float32
+        )
 
 
 def half_transparent() -> Picture:
@@ -400,3 +403,19 @@ def test_a_part_of_a_warp_and_of_a_layer(by_hand: SimpleNamespace) -> None:
     assert np.array_equal(layer.within(box).alpha, again.alpha)
     flagged = replace(whole, canvas=replace(whole.canvas, cropped=True))
     assert flagged.within(box).canvas.cropped, "a part of what was cut off stays cut off"
+
+
+def test_depth_and_confidence_are_the_same_whatever_part_is_asked_for(by_hand: SimpleNamespace) -> None:
+    camera = by_hand.camera((1203, 1001), 900.0)
+    view = by_hand.view(camera, camera, *STANDS["sideways"])
+    nodes = np.random.default_rng(2).normal(scale=0.01, size=(30, 40, 4)).astype(np.float32)
+    relief = Relief((100.5, 200.5), (20.0, 20.0), nodes[..., 0], nodes[..., 1:3], np.abs(nodes[..., 3]))
+    warp = build_map(wavy(by_hand), view, Canvas(1203, 1001, (17, -5)), camera, camera, relief)
+    assert warp.sureness is not None and warp.confidence is not None
+    for plane, all_of_it in ((warp.depth, warp.inverse_depth), (warp.sureness, warp.confidence)):
+        assert all_of_it[300:500, 300:500].any()
+        for part in (np.s_[700:900, 0:1203], np.s_[815:1001, 333:700], np.s_[3:4, 9:10]):
+            assert np.array_equal(plane[part], all_of_it[part])
+    x, y = warp.map_x[300:500, 300:500], warp.map_y[300:500, 300:500]
+    flat = build_map(wavy(by_hand), view, Canvas(1203, 1001, (17, -5)), camera, camera)
+    assert np.hypot(x - flat.map_x[300:500, 300:500], y - flat.map_y[300:500, 300:500]).mean() > 0.5

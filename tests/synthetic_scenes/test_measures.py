@@ -42,7 +42,7 @@ def perfect(result: StitchResult, truth: Truth) -> StitchResult:
     x, y = (np.where(truth.in_target, truth.target[..., k], -9).astype(np.float32) for k in range(2))
     canvas = replace(result.warp.canvas, width=width, height=height, offset=(-truth.corner[0], -truth.corner[1]))
     view = replace(result.two_view, K=g.K, K_prime=g.K_prime, R=g.R, t=g.t, F=g.F, H_inf=g.H_inf, e_prime=g.e_prime)
-    warp = replace(result.warp, canvas=canvas, map_x=x, map_y=y, inverse_depth=np.zeros_like(x))
+    warp = replace(result.warp, canvas=canvas, map_x=x, map_y=y, depth=np.zeros_like(x))
     alpha = (truth.in_target | truth.in_reference).astype(np.float32)
     pixels = np.zeros((height, width, 3), np.float32)
     return replace(result, two_view=view, warp=warp, panorama=Layer(pixels, alpha))
