@@ -1,7 +1,7 @@
 """The relief: what dense refinement adds to a field, on the nodes it was found at and a margin around them.
 
-Inverse depth takes it up as it is, so that x' ~ H_inf p + d e' stays the whole warp. Beyond the overlap it goes on
-smoothly and fades to nothing.
+Inverse depth takes it up as it is, so that x' ~ H_inf p + d e' stays the whole warp. Beyond the overlap what both
+pictures agreed on goes on smoothly and fades to nothing.
 """
 
 from __future__ import annotations
@@ -15,12 +15,18 @@ from numpy.typing import NDArray
 from .displacement import fading, outside
 from .epipolar import Array
 from .line_map import Lines, Plane, SparseMap
+from .overlap import distance_inside
 from .warp import fetch
 
 # Moves fade over so many times their own size (98 %) outside the overlap, as the field does, within this share of the
 # picture's side.
 FADE, LEAST_FADE, MOST_FADE = 5.0, 8.0, 0.15
 COARSE = 8
+# Confidence that counts for nothing and for all in what goes on beyond the overlap; it reaches so many nodes (a side)
+# over the rim of what it is about.
+DOUBTED, SURE, RIM = 0.2, 0.5, 9
+# Share of the fade's width over which doubtful moves give way before the border: twice their own size.
+GIVE_WAY = 2 / FADE
 
 
 @dataclass(frozen=True)
@@ -106,7 +112,8 @@ def raised(
     moved = cv2.copyMakeBorder(moved, *[margin] * 4, cv2.BORDER_CONSTANT)
     inside = np.pad(there, margin)
     share = fading(outside(inside), fade).astype(np.float32)
-    moved = carried_on(moved, inside.astype(np.float32)) * share[..., None]
+    sure = np.pad(np.where(there, np.clip(confidence, 0, 1), np.float32(0)), margin)
+    moved = _beyond(moved, inside, sure, GIVE_WAY * fade) * share[..., None]
     more = margin * step[0], margin * step[1]
     smooth = Lines.over(sparse, (left - more[0], top - more[1], width + 2 * more[0], height + 2 * more[1]),
                         COARSE * min(step))
@@ -115,9 +122,22 @@ def raised(
         for v in (smooth.moved, smooth.direction[..., 0], smooth.direction[..., 1])
     )
     shift = np.stack([-moved[..., 1] * direction[1], moved[..., 1] * direction[0]], axis=-1)
-    sure = np.pad(np.where(there, confidence, np.float32(0)), margin)
     start = left + (step[0] - 1) / 2 - more[0], top + (step[1] - 1) / 2 - more[1]
-    return Relief(start, step, moved[..., 0] * per_px, shift, np.clip(sure, 0, 1))
+    return Relief(start, step, moved[..., 0] * per_px, shift, sure)
+
+
+def _beyond(moved: Plane, inside: NDArray[np.bool_], sure: Plane, width: float) -> Plane:
+    """Moves (h, w, 2) of the nodes inside, and beyond them what goes on of those that are sure (h, w).
+
+    A bare sky moves by whatever the search made of it: carried on it would bend the mast before it. The last
+    nodes before the border are doubtful too: they were sought by half a window. Within `width` nodes of the border what
+    is doubtful gives way to what goes on beyond, or the map would jump there.
+    """
+    held = cv2.erode(sure, np.ones((RIM, RIM), np.uint8))
+    weight = inside * np.clip((held - np.float32(DOUBTED)) / np.float32(SURE - DOUBTED), 0, 1)
+    gone_on = carried_on(moved, weight.astype(np.float32))
+    share = np.clip(1 - distance_inside(inside) / np.float32(width), 0, 1)
+    return moved + (gone_on - moved) * np.where(inside, share, np.float32(1))[..., None]
 
 
 def carried_on(values: NDArray[np.float32], known: Plane) -> NDArray[np.float32]:

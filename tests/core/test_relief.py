@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.displacement import target_points
 from edf_stitch.core.line_map import Lines, SparseMap
-from edf_stitch.core.relief import Relief, carried_on, raised
+from edf_stitch.core.relief import RIM, Relief, carried_on, raised
 
 from .line_scenes import Scene, scene
 
@@ -82,7 +82,10 @@ def test_on_its_nodes_it_does_what_the_moves_do(made: tuple) -> None:
     x, y = lines.nodes
     more, shift, sure = relief.at(x, y)
     sent = target_points(pair.view, lines.ideal, lines.inverse_depth + more.astype(float)) + lines.shift + shift
-    np.testing.assert_allclose(sent, np.stack(lines.target(along, across), axis=-1), atol=0.05)
+    meant = np.stack(lines.target(along, across), axis=-1)
+    inner = np.s_[RIM // 2 : -(RIM // 2), RIM // 2 : -(RIM // 2)]
+    np.testing.assert_allclose(sent[inner], meant[inner], atol=0.05)
+    assert np.abs(sent - meant).max() < 1, "the last nodes before the border are what the others say"
     np.testing.assert_allclose(sure, 0.7, atol=1e-6)
 
 
@@ -113,6 +116,26 @@ def test_what_lies_outside_the_overlap_has_no_say(made: tuple) -> None:
     for part, part_too in zip(one.parts, other.parts, strict=True):
         assert np.array_equal(part, part_too)
     assert not one.at(*(v[:, :19] for v in lines.nodes))[2].any()
+
+
+def test_what_nobody_is_sure_of_does_not_go_on_beyond_the_border() -> None:
+    """A mast that is found before a bare sky that moves by nonsense: beyond the border it keeps its own move, and the
+    map has no step there."""
+    pair = scene("sideways")
+    sparse = pair.field(shift=(0.0, 0.0))
+    lines = Lines.over(sparse, (40, 30, 120, 90), 1.0)
+    confidence = np.zeros(lines.shape, np.float32)
+    confidence[:, 40:75] = 0.9
+    along, across = np.where(confidence > 0, np.float32(1), np.float32(12)), np.zeros(lines.shape, np.float32)
+    relief = raised(lines, sparse, along, across, confidence, np.ones(lines.shape, bool))
+    rows, columns = (np.array(relief.confidence.shape) - lines.shape) // 2
+    per_px = relief.inverse_depth[rows + 45, columns + 57] / 1.0  # of a px along the lines, on the mast
+    moved = relief.inverse_depth / per_px
+    mast = moved[rows - 8 : rows + 8, columns + 50 : columns + 66]
+    assert mast.min() > 0.5 and mast.max() < 1.2
+    sky = moved[:, columns + 15]
+    assert abs(sky[rows + 45] - 12) < 2 and np.abs(sky[:rows]).max() < 1.2, "kept far inside alone"
+    assert np.abs(np.diff(sky[: rows + 45])).max() < 1, "no fold on the way"
 
 
 def test_gaps_are_filled_from_around_and_what_is_known_stays() -> None:
