@@ -14,6 +14,7 @@ FADE_CHOICES = ("plane", "infinity")
 FIELD_CHOICES = ("slack", "strict", "paper", "rew", "apap", "homography")
 PROJECTION_CHOICES = ("perspective", "cylindrical", "equirectangular")
 BLEND_CHOICES, SEAM_CHOICES = ("multiband", "feather", "linear"), ("graphcut", "none")
+HOLE_CHOICES = ("transparent", "inpaint")
 
 
 def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> None:
@@ -119,6 +120,10 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         help="match TARGET's exposure and white balance to REF's (default)",
     )  # fmt: skip
     how.add_argument(
+        "--holes", default="transparent", type=_choice(HOLE_CHOICES), metavar="HOLES",
+        help="what neither camera saw behind something near: transparent (default) or inpaint (filled smoothly)",
+    )  # fmt: skip
+    how.add_argument(
         "--cache", action=argparse.BooleanOptionalAction, default=True,
         help="keep features, geometry and field for the next stitch of the same pictures (default; EDF_CACHE: where)",
     )  # fmt: skip
@@ -151,6 +156,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         seam=args.seam,
         mask=args.mask,
         exposure=args.exposure,
+        holes=args.holes,
         seed=args.seed,
         measure=measure,
         cache=default_folder() if args.cache else None,

@@ -24,7 +24,7 @@ from .errors import BadRequest, UnreadableImage, UnwritableOutput
 from .images import output_bits
 from .options import StitchOptions
 from .output_files import OutputFiles
-from .outputs import MASKS, SEAM, OutputRequest, add_report, json_bytes, warp_bytes, write
+from .outputs import INPAINTED, MASKS, SEAM, OutputRequest, add_report, json_bytes, warp_bytes, write
 from .pipeline import StitchResult
 
 STAMPS = ".edf"
@@ -94,6 +94,7 @@ class Unit:
         if self._layers:
             out += [self._layers / f"{name}.png" for name in ("reference", "target", *MASKS)]
             out += [self._layers / f"{SEAM}.png"] if self.options.has_seam else []
+            out += [self._layers / f"{INPAINTED}.png"] if self.options.holes == "inpaint" else []
         if self.report:
             out += [self.report, self._named(".matches.csv"), self._named(".timing.json")]
             out += [self._named(".warp.npz")] if self.request.warp else []

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .around import roll_for, rolled, rolled_layer, rolled_maps
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
 from .exposure import BLOCK, Exposure, match_exposure, pooled, unchanged
+from .inpaint import inpainted
 from .light import Weighed, around, bounds
 from .metrics import folds
 from .occlusion import occluded, turned_over
@@ -31,8 +32,8 @@ class Decided:
     hidden (H, W): what the target cannot see, or would show mirrored; exposure: the target's; from_target (H, W): which
     side of the seam a pixel lies on, None without a seam; known, cost, price, box: what the seam was cut by (see
     `find_seam`), None if it was not; roll: by how many columns those four are rolled (see `around`); holes: pixels that
-    the target cannot see and the reference does not show: transparent, but in an average; folds: `metrics.folds` away
-    from what is hidden behind something near.
+    the target cannot see and the reference does not show: transparent or filled, but in an average; folds:
+    `metrics.folds` away from what is hidden behind something near.
     """
 
     hidden: NDArray[np.bool_]
@@ -54,7 +55,8 @@ def composed(
 ) -> tuple[Layer, Layer, Decided]:
     """The panorama, the target's layer as it was exposed for it, and what was decided.
 
-    What neither picture shows, and what only a target that cannot see it would show, is transparent. floats: whether
+    What neither picture shows is transparent, and so is what only a target that cannot see it would show, unless it is
+    to be inpainted. floats: whether
     reference and target come from float pictures; painted (H, W): see `masks.read_painted`; decided: from other frames
     of the same two cameras, kept to.
     """
@@ -100,11 +102,14 @@ def composed(
 
     steps("blend", 0.0)
     if found.from_target is None:
-        return rolled_layer(feathered(reference, seen, hidden_there), -roll), target, found
-    # the frames of a clip need not show the same everywhere
-    side = (rolled(found.from_target, roll) & (seen.alpha > 0)) | (reference.alpha == 0)
-    blended = in_bands if options.blend == "multiband" else feathered_across
-    return rolled_layer(blended(reference, seen, side, overlap), -roll), target, found
+        out = feathered(reference, seen, hidden_there)
+    else:
+        # the frames of a clip need not show the same everywhere
+        side = (rolled(found.from_target, roll) & (seen.alpha > 0)) | (reference.alpha == 0)
+        blended = in_bands if options.blend == "multiband" else feathered_across
+        out = blended(reference, seen, side, overlap)
+    out = rolled_layer(out, -roll)
+    return inpainted(out, holes, warp.inverse_depth) if options.holes == "inpaint" else out, target, found
 
 
 def pooled_decision(decisions: Sequence[Decided]) -> Decided:

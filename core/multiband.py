@@ -66,9 +66,11 @@ def _from_nearest(values: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArra
     return by_label[nearest]
 
 
-def filled(values: NDArray[np.float32], known: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Values (h, w, C) where known, continued smoothly elsewhere (pull and push: means over ever larger cells fill what
-    smaller ones leave open; Gortler et al., SIGGRAPH 1996, section 3.4)."""
+def filled(
+    values: NDArray[np.float32], known: NDArray[np.bool_] | NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Values (h, w, C) where known, or by how well (0..1), continued smoothly elsewhere (pull and push: means over ever
+    larger cells fill what smaller ones leave open; Gortler et al., SIGGRAPH 1996, section 3.4)."""
     weight = known.astype(np.float32)
     return _filled(values * weight[..., None], weight)
 

@@ -14,6 +14,7 @@ from .crop import CROPS, Crop
 from .displacement import FADES
 from .errors import BadRequest
 from .fields import FIELDS, ROUND_FIELDS
+from .inpaint import HOLES
 from .levelling import LEVELS, Level
 from .projection import PROJECTIONS
 from .seam import SEAMS
@@ -33,8 +34,9 @@ class StitchOptions:
     first, at most 1; crop: what of the panorama is kept (see `crop_box`); dense: whether every pixel of the overlap is
     sought along its epipolar line; blend: one of BLENDS; seam: one of SEAMS, of no matter for `linear`; mask: what an
     artist painted over the whole panorama, a file or array, black = from the reference, white = from the target, gray
-    or transparent = the seam decides; exposure: whether the target's is matched to the reference's; seed: of every
-    random choice; measure: whether the report also compares the pictures in the overlap and holds matches back to see
+    or transparent = the seam decides; exposure: whether the target's is matched to the reference's; holes: what becomes
+    of what neither camera saw because something near hid it, one of HOLES (an average has none); seed: of every random
+    choice; measure: whether the report also compares the pictures in the overlap and holds matches back to see
     how far the field can be trusted; cache: the folder where features, geometry and fields are kept for the next stitch
     of the same pictures, None for nowhere (the outcome is the same).
     """
@@ -54,6 +56,7 @@ class StitchOptions:
     seam: str = "graphcut"
     mask: Path | np.ndarray | None = None
     exposure: bool = True
+    holes: str = "transparent"
     seed: int = 0
     measure: bool = True
     cache: Path | None = dataclasses.field(default=None, compare=False)
@@ -73,6 +76,7 @@ class StitchOptions:
         for name, value, known in (
             ("field", self.field, FIELDS), ("fade", self.fade, FADES), ("blend", self.blend, BLENDS),
             ("projection", self.projection, PROJECTIONS), ("seam", self.seam, SEAMS),
+            ("holes", self.holes, HOLES),
         ):  # fmt: skip
             if value not in known:
                 raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")

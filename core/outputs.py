@@ -24,6 +24,8 @@ from .warp import Layer, cut
 MASKS = ("occluded", "confidence")
 # Where the pictures meet, in the form that --mask takes; only where there is a seam.
 SEAM = "seam"
+# What was filled though neither picture saw it; only where that is asked for.
+INPAINTED = "inpainted"
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ def check(request: OutputRequest, files: OutputFiles) -> None:
     files.check(*single)
     if request.layers is not None:
         names = [f"{layer}{suffix}" for layer in ("reference", "target") for suffix in (".png", ".exr")]
-        names += [f"{mask}.png" for mask in (*MASKS, SEAM)]
+        names += [f"{mask}.png" for mask in (*MASKS, SEAM, INPAINTED)]
         files.check_folder(request.layers, names)
         taken = {(request.layers / name).resolve() for name in names}
         for path in single:
@@ -78,6 +80,9 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
         for name in MASKS:
             mask = cut(getattr(result, name), result.spread)
             files.add_to_folder(request.layers, f"{name}.png", _mask_bytes(mask))
+        if result.report["options"]["holes"] == "inpaint":
+            filled = _mask_bytes(cut(result.inpainted, result.spread))
+            files.add_to_folder(request.layers, f"{INPAINTED}.png", filled)
         if result.from_target is not None:
             seam = _mask_bytes(cut(result.from_target, result.spread), result.panorama.alpha > 0)
             files.add_to_folder(request.layers, f"{SEAM}.png", seam)

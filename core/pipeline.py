@@ -109,6 +109,14 @@ class StitchResult:
         return np.zeros(self.warp.map_x.shape, np.float32) if confidence is None else confidence
 
     @property
+    def inpainted(self) -> np.ndarray:
+        """(H, W) bool: what neither picture saw and was filled because that was asked for."""
+        asked = self.report["options"]
+        if asked["holes"] != "inpaint" or asked["blend"] == "linear":
+            return np.zeros(self.occluded.shape, bool)
+        return self.occluded & (self.reference_layer.alpha == 0) & (self.target_layer.alpha > 0)
+
+    @property
     def bits(self) -> int:
         """Bits per channel of the deeper input (32: float)."""
         return max(self.reference.bits, self.target.bits)

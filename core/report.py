@@ -40,7 +40,7 @@ def make_report(
     """The report of a stitch that shows `canvas`, and warnings in plain words drawn from it.
 
     decided: about its composition (hole_px: pixels that neither picture sees, beyond the reference and behind something
-    near); appearance: of the panorama (see `metrics.appearance`).
+    near; inpainted_px: how many of them were filled); appearance: of the panorama (see `metrics.appearance`).
     No seconds, no dates: the same input gives the same report.
     """
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
@@ -52,7 +52,8 @@ def make_report(
         "options": {
             "field": options.field, "fade": options.fade, "dense": options.dense, "projection": options.projection,
             "level": options.level, "scale": options.scale, "crop": options.crop, "blend": options.blend,
-            "seam": options.seam, "exposure": options.exposure, "seed": options.seed,
+            "seam": options.seam, "exposure": options.exposure, "holes": options.holes,
+            "seed": options.seed,
         },
         "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
         "two_view": {
@@ -78,15 +79,19 @@ def make_report(
         "composition": {
             "exposure_gain": decided.exposure.gain, "exposure_spread": decided.exposure.spread,
             "exposure_blocks": decided.exposure.blocks, "occluded_px": int(decided.hidden.sum()),
-            "hole_px": decided.holes,
+            "hole_px": decided.holes, "inpainted_px": decided.holes if options.holes == "inpaint" else 0,
         },
         "measured": measured,
     }  # fmt: skip
     warnings = _warnings(alignment, measured["folds"])
     if decided.holes > HOLES * alignment.warp.map_x.size:
+        shown = (
+            "filled smoothly from around there" if options.holes == "inpaint" else
+            "transparent there (black in a JPEG); --holes inpaint fills them"
+        )  # fmt: skip
         warnings.append(
             f"{decided.holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
-            "transparent there (black in a JPEG); --crop reference shows none of them"
+            f"{shown}; --crop reference shows none of them"
         )
     return plain(report), warnings
 

@@ -203,6 +203,8 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
             add(f"{side} mask", _png((layer.alpha.astype("float32") * 255).round().astype("uint8")), ".png")
     if "masks" in take:
         add("occluded", _png(result.occluded.astype("uint8") * 255), ".png")
+        if result.inpainted.any():
+            add("inpainted", _png(result.inpainted.astype("uint8") * 255), ".png")
         if result.from_target is not None:
             add("seam", _png(_painted(result.from_target, result.panorama.alpha > 0)), ".png")
         if result.warp.confidence is not None:

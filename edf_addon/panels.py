@@ -92,6 +92,7 @@ OUTPUT = (
     Row("blend"),
     Row("seam", why_not=lambda settings: "An average has no seam" if settings.blend == "LINEAR" else ""),
     Row("exposure"),
+    Row("holes", why_not=lambda settings: "An average has no holes" if settings.blend == "LINEAR" else ""),
     Row("crop"),
     Row("crop_box", shown=lambda settings: settings.crop == "BOX"),
     Row("scale"),

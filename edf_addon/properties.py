@@ -55,6 +55,10 @@ BLENDS = (
     ("FEATHER", "Feather", "A soft change from one picture to the other, across the whole overlap"),
     ("LINEAR", "Average", "The plain average of both: doubled edges show where they do not fit"),
 )
+HOLES = (
+    ("TRANSPARENT", "Transparent", "Left open, to be painted or filled with another picture"),
+    ("INPAINT", "Inpaint", "Filled smoothly from what lies behind; no detail is made up"),
+)
 SEAMS = (
     ("GRAPHCUT", "Best Cut", "Where the two pictures look most alike, around things rather than through them"),
     ("NONE", "Midway", "Midway between the borders of the two pictures"),
@@ -190,6 +194,10 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         name="Match Exposure", description="Match the target's exposure and white balance to the reference's",
         default=True,
     )
+    holes: EnumProperty(
+        name="Holes", description="What neither camera saw, because something near hid it from the only one that "
+        "looked there", items=HOLES,
+    )
     crop: EnumProperty(name="Crop", description="What of the panorama is kept", items=CROPS)
     crop_box: IntVectorProperty(
         name="Box", description="Left, top, width and height, in pixels of the full panorama, from its top left",
@@ -270,7 +278,7 @@ class EDF_PG_job(bpy.types.PropertyGroup):  # noqa: N801
 
 
 # The properties that are options of the engine under the same name: one word of several, or a plain value.
-CHOICES = ("field", "fade", "projection", "seam", "blend")
+CHOICES = ("field", "fade", "projection", "seam", "blend", "holes")
 VALUES = ("dense", "exposure", "seed")
 # What changes places when reference and target do; the lenses only where each picture has its own.
 PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))

@@ -17,7 +17,7 @@ SIDES = ("reference", "target")
 # The worker's pictures that lie over the panorama: kept with it, out of the artist's lists of images.
 HIDDEN = ("heat", "difference")
 # Those that are values and no colours.
-VALUES = ("reference mask", "target mask", "occluded", "seam", "confidence", "inverse depth")
+VALUES = ("reference mask", "target mask", "occluded", "inpainted", "seam", "confidence", "inverse depth")
 
 
 def why_not(settings: Any) -> str:

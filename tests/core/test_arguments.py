@@ -16,6 +16,7 @@ from edf_stitch.core.crop import CROPS
 from edf_stitch.core.displacement import FADES
 from edf_stitch.core.errors import BadRequest
 from edf_stitch.core.fields import FIELDS
+from edf_stitch.core.inpaint import HOLES
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.seam import SEAMS
 
@@ -38,7 +39,7 @@ def test_without_any_the_defaults_are_pythons() -> None:
 def test_it_offers_what_core_offers() -> None:
     """The lists stand twice, so that a wrong call costs no import of NumPy; they must agree."""
     assert arguments.FIELD_CHOICES == FIELDS and arguments.FADE_CHOICES == FADES and arguments.BLEND_CHOICES == BLENDS
-    assert arguments.SEAM_CHOICES == SEAMS
+    assert arguments.SEAM_CHOICES == SEAMS and arguments.HOLE_CHOICES == HOLES
     for name, choices in (("field", FIELDS), ("fade", FADES), ("blend", BLENDS), ("seam", SEAMS), ("crop", CROPS)):
         for choice in choices:
             assert getattr(options(f"--{name}", choice), name) == choice
@@ -72,6 +73,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--crop", "3,4,50,60"], {"crop": (3, 4, 50, 60)}), (["--crop", "reference"], {"crop": "reference"}),
     (["--dense"], {}),
     (["--no-dense", "--no-exposure"], {"dense": False, "exposure": False}), (["--exposure", "--seam", "graphcut"], {}),
+    (["--holes", "inpaint"], {"holes": "inpaint"}), (["--holes", "transparent"], {}),
     (["--mask", "m.png"], {"mask": Path("m.png")}),
     (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {"blend": "feather"}),
     (["--projection", "perspective"], {}), (["--projection", "cylindrical"], {"projection": "cylindrical"}),
@@ -115,8 +117,8 @@ def test_the_help_names_every_option_and_choice() -> None:
     for word in (*(f"--{name}" for name in (
         "focal-px", "focal-mm", "sensor-mm", "focal35", "principal", "cameras", "matches", "ignore-ref",
         "ignore-target", "scale", "crop", "field", "fade", "dense", "projection", "blend", "seam", "mask",
-        "exposure", "seed",
-    )), *FIELDS, *FADES, *BLENDS, *SEAMS, *CROPS):  # fmt: skip
+        "exposure", "holes", "seed",
+    )), *FIELDS, *FADES, *BLENDS, *SEAMS, *HOLES, *CROPS):  # fmt: skip
         assert word in said, word
 
 

@@ -57,6 +57,20 @@ def test_what_the_target_cannot_see_never_comes_from_it(options: dict) -> None:
     assert found.holes == (holes & (second.alpha > 0)).sum() > 0
 
 
+def test_holes_are_filled_where_that_is_asked_for_and_nothing_else_changes() -> None:
+    first, second, warp = pictures()
+    first.alpha[80:120] = 0
+    for blend in ({}, {"blend": "feather"}, {"blend": "feather", "seam": "none"}):
+        left, _, found = compose(first, second, warp, **blend)
+        out, _, found_too = compose(first, second, warp, holes="inpaint", **blend)
+        holes = found.hidden & (first.alpha == 0) & (second.alpha > 0)
+        assert found_too.holes == found.holes == holes.sum() > 0
+        assert np.array_equal(out.alpha > 0, (left.alpha > 0) | holes) and (out.alpha[holes] == 1).all()
+        assert np.array_equal(out.pixels[~holes], left.pixels[~holes]) and (out.pixels[holes] > 0).all()
+    average, _, _ = compose(first, second, warp, blend="linear", holes="inpaint")
+    assert np.array_equal(average.pixels, compose(first, second, warp, blend="linear")[0].pixels), "it has no holes"
+
+
 def test_an_average_hides_nothing() -> None:
     first, second, warp = pictures()
     out, _, found = compose(first, second, warp, blend="linear")

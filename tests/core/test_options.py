@@ -23,7 +23,8 @@ def test_the_defaults_are_the_designs() -> None:
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore_reference": None,
         "ignore_target": None, "projection": "perspective", "level": "auto", "scale": 1.0, "crop": "full",
-        "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "seed": 0,
+        "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "holes": "transparent",
+        "seed": 0,
         "measure": True, "cache": None,
     }  # fmt: skip
 
@@ -36,6 +37,7 @@ def test_nothing_changes_them_afterwards() -> None:
 @pytest.mark.parametrize("asked", [
     *({"field": name} for name in FIELDS), *({"fade": name} for name in FADES), *({"blend": name} for name in BLENDS),
     *({"seam": name} for name in SEAMS), {"mask": Path("m.png")}, {"exposure": False},
+    {"holes": "inpaint"},
     *({"crop": name} for name in CROPS), {"crop": (0, 0, 1, 1)}, {"crop": (3, 4, 500, 600)}, {"scale": 1},
     {"scale": LEAST_SCALE}, {"scale": 0.5}, {"seed": 0}, {"seed": 2**31 - 1}, {"matches": Path("m.csv")},
     {"matches": np.zeros((20, 4))}, {"ignore_reference": Path("a.png")}, {"ignore_target": np.zeros((4, 4), bool)},
@@ -52,6 +54,7 @@ def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
     *(({"fade": name}, ("fade", repr(name), "choose from: plane, infinity")) for name in ("none", "", "Plane")),
     *(({"blend": name}, ("blend", repr(name), "choose from: multiband, feather, linear")) for name in ("", "Linear")),
     *(({"seam": name}, ("seam", repr(name), "choose from: graphcut, none")) for name in ("", "voronoi")),
+    *(({"holes": name}, ("holes", repr(name), "choose from: transparent, inpaint")) for name in ("", "fill")),
     *(({"crop": name}, ("crop", repr(name), "choose from: full, inscribed, reference, or X, Y, W, H"))
       for name in ("tight", "", "1,2,3,4", "Full")),
     *(({"scale": scale}, ("scale", "between 0.02 and 1"))

@@ -63,6 +63,19 @@ def test_all_files_and_no_others_are_there(written: Path) -> None:
         "layers/target.png", "layers/occluded.png", "layers/confidence.png", "layers/seam.png"}
 
 
+def test_what_was_filled_is_marked(small_result: StitchResult, tmp_path: Path) -> None:
+    """Hidden from the target, and not shown by the reference."""
+    occluded = np.zeros_like(small_result.occluded)
+    occluded[30:60, 200:] = True
+    report = {**small_result.report, "options": {**small_result.report["options"], "holes": "inpaint"}}
+    result = replace(small_result, occluded=occluded, report=report)
+    alone = (result.reference_layer.alpha == 0) & (result.target_layer.alpha > 0)
+    write_all(result, tmp_path)
+    marked = raw(tmp_path / "layers" / "inpainted.png")
+    assert np.array_equal(marked > 0, occluded & alone) and (occluded & alone).sum() > 100
+    assert not replace(result, report=small_result.report).inpainted.any()
+
+
 def test_only_the_panorama_where_nothing_else_was_asked_for(small_result: StitchResult, tmp_path: Path) -> None:
     with OutputFiles() as files:
         write(small_result, OutputRequest(tmp_path / "out.jpg"), files)

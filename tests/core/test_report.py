@@ -24,7 +24,9 @@ from edf_stitch.core.warp import Warp, build_warp
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 
-def report_of(result: StitchResult, measure: bool = True, **changed: Any) -> tuple[dict[str, Any], list[str]]:
+def report_of(
+    result: StitchResult, measure: bool = True, holes: str = "transparent", **changed: Any
+) -> tuple[dict[str, Any], list[str]]:
     """The report of a result in whose alignment something is changed."""
     alignment = replace(
         Alignment(result.cameras, result.matches, result.two_view, result.field, result.warp, ()), **changed
@@ -34,7 +36,8 @@ def report_of(result: StitchResult, measure: bool = True, **changed: Any) -> tup
         hidden = np.zeros(alignment.warp.map_x.shape, bool)
         decided = replace(decided, hidden=hidden, folds=folds(alignment.warp, result.cameras[1].size))
     return make_report(
-        StitchOptions(measure=measure), (result.reference, result.target), alignment, alignment.warp.canvas, decided, {}
+        StitchOptions(measure=measure, holes=holes), (result.reference, result.target), alignment,
+        alignment.warp.canvas, decided, {},
     )
 
 
@@ -60,6 +63,14 @@ def test_holes_are_counted_and_said_where_they_matter(small_result: StitchResult
         report, spoken = report_of(replace(small_result, decided=decided))
         assert report["composition"]["hole_px"] == holes
         assert any(f"{holes} pixels were seen by neither camera" in line for line in spoken) == said
+        assert report["composition"]["inpainted_px"] == 0
+
+
+def test_filled_holes_are_counted_and_said(small_result: StitchResult) -> None:
+    decided = replace(small_result.decided, holes=int(2e-4 * small_result.warp.map_x.size) + 1)
+    report, spoken = report_of(replace(small_result, decided=decided), holes="inpaint")
+    assert report["composition"]["inpainted_px"] == report["composition"]["hole_px"] == decided.holes
+    assert any("filled smoothly" in line for line in spoken)
 
 
 def test_numpys_numbers_become_pythons() -> None:
@@ -95,7 +106,8 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
         assert entry["camera"]["fixed"] and entry["camera"]["focal_px"] == view.K[0, 0]
     assert report["options"] == {
         "field": "slack", "fade": "plane", "dense": True, "projection": "perspective", "level": "auto", "scale": 1.0,
-        "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": True, "seed": 0}
+        "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": True,
+        "holes": "transparent", "seed": 0}
     assert report["composition"]["exposure_blocks"] > 100
     assert report["composition"]["exposure_gain"] == pytest.approx([1, 1, 1], abs=0.01)
     assert report["composition"]["occluded_px"] < 40
