@@ -14,7 +14,7 @@ from .exposure import BLOCK, Exposure, match_exposure, pooled, unchanged
 from .inpaint import inpainted
 from .light import Weighed, around, bounds
 from .metrics import folds
-from .occlusion import occluded, turned_over
+from .occlusion import occluded, turned_over, turning
 from .options import StitchOptions
 from .overlap import Overlap, of_consequence, overlap_of
 from .seam import find_seam, known_labels, seam_cost, target_price
@@ -65,9 +65,11 @@ def composed(
         hidden, folded = decided.hidden, decided.folds
     else:
         hidden = occluded(warp, two_view, target_size)
-        folded = folds(warp, target_size, hidden)
+        turns = turning(warp, target_size)
+        folded = folds(turns, hidden)
         # what is mirrored comes from the reference, too, where that shows anything
-        hidden |= turned_over(warp, target_size) & (reference.alpha > 0)
+        hidden |= turned_over(turns) & (reference.alpha > 0)
+        del turns
 
     steps("exposure", 0.0)
     box = bounds((reference.alpha > 0) & (target.alpha > 0))

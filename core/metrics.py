@@ -16,8 +16,9 @@ from .epipolar import Array, distance_to_line
 from .images import Picture
 from .lens import undistort
 from .light import bounds
+from .occlusion import NO_TURN
 from .tone import to_tones
-from .warp import Layer, Warp, cell_areas, fetch
+from .warp import Layer, Warp, fetch
 
 # Constants of the structural similarity index for 8 bit (Wang et al., IEEE TIP 2004, section III-B).
 SSIM_C1, SSIM_C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
@@ -179,19 +180,20 @@ def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
     return np.column_stack(out)
 
 
-def folds(warp: Warp, target_size: tuple[int, int], hidden: NDArray[np.bool_] | None = None) -> float:
+def folds(turns: NDArray[np.int8], hidden: NDArray[np.bool_] | None = None) -> float:
     """Share of the pixels that show the target where the map turns over (its Jacobian changes sign).
 
-    hidden (H, W): what the target cannot see does not count, nor its rim: there one thing ends before another.
+    turns (H, W): see `turning`; hidden (H, W): what the target cannot see does not count, nor its rim: there one thing
+    ends before another.
     """
-    turn = cell_areas(warp.map_x, warp.map_y)
-    counts = warp.inside(target_size)[:-1, :-1] & np.isfinite(turn)
+    counts = turns != NO_TURN
     if hidden is not None:
-        counts &= cv2.dilate(hidden.astype(np.uint8), RIM)[:-1, :-1] == 0
-    turn = turn[counts]
-    if turn.size == 0:
-        return 0.0
-    return float(np.mean(np.sign(turn) != np.sign(np.median(turn))))
+        counts &= cv2.dilate(hidden.astype(np.uint8), RIM) == 0
+    back, flat, on = (int(np.count_nonzero(counts & (turns == way))) for way in (-1, 0, 1))
+    total = back + flat + on
+    # the median's own way is the right one: what most pixels do, or nearly
+    usual = back if 2 * back >= total else on if 2 * on >= total else flat
+    return (total - usual) / total if total else 0.0
 
 
 @dataclass(frozen=True)

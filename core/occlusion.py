@@ -21,6 +21,8 @@ BETWEEN = (0.25, 0.5, 0.75)
 # Where the map folds is known to blocks of the target, 2^BLOCK px wide and with their neighbours wider than any cell.
 BLOCK = 5
 STRIP = 2_000_000
+# In place of -1, 0 or 1: see `turning`.
+NO_TURN = 2
 
 
 def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -50,28 +52,30 @@ def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDA
     return closed & warp.inside(target_size)
 
 
-def turned_over(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Where (H, W) the map turns over: it would show the target mirrored, which no surface in view does.
+def turning(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.int8]:
+    """Which way (H, W) the map turns its pixels: 1 as they are, -1 mirrored, 0 flattened; NO_TURN where it does not
+    show the target, or nothing is known to the right or below. target_size: (W, H) px."""
+    height, width = warp.map_x.shape
+    out = np.full((height, width), NO_TURN, np.int8)
+    rows = max(1, STRIP // width)
+    for top in range(0, height - 1, rows):
+        bottom = min(top + rows, height - 1)
+        strip = warp.within((0, top, width, bottom + 1 - top))
+        with np.errstate(invalid="ignore", over="ignore"):
+            area = cell_areas(strip.map_x, strip.map_y)
+            counts = strip.inside(target_size)[:-1, :-1] & np.isfinite(area)
+            out[top:bottom, :-1] = np.where(counts, np.sign(area), NO_TURN)
+    return out
+
+
+def turned_over(turns: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Where (H, W) a map turns over (see `turning`): it would show the target mirrored, which no surface in view does.
 
     That is how a map jumps back from the rim of a near thing that it knows too little of to know what the rim hides.
-    target_size: (W, H) px.
     """
-    height, width = warp.map_x.shape
-    rows = max(2, STRIP // width)
-    strips = [(top, min(top + rows + 1, height)) for top in range(0, height - 1, rows)]
-
-    def turns(sign: int) -> NDArray[np.bool_]:
-        out = np.zeros((height, width), bool)
-        for top, bottom in strips:
-            strip = warp.within((0, top, width, bottom - top))
-            with np.errstate(invalid="ignore"):
-                area = sign * cell_areas(strip.map_x, strip.map_y)
-                out[top : bottom - 1, :-1] = (area < 0) & strip.inside(target_size)[:-1, :-1]
-        return out
-
-    out = turns(1)
+    out = turns == -1
     # where one picture is a mirror image, not being mirrored is what stands out
-    return out if 2 * int(out.sum()) <= int(warp.inside(target_size).sum()) else turns(-1)
+    return out if 2 * int(out.sum()) <= int((turns != NO_TURN).sum()) else turns == 1
 
 
 def _contested(

@@ -24,6 +24,7 @@ from edf_stitch.core.metrics import (
     shown_points,
     ssim,
 )
+from edf_stitch.core.occlusion import turning
 from edf_stitch.core.warp import Layer, Warp, build_warp
 
 
@@ -101,14 +102,18 @@ def test_a_mask_without_room_for_a_window() -> None:
 
 def test_a_fold_is_found_and_a_bend_is_not() -> None:
     y, x = np.mgrid[:80, :200].astype(float)
-    assert folds(map_of(x + 9 * np.sin(x / 10) * np.cos(y / 30), y + 0.2 * x), (200, 80)) == 0, "slope 0.1 at least"
-    assert folds(map_of(199 - x, y), (200, 80)) == 0, "a mirror turns everything over: not a fold"
+    bend = map_of(x + 9 * np.sin(x / 10) * np.cos(y / 30), y + 0.2 * x)
+    assert folds(turning(bend, (200, 80))) == 0, "slope 0.1 at least"
+    assert folds(turning(map_of(199 - x, y), (200, 80))) == 0, "a mirror turns everything over: not a fold"
     there_and_back = np.where(x < 120, x, 240 - x)  # the last 80 of 200 columns run backwards
-    assert folds(map_of(there_and_back, y), (200, 80)) == pytest.approx(80 / 199, abs=2 / 199)
-    assert folds(map_of(np.where(x < 120, x, 2 * x), y), (120, 80)) == 0
+    assert folds(turning(map_of(there_and_back, y), (200, 80))) == pytest.approx(80 / 199, abs=2 / 199)
+    assert folds(turning(map_of(np.where(x < 120, x, 2 * x), y), (120, 80))) == 0
     beyond = np.where(x < 120, x, -1 - x)
-    assert folds(map_of(beyond, y), (200, 80)) < 0.02, "what falls outside the target does not count"
-    assert folds(map_of(np.full_like(x, np.nan), y), (200, 80)) == 0
+    assert folds(turning(map_of(beyond, y), (200, 80))) < 0.02, "what falls outside the target does not count"
+    assert folds(turning(map_of(np.full_like(x, np.nan), y), (200, 80))) == 0
+    hidden = np.zeros((80, 200), bool)
+    hidden[:, 123:] = True
+    assert folds(turning(map_of(there_and_back, y), (200, 80)), hidden) == 0, "nor what is hidden, nor its rim"
 
 
 def curved_map() -> tuple[Warp, object]:

@@ -11,7 +11,7 @@ import pytest
 from edf_stitch.core import occlusion
 from edf_stitch.core.canvas import Canvas
 from edf_stitch.core.epipolar import homogeneous, infinite_homography
-from edf_stitch.core.occlusion import inverse_depth_in_target, occluded, turned_over
+from edf_stitch.core.occlusion import inverse_depth_in_target, occluded, turned_over, turning
 from edf_stitch.core.warp import Warp
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -188,7 +188,8 @@ def test_what_turns_over_is_found_and_nothing_else(
     y, x = np.mgrid[0:60, 0:350].astype(np.float32)
     x[20:31, 100:120] = 219 - x[20:31, 100:120]
     warp = Warp(Canvas(350, 60, (0, 0)), 349 - x if mirrored else x, y, np.zeros_like(x))
-    found = turned_over(warp, (350, 60))
+    found = turned_over(turning(warp, (350, 60)))
     assert found[20:30, 100:119].all() and not found[:18].any() and not found[33:].any()
     assert found.sum() < 20 * 22
-    assert not turned_over(Warp(warp.canvas, x * 0 - 9, y, warp.inverse_depth), (350, 60)).any(), "outside the target"
+    outside = Warp(warp.canvas, x * 0 - 9, y, warp.inverse_depth)
+    assert not turned_over(turning(outside, (350, 60))).any(), "outside the target"

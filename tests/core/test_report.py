@@ -18,6 +18,7 @@ from edf_stitch.core.features import Matches
 from edf_stitch.core.fields import FIELDS, RIVALS, fit_field
 from edf_stitch.core.lens import distort
 from edf_stitch.core.metrics import folds
+from edf_stitch.core.occlusion import turning
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.report import make_report, plain
 from edf_stitch.core.warp import Warp, build_warp
@@ -34,7 +35,7 @@ def report_of(
     decided = result.decided
     if "warp" in changed:  # what is hidden lies on the warp's own canvas
         hidden = np.zeros(alignment.warp.map_x.shape, bool)
-        decided = replace(decided, hidden=hidden, folds=folds(alignment.warp, result.cameras[1].size))
+        decided = replace(decided, hidden=hidden, folds=folds(turning(alignment.warp, result.cameras[1].size)))
     return make_report(
         StitchOptions(measure=measure, holes=holes), (result.reference, result.target), alignment,
         alignment.warp.canvas, decided, {},
