@@ -14,7 +14,7 @@ from .exposure import BLOCK, Exposure, match_exposure, pooled, unchanged
 from .inpaint import inpainted
 from .light import Weighed, around, bounds
 from .metrics import folds
-from .occlusion import occluded, turned_over, turning
+from .occlusion import by_agreement, occluded, turned_over, turning
 from .options import StitchOptions
 from .overlap import Overlap, of_consequence, overlap_of
 from .seam import find_seam, known_labels, seam_cost, target_price
@@ -29,14 +29,16 @@ Steps = Callable[[str, float], None]
 class Decided:
     """What was decided before a pixel was mixed; the frames of a clip share it.
 
-    hidden (H, W): what the target cannot see, or would show mirrored; exposure: the target's; from_target (H, W): which
-    side of the seam a pixel lies on, None without a seam; known, cost, price, box: what the seam was cut by (see
-    `find_seam`), None if it was not; roll: by how many columns those four are rolled (see `around`); holes: pixels that
-    the target cannot see and the reference does not show: transparent or filled, but in an average; folds:
-    `metrics.folds` away from what is hidden behind something near.
+    hidden (H, W): what the target cannot see, or would show mirrored; surely (H, W): that of it which the depth order
+    says by itself, which is what the seam goes by: more would leave it no way through leaves; exposure: the target's;
+    from_target (H, W): which side of the seam a pixel lies on, None without a seam; known, cost, price, box: what the
+    seam was cut by (see `find_seam`), None if it was not; roll: by how many columns those four are rolled (see
+    `around`); holes: pixels that the target cannot see and the reference does not show: transparent or filled, but in
+    an average; folds: `metrics.folds` away from what is hidden behind something near.
     """
 
     hidden: NDArray[np.bool_]
+    surely: NDArray[np.bool_]
     exposure: Exposure
     from_target: NDArray[np.bool_] | None = None
     known: NDArray[np.int8] | None = None
@@ -62,14 +64,17 @@ def composed(
     """
     steps("occlusion", 0.0)
     if decided:
-        hidden, folded = decided.hidden, decided.folds
+        hidden, surely, folded = decided.hidden, decided.surely, decided.folds
     else:
-        hidden = occluded(warp, two_view, target_size)
+        surely = occluded(warp, two_view, target_size)
+        hidden = by_agreement(surely, warp, target_size, reference.alpha > 0)
+        surely &= hidden
         turns = turning(warp, target_size)
         folded = folds(turns, hidden)
         # what is mirrored comes from the reference, too, where that shows anything
-        hidden |= turned_over(turns) & (reference.alpha > 0)
-        del turns
+        mirrored = turned_over(turns) & (reference.alpha > 0)
+        surely, hidden = surely | mirrored, hidden | mirrored
+        del turns, mirrored
 
     steps("exposure", 0.0)
     box = bounds((reference.alpha > 0) & (target.alpha > 0))
@@ -85,26 +90,26 @@ def composed(
 
     steps("seam", 0.0)
     if options.blend == "linear":
-        found = Decided(hidden, exposure, folds=folded)
+        found = Decided(hidden, surely, exposure, folds=folded)
         steps("blend", 0.0)
         return averaged(reference, target), target, found
     holes = hidden & (reference.alpha == 0) & (target.alpha > 0)
     seen = _without(target, holes) if holes.any() else target
     roll = decided.roll if decided else roll_for(warp.canvas, reference, seen)
-    reference, seen, hidden_there = rolled_layer(reference, roll), rolled_layer(seen, roll), rolled(hidden, roll)
-    overlap = overlap_of(reference, seen, hidden_there) if options.has_seam else None
+    reference, seen, surely_there = rolled_layer(reference, roll), rolled_layer(seen, roll), rolled(surely, roll)
+    overlap = overlap_of(reference, seen, surely_there) if options.has_seam else None
     if decided:
         found = decided
     else:
-        start = Decided(hidden_there, exposure, roll=roll, holes=int(holes.sum()), folds=folded)
+        start = Decided(hidden, surely_there, exposure, roll=roll, holes=int(holes.sum()), folds=folded)
         painted = None if painted is None else rolled(painted, roll)
         found = _with_seam(start, reference, seen, overlap, rolled_maps(warp, roll), options, painted)
         side = None if found.from_target is None else rolled(found.from_target, -roll)
-        found = replace(found, hidden=hidden, from_target=side)
+        found = replace(found, surely=surely, from_target=side)
 
     steps("blend", 0.0)
     if found.from_target is None:
-        out = feathered(reference, seen, hidden_there)
+        out = feathered(reference, seen, rolled(hidden, roll))
     else:
         # the frames of a clip need not show the same everywhere
         side = (rolled(found.from_target, roll) & (seen.alpha > 0)) | (reference.alpha == 0)
@@ -142,12 +147,12 @@ def _with_seam(
     if not options.has_seam:
         return so_far
     cuts = options.seam != "none" and overlap is not None
-    known = known_labels(reference, target, of_consequence(so_far.hidden) if cuts else so_far.hidden, painted)
+    known = known_labels(reference, target, of_consequence(so_far.surely) if cuts else so_far.surely, painted)
     if overlap is None:
         return replace(so_far, from_target=known == 1)
     if options.seam == "none":
         nearest = distance_labels(reference, target)
         return replace(so_far, from_target=np.where(known == 0, nearest, known == 1))
-    cost, price = seam_cost(overlap, warp), target_price(overlap, so_far.hidden)
+    cost, price = seam_cost(overlap, warp), target_price(overlap, so_far.surely)
     from_target = find_seam(known, cost, price, overlap.box)
     return replace(so_far, from_target=from_target, known=known, cost=cost, price=price, box=overlap.box)

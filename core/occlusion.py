@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .light import around, bounds
 from .two_view import TwoView
 from .warp import Warp, cell_areas
 
@@ -21,6 +22,9 @@ BETWEEN = (0.25, 0.5, 0.75)
 # Where the map folds is known to blocks of the target, 2^BLOCK px wide and with their neighbours wider than any cell.
 BLOCK = 5
 STRIP = 2_000_000
+# Confidence of what both pictures show, and of what one shows alone; how far what is hidden may reach beyond what the
+# depth order tells of it, as a share of the target's longer side.
+AGREED, ALONE, BESIDE = 0.5, 0.3, 1 / 200
 # In place of -1, 0 or 1: see `turning`.
 NO_TURN = 2
 
@@ -65,6 +69,32 @@ def turning(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.int8]:
             area = cell_areas(strip.map_x, strip.map_y)
             counts = strip.inside(target_size)[:-1, :-1] & np.isfinite(area)
             out[top:bottom, :-1] = np.where(counts, np.sign(area), NO_TURN)
+    return out
+
+
+def by_agreement(
+    hidden: NDArray[np.bool_], warp: Warp, target_size: tuple[int, int], shown: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """What is hidden by the depth order (see `occluded`), put right by what dense refinement found in both pictures.
+
+    What both agree on both see; and beside what is hidden, what they agree on nowhere is hidden too: the rims that a
+    map draws are a few px off, and a band of background that the target does not see has no depth of its own.
+    shown (H, W): where the reference shows anything. Without dense refinement it stays what it was.
+    """
+    extent = bounds(hidden)
+    if warp.sureness is None or extent is None:
+        return hidden
+    reach = max(1, round(BESIDE * max(target_size)))
+    box = around(extent, reach, hidden.shape)
+    rows, columns = box
+    part = warp.within((columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start))
+    sure = np.asarray(warp.sureness[box])
+    kept = (hidden[box] & (sure <= AGREED)).astype(np.uint8)
+    alone = (shown[box] & part.inside(target_size) & (sure < ALONE)) | (kept > 0)
+    for _ in range(reach):
+        kept = cv2.dilate(kept, np.ones((3, 3), np.uint8)) & alone
+    out = hidden.copy()
+    out[box] = kept > 0
     return out
 
 

@@ -6,12 +6,20 @@ from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from edf_stitch.core import occlusion
 from edf_stitch.core.canvas import Canvas
 from edf_stitch.core.epipolar import homogeneous, infinite_homography
-from edf_stitch.core.occlusion import inverse_depth_in_target, occluded, turned_over, turning
+from edf_stitch.core.occlusion import (
+    BESIDE,
+    by_agreement,
+    inverse_depth_in_target,
+    occluded,
+    turned_over,
+    turning,
+)  # fmt: skip
 from edf_stitch.core.warp import Warp
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -193,3 +201,42 @@ def test_what_turns_over_is_found_and_nothing_else(
     assert found.sum() < 20 * 22
     outside = Warp(warp.canvas, x * 0 - 9, y, warp.inverse_depth)
     assert not turned_over(turning(outside, (350, 60))).any(), "outside the target"
+
+
+
+# --- put right by what both pictures agree on -----------------------------------------------------------------------
+
+
+def agreement() -> tuple[Warp, np.ndarray, np.ndarray, np.ndarray]:
+    """A warp, what its depth order hides, what really is hidden, and confidence: none where it is, full elsewhere."""
+    warp, hidden = SIDEWAYS.truth()
+    told = np.roll(hidden, 1, axis=1) & warp.inside(TARGET)
+    return warp, told, hidden, np.where(hidden, np.float32(0), np.float32(1))
+
+
+def test_rims_follow_what_both_pictures_agree_on() -> None:
+    warp, told, hidden, sure = agreement()
+    everywhere = np.ones(SHAPE, bool)
+    assert (told != hidden).sum() > 50
+    right = by_agreement(told, replace(warp, sureness=sure), TARGET, everywhere)
+    assert np.array_equal(right, hidden)
+    assert np.array_equal(told, agreement()[1]), "what was given stays as it is"
+
+
+def test_without_dense_refinement_the_depth_order_has_the_last_word() -> None:
+    warp, told, _, _ = agreement()
+    assert np.array_equal(by_agreement(told, warp, TARGET, np.ones(SHAPE, bool)), told)
+
+
+def test_doubt_alone_hides_nothing() -> None:
+    """A bare wall is agreed on nowhere: it is hidden only close by what the depth order hides, and where the reference
+    shows it."""
+    warp, told, hidden, _ = agreement()
+    unsure, everywhere = replace(warp, sureness=np.zeros(SHAPE, np.float32)), np.ones(SHAPE, bool)
+    out = by_agreement(told, unsure, TARGET, everywhere)
+    reach = round(BESIDE * max(TARGET))
+    near = cv2.dilate(told.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0
+    assert (out & ~told).any() and not (out & ~near).any() and not (out & ~warp.inside(TARGET)).any()
+    assert np.array_equal(by_agreement(told, unsure, TARGET, ~everywhere), told), "beyond the reference: nothing"
+    nothing = np.zeros(SHAPE, bool)
+    assert not by_agreement(nothing, unsure, TARGET, everywhere).any()
