@@ -140,10 +140,10 @@ def in_bands(reference: Layer, target: Layer, from_target: NDArray[np.bool_], ov
     if region is None or overlap is None:
         return out
     shown = out.alpha[region] > 0
-    change = correction(
-        _on_region(overlap.difference, overlap.box, region), _on_region(overlap.same, overlap.box, region),
-        from_target[region], shown, bands,
-    )  # fmt: skip
+    parts = [_on_region(values, overlap.box, region) for values in (overlap.difference, overlap.same)]
+    del overlap  # as large as they are: the peak of memory is ahead
+    same = parts.pop()
+    change = correction(parts.pop(), same, from_target[region], shown, bands)
     touched = change.any(axis=2) & shown
     return Layer(Evened(out.light, (region[0].start, region[1].start), change, touched), out.alpha)
 

@@ -114,7 +114,9 @@ def composed(
         # the frames of a clip need not show the same everywhere
         side = (rolled(found.from_target, roll) & (seen.alpha > 0)) | (reference.alpha == 0)
         blended = in_bands if options.blend == "multiband" else feathered_across
-        out = blended(reference, seen, side, overlap)
+        # handed over, not kept: the bands need the room
+        handed, overlap = [overlap], None
+        out = blended(reference, seen, side, handed.pop())
     out = rolled_layer(out, -roll)
     return inpainted(out, holes, warp.inverse_depth) if options.holes == "inpaint" else out, target, found
 

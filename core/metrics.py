@@ -15,7 +15,7 @@ from .colour import encode
 from .epipolar import Array, distance_to_line
 from .images import Picture
 from .lens import undistort
-from .light import bounds
+from .light import AnyLight, Part, bounds, strips
 from .occlusion import NO_TURN
 from .tone import to_tones
 from .warp import Layer, Warp, fetch
@@ -126,18 +126,34 @@ def appearance(
     if box is None:
         return {"source_fidelity_mean": math.nan, "source_fidelity_p5": math.nan, "seam_visibility": math.nan}
     # what else is there may be missing for want of room in 8 bit: light beyond white is looked at as tones
-    levels = [
-        np.float32(255) * to_tones(part.light[box]) if any(floats) else encode(part.light[box], 8).astype(np.float32)
-        for part in (panorama, reference, target)
-    ]
+    levels = [_levels(part.light, box, any(floats)) for part in (panorama, reference, target)]
     both = ((reference.alpha > 0) & (target.alpha > 0))[box]
-    whole, first, second = (_gray(part) for part in levels)
+    whole, first, second = (_gray_levels(part) for part in levels)
     fidelity = np.maximum(_similarity(whole, first), _similarity(whole, second))[both]
     seam = math.nan if from_target is None else _seam_visibility(levels, from_target[box], both)
     return {
         "source_fidelity_mean": float(fidelity.mean(dtype=np.float64)),
         "source_fidelity_p5": float(np.percentile(fidelity, 5)), "seam_visibility": seam,
     }  # fmt: skip
+
+
+def _levels(light: AnyLight, box: Part, floats: bool) -> NDArray:
+    """Levels (h, w, C) of a part: uint8, or float32 on the same scale."""
+    rows, columns = box
+    shape = (rows.stop - rows.start, columns.stop - columns.start, light.shape[2])
+    out = np.empty(shape, np.float32 if floats else np.uint8)
+    for strip in strips(shape):
+        part = light[rows.start + strip.start : rows.start + strip.stop, columns]
+        out[strip] = np.float32(255) * to_tones(part) if floats else encode(part, 8)
+    return out
+
+
+def _gray_levels(levels: NDArray) -> NDArray[np.float32]:
+    """Levels (h, w, C) in gray (h, w), not rounded."""
+    out = np.empty(levels.shape[:2], np.float32)
+    for strip in strips(levels.shape):
+        out[strip] = _gray(levels[strip].astype(np.float32))
+    return out
 
 
 def _similarity(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray:
@@ -152,12 +168,12 @@ def _similarity(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray:
 
 
 def _seam_visibility(
-    levels: list[NDArray[np.float32]], from_target: NDArray[np.bool_], both: NDArray[np.bool_]
+    levels: list[NDArray], from_target: NDArray[np.bool_], both: NDArray[np.bool_]
 ) -> float:
     beyond = []
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         across = (from_target[here] != from_target[there]) & both[here] & both[there]
-        steps = [part[here][across] - part[there][across] for part in levels]
+        steps = [part[here][across].astype(np.float32) - part[there][across] for part in levels]
         beyond.append(np.minimum(*(np.abs(steps[0] - step).mean(axis=1) for step in steps[1:])))
     every = np.concatenate(beyond)
     return float(every.mean(dtype=np.float64)) if every.size else math.nan

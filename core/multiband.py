@@ -35,10 +35,11 @@ def correction(
     """What is to be added to the tones (h, w, C) of pictures cut hard along a seam, so that they blend.
 
     difference (h, w, C): target's tones less the reference's, where `same`; from_target (h, w): which side of the seam
-    a pixel lies on, where anything is `shown`.
+    a pixel lies on, where anything is `shown`. The difference is written over.
     """
     # on the far side of the seam: what the picture of this side would show there, had it the other's light
-    light = filled(difference, same)
+    difference *= same[..., None]
+    light = _filled(difference, same.astype(np.float32))
     del difference  # as large as the overlap: the peak of memory is here
     # a pixel's width to either side, or else the finest band is cut with a pair of scissors
     share = cv2.blur(_from_nearest(from_target, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
@@ -97,7 +98,8 @@ def _masked_bands(light: NDArray[np.float32], share: NDArray[np.float32], bands:
     if bands == 0 or min(light.shape[:2]) <= 2:
         return light * share
     coarser, smooth = _down(light), _down(share)
-    band = light - _up(coarser, light.shape[:2])
+    band = _up(coarser, light.shape[:2])
+    np.subtract(light, band, out=band)
     band *= share
     band += _up(_masked_bands(coarser, smooth, bands - 1), light.shape[:2])
     return band
