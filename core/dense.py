@@ -21,7 +21,7 @@ from .features import Matches
 from .images import Picture
 from .line_map import Lines, Plane, SparseMap
 from .line_search import View, search, search_base
-from .polish import polish
+from .polish import likeness, polish
 from .relief import MOST_FADE, Relief, raised
 from .slack import SlackField
 from .two_view import TwoView
@@ -32,13 +32,13 @@ from .warp import REMAP_LIMIT, fetch
 SEARCHED, POLISHED = 1.5e6, 3e6
 # Search range in px of what is searched: at least, at most.
 LEAST_REACH, MOST_REACH = 24.0, 96.0
-# Gray levels across an edge; strength of the first smoothing; what the field itself counts beside a found pixel.
+# Gray levels across an edge; strength of the first smoothing; what the field, or a guess, counts beside a found pixel.
 EDGE, FIRST_SMOOTHNESS, FIELD_SHARE = 4.0, 5.0, 1e-2
 # px between neighbours that are a depth edge
 JUMP = 0.3
 # Squared gradient along the line (gray levels per px) of half a texture; how much more neighbours without any hold
-# together, and how little they count.
-TEXTURE, TIE, PLAIN_DOUBT = 1.0, 15.0, 0.9
+# together, and how little they count, unless both pictures look alike there: noise does not, a soft surface does.
+TEXTURE, TIE, PLAIN_DOUBT = 1.0, 15.0, 0.99
 # Nodes, a side, that say where the overlap is; overlaps with fewer pixels a side are left alone.
 LOOK, LEAST_SIDE = 64, 32
 
@@ -86,20 +86,22 @@ def refine(
     field_at = (lines.at(sparse) - lines.inverse_depth) / lines.moved
     coarse_views, views = ([View.of(p.view, p.alpha, s) for p in pictures] for s in (step, fine))
     along, found = search(lines, base, coarse_views[0], coarse_views[1], step, reach)
+    along = np.where(found > 0, along, field_at)
+    alike = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
+    plain = _plain(lines, sparse, views[0]) * (1 - alike)
     weights = edge_weights(_guide(pictures[0].view, lines), EDGE)
-    plain = _plain(lines, sparse, views[0])
-    weights = tied(broken(weights, along, found, JUMP), plain, TIE)
+    weights = tied(broken(weights, along, found > 0, JUMP), plain, TIE)
     share = np.maximum(found * (1 - np.float32(PLAIN_DOUBT) * plain), np.float32(FIELD_SHARE))
-    along = smoothed(np.where(found, along, field_at), share, weights, FIRST_SMOOTHNESS)
-    polished = polish(lines, views[0], views[1], along, weights, slack)
-    confidence = np.clip(polished.likeness, 0, 1) * cv2.blur(found.astype(np.float32), (9, 9))
+    along = smoothed(along, share, weights, FIRST_SMOOTHNESS)
+    polished = polish(lines, views[0], views[1], along, np.maximum(found, np.float32(FIELD_SHARE)), weights, slack)
+    confidence = np.clip(polished.likeness, 0, 1) * cv2.blur((found > 0).astype(np.float32), (9, 9))
     there = _there(lines, polished.along, polished.across, pictures)
     if not there.any():
         return Dense(None, "the overlap is too small")
     along = unfolded(lines, two_view, cameras[1].size, polished.along, polished.across) - field_at
     relief = raised(lines, base, along, polished.across, confidence, there)
     moved, across = (float(np.sqrt(np.square(v[there]).mean())) for v in (along, polished.across))
-    return Dense(relief, "", reach, float(found[there].mean()), moved, across)
+    return Dense(relief, "", reach, float((found[there] > 0).mean()), moved, across)
 
 
 def _overlap(sparse: SparseMap, target_size: tuple[int, int]) -> Box | None:

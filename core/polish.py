@@ -40,10 +40,14 @@ class Polished:
 
 
 def polish(
-    lines: Lines, reference: View, target: View, along: Plane,
+    lines: Lines, reference: View, target: View, along: Plane, known: Plane,
     weights: tuple[NDArray[np.float32], NDArray[np.float32]], slack: bool,
 ) -> Polished:  # fmt: skip
-    """Starts at moves `along` (h, w) px. weights: see `edge_weights`; slack: whether the lines may be left."""
+    """Starts at moves `along` (h, w) px.
+
+    known (h, w) 0..1: how well, so that guesses do not pull at what was found; weights: see `edge_weights`; slack:
+    whether the lines may be left.
+    """
     across = np.zeros_like(along)
     start = along
     nodes = lines.nodes
@@ -64,16 +68,21 @@ def polish(
             slope = gx * lines.direction[..., 0] + gy * lines.direction[..., 1]
             evidence, wanted = _mean(trust * slope * slope, WINDOW), _mean(trust * slope * left, WINDOW)
             step = (wanted + np.float32(BELIEF) * (start - along)) / (evidence + np.float32(BELIEF + 1))
-            share = (evidence + np.float32(LEAST_BELIEF)) / (evidence + np.float32(LITTLE_EVIDENCE))
+            share = (evidence + np.float32(LEAST_BELIEF)) / (evidence + np.float32(LITTLE_EVIDENCE)) * known
             along = smoothed(along + np.clip(step, -1, 1), share, weights, SMOOTHNESS, floor=1e-4)
             if slack:
                 slope = gy * lines.direction[..., 0] - gx * lines.direction[..., 1]
                 across = across + _smooth_step(trust * slope * left, trust * slope * slope, lines.step)
-    first, shown = reference.sample(reference.gray, *nodes)
+    return Polished(along, across, likeness(lines, reference, target, along, across), share)
+
+
+def likeness(lines: Lines, reference: View, target: View, along: Plane, across: Plane | None = None) -> Plane:
+    """Correlation (h, w) of the two pictures around each node after moves along and across its line, 0 where the target
+    shows nothing."""
+    first, shown = reference.sample(reference.gray, *lines.nodes)
     fetched, inside = target.sample(target.gray, *lines.target(along, across))
     there = (inside & shown).astype(np.float32)
-    _, _, _, likeness = _alike(first, fetched, there)
-    return Polished(along, across, likeness * there, share)
+    return _alike(first, fetched, there)[3] * there
 
 
 def _mean(values: Plane, side: int) -> Plane:

@@ -11,7 +11,7 @@ import pytest
 from edf_stitch.core.displacement import target_points
 from edf_stitch.core.features import Matches
 from edf_stitch.core.line_map import SparseMap
-from edf_stitch.core.line_search import View, in_tones_of, search, search_base
+from edf_stitch.core.line_search import COARSE_SHARE, View, in_tones_of, search, search_base
 
 from .line_scenes import MARGIN, MOTIONS, SIZE, Field, Scene, scene
 
@@ -59,6 +59,8 @@ def test_tones_follow_the_curve_between_the_pictures() -> None:
     found = in_tones_of(first, second, both)
     assert np.abs(found - first)[both].max() < 6 and np.median(np.abs(found - first)[both]) < 1
     assert in_tones_of(first, second, np.zeros(first.shape, bool)) is second
+    coloured = in_tones_of(np.stack([first, 255 - first], -1), np.stack([second, 255 - second], -1), both)
+    assert np.array_equal(coloured[..., 0], found) and np.median(np.abs(coloured[..., 1] - 255 + first)[both]) < 1
 
 
 # --- the search -----------------------------------------------------------------------------------------------------
@@ -69,9 +71,9 @@ def searched(pair: Scene, step: float = 1.0, target: View | None = None) -> tupl
     field = pair.field()
     lines = pair.lines(field)
     views = pair.views(step)
-    along, found = search(lines, field, views[0], target or views[1], step, REACH)
-    assert along.shape == found.shape == lines.shape and not along[~found].any()
-    return along - pair.truth(lines), found, pair.visible(lines)
+    along, counts = search(lines, field, views[0], target or views[1], step, REACH)
+    assert along.shape == counts.shape == lines.shape and not along[counts == 0].any()
+    return along - pair.truth(lines), counts == 1, pair.visible(lines)
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
@@ -95,6 +97,42 @@ def test_another_exposure_changes_little() -> None:
     assert np.median(np.abs(off_dark[found_dark & visible])) < np.median(np.abs(off[found & visible])) + 0.1
 
 
+def test_colours_tell_what_gray_does_not() -> None:
+    """A picture whose gray is the same everywhere: red against green."""
+    pair = scene("sideways")
+    field = pair.field()
+    lines = pair.lines(field)
+
+    def isoluminant(picture: np.ndarray) -> np.ndarray:
+        red = picture[..., 0].astype(np.float32)
+        return np.rint(np.stack([red, (140 - 0.299 * red) / 0.587, np.full_like(red, 40)], axis=-1)).astype(np.uint8)
+
+    views = tuple(View.of(isoluminant(picture), None, 1.0) for picture in (pair.reference, pair.target))
+    assert views[0].gray.std() < 1.0
+    along, counts = search(lines, field, *views, 1.0, REACH)
+    good = (counts == 1) & pair.visible(lines)
+    assert good.mean() > 0.4 and (np.abs(along - pair.truth(lines))[good] < 1).mean() > 0.9
+
+
+def test_a_gray_picture_is_sought_in_a_coloured_one() -> None:
+    pair = scene("sideways")
+    gray = cv2.cvtColor(pair.target, cv2.COLOR_RGB2GRAY)[..., None]
+    off, found, visible = searched(pair, target=View.of(gray, None, 1.0))
+    assert found[visible].mean() > 0.5 and (np.abs(off[found & visible]) < 1).mean() > 0.9
+
+
+def test_what_noise_hides_at_full_size_is_found_at_half_and_counts_less() -> None:
+    pair = scene("sideways")
+    field = pair.field()
+    lines = pair.lines(field)
+    rng = np.random.default_rng(3)
+    noisy = (np.clip(p + rng.normal(0, 25, p.shape), 0, 255).astype(np.uint8) for p in (pair.reference, pair.target))
+    along, counts = search(lines, field, *(View.of(p, None, 1.0) for p in noisy), 1.0, REACH)
+    guessed = (counts > 0) & (counts < 1) & pair.visible(lines)
+    assert guessed.mean() > 0.05 and np.allclose(counts[guessed], COARSE_SHARE)
+    assert (np.abs(along - pair.truth(lines))[guessed] < 3).mean() > 0.6
+
+
 def test_what_a_picture_does_not_show_is_not_found() -> None:
     """Transparent: the target's left half, and a corner of the reference."""
     pair = scene("sideways")
@@ -104,7 +142,8 @@ def test_what_a_picture_does_not_show_is_not_found() -> None:
     first[:60, -60:] = 0
     second[:, :100] = 0
     views = View.of(pair.reference, first, 1.0), View.of(pair.target, second, 1.0)
-    along, found = search(lines, field, *views, 1.0, REACH)
+    along, counts = search(lines, field, *views, 1.0, REACH)
+    found = counts > 0
     x, _ = lines.target(along)
     assert found.mean() > 0.1 and not found[:60, -60:].any()
     assert x[found].min() > 98.5
@@ -117,9 +156,11 @@ def test_no_further_than_it_is_told() -> None:
     )  # some fifty px off everywhere
     lines = pair.lines(field)
     right = np.abs(pair.truth(lines))
-    along, found = search(lines, field, *pair.views(), 1.0, 8.0)
+    along, counts = search(lines, field, *pair.views(), 1.0, 8.0)
+    found = counts > 0
     assert np.median(right) > 25 and np.abs(along).max() < 12
-    far, found_far = search(lines, field, *pair.views(), 1.0, 64.0)
+    far, counts_far = search(lines, field, *pair.views(), 1.0, 64.0)
+    found_far = counts_far > 0
     good = np.abs(far - pair.truth(lines)) < 1
     assert (good & found_far).mean() > 0.2 and (found & (np.abs(along - pair.truth(lines)) < 1)).mean() < 0.02
 

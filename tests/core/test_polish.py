@@ -30,7 +30,8 @@ def polished(
 ) -> Polished:
     guide = cv2.resize(pair.reference, lines.shape[::-1], interpolation=cv2.INTER_AREA)
     weights = edge_weights(cv2.GaussianBlur(guide, (0, 0), 1.0).astype(np.float32), 4.0)
-    return polish(lines, *(views or pair.views(lines.step)), along, weights, slack)
+    known = np.ones(lines.shape, np.float32)
+    return polish(lines, *(views or pair.views(lines.step)), along, known, weights, slack)
 
 
 def inner(pair: Scene, lines: Lines) -> np.ndarray:
@@ -150,3 +151,17 @@ def test_where_there_is_nothing_to_see_the_search_is_believed() -> None:
     middle = np.s_[65:85, 95:115]
     assert np.abs(found.along - start)[middle].max() < 0.3
     assert found.evidence[middle].max() < np.percentile(found.evidence[~patch & pair.visible(lines)], 20)
+
+
+def test_guesses_do_not_pull_at_what_was_found() -> None:
+    """A wrong guess beside a right place, in gray that says nothing of its own and holds together."""
+    pair = scene("sideways")
+    lines = pair.lines(pair.field())
+    blank = View.of(np.full_like(pair.reference, 128), None, 1.0)
+    start = np.zeros(lines.shape, np.float32)
+    start[:, 100:] = 4.0
+    known = np.where(start > 0, np.float32(0.01), np.float32(1))
+    weights = np.full((SIZE[1], SIZE[0] - 1), 30, np.float32), np.full((SIZE[1] - 1, SIZE[0]), 30, np.float32)
+    even, told = (polish(lines, blank, blank, start, k, weights, False).along for k in (np.ones_like(known), known))
+    near = np.s_[20:130, 92:98]
+    assert even[near].mean() > 0.3 and told[near].mean() < 0.2 * even[near].mean()
