@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import AnyLight, Light, Part, bounds, meet, within
+from .light import AnyLight, Light, Part, Retouched, bounds, within
 from .multiband import bands_for, correction
 from .overlap import Overlap, distance_inside, distance_to_border
 from .tone import to_light, to_tones
@@ -145,40 +145,22 @@ def in_bands(reference: Layer, target: Layer, from_target: NDArray[np.bool_], ov
     same = parts.pop()
     change = correction(parts.pop(), same, from_target[region], shown, bands)
     touched = change.any(axis=2) & shown
-    return Layer(Evened(out.light, (region[0].start, region[1].start), change, touched), out.alpha)
+    return Layer(Evened(out.light, (region[0].start, region[1].start), touched, change), out.alpha)
 
 
 @dataclass(frozen=True, eq=False)
-class Evened(Light):
-    """Light with a change (h, w, C) of its tones from `at` (row, column) on, where touched (h, w)."""
+class Evened(Retouched):
+    """Light with a change (h, w, C) of the tones of the pixels that are touched."""
 
-    light: AnyLight
-    at: tuple[int, int]
     change: NDArray[np.float32]
-    touched: NDArray[np.bool_]
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(H, W, C)."""
-        return self.light.shape
-
-    def __getitem__(self, part: Part) -> NDArray[np.float32]:
-        out = self.light[part]
-        meeting = meet(part, self.shape, self.at, self.change.shape)
-        if meeting is None:
-            return out
-        here, there = meeting
-        touched = self.touched[there]
-        if not touched.any():
-            return out
-        out = out.copy()
-        before = out[here][touched]
+    def anew(self, before: NDArray[np.float32], there: Part) -> NDArray[np.float32]:
+        """See `Retouched`."""
         tones = to_tones(before)
         # what brighter neighbours differ by is too much for the dark: it stays dark, and no light turns negative
         most = HALF * np.abs(tones) + DARK
-        after = to_light(tones + np.clip(self.change[there][touched], -most, most))
-        out[here][touched] = np.maximum(after, np.minimum(before, 0))
-        return out
+        after = to_light(tones + np.clip(self.change[there][self.touched[there]], -most, most))
+        return np.maximum(after, np.minimum(before, 0))
 
 
 def seam_region(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .around import roll_for, rolled, rolled_layer, rolled_maps
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
 from .exposure import BLOCK, Exposure, match_exposure, pooled, unchanged
-from .inpaint import inpainted
+from .inpaint import holes_of, inpainted
 from .light import Weighed, around, bounds
 from .metrics import folds
 from .occlusion import by_agreement, occluded, turned_over, turning
@@ -58,9 +58,8 @@ def composed(
     """The panorama, the target's layer as it was exposed for it, and what was decided.
 
     What neither picture shows is transparent, and so is what only a target that cannot see it would show, unless it is
-    to be inpainted. floats: whether
-    reference and target come from float pictures; painted (H, W): see `masks.read_painted`; decided: from other frames
-    of the same two cameras, kept to.
+    to be inpainted. floats: whether reference and target come from float pictures; painted (H, W): see
+    `masks.read_painted`; decided: from other frames of the same two cameras, kept to.
     """
     steps("occlusion", 0.0)
     if decided:
@@ -93,7 +92,7 @@ def composed(
         found = Decided(hidden, surely, exposure, folds=folded)
         steps("blend", 0.0)
         return averaged(reference, target), target, found
-    holes = hidden & (reference.alpha == 0) & (target.alpha > 0)
+    holes = holes_of(hidden, reference, target)
     seen = _without(target, holes) if holes.any() else target
     roll = decided.roll if decided else roll_for(warp.canvas, reference, seen)
     reference, seen, surely_there = rolled_layer(reference, roll), rolled_layer(seen, roll), rolled(surely, roll)
@@ -118,7 +117,7 @@ def composed(
         handed, overlap = [overlap], None
         out = blended(reference, seen, side, handed.pop())
     out = rolled_layer(out, -roll)
-    return inpainted(out, holes, warp.inverse_depth) if options.holes == "inpaint" else out, target, found
+    return inpainted(out, holes, warp.depth) if options.holes == "inpaint" else out, target, found
 
 
 def pooled_decision(decisions: Sequence[Decided]) -> Decided:

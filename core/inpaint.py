@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .blend import copied_where
-from .light import AnyLight, Light, Part, around, bounds, meet
+from .light import AnyLight, Part, Retouched, around, bounds
 from .multiband import filled
 from .tone import to_light, to_tones
 from .warp import Layer
@@ -17,6 +16,12 @@ from .warp import Layer
 HOLES = ("transparent", "inpaint")
 # Pixels around a hole that it is filled from, and what the near ones among them count beside the far ones.
 REACH, NEAR = 12, 1e-3
+
+
+def holes_of(hidden: NDArray[np.bool_], reference: Layer, target: Layer) -> NDArray[np.bool_]:
+    """Where (H, W) neither camera saw anything: what is hidden (H, W) from the target's, and the reference's did not
+    look there."""
+    return hidden & (reference.alpha == 0) & (target.alpha > 0)
 
 
 def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyLight) -> Layer:
@@ -32,12 +37,12 @@ def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyLight
     missing = holes[box]
     rim = cv2.dilate(missing.astype(np.uint8), np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8)) > 0
     beside = rim & ~missing & (panorama.alpha[box] > 0)
-    weight = beside * np.where(_far(np.asarray(inverse_depth[box]), missing, beside), np.float32(1), np.float32(NEAR))
+    weight = beside * np.where(_far(inverse_depth[box], missing, beside), np.float32(1), np.float32(NEAR))
     tones = filled(to_tones(panorama.light[box]), weight)
     at = box[0].start, box[1].start
     alpha = panorama.alpha.copy()
     alpha[box][missing] = 1
-    return Layer(Patched(panorama.light, at, to_light(tones), missing), alpha)
+    return Layer(Patched(panorama.light, at, missing, to_light(tones)), alpha)
 
 
 def _far(inverse_depth: NDArray, missing: NDArray[np.bool_], beside: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -50,27 +55,11 @@ def _far(inverse_depth: NDArray, missing: NDArray[np.bool_], beside: NDArray[np.
 
 
 @dataclass(frozen=True, eq=False)
-class Patched(Light):
-    """Light with other pixels (h, w, C) from `at` (row, column) on, where a mask (h, w) says so."""
+class Patched(Retouched):
+    """Light with the pixels of a patch (h, w, C) in place of those that are touched."""
 
-    light: AnyLight
-    at: tuple[int, int]
     patch: NDArray[np.float32]
-    mask: NDArray[np.bool_]
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(H, W, C)."""
-        return self.light.shape
-
-    def __getitem__(self, part: Part) -> NDArray[np.float32]:
-        out = self.light[part]
-        meeting = meet(part, self.shape, self.at, self.patch.shape)
-        if meeting is None or not self.mask[meeting[1]].any():
-            return out
-        out = out.copy()
-        here, there = meeting
-        inner = np.ascontiguousarray(out[here])
-        copied_where(self.mask[there], np.ascontiguousarray(self.patch[there]), inner)
-        out[here] = inner
-        return out
+    def anew(self, before: NDArray[np.float32], there: Part) -> NDArray[np.float32]:
+        """See `Retouched`."""
+        return self.patch[there][self.touched[there]]

@@ -169,6 +169,37 @@ class Placed(Light):
 
 
 @dataclass(frozen=True, eq=False)
+class Retouched(Light):
+    """Light of which some pixels are made anew: those touched (h, w), from `at` (row, column) on."""
+
+    light: AnyLight
+    at: tuple[int, int]
+    touched: NDArray[np.bool_]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.light.shape
+
+    @abstractmethod
+    def anew(self, before: NDArray[np.float32], there: Part) -> NDArray[np.float32]:
+        """The touched pixels (n, C) of rows and columns of `touched`, row by row; before (n, C): what they were."""
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        out = self.light[part]
+        meeting = meet(part, self.shape, self.at, self.touched.shape)
+        if meeting is None:
+            return out
+        here, there = meeting
+        touched = self.touched[there]
+        if not touched.any():
+            return out
+        out = out.copy()
+        out[here][touched] = self.anew(out[here][touched], there)
+        return out
+
+
+@dataclass(frozen=True, eq=False)
 class Held(Light):
     """Light of which a part, from `at` (row, column) on, is kept as an array, for it is asked for more than once."""
 

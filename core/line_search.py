@@ -91,7 +91,7 @@ def search_base(sparse: SparseMap, matches: Matches, plane: Array, most: float) 
 
 def search(
     lines: Lines, sparse: SparseMap, reference: View, target: View, step: float, reach: float
-) -> tuple[Plane, Plane]:  # fmt: skip
+) -> tuple[Plane, Plane]:
     """Moves (h, w) px along the lines to where the nodes are seen in the target, and how much (h, w) 0..1 each counts:
     0 where nothing was found, 1 where it was at full size, COARSE_SHARE where only at half.
 
@@ -144,7 +144,7 @@ def _levels(values: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 def _matched(
     a: NDArray[np.uint8], b: NDArray[np.uint8], count: int, smoother: int = 1
-) -> tuple[Plane, NDArray[np.bool_]]:  # fmt: skip
+) -> tuple[Plane, NDArray[np.bool_]]:
     """Columns (h, w) by which what a (h, w[, C]) shows lies further left in b, between −count/2 and count/2, and where
     that is sure; smoother: how many times the usual a step costs."""
     least = -count // 2

@@ -19,6 +19,7 @@ from .displacement import Field
 from .errors import NoOverlap
 from .features import Matches
 from .images import Picture, in_same_colour_space, load_picture, picture_from_array
+from .inpaint import holes_of
 from .masks import painted_over
 from .metrics import appearance
 from .options import StitchOptions
@@ -114,7 +115,7 @@ class StitchResult:
         asked = self.report["options"]
         if asked["holes"] != "inpaint" or asked["blend"] == "linear":
             return np.zeros(self.occluded.shape, bool)
-        return self.occluded & (self.reference_layer.alpha == 0) & (self.target_layer.alpha > 0)
+        return holes_of(self.occluded, self.reference_layer, self.target_layer)
 
     @property
     def bits(self) -> int:

@@ -52,8 +52,7 @@ def make_report(
         "options": {
             "field": options.field, "fade": options.fade, "dense": options.dense, "projection": options.projection,
             "level": options.level, "scale": options.scale, "crop": options.crop, "blend": options.blend,
-            "seam": options.seam, "exposure": options.exposure, "holes": options.holes,
-            "seed": options.seed,
+            "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
         },
         "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
         "two_view": {

@@ -7,6 +7,7 @@ import pytest
 from edf_stitch.core.blend import Cut, Evened, Mixed
 from edf_stitch.core.colour import decode, srgb_curve
 from edf_stitch.core.exposure import Exposed
+from edf_stitch.core.inpaint import Patched
 from edf_stitch.core.light import AnyLight, Coded, Held, Placed, Weighed, around, extent, meet, whole, within
 from edf_stitch.core.warp import Layer
 from hypothesis import given
@@ -39,7 +40,8 @@ def kinds(channels: int) -> dict[str, AnyLight]:
         "beyond": Placed(numbers(40, 12, channels), (-5, 25), (H, W)),
         "mixed": Mixed(layer(), layer(), np.clip(numbers(H, W), 0, 1)),
         "cut": Cut(light, other, numbers(H, W) > 0.5),
-        "evened": Evened(light, (6, 8), change, change.any(axis=2)),
+        "evened": Evened(light, (6, 8), change.any(axis=2), change),
+        "patched": Patched(light, (6, 8), numbers(9, 17) > 0.5, change),
     }  # fmt: skip
 
 
@@ -67,6 +69,10 @@ def test_what_each_kind_is() -> None:
     changed[6:15, 8:25] = evened.touched
     differs = (whole(evened) != evened.light).any(axis=2)
     assert not (differs & ~changed).any() and differs[changed].mean() > 0.9
+    patched = made["patched"]
+    frame = patched.light.copy()
+    frame[6:15, 8:25][patched.touched] = patched.patch[patched.touched]
+    assert np.array_equal(whole(patched), frame)
     first, second = mixed.first, mixed.second
     alone = (first.alpha > 0) & (second.alpha == 0)
     assert np.array_equal(whole(mixed)[alone], first.light[alone])
