@@ -94,7 +94,7 @@ def refine(
     share = np.maximum(found * (1 - np.float32(PLAIN_DOUBT) * plain), np.float32(FIELD_SHARE))
     along = smoothed(along, share, weights, FIRST_SMOOTHNESS)
     polished = polish(lines, views[0], views[1], along, np.maximum(found, np.float32(FIELD_SHARE)), weights, slack)
-    confidence = np.clip(polished.likeness, 0, 1) * cv2.blur((found > 0).astype(np.float32), (9, 9))
+    confidence = np.clip(polished.likeness, 0, 1) * cv2.blur(found, (9, 9))
     there = _there(lines, polished.along, polished.across, pictures)
     if not there.any():
         return Dense(None, "the overlap is too small")
