@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .light import around, bounds
+from .overlap import of_consequence
 from .two_view import TwoView
 from .warp import Warp, cell_areas
 
@@ -78,7 +79,8 @@ def by_agreement(
     """What is hidden by the depth order (see `occluded`), put right by what dense refinement found in both pictures.
 
     What both agree on both see; and beside what is hidden, what they agree on nowhere is hidden too: the rims that a
-    map draws are a few px off, and a band of background that the target does not see has no depth of its own.
+    map draws are a few px off, and a band of background that the target does not see has no depth of its own. A speck
+    is noise, and nothing lies beside it.
     shown (H, W): where the reference shows anything. Without dense refinement it stays what it was.
     """
     extent = bounds(hidden)
@@ -89,12 +91,13 @@ def by_agreement(
     rows, columns = box
     part = warp.within((columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start))
     sure = np.asarray(warp.sureness[box])
-    kept = (hidden[box] & (sure <= AGREED)).astype(np.uint8)
-    alone = (shown[box] & part.inside(target_size) & (sure < ALONE)) | (kept > 0)
+    kept = hidden[box] & (sure <= AGREED)
+    alone = (shown[box] & part.inside(target_size) & (sure < ALONE)) | kept
+    grown = of_consequence(kept).astype(np.uint8)
     for _ in range(reach):
-        kept = cv2.dilate(kept, np.ones((3, 3), np.uint8)) & alone
+        grown = cv2.dilate(grown, np.ones((3, 3), np.uint8)) & alone
     out = hidden.copy()
-    out[box] = kept > 0
+    out[box] = kept | (grown > 0)
     return out
 
 

@@ -228,6 +228,16 @@ def test_without_dense_refinement_the_depth_order_has_the_last_word() -> None:
     assert np.array_equal(by_agreement(told, warp, TARGET, np.ones(SHAPE, bool)), told)
 
 
+def test_nothing_lies_beside_a_speck() -> None:
+    """Noise on a bare wall turns a few pixels over: they stay what they are."""
+    warp, _, _, _ = agreement()
+    speck = np.zeros(SHAPE, bool)
+    speck[SHAPE[0] // 2, SHAPE[1] // 2 : SHAPE[1] // 2 + 3] = True
+    unsure, everywhere = replace(warp, sureness=np.zeros(SHAPE, np.float32)), np.ones(SHAPE, bool)
+    assert warp.inside(TARGET)[speck].all()
+    assert np.array_equal(by_agreement(speck, unsure, TARGET, everywhere), speck)
+
+
 def test_doubt_alone_hides_nothing() -> None:
     """A bare wall is agreed on nowhere: it is hidden only close by what the depth order hides, and where the reference
     shows it."""
