@@ -18,13 +18,14 @@ from .occlusion import occluded
 from .two_view import TwoView
 from .warp import Warp, jacobian
 
-# How often occlusion is looked at, and how often moves are smoothed each time.
-LOOKS, SMOOTHINGS = 2, 10
-# px over which they are smoothed at first; what does not help is done more widely
-LEAST_SIGMA = 1.5
+# How often occlusion is looked at, and how often moves are smoothed each time: by medians, which leave what is right as
+# it is, then by means, which end what is left.
+LOOKS, MEDIANS, MEANS = 2, 4, 4
+# Nodes, a side, of a median; px of a mean at first: what does not help is done more widely.
+MEDIAN, LEAST_SIGMA = 5, 1.5
 # More px than noise moves a node by: smoothing that would move any of a patch further has met the edge of a near thing
 # whose rim was not told, and the patch stays as it was.
-MOST_MOVED = 6.0
+MOST_MOVED = 8.0
 # The area (share of the usual) that is left at a place not folded; px around what is occluded that are left alone.
 LEAST_TURN, RIM = 0.1, 5
 
@@ -35,14 +36,15 @@ def unfolded(lines: Lines, two_view: TwoView, target_size: tuple[int, int], alon
     for _ in range(LOOKS):
         start = along
         keep = cv2.dilate(_hidden(lines, two_view, target_size, along, across).astype(np.uint8), around) > 0
-        for number in range(SMOOTHINGS):
+        for number in range(MEDIANS + MEANS):
             folded = _turns_over(*lines.target(along, across)) & ~keep
             if not folded.any():
                 break
-            sigma = LEAST_SIGMA * 2 ** (number / 6)
-            reach = np.ones((2 * int(sigma) + 3,) * 2, np.uint8)
+            sigma = LEAST_SIGMA * 2 ** (max(0, number - MEDIANS) / 6)
+            reach = np.ones((2 * int(sigma) + 1,) * 2, np.uint8)
             near = (cv2.dilate(folded.astype(np.uint8), reach) > 0) & ~keep
-            along = np.where(near, cv2.GaussianBlur(along, (0, 0), sigma), along)
+            smooth = cv2.medianBlur(along, MEDIAN) if number < MEDIANS else cv2.GaussianBlur(along, (0, 0), sigma)
+            along = np.where(near, smooth, along)
         along = _where_little_moved(along, start)
     return along
 

@@ -65,6 +65,19 @@ def test_noise_that_turns_the_map_over_is_smoothed_and_nothing_else(made: tuple[
     assert np.abs(found).max() <= np.abs(along).max()
 
 
+def test_what_is_right_beside_a_wrong_node_keeps_its_place(made: tuple[TwoView, Lines]) -> None:
+    view, lines = made
+    right = np.zeros(lines.shape, np.float32)
+    right[:, 110:] = 0.6  # a step too small to fold
+    along = right.copy()
+    along[30:90:9, 105:116:9] += 4.0
+    wrong = along != right
+    assert noisy(view, lines, along) > 8
+    found = unfolded(lines, view, SIZE, along, np.zeros_like(along))
+    assert noisy(view, lines, found) == 0
+    assert np.abs(found - right)[~wrong].max() < 0.05
+
+
 def test_a_map_without_folds_stays_as_it_is(made: tuple[TwoView, Lines]) -> None:
     view, lines = made
     along = noise(lines.shape, 1.0, 15.0)
