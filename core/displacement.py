@@ -213,18 +213,19 @@ def fading(away: Array, width: float) -> Array:
 
 def target_points(two_view: TwoView, points: Array, inverse_depth: Array) -> Array:
     """π(H_inf p + d e') (…, 2) for points (…, 2) and d (…); NaN where the point lies behind the target camera."""
-    return target_of(two_view, homogeneous(points), inverse_depth)
+    x, y = points[..., 0], points[..., 1]
+    return np.stack(slid(two_view, [(h[0] * x + h[1] * y) + h[2] for h in two_view.H_inf], inverse_depth), axis=-1)
 
 
-def target_of(two_view: TwoView, points: Array, inverse_depth: Array) -> Array:
-    """The same for canvas points p (…, 3) (see `Canvas.through`)."""
-    ray = points @ two_view.H_inf.T
-    if two_view.e_prime.any():  # else depth, known or not (NaN), moves nothing
-        ray += inverse_depth[..., None] * two_view.e_prime
+def slid(two_view: TwoView, infinite: list[Array], inverse_depth: Array) -> tuple[Array, Array]:
+    """x and y (…) of π(q + d e') for the three coordinates (…) of q = H_inf p (see `Canvas.through`) and d (…); NaN
+    where the point lies behind the target camera."""
+    e = two_view.e_prime
+    depth = inverse_depth if e.any() else 0.0  # without a baseline depth, known or not (NaN), moves nothing
+    a, b, c = (part + depth * e[k] for k, part in enumerate(infinite))
     # relative to the ray's own length: less than this in front is behind for any picture
-    behind = ray[..., 2] <= 1e-6 * np.abs(ray[..., :2]).max(axis=-1)
-    ray[behind] = np.nan
-    return project(ray)
+    c = np.where(c <= 1e-6 * np.maximum(np.abs(a), np.abs(b)), np.nan, c)
+    return a / c, b / c
 
 
 def inverse_depths(two_view: TwoView, x: Array, y: Array) -> tuple[Array, Array]:

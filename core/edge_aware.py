@@ -60,9 +60,10 @@ def smoothed(
     """
     layers = np.stack([values * confidence, confidence], axis=0).astype(np.float32)
     share = 1.5 * ATTENUATION ** (PASSES - 1) / (ATTENUATION**PASSES - 1)
+    across = np.ascontiguousarray(weights[0].T)
     for number in range(PASSES):
         lam = np.float32(strength * share / ATTENUATION**number)
-        layers = _along_last(layers.transpose(0, 2, 1), lam * weights[0].T).transpose(0, 2, 1)
+        layers = _along_last(layers.transpose(0, 2, 1), lam * across).transpose(0, 2, 1)
         layers = _along_last(layers, lam * weights[1])
     return layers[0] / (layers[1] + np.float32(floor))
 
@@ -72,7 +73,6 @@ def _along_last(layers: NDArray[np.float32], weight: NDArray[np.float32]) -> NDA
     algorithm, all lines at once."""
     count = layers.shape[1]
     f = np.ascontiguousarray(layers.transpose(1, 0, 2))
-    weight = np.ascontiguousarray(weight)
     ratio = np.empty_like(weight)
     denominator = 1 + weight[0]
     f[0] /= denominator

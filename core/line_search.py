@@ -34,12 +34,12 @@ TONES = 64
 
 @dataclass(frozen=True)
 class View:
-    """A picture to be matched: levels (h, w, C) uint8, gray (h, w) float32, shown (h, w) float32 0 or 1; size (W, H)
-    px of the full one."""
+    """A picture to be matched: levels (h, w, C) uint8, gray (h, w) float32, shown (h, w) float32 0 or 1, None where all
+    is; size (W, H) px of the full one."""
 
     levels: NDArray[np.uint8]
     gray: Plane
-    shown: Plane
+    shown: Plane | None
     size: tuple[int, int]
 
     @staticmethod
@@ -47,12 +47,13 @@ class View:
         """An 8-bit picture (H, W, C) with `step` px to each of its own."""
         height, width = view.shape[:2]
         gray = (cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else view[..., 0]).astype(np.float32)
-        shown = np.ones(gray.shape, np.float32) if alpha is None else (alpha > 0).astype(np.float32)
+        shown = None if alpha is None else (alpha > 0).astype(np.float32)
         if step > 1:
             small = max(1, round(width / step)), max(1, round(height / step))
             view = cv2.resize(view, small, interpolation=cv2.INTER_AREA).reshape(*small[::-1], -1)
             gray = cv2.resize(gray, small, interpolation=cv2.INTER_AREA)
-            shown = (cv2.resize(shown, small, interpolation=cv2.INTER_AREA) > 0.999).astype(np.float32)
+            if shown is not None:
+                shown = (cv2.resize(shown, small, interpolation=cv2.INTER_AREA) > 0.999).astype(np.float32)
         return View(view, gray, shown, (width, height))
 
     def sample(
@@ -66,7 +67,8 @@ class View:
         with np.errstate(invalid="ignore"):
             inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
         x, y = np.where(inside, x, np.float32(0)), np.where(inside, y, np.float32(0))
-        inside &= cv2.remap(self.shown, x, y, cv2.INTER_LINEAR) > 0.999
+        if self.shown is not None:
+            inside &= cv2.remap(self.shown, x, y, cv2.INTER_LINEAR) > 0.999
         return cv2.remap(picture, x, y, interpolation, borderMode=cv2.BORDER_REPLICATE), inside
 
 
@@ -153,7 +155,7 @@ def _matched(
         P1=smoother * STEP_COST * BLOCK**2, P2=smoother * JUMP_COST * BLOCK**2,
         disp12MaxDiff=1, preFilterCap=31, uniquenessRatio=UNIQUE,
         speckleWindowSize=int(SPECK**2 * a.shape[0] * a.shape[1]), speckleRange=SPECK_RANGE,
-        mode=cv2.STEREO_SGBM_MODE_HH,
+        mode=cv2.STEREO_SGBM_MODE_HH4,
     )  # fmt: skip
     found = matcher.compute(a, b).astype(np.float32) / 16
     sure = found > least - 1

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .camera import Camera
 from .canvas import NODES, Box, Canvas, Grid, border, bounding_canvas, expected_reach, round_reach
-from .displacement import Field, FieldValues, target_of
+from .displacement import Field, FieldValues, slid
 from .epipolar import Array, homogeneous, project
 from .errors import BadRequest, NoOverlap
 from .lens import distort, undistort
@@ -145,8 +145,8 @@ def build_warp(
 
     def target_at(grid: Grid) -> Array:
         values = _node_values(field, grid, plane, camera)
-        points = np.stack(plane.through(np.eye(3), grid.xs, grid.ys, camera), axis=-1)
-        target = target_of(two_view, points, values.inverse_depth)
+        infinite = plane.through(two_view.H_inf, grid.xs, grid.ys, camera)
+        target = np.stack(slid(two_view, infinite, values.inverse_depth), axis=-1)
         return distort(target if values.shift is None else target + values.shift, camera_prime)
 
     canvas = bounding_canvas(target_at, reference, camera_prime.size, reach, projection)
@@ -163,17 +163,13 @@ def build_map(
     values = _node_values(field, grid, canvas, camera)
     shape = (canvas.height, canvas.width)
     map_x, map_y = (np.empty(shape, np.float32) for _ in range(2))
-    xs, ys, e = canvas.xs, canvas.ys, two_view.e_prime
+    xs, ys = canvas.xs, canvas.ys
     depth = Depth(canvas, camera, grid, values.inverse_depth, relief)
     for part in strips(shape):
         start, stop = part.start, part.stop
         strip = (left, top + start, canvas.width, stop - start)
         d, sideways = depth.strip(part)
-        slide = d if e.any() else np.zeros_like(d)  # where nothing slides, depth may be unknown (NaN)
-        infinite = canvas.through(two_view.H_inf, xs, ys[start:stop], camera)
-        a, b, c = (part + slide * e[k] for k, part in enumerate(infinite))
-        c[c <= 1e-6 * np.maximum(np.abs(a), np.abs(b))] = np.nan
-        x, y = a / c, b / c
+        x, y = slid(two_view, canvas.through(two_view.H_inf, xs, ys[start:stop], camera), d)
         if values.shift is not None:
             x += grid.to_pixels(values.shift[..., 0], *strip)
             y += grid.to_pixels(values.shift[..., 1], *strip)
