@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
-from .overlap import WHOLE, Overlap, distance_to_border
+from .overlap import SAME_TONE, WHOLE, Overlap, distance_to_border
 from .warp import Layer, Warp
 
 SEAMS = ("graphcut", "none")
@@ -24,13 +24,14 @@ COARSE, BANDED = 12_000, 80_000
 BAND = 3
 # A reference with less than this share of it to itself is held at its core: so far from its border (1: the middle).
 SURROUNDED, CORE = 0.1, 0.2
-# Price (of 1, for opposite tones) of a step in depth by a pixel of parallax, of no confidence, and of length alone.
-DEPTH, DOUBT, LENGTH = 0.1, 0.1, 0.004
+# Price (of 1, for opposite tones) of length alone; what differs costs twice as much at a step in depth by a pixel of
+# parallax, and where the warp is not sure at all: a sky without a depth is as good a place as any to cut through.
+LENGTH = 0.004
 # Price of the target where both could be shown, by how far across the overlap it comes (1: from corner to corner): the
-# reference is exact, the target is fetched by an uncertain map.
-WARPED = 0.5
-# Price of a pixel of what the target cannot see, for opposite tones: thinner than two or three, its border costs more.
-GHOST = 2.0
+# reference is exact, the target is fetched by an uncertain map. Dearer, and the seam keeps to the reference's border.
+WARPED = 0.1
+# Price of a pixel of what the target cannot see, for opposite tones: thinner than about eight, its border costs more.
+GHOST = 0.5
 
 
 def known_labels(
@@ -60,14 +61,22 @@ def known_labels(
 
 
 def seam_cost(overlap: Overlap, warp: Warp) -> NDArray[np.float32]:
-    """What a seam costs at each pixel of the overlap's box (h, w), in [0, 1]."""
-    cost = np.abs(overlap.difference).mean(axis=2)
+    """What a seam costs at each pixel of the overlap's box (h, w), in [0, 1].
+
+    A difference so small that blending evens it out costs as its square, a larger one as it is: rather a longer way
+    where nobody sees it than a short one through what moved.
+    """
+    away = np.abs(overlap.difference).mean(axis=2)
+    warned = np.ones(away.shape, np.float32)
     for axis in (0, 1):
         step = np.abs(np.diff(overlap.difference, axis=axis)).mean(axis=2)
-        cost += np.maximum(_padded(step, axis, 0, 1), _padded(step, axis, 1, 0))
-        cost += np.float32(DEPTH) * np.minimum(_jumps(warp, overlap.box, axis), np.float32(1))
+        away += np.maximum(_padded(step, axis, 0, 1), _padded(step, axis, 1, 0))
+        warned += np.minimum(_jumps(warp, overlap.box, axis), np.float32(1))
     if warp.sureness is not None:
-        cost += np.float32(DOUBT) * (1 - warp.sureness[overlap.box])
+        warned += 1 - warp.sureness[overlap.box]
+    cost = away * away
+    cost /= away + np.float32(SAME_TONE)
+    cost *= warned
     cost += np.float32(LENGTH)
     return np.minimum(cost, np.float32(1), out=cost)
 
