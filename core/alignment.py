@@ -29,6 +29,7 @@ from .match_files import read_matches
 from .options import StitchOptions
 from .projection import Projection, round_projection
 from .slack import SlackField
+from .threads import in_order
 from .two_view import MIN_MATCHES, TwoView, estimate
 from .warp import Warp, build_warp
 
@@ -178,9 +179,8 @@ def _projection(options: StitchOptions, two_view: TwoView) -> Projection | None:
 def _found_in(frames: Sequence[Frame], steps: Steps) -> Matches:
     found = []
     for i, frame in enumerate(frames):
-        seen = features.detect(frame.reference.view, frame.reference.alpha)
-        steps("features", (i + 0.45) / len(frames))
-        seen_too = features.detect(frame.target.view, frame.target.alpha)
+        pictures = (frame.reference, frame.target)
+        seen, seen_too = in_order(lambda picture: features.detect(picture.view, picture.alpha), pictures)
         steps("features", (i + 0.9) / len(frames))
         found.append(features.match(seen, seen_too))
         if len(frames) == 1 and len(found[0]) < MIN_MATCHES:

@@ -290,7 +290,7 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
     alignment = align(list(used.values()), options, steps)
     quick = replace(options, crop="full", measure=False)
     decided = pooled_decision([
-        compose(read_frame(*item.pair(number), options), alignment, quick, meter.steps(FRAME_WEIGHT)).decided
+        compose(read_frame(*item.pair(number), options), alignment, quick, meter.steps(FRAME_WEIGHT), keep=True).decided
         for number in used
     ])
     reports = [unit for unit in job.todo if unit.frame is None]

@@ -32,9 +32,9 @@ class Decided:
     hidden (H, W): what the target cannot see, or would show mirrored; surely (H, W): that of it which the depth order
     says by itself, which is what the seam goes by: more would leave it no way through leaves; exposure: the target's;
     from_target (H, W): which side of the seam a pixel lies on, None without a seam; known, cost, price, box: what the
-    seam was cut by (see `find_seam`), None if it was not; roll: by how many columns those four are rolled (see
-    `around`); holes: pixels that the target cannot see and the reference does not show: transparent or filled, but in
-    an average; folds: `metrics.folds` away from what is hidden behind something near.
+    seam was cut by (see `find_seam`), None if it was not or they are not kept; roll: by how many columns those four are
+    rolled (see `around`); holes: pixels that the target cannot see and the reference does not show: transparent or
+    filled, but in an average; folds: `metrics.folds` away from what is hidden behind something near.
     """
 
     hidden: NDArray[np.bool_]
@@ -53,13 +53,14 @@ class Decided:
 def composed(
     reference: Layer, target: Layer, warp: Warp, two_view: TwoView, target_size: tuple[int, int],
     options: StitchOptions, floats: tuple[bool, bool], painted: NDArray[np.int8] | None, steps: Steps,
-    decided: Decided | None = None,
+    decided: Decided | None = None, keep: bool = False,
 ) -> tuple[Layer, Layer, Decided]:
     """The panorama, the target's layer as it was exposed for it, and what was decided.
 
     What neither picture shows is transparent, and so is what only a target that cannot see it would show, unless it is
     to be inpainted. floats: whether reference and target come from float pictures; painted (H, W): see
-    `masks.read_painted`; decided: from other frames of the same two cameras, kept to.
+    `masks.read_painted`; decided: from other frames of the same two cameras, kept to; keep: what
+    the seam was cut by, for `pooled_decision`.
     """
     steps("occlusion", 0.0)
     if decided:
@@ -105,6 +106,8 @@ def composed(
         found = _with_seam(start, reference, seen, overlap, rolled_maps(warp, roll), options, painted)
         side = None if found.from_target is None else rolled(found.from_target, -roll)
         found = replace(found, surely=surely, from_target=side)
+        if not keep:
+            found = replace(found, known=None, cost=None, price=None, box=None)
 
     steps("blend", 0.0)
     if found.from_target is None:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import AnyLight, Light, Part, bounds
+from .light import AnyLight, Light, Part, bounds, part_of
 from .warp import Layer
 
 BLOCK = 8
@@ -79,7 +79,7 @@ def match_exposure(
     # whole blocks of the canvas
     rows, columns = (slice(part.start - part.start % BLOCK, part.stop + -part.stop % BLOCK) for part in box)
     shown = shown[rows, columns]
-    pixels, pixels_too = (layer.light[rows, columns] for layer in (reference, target))
+    pixels, pixels_too = (part_of(layer.light, (rows, columns)) for layer in (reference, target))
     for light, unclipped in zip((pixels, pixels_too), floats, strict=True):
         if not unclipped:
             for k in range(channels):

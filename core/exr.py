@@ -12,6 +12,7 @@ import numpy as np
 from .errors import UnreadableImage
 from .light import AnyLight, strips
 from .metadata import SOFTWARE, Exif
+from .threads import each
 
 
 class ExrPixels(NamedTuple):
@@ -130,11 +131,14 @@ def write_exr(pixels: AnyLight, alpha: np.ndarray | None, exif: Exif) -> bytes:
 
     names = "RGB" if pixels.shape[2] == 3 else "Y"
     channels = {name: np.empty(pixels.shape[:2], np.float32) for name in names}
-    for rows in strips(pixels.shape):
+
+    def put(rows: slice) -> None:
         part = pixels[rows, 0 : pixels.shape[1]]
         stored = part if alpha is None else part * alpha[rows][..., None]
         for index, name in enumerate(names):
             channels[name][rows] = stored[..., index]
+
+    each(put, strips(pixels.shape))
     if alpha is not None:
         channels["A"] = np.ascontiguousarray(alpha, np.float32)
     texts = {

@@ -21,6 +21,8 @@ from .exr import write_exr
 from .light import AnyLight, Coded, strips, whole
 from .metadata import Exif, embed, read_exif
 from .output_files import OutputFiles
+from .png import encode_png
+from .threads import in_order
 
 _READABLE = "PNG, JPEG, TIFF, EXR, WebP or BMP"
 _MOST_NOT_FINITE = 0.5
@@ -308,46 +310,94 @@ def encode_picture(
     height, width = pixels.shape[:2]
     if kind == "jpeg" and max(width, height) > _JPEG_LONGEST_SIDE:
         raise UnwritableOutput(f"JPEG holds {_JPEG_LONGEST_SIDE} pixels a side, not {width} × {height}; use .png")
-    warnings: tuple[str, ...] = ()
-    # OpenCV writes no gray with alpha
+    # none of the files has gray with alpha
     channels = 3 if alpha is not None and kind != "jpeg" else pixels.shape[2]
     if icc is not None and icc_channels(icc) != channels:
         icc = None
-    coded, clipped = _levels(pixels, alpha, depth, _curves(icc, channels), kind == "jpeg")
+    levels = _Levels(pixels, alpha, depth, _curves(icc, channels), kind == "jpeg")
+    if kind == "png":
+        encoded, brighter = levels.as_png()
+    else:
+        coded, brighter = levels.as_array()
+        encoded = _by_opencv(coded, suffix)
+    warnings: tuple[str, ...] = ()
     if bits == 32:
-        lost = f", and {clipped:.2%} of its pixels, brighter than white, were clipped" if clipped else ""
+        lost = f", and {brighter:.2%} of its pixels, brighter than white, were clipped" if brighter else ""
         warnings = (f"float input was written display-encoded with {depth} bits{lost}; .exr keeps it",)
-    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if kind == "jpeg" else []
+    return embed(encoded, kind, exif, icc, straight_alpha=levels.shape[2] == 4), warnings
+
+
+def _by_opencv(coded: np.ndarray, suffix: str) -> bytes:
+    """The file of levels (H, W, C) in B, G, R, A order."""
+    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if _WRITABLE[suffix.lower()][0] == "jpeg" else []
     try:
         with quiet_opencv():
             done, encoded = cv2.imencode(suffix.lower(), coded, options)
     except (cv2.error, MemoryError):
         done = False
     if not done:
+        height, width = coded.shape[:2]
         raise UnwritableOutput(f"{width} × {height} pixels do not fit into a {suffix} file; use .exr or a smaller size")
-    return embed(encoded.tobytes(), kind, exif, icc, straight_alpha=coded.shape[2] == 4), warnings
+    return encoded.tobytes()
 
 
-def _levels(
-    light: AnyLight, alpha: np.ndarray | None, bits: int, curves: tuple[Curve, ...], flat: bool
-) -> tuple[np.ndarray, float]:
-    """Light as OpenCV writes it: (H, W, 1, 3 or 4) levels of 8 or 16 bits, in B, G, R, A order; and the share of pixels
-    brighter than white. flat: black where alpha says so, instead of alpha."""
-    height, width, channels = light.shape
-    sees_through, most = alpha is not None and not flat, np.float32(255 if bits == 8 else 65535)
-    channels = 3 if sees_through else channels
-    out = np.empty((height, width, channels + sees_through), np.uint8 if bits == 8 else np.uint16)
-    beyond = 0
-    for rows in strips(light.shape):
-        part = light[rows, 0:width]
-        beyond += int((part > 1.0).any(axis=2).sum())
-        if flat and alpha is not None:
-            part = part * alpha[rows][..., None]
-        coded = encode(part, bits, curves)
-        out[rows, :, :channels] = coded[..., ::-1]
-        if sees_through and alpha is not None:
-            out[rows, :, -1] = np.rint(np.clip(alpha[rows].astype(np.float32), 0, 1) * most)
-    return out, beyond / max(1, height * width)
+@dataclass(frozen=True, eq=False)
+class _Levels:
+    """Light as files hold it: levels (H, W, 1, 3 or 4) of 8 or 16 bits. flat: black where alpha says so, instead of
+    alpha."""
+
+    light: AnyLight
+    alpha: np.ndarray | None
+    bits: int
+    curves: tuple[Curve, ...]
+    flat: bool
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(H, W, C)."""
+        height, width, channels = self.light.shape
+        return height, width, channels if self.alpha is None or self.flat else 4  # no gray with alpha
+
+    def as_png(self) -> tuple[bytes, float]:
+        """The file, and the share of pixels brighter than white."""
+        beyond: list[int] = []
+
+        def levels(rows: slice) -> np.ndarray:
+            out, brighter = self._of(rows)
+            beyond.append(brighter)
+            return out
+
+        return encode_png(self.shape, self.bits, levels), self._share(beyond)
+
+    def as_array(self) -> tuple[np.ndarray, float]:
+        """All of them as OpenCV writes them, in B, G, R, A order, and the share of pixels brighter than white."""
+        out = np.empty(self.shape, np.uint8 if self.bits == 8 else np.uint16)
+        order = {1: [0], 3: [2, 1, 0], 4: [2, 1, 0, 3]}[self.shape[2]]
+
+        def put(rows: slice) -> int:
+            levels, brighter = self._of(rows)
+            for to, channel in enumerate(order):
+                out[rows, :, to] = levels[..., channel]
+            return brighter
+
+        return out, self._share(in_order(put, strips(self.shape)))
+
+    def _of(self, rows: slice) -> tuple[np.ndarray, int]:
+        """The levels of some rows, in R, G, B, A order, and how many of the pixels are brighter than white."""
+        part = self.light[rows, 0 : self.light.shape[1]]
+        brighter = int((part > 1.0).any(axis=2).sum())
+        if self.flat and self.alpha is not None:
+            part = part * self.alpha[rows][..., None]
+        coded = encode(part, self.bits, self.curves)
+        if self.flat or self.alpha is None:
+            return coded, brighter
+        out = np.empty((*coded.shape[:2], 4), coded.dtype)
+        out[..., :3] = coded
+        out[..., 3] = np.rint(np.clip(self.alpha[rows].astype(np.float32), 0, 1) * np.iinfo(coded.dtype).max)
+        return out, brighter
+
+    def _share(self, counts: Iterable[int]) -> float:
+        return sum(counts) / max(1, self.shape[0] * self.shape[1])
 
 
 def save_picture(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .colour import Curve, decode
+from .threads import each, in_order
 
 # Pixels that are worked out at a time.
 STRIP = 1_000_000
@@ -89,9 +90,18 @@ def whole(light: AnyLight) -> NDArray[np.float32]:
     """All of it as an array."""
     if isinstance(light, np.ndarray):
         return light
-    out = np.empty(light.shape, np.float32)
-    for rows in strips(light.shape):
-        out[rows] = light[rows, 0 : light.shape[1]]
+    return part_of(light, (slice(0, light.shape[0]), slice(0, light.shape[1])))
+
+
+def part_of(light: AnyLight, part: Part) -> NDArray[np.float32]:
+    """The light of rows and columns as an array of its own, worked out by several threads."""
+    rows, columns = within(part, light.shape)
+    out = np.empty((rows.stop - rows.start, columns.stop - columns.start, *light.shape[2:]), np.float32)
+
+    def put(strip: slice) -> None:
+        out[strip] = light[rows.start + strip.start : rows.start + strip.stop, columns]
+
+    each(put, strips(out.shape))
     return out
 
 
@@ -103,7 +113,7 @@ def extent(light: AnyLight) -> tuple[float, float]:
         return float(low.min()), float(high.max())
     if isinstance(light, np.ndarray):
         return float(light.min()), float(light.max())
-    ends = [extent(light[rows, 0 : light.shape[1]]) for rows in strips(light.shape)]
+    ends = list(in_order(lambda rows: extent(light[rows, 0 : light.shape[1]]), strips(light.shape)))
     return min(low for low, _ in ends), max(high for _, high in ends)
 
 

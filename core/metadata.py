@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from .containers import tiff_bytes, tiff_directory
+from .png import chunk
 
 SOFTWARE = "EDF Stitch"
 _LONGEST_TEXT = 2000  # bytes; the block has to fit one JPEG segment
@@ -198,8 +199,8 @@ def _directory(fields: list[Field], at: int) -> bytes:
 def embed(encoded: bytes, kind: str, exif: Exif, icc: bytes | None, straight_alpha: bool = False) -> bytes:
     """The encoded picture with EXIF and, where given, an ICC profile put in.
 
-    encoded: bytes as OpenCV writes them; kind: jpeg, png or tiff (little-endian, classic). straight_alpha: say in a
-    TIFF that the fourth sample is a straight alpha.
+    encoded: bytes as `png` and OpenCV write them; kind: jpeg, png or tiff (little-endian, classic). straight_alpha: say
+    in a TIFF that the fourth sample is a straight alpha.
     """
     if kind == "jpeg":
         return _embed_jpeg(encoded, exif, icc)
@@ -223,9 +224,6 @@ def _embed_jpeg(encoded: bytes, exif: Exif, icc: bytes | None) -> bytes:
 
 
 def _embed_png(encoded: bytes, exif: Exif, icc: bytes | None) -> bytes:
-    def chunk(name: bytes, body: bytes) -> bytes:
-        return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(body, zlib.crc32(name)))
-
     header_end = 8 + 12 + 13
     profile = chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(icc)) if icc else b""
     return encoded[:header_end] + profile + chunk(b"eXIf", exif_block(exif)) + encoded[header_end:]

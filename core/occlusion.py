@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .light import around, bounds
 from .overlap import of_consequence
+from .threads import each, in_order
 from .two_view import TwoView
 from .warp import Warp, cell_areas
 
@@ -38,11 +39,10 @@ def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDA
     the pixels.
     """
     hidden = np.zeros(warp.map_x.shape, bool)
-    points, near = _contested(warp, two_view, target_size)
+    points, near, levels = _contested(warp, two_view, target_size)
     if not (near > 0).any():
         return hidden
     x, y = (values.ravel()[points] for values in (warp.map_x, warp.map_y))
-    levels = _levels(warp, points)
     order = _ascending(near)
     found = np.zeros(points.size, bool)
     for level in np.unique(levels):
@@ -63,13 +63,16 @@ def turning(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.int8]:
     height, width = warp.map_x.shape
     out = np.full((height, width), NO_TURN, np.int8)
     rows = max(1, STRIP // width)
-    for top in range(0, height - 1, rows):
+
+    def put(top: int) -> None:
         bottom = min(top + rows, height - 1)
         strip = warp.within((0, top, width, bottom + 1 - top))
         with np.errstate(invalid="ignore", over="ignore"):
             area = cell_areas(strip.map_x, strip.map_y)
             counts = strip.inside(target_size)[:-1, :-1] & np.isfinite(area)
             out[top:bottom, :-1] = np.where(counts, np.sign(area), NO_TURN)
+
+    each(put, range(0, height - 1, rows))
     return out
 
 
@@ -113,30 +116,36 @@ def turned_over(turns: NDArray[np.int8]) -> NDArray[np.bool_]:
 
 def _contested(
     warp: Warp, two_view: TwoView, target_size: tuple[int, int]
-) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """Canvas points (flat indices) that others may hide, with all those others, and their inverse depth in the target.
+) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.uint8]]:
+    """Canvas points (flat indices) that others may hide, with all those others, their inverse depth in the target, and
+    their cells (see `_levels`).
 
     Along an epipolar line the map is a function of one variable, and continuous between pixels. Where it takes a value
     twice it turns back in between, over that value. So what is hidden lies in the target where the map folds, and
     where it folds nowhere nothing is hidden.
     """
     blocks = _folded_blocks(warp, target_size)
-    found, depths = [np.empty(0, np.intp)], [np.empty(0, np.float32)]
+    if not blocks.any():
+        return np.empty(0, np.intp), np.empty(0, np.float32), np.empty(0, np.uint8)
     height, width = warp.map_x.shape
     rows = max(1, STRIP // width)
-    for top in range(0, height if blocks.any() else 0, rows):
+
+    def found_from(top: int) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.uint8]]:
         strip = warp.within((0, top, width, min(rows, height - top)))
         inside = np.flatnonzero(strip.inside(target_size))
         row, column = ((v.ravel()[inside] + np.float32(0.5)).astype(np.intp) for v in (strip.map_y, strip.map_x))
         inside = inside[blocks[row >> BLOCK, column >> BLOCK]]
         if not inside.size:
-            continue
+            return inside, np.empty(0, np.float32), np.empty(0, np.uint8)
         with np.errstate(invalid="ignore", divide="ignore"):
             near = inverse_depth_in_target(strip, two_view).ravel()[inside]
         known = np.isfinite(near)
-        found.append(inside[known] + top * width)
-        depths.append(near[known])
-    return np.concatenate(found), np.concatenate(depths)
+        points = inside[known] + top * width
+        return points, near[known], _levels(warp, points)
+
+    found = list(in_order(found_from, range(0, height, rows)))
+    points, near, levels = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return points, near, levels
 
 
 def _folded_blocks(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -148,7 +157,9 @@ def _folded_blocks(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_
     counts = np.zeros(((height >> BLOCK) + 2, (width >> BLOCK) + 2), np.int32)
     mirrored = _mirrored(warp)
     rows = max(1, STRIP // warp.map_x.shape[1])
-    for top in range(0, warp.map_x.shape[0] - 1, rows):
+
+    def corners_of(top: int) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]]:
+        """First and last blocks, across and down, that the folds of some rows fall on."""
         x, y = (values[top : top + rows + 1] for values in (warp.map_x, warp.map_y))
         with np.errstate(invalid="ignore", over="ignore"):
             right, down = ([np.diff(v, axis=axis) for v in (x, y)] for axis in (1, 0))
@@ -156,15 +167,16 @@ def _folded_blocks(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_
             lower = right[0][1:] * down[1][:, 1:] - right[1][1:] * down[0][:, 1:]
             turned = (upper >= 0) | (lower >= 0) if mirrored else (upper <= 0) | (lower <= 0)
         row, column = np.nonzero(turned)
-        if not row.size:
-            continue
         corners = [np.stack([v[row + i, column + j] for i in (0, 1) for j in (0, 1)]) for v in (x, y)]
         low, high = ([np.nan_to_num(how(v, axis=0), nan=-9) for v in corners] for how in (np.nanmin, np.nanmax))
         there = (high[0] >= 0) & (high[1] >= 0) & (low[0] <= width - 1) & (low[1] <= height - 1)
-        (x0, x1), (y0, y1) = (
+        across, down = (
             [(np.clip(ends[axis][there], 0, size - 1) + 0.5).astype(np.intp) >> BLOCK for ends in (low, high)]
             for axis, size in enumerate(target_size)
         )
+        return across, down
+
+    for (x0, x1), (y0, y1) in in_order(corners_of, range(0, warp.map_x.shape[0] - 1, rows)):
         for at, sign in (((y0, x0), 1), ((y0, x1 + 1), -1), ((y1 + 1, x0), -1), ((y1 + 1, x1 + 1), 1)):
             np.add.at(counts, at, sign)
     covered = counts.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0

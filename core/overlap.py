@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import bounds
+from .light import bounds, strips
+from .threads import each
 from .tone import to_tones
 from .warp import Layer
 
@@ -45,9 +46,15 @@ def overlap_of(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Ov
     if box is None:
         return None
     both = both[box]
-    difference = to_tones(target.light[box])
-    difference -= to_tones(reference.light[box])
-    difference *= both[..., None]
+    difference = np.empty((*both.shape, reference.light.shape[2]), np.float32)
+
+    def put(rows: slice) -> None:
+        part = slice(box[0].start + rows.start, box[0].start + rows.stop), box[1]
+        tones = to_tones(target.light[part])
+        tones -= to_tones(reference.light[part])
+        np.multiply(tones, both[rows][..., None], out=difference[rows])
+
+    each(put, strips(difference.shape))
     edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) > 0
     same = both & ~edge
     return Overlap(box, both, difference, same & _alike(difference, same))
@@ -60,15 +67,23 @@ def of_consequence(hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Where the difference is about what it is in general."""
-    sample = difference[shown]
-    if not len(sample):
+    places = np.flatnonzero(shown)
+    if not places.size:
         return shown
-    sample = sample[:: max(1, len(sample) // SAMPLES)]
+    sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // SAMPLES)]]
     middle = np.median(sample, axis=0)
     sigma = 1.4826 * np.median(np.abs(sample - middle), axis=0)
-    # a little blurred: noise is no content
-    away = np.abs(cv2.blur(difference, (3, 3)).reshape(difference.shape) - middle)
-    return (away <= np.maximum(SAME_SIGMAS * sigma, SAME_TONE)).all(axis=2)
+    alike = np.empty(shown.shape, bool)
+
+    def put(rows: slice) -> None:
+        near = slice(max(0, rows.start - 1), rows.stop + 1)
+        # a little blurred: noise is no content
+        blurred = cv2.blur(difference[near], (3, 3)).reshape(difference[near].shape)[rows.start - near.start :]
+        away = np.abs(blurred[: rows.stop - rows.start] - middle)
+        alike[rows] = (away <= np.maximum(SAME_SIGMAS * sigma, SAME_TONE)).all(axis=2)
+
+    each(put, strips(difference.shape))
+    return alike
 
 
 def distance_to_border(mask: NDArray[np.bool_]) -> NDArray[np.float32]:

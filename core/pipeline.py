@@ -25,6 +25,7 @@ from .metrics import appearance
 from .options import StitchOptions
 from .progress import Progress
 from .report import make_report
+from .threads import in_order
 from .two_view import TwoView
 from .warp import Layer, Warp, cut, reference_box, reference_layer, target_layer
 
@@ -147,17 +148,18 @@ def stitch(
 
 def read_frame(reference: Source, target: Source, options: StitchOptions) -> Frame:
     """Both pictures, in the same colour space. Raises UnreadableImage, BadRequest, NoOverlap (one picture twice)."""
-    first, second = in_same_colour_space(_picture(reference), _picture(target))
+    first, second = in_same_colour_space(*in_order(_picture, (reference, target)))
     if first.view.shape == second.view.shape and np.array_equal(first.view, second.view):
         raise NoOverlap("the two pictures are the same picture: choose two photographs taken from different places")
     return prepare(first, second, options)
 
 
 def compose(
-    frame: Frame, alignment: Alignment, options: StitchOptions, steps: Stopwatch, decided: Decided | None = None
+    frame: Frame, alignment: Alignment, options: StitchOptions, steps: Stopwatch, decided: Decided | None = None,
+    keep: bool = False,
 ) -> StitchResult:
     """The panorama of two pictures by an alignment, which may come from other frames of the same two cameras, as may
-    what was decided about exposure and seam."""
+    what was decided about exposure and seam. decided, keep: see `composed`."""
     first, second, whole = frame.reference, frame.target, alignment.warp
     steps("warp", 0.5)
     base, layer = reference_layer(first, whole.canvas, alignment.cameras[0]), target_layer(second, whole)
@@ -165,7 +167,7 @@ def compose(
     painted = None if frame.painted is None else _on_canvas(frame.painted, whole.canvas)
     floats = (first.bits == 32, second.bits == 32)
     panorama, exposed, found = composed(
-        base, layer, whole, alignment.two_view, size_of(second), options, floats, painted, steps, decided
+        base, layer, whole, alignment.two_view, size_of(second), options, floats, painted, steps, decided, keep
     )
     seen = appearance(panorama, base, exposed, found.from_target, floats) if options.measure else {}
     place = reference_box(whole.canvas, alignment.cameras[0])

@@ -13,8 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .light import strips
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
 from .overlap import SAME_TONE, WHOLE, Overlap, distance_to_border
+from .threads import each
 from .warp import Layer, Warp
 
 SEAMS = ("graphcut", "none")
@@ -66,14 +68,27 @@ def seam_cost(overlap: Overlap, warp: Warp) -> NDArray[np.float32]:
     A difference so small that blending evens it out costs as its square, a larger one as it is: rather a longer way
     where nobody sees it than a short one through what moved.
     """
-    away = np.abs(overlap.difference).mean(axis=2)
+    cost = np.empty(overlap.both.shape, np.float32)
+
+    def put(rows: slice) -> None:
+        near = slice(max(0, rows.start - 1), min(len(cost), rows.stop + 1))  # with their neighbours
+        box = slice(overlap.box[0].start + near.start, overlap.box[0].start + near.stop), overlap.box[1]
+        cost[rows] = _cost(overlap.difference[near], warp, box)[rows.start - near.start :][: rows.stop - rows.start]
+
+    each(put, strips(cost.shape))
+    return cost
+
+
+def _cost(difference: NDArray[np.float32], warp: Warp, box: tuple[slice, slice]) -> NDArray[np.float32]:
+    """What a seam costs at the pixels of a box of the canvas, by the difference (h, w, C) there."""
+    away = np.abs(difference).mean(axis=2)
     warned = np.ones(away.shape, np.float32)
     for axis in (0, 1):
-        step = np.abs(np.diff(overlap.difference, axis=axis)).mean(axis=2)
+        step = np.abs(np.diff(difference, axis=axis)).mean(axis=2)
         away += np.maximum(_padded(step, axis, 0, 1), _padded(step, axis, 1, 0))
-        warned += np.minimum(_jumps(warp, overlap.box, axis), np.float32(1))
+        warned += np.minimum(_jumps(warp, box, axis), np.float32(1))
     if warp.sureness is not None:
-        warned += 1 - warp.sureness[overlap.box]
+        warned += 1 - warp.sureness[box]
     cost = away * away
     cost /= away + np.float32(SAME_TONE)
     cost *= warned
@@ -94,7 +109,9 @@ def _padded(values: NDArray[np.float32], axis: int, before: int, after: int) -> 
 def target_price(overlap: Overlap, hidden: NDArray[np.bool_]) -> NDArray[np.float32]:
     """What each pixel of the overlap's box (h, w) costs if it comes from the target; hidden (H, W): what the target
     cannot see costs by how different it looks."""
-    price = np.where(hidden[overlap.box], np.float32(GHOST) * np.abs(overlap.difference).mean(axis=2), np.float32(0))
+    unseen = hidden[overlap.box]
+    price = np.zeros(unseen.shape, np.float32)
+    price[unseen] = np.float32(GHOST) * np.abs(overlap.difference[unseen]).mean(axis=1)
     price += np.float32(WARPED / math.hypot(*price.shape))
     return price
 

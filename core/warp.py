@@ -19,8 +19,9 @@ from .displacement import Field, FieldValues, slid
 from .epipolar import Array, homogeneous, project
 from .errors import BadRequest, NoOverlap
 from .lens import distort, undistort
-from .light import AnyLight, Held, Light, Part, Placed, Weighed, bounds, extent, strips, whole, within
+from .light import AnyLight, Held, Light, Part, Placed, Weighed, bounds, extent, part_of, strips, whole, within
 from .projection import Projection
+from .threads import each
 from .two_view import TwoView
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ class Layer:
 
     def held(self, part: Part) -> Layer:
         """The same, with the light of a part, which is asked for more than once, kept as an array."""
-        return Layer(Held(self.light, (part[0].start, part[1].start), self.light[part]), self.alpha)
+        return Layer(Held(self.light, (part[0].start, part[1].start), part_of(self.light, part)), self.alpha)
 
 
 def cut(array: NDArray, box: Box, beyond: float = 0.0) -> NDArray:
@@ -165,7 +166,8 @@ def build_map(
     map_x, map_y = (np.empty(shape, np.float32) for _ in range(2))
     xs, ys = canvas.xs, canvas.ys
     depth = Depth(canvas, camera, grid, values.inverse_depth, relief)
-    for part in strips(shape):
+
+    def put(part: slice) -> None:
         start, stop = part.start, part.stop
         strip = (left, top + start, canvas.width, stop - start)
         d, sideways = depth.strip(part)
@@ -179,6 +181,8 @@ def build_map(
         if camera_prime.distortion.any():
             x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), camera_prime), -1, 0)
         map_x[part], map_y[part] = x, y
+
+    each(put, strips(shape))
     return Warp(canvas, map_x, map_y, depth, None if relief is None else Sureness(canvas, camera, relief))
 
 
@@ -431,10 +435,11 @@ def fetch(
     """Samples (H, W, C) of a source (h, w, C) at map positions, in tiles, of the source's type; 0 where the map leaves
     the picture."""
     out = np.zeros((*map_x.shape, source.shape[2]), source.dtype)
-    for top in range(0, map_x.shape[0], TILE):
-        for left in range(0, map_x.shape[1], TILE):
-            tile = (slice(top, top + TILE), slice(left, left + TILE))
-            _fetch_tile(source, map_x[tile], map_y[tile], out[tile], interpolation)
+    tops, lefts = (range(0, side, TILE) for side in map_x.shape)
+    each(
+        lambda tile: _fetch_tile(source, map_x[tile], map_y[tile], out[tile], interpolation),
+        [(slice(top, top + TILE), slice(left, left + TILE)) for top in tops for left in lefts],
+    )
     return out
 
 

@@ -41,7 +41,7 @@ def world(turn: int) -> tuple[Layer, Layer, Warp]:
 def compose(turn: int, decided: Any = None, painted: np.ndarray | None = None, **options: Any) -> tuple:
     first, second, warp = world(turn)
     return composed(first, second, warp, NO_DEPTH, (W, H), StitchOptions(exposure=False, **options), (True, True),
-                    painted, lambda *_: None, decided)  # fmt: skip
+                    painted, lambda *_: None, decided, keep=True)  # fmt: skip
 
 
 # where the sphere is cut open: where nothing is, in the reference alone, in the overlap, in the target alone

@@ -152,12 +152,12 @@ def test_an_interrupted_clip_goes_on_where_it_was(
     calls = 0
     original = batch.compose
 
-    def compose(*args: object) -> object:
+    def compose(*args: object, **more: object) -> object:
         nonlocal calls
         calls += len(args) == 5  # what was decided is handed over
         if calls == 4:  # the report, 7, 8, then 9
             raise KeyboardInterrupt
-        return original(*args)
+        return original(*args, **more)
 
     with monkeypatch.context() as patch:
         patch.setattr(batch, "compose", compose)

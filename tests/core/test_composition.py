@@ -35,10 +35,10 @@ def pictures(gain: float = 1.0) -> tuple[Layer, Layer, Any]:
 
 
 def compose(first: Layer, second: Layer, warp: Any, decided: Decided | None = None, said: list | None = None,
-            painted: np.ndarray | None = None, **options: Any) -> tuple[Layer, Layer, Decided]:
+            painted: np.ndarray | None = None, keep: bool = False, **options: Any) -> tuple[Layer, Layer, Decided]:
     steps = (lambda *step: None) if said is None else (lambda stage, share: said.append(stage))
     return composed(first, second, warp, SIDEWAYS.view, TARGET, StitchOptions(**options), FLOATS, painted, steps,
-                    decided)  # fmt: skip
+                    decided, keep)  # fmt: skip
 
 
 @pytest.mark.parametrize("options", [{}, {"blend": "feather"}, {"blend": "feather", "seam": "none"}, {"seam": "none"}])
@@ -125,12 +125,14 @@ def test_a_clips_seam_is_cheap_over_all_its_frames() -> None:
     for top in (40, 90, 140):
         walker = first.pixels.copy()
         walker[top : top + 40, 230:300] = 0.9
-        decisions.append(compose(Layer(walker, first.alpha), second, warp)[2])
+        decisions.append(compose(Layer(walker, first.alpha), second, warp, keep=True)[2])
     shared = pooled_decision(decisions)
     assert shared.from_target is not None and shared.cost is not None
     for name in ("cost", "price"):
         assert np.allclose(getattr(shared, name), np.mean([getattr(d, name) for d in decisions], axis=0))
     assert shared.exposure.gain == pytest.approx(np.median([d.exposure.gain for d in decisions], axis=0))
+    dropped = compose(first, second, warp)[2]
+    assert dropped.from_target is not None and dropped.cost is dropped.price is dropped.known is None
     none = pooled_decision([replace(d, known=None, cost=None, box=None, from_target=None) for d in decisions])
     assert none.from_target is None
 

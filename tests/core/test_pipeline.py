@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core import features
+from edf_stitch.core import features, light, occlusion
 from edf_stitch.core.camera import CameraRequest
 from edf_stitch.core.colour import decode
 from edf_stitch.core.epipolar import (
@@ -312,6 +312,22 @@ def test_the_same_input_gives_the_same_result_whatever_opencvs_threads(
             assert same(again, small_result) and again.report == small_result.report
     finally:
         cv2.setNumThreads(before)
+
+
+def test_the_same_pixels_whichever_strip_is_done_first(
+    small_pair: Pair, known: StitchOptions, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Small pictures are one strip; here they are dozens, with dense refinement and all."""
+    for module in (light, occlusion):
+        monkeypatch.setattr(module, "STRIP", 5_000)
+    before, results = cv2.getNumThreads(), []
+    try:
+        for threads in (1, 3):
+            cv2.setNumThreads(threads)
+            results.append(stitch(small_pair.reference, small_pair.target, known))
+    finally:
+        cv2.setNumThreads(before)
+    assert same(*results) and results[0].report == results[1].report
 
 
 def test_the_same_field_gives_the_same_map_wherever_memory_lies(small_result: StitchResult) -> None:
