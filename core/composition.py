@@ -14,6 +14,7 @@ from .exposure import BLOCK, Exposure, match_exposure, pooled, unchanged
 from .inpaint import holes_of, inpainted
 from .light import Weighed, around, bounds
 from .metrics import folds
+from .moved import times
 from .occlusion import by_agreement, occluded, turned_over, turning
 from .options import StitchOptions
 from .overlap import Overlap, of_consequence, overlap_of
@@ -157,6 +158,7 @@ def _with_seam(
     if options.seam == "none":
         nearest = distance_labels(reference, target)
         return replace(so_far, from_target=np.where(known == 0, nearest, known == 1))
-    cost, price = seam_cost(overlap, warp), target_price(overlap, so_far.surely)
+    when = times(overlap, warp, reference, target, so_far.surely)
+    cost, price = seam_cost(overlap, warp), target_price(overlap, so_far.surely, when)
     from_target = find_seam(known, cost, price, overlap.box)
     return replace(so_far, from_target=from_target, known=known, cost=cost, price=price, box=overlap.box)

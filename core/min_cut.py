@@ -19,9 +19,9 @@ def min_cut(
     """Labels (H, W), True for the second picture, such that the sum over all borders between neighbours (4) of their
     mean cost, plus the price of every free pixel of the second, is least.
 
-    cost (H, W) in [0, 1]; known (H, W): FIRST, SECOND, FREE or NOWHERE (labelled False); price (H, W) ≥ 0, none: 0. Of
-    equal cuts the one with the most of the first picture. Time grows with the free pixels to the power of 1.5 or so:
-    keep them below 20000 in a block, or in a narrow band.
+    cost (H, W) in [0, 1]; known (H, W): FIRST, SECOND, FREE or NOWHERE (labelled False); price (H, W), none: 0; below 0
+    it is the first picture's that costs. Of equal cuts the one with the most of the first picture. Time grows with the
+    free pixels to the power of 1.5 or so: keep them below 20000 in a block, or in a narrow band.
     """
     free = np.flatnonzero(known == FREE)
     out = known == SECOND
@@ -51,7 +51,8 @@ def min_cut(
         connect(node[at[there == SECOND]], sink, units[there == SECOND])
     if price is not None:
         units = np.rint(UNITS * price.ravel()[free])
-        connect(source, np.flatnonzero(units), units[units > 0])
+        connect(source, np.flatnonzero(units > 0), units[units > 0])
+        connect(np.flatnonzero(units < 0), sink, -units[units < 0])
     edges = np.concatenate(tails), np.concatenate(heads)
     graph = csr_matrix((np.concatenate(capacities), edges), shape=(count + 2, count + 2), dtype=np.int32)
     if not (graph.indices == sink).any():  # nothing belongs to the second picture

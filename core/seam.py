@@ -106,12 +106,20 @@ def _padded(values: NDArray[np.float32], axis: int, before: int, after: int) -> 
     return np.pad(values, [(before, after) if k == axis else (0, 0) for k in range(2)])
 
 
-def target_price(overlap: Overlap, hidden: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """What each pixel of the overlap's box (h, w) costs if it comes from the target; hidden (H, W): what the target
-    cannot see costs by how different it looks."""
-    unseen = hidden[overlap.box]
-    price = np.zeros(unseen.shape, np.float32)
-    price[unseen] = np.float32(GHOST) * np.abs(overlap.difference[unseen]).mean(axis=1)
+def target_price(
+    overlap: Overlap, hidden: NDArray[np.bool_], times: NDArray[np.int8] | None = None
+) -> NDArray[np.float32]:
+    """What each pixel of the overlap's box (h, w) costs if it comes from the target; less than nothing: if it does not.
+
+    hidden (H, W): what the target cannot see costs by how different it looks, and so does what moved if it is not seen
+    at its own time, times (h, w): see `moved.times`.
+    """
+    misplaced = hidden[overlap.box].astype(np.int8)
+    if times is not None:
+        misplaced -= times
+    price = np.zeros(misplaced.shape, np.float32)
+    where = misplaced != 0
+    price[where] = np.float32(GHOST) * np.abs(overlap.difference[where]).mean(axis=1) * misplaced[where]
     price += np.float32(WARPED / math.hypot(*price.shape))
     return price
 
