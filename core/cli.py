@@ -256,9 +256,11 @@ def _stitch(args: argparse.Namespace) -> int:
     from .output_files import OutputFiles, undisturbed
 
     with undisturbed():  # NumPy prints a traceback of its own where a signal breaks into its loading
+        from .memory import use_again
         from .outputs import OutputRequest, check, write
         from .pipeline import stitch
 
+    use_again()
     options = options_from(args, measure=bool(args.report or args.verbose))
     outputs = OutputRequest(args.output, args.report, args.layers, args.warp)
     with OutputFiles(args.overwrite, [args.reference, *args.target, *options.files_read]) as files:
@@ -285,7 +287,9 @@ def _batch(args: argparse.Namespace) -> int:
         from .batch import Outcome, run_batch
         from .batch_list import read_list
         from .batch_outputs import BatchRequest
+        from .memory import use_again
 
+    use_again()
     suffix = args.format if args.format.startswith(".") else f".{args.format}"
     request = BatchRequest(args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard)
 

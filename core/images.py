@@ -385,7 +385,7 @@ class _Levels:
     def _of(self, rows: slice) -> tuple[np.ndarray, int]:
         """The levels of some rows, in R, G, B, A order, and how many of the pixels are brighter than white."""
         part = self.light[rows, 0 : self.light.shape[1]]
-        brighter = int((part > 1.0).any(axis=2).sum())
+        brighter = int((part > 1.0).any(axis=2).sum()) if part.max(initial=0) > 1 else 0
         if self.flat and self.alpha is not None:
             part = part * self.alpha[rows][..., None]
         coded = encode(part, self.bits, self.curves)

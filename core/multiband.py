@@ -14,10 +14,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .light import strips
+from .threads import each
+
 # Tones less than this away from what they were are what they were.
 NOTHING = 1e-5
-# Rows at a time of what needs no neighbours.
-STRIP = 256
 # The width of the coarsest band, as a share of the canvas's diagonal.
 WIDTH = 1 / 50
 FEWEST, MOST = 3, 7
@@ -38,21 +39,33 @@ def correction(
     a pixel lies on, where anything is `shown`. The difference is written over.
     """
     # on the far side of the seam: what the picture of this side would show there, had it the other's light
-    difference *= same[..., None]
+    _weigh(difference, same.astype(np.float32))
     light = _filled(difference, same.astype(np.float32))
     del difference  # as large as the overlap: the peak of memory is here
     # a pixel's width to either side, or else the finest band is cut with a pair of scissors
     share = cv2.blur(_from_nearest(from_target, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
     share = share[..., None]
     blended = _masked_bands(light, share, bands)
-    for start in range(0, len(blended), STRIP):
-        part, over = (values[start : start + STRIP] for values in (blended, from_target[..., None]))
-        part -= np.where(over, light[start : start + STRIP], np.float32(0))
+
+    def put(rows: slice) -> None:
+        part, over = blended[rows], from_target[rows][..., None]
+        part -= np.where(over, light[rows], np.float32(0))
         # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
-        whole = np.where(over, -light[start : start + STRIP], light[start : start + STRIP])
+        whole = np.where(over, -light[rows], light[rows])
         np.clip(part, np.minimum(whole, 0), np.maximum(whole, 0), out=part)
         part[np.abs(part) < NOTHING] = 0
+
+    each(put, strips(blended.shape))
     return blended
+
+
+def _weigh(values: NDArray[np.float32], weight: NDArray[np.float32]) -> None:
+    """Multiplies values (h, w, C) by a weight (h, w), in place."""
+
+    def put(rows: slice) -> None:
+        values[rows] *= weight[rows][..., None]
+
+    each(put, strips(values.shape))
 
 
 def _from_nearest(values: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -86,10 +99,15 @@ def _filled(sums: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[n
     # weights grow on the way up: a cell with a quarter of it known is known
     coarser = _filled(4 * _down(sums), 4 * _down(weight[..., None])[..., 0])
     out = _up(coarser, weight.shape)
-    out *= (1 - whole)[..., None]
-    sums /= np.maximum(weight, np.float32(1e-6))[..., None]
-    sums *= whole[..., None]
-    out += sums
+
+    def put(rows: slice) -> None:
+        known = whole[rows][..., None]
+        out[rows] *= 1 - known
+        sums[rows] /= np.maximum(weight[rows], np.float32(1e-6))[..., None]
+        sums[rows] *= known
+        out[rows] += sums[rows]
+
+    each(put, strips(out.shape))
     return out
 
 
@@ -100,8 +118,10 @@ def _masked_bands(light: NDArray[np.float32], share: NDArray[np.float32], bands:
     coarser, smooth = _down(light), _down(share)
     band = _up(coarser, light.shape[:2])
     np.subtract(light, band, out=band)
-    band *= share
-    band += _up(_masked_bands(coarser, smooth, bands - 1), light.shape[:2])
+    _weigh(band, share[..., 0])
+    below = _masked_bands(coarser, smooth, bands - 1)
+    for k in range(band.shape[2]):  # one channel at a time: all at once would be as large as the overlap
+        band[..., k] += _up(np.ascontiguousarray(below[..., k : k + 1]), light.shape[:2])[..., 0]
     return band
 
 

@@ -239,10 +239,10 @@ def _cells(
 
 def _owners(
     x: NDArray[np.float32], y: NDArray[np.float32], order: NDArray[np.intp], level: int, target_size: tuple[int, int]
-) -> NDArray[np.intp]:
+) -> NDArray[np.int32]:
     """For each cell the last in order of those in it, -1 where there is none."""
     width, height = target_size
-    owner = np.full(((width >> level) + 1) * ((height >> level) + 1), -1, np.intp)
+    owner = np.full(((width >> level) + 1) * ((height >> level) + 1), -1, np.int32)
     owner[_cells(x[order], y[order], level, target_size)] = order  # of equal indices NumPy keeps the last
     return owner
 

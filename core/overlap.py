@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .light import bounds, strips
 from .threads import each
 from .tone import to_tones
-from .warp import Layer
+from .warp import Layer, shown_only
 
 WHOLE = 1 - 1 / 255
 # Tones that differ by more than the pictures' general difference and this show different things.
@@ -52,7 +52,7 @@ def overlap_of(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Ov
         part = slice(box[0].start + rows.start, box[0].start + rows.stop), box[1]
         tones = to_tones(target.light[part])
         tones -= to_tones(reference.light[part])
-        np.multiply(tones, both[rows][..., None], out=difference[rows])
+        difference[rows] = shown_only(tones, both[rows])
 
     each(put, strips(difference.shape))
     edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) > 0
@@ -73,14 +73,15 @@ def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray
     sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // SAMPLES)]]
     middle = np.median(sample, axis=0)
     sigma = 1.4826 * np.median(np.abs(sample - middle), axis=0)
+    most = np.maximum(SAME_SIGMAS * sigma, SAME_TONE)
     alike = np.empty(shown.shape, bool)
 
     def put(rows: slice) -> None:
         near = slice(max(0, rows.start - 1), rows.stop + 1)
         # a little blurred: noise is no content
         blurred = cv2.blur(difference[near], (3, 3)).reshape(difference[near].shape)[rows.start - near.start :]
-        away = np.abs(blurred[: rows.stop - rows.start] - middle)
-        alike[rows] = (away <= np.maximum(SAME_SIGMAS * sigma, SAME_TONE)).all(axis=2)
+        within = [np.abs(blurred[: rows.stop - rows.start, :, k] - middle[k]) <= most[k] for k in range(len(most))]
+        alike[rows] = np.logical_and.reduce(within)
 
     each(put, strips(difference.shape))
     return alike

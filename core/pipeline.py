@@ -21,6 +21,7 @@ from .features import Matches
 from .images import Picture, in_same_colour_space, load_picture, picture_from_array
 from .inpaint import holes_of
 from .masks import painted_over
+from .memory import give_back
 from .metrics import appearance
 from .options import StitchOptions
 from .progress import Progress
@@ -190,7 +191,7 @@ def compose(
 
 
 class Stopwatch:
-    """Reports each stage, lets it be cancelled, and keeps its seconds."""
+    """Reports each stage, lets it be cancelled, keeps its seconds, and gives back what the one before has freed."""
 
     def __init__(self, progress: Progress) -> None:
         self.seconds: dict[str, float] = {}
@@ -202,6 +203,7 @@ class Stopwatch:
         if self._stage:
             self.seconds[self._stage] = self.seconds.get(self._stage, 0.0) + now - self._since
         self._stage, self._since = stage, now
+        give_back()
         self._progress(stage, fraction)
 
 

@@ -56,17 +56,20 @@ class Relief:
 
     def over(self, xs: Array, ys: Array) -> tuple[Plane, Plane, Plane]:
         """The same at every crossing of columns xs and lines ys, which are evenly spaced, rising reference px."""
+        inverse_depth, shift, confidence = (self.part_over(part, xs, ys) for part in self.parts)
+        return inverse_depth, shift, confidence
+
+    def part_over(self, part: Plane, xs: Array, ys: Array) -> Plane:
+        """The same of one of its `parts`."""
         rows, columns = self.inverse_depth.shape
         left, share, across = _between((xs - self.start[0]) / self.step[0], columns)
         top, share_down, down = _between((ys - self.start[1]) / self.step[1], rows)
-        out = [np.zeros((len(ys), len(xs), *part.shape[2:]), np.float32) for part in self.parts]
+        out = np.zeros((len(ys), len(xs), *part.shape[2:]), np.float32)
         if left.size and top.size:
             near = slice(int(top[0]), int(top[-1]) + 2)
-            for part, to in zip(self.parts, out, strict=True):
-                lines = _mixed(part[near], left, share, 1)
-                to[down, across] = _mixed(lines, top - near.start, share_down, 0)
-        inverse_depth, shift, confidence = out
-        return inverse_depth, shift, confidence
+            lines = _mixed(part[near], left, share, 1)
+            out[down, across] = _mixed(lines, top - near.start, share_down, 0)
+        return out
 
     @property
     def parts(self) -> tuple[Plane, Plane, Plane]:

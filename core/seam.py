@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import strips
+from .light import AnyLight, Placed, around, bounds, strips
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
 from .overlap import SAME_TONE, WHOLE, Overlap, distance_to_border
 from .threads import each
@@ -81,10 +81,10 @@ def seam_cost(overlap: Overlap, warp: Warp) -> NDArray[np.float32]:
 
 def _cost(difference: NDArray[np.float32], warp: Warp, box: tuple[slice, slice]) -> NDArray[np.float32]:
     """What a seam costs at the pixels of a box of the canvas, by the difference (h, w, C) there."""
-    away = np.abs(difference).mean(axis=2)
+    away = _mean(np.abs(difference))
     warned = np.ones(away.shape, np.float32)
     for axis in (0, 1):
-        step = np.abs(np.diff(difference, axis=axis)).mean(axis=2)
+        step = _mean(np.abs(np.diff(difference, axis=axis)))
         away += np.maximum(_padded(step, axis, 0, 1), _padded(step, axis, 1, 0))
         warned += np.minimum(_jumps(warp, box, axis), np.float32(1))
     if warp.sureness is not None:
@@ -94,6 +94,14 @@ def _cost(difference: NDArray[np.float32], warp: Warp, box: tuple[slice, slice])
     cost *= warned
     cost += np.float32(LENGTH)
     return np.minimum(cost, np.float32(1), out=cost)
+
+
+def _mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means (h, w) over channels (h, w, C); NumPy's own takes several times as long over so few."""
+    total = values[..., 0].copy()
+    for k in range(1, values.shape[2]):
+        total += values[..., k]
+    return total / np.float32(values.shape[2])
 
 
 def _jumps(warp: Warp, box: tuple[slice, slice], axis: int) -> NDArray[np.float32]:
@@ -138,31 +146,44 @@ def find_seam(
         return out
     # around the box as far as a coarse cell: what lies there on either side is what the cut holds on to
     reach = 2 << max(0, math.ceil(math.log(free / COARSE, 4)))
-    around = [
+    wider = [
         slice(max(0, part.start - reach), min(side, part.stop + reach))
         for part, side in zip(box, known.shape, strict=True)
     ]
-    margins = [(part.start - far.start, far.stop - part.stop) for part, far in zip(box, around, strict=True)]
-    here = around[0], around[1]
-    out[here] = _cut(known[here], np.pad(cost, margins), np.pad(price, margins))
+    here, at = (wider[0], wider[1]), (box[0].start - wider[0].start, box[1].start - wider[1].start)
+    out[here] = _cut(known[here], *(Placed(values, at, out[here].shape) for values in (cost, price)))
     return out
 
 
-def _cut(known: NDArray[np.int8], cost: NDArray[np.float32], price: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _cut(known: NDArray[np.int8], cost: AnyLight, price: AnyLight) -> NDArray[np.bool_]:
     """The cut at one level, from that at half the size where this one is too large to be cut at once."""
     free = known == FREE
     if free.sum() <= COARSE:
-        return min_cut(_continued(cost, free), known, price)
+        return _cut_within(known, cost, price, free)
     # four pixels have a cell's area, but two its side
     coarse = _cut(_halved_labels(known), _halved(cost, free), 2 * _halved(price, free))
     labels = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[: known.shape[0], : known.shape[1]]
     labels = np.where(known == FREE, labels, known == SECOND)
     for reach in (BAND, 1):
-        settled = np.where(_near_border(labels, known != NOWHERE, reach), known, np.where(labels, SECOND, FIRST))
+        settled = np.where(labels, np.int8(SECOND), np.int8(FIRST))
+        near = _near_border(labels, known != NOWHERE, reach)
+        settled[near] = known[near]
         settled[known == NOWHERE] = NOWHERE
         if (settled == FREE).sum() <= BANDED:
-            return min_cut(_continued(cost, free), settled.astype(np.int8), price)
+            return _cut_within(settled, cost, price, free)
     return labels
+
+
+def _cut_within(
+    known: NDArray[np.int8], cost: AnyLight, price: AnyLight, free: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """The cut through what is FREE in `known`; free (h, w): where the cost is known."""
+    out = known == SECOND
+    box = bounds(known == FREE)
+    if box is not None:
+        part = around(box, 2, known.shape)  # neighbours, and what their cost is continued from
+        out[part] = min_cut(_continued(cost[part], free[part]), known[part], price[part])
+    return out
 
 
 def _near_border(labels: NDArray[np.bool_], there: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
@@ -178,10 +199,19 @@ def _continued(cost: NDArray[np.float32], free: NDArray[np.bool_]) -> NDArray[np
     return np.where(free, cost, beside)
 
 
-def _halved(cost: NDArray[np.float32], free: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _halved(cost: AnyLight, free: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Means over cells of 2×2, of what is free in them."""
-    sums, counts = (_cell_sums(values) for values in (np.where(free, cost, np.float32(0)), free.astype(np.float32)))
-    return sums / np.maximum(counts, np.float32(1))
+    height, width = free.shape
+    out = np.empty((-(-height // 2), -(-width // 2)), np.float32)
+
+    def put(cells: slice) -> None:
+        rows = slice(2 * cells.start, min(height, 2 * cells.stop))
+        here = free[rows]
+        sums = _cell_sums(np.where(here, cost[rows, 0:width], np.float32(0)))
+        np.divide(sums, np.maximum(_cell_sums(here.astype(np.float32)), np.float32(1)), out=out[cells])
+
+    each(put, strips(out.shape))
+    return out
 
 
 def _cell_sums(values: NDArray) -> NDArray:

@@ -208,20 +208,30 @@ class Depth(Light):
         for strip in strips(self.shape):
             low, high = max(rows.start, strip.start), min(rows.stop, strip.stop)
             if low < high:
-                d, _ = self.strip(strip)
+                d = self._alone(strip)
                 out[low - rows.start : high - rows.start] = d[low - strip.start : high - strip.start, columns]
         return out
 
     def strip(self, rows: slice) -> tuple[Array, NDArray[np.float32] | None]:
         """Whole rows of it, and px that the relief adds in the target."""
-        canvas = self.canvas
-        left, top = -canvas.offset[0], rows.start - canvas.offset[1]
-        # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
-        d = self.grid.to_pixels(self.nodes, left, top, canvas.width, rows.stop - rows.start).astype(np.float64)
+        canvas, d = self.canvas, self._of_field(rows)
         if self.relief is None:
             return d, None
         more, sideways, _ = _relief_at(self.relief, canvas, canvas.xs, canvas.ys[rows], self.camera)
         return d + more, sideways
+
+    def _alone(self, rows: slice) -> Array:
+        """Whole rows of it."""
+        canvas, relief = self.canvas, self.relief
+        if relief is None or canvas.projection is not None:
+            return self.strip(rows)[0]
+        return self._of_field(rows) + relief.part_over(relief.inverse_depth, canvas.xs, canvas.ys[rows])
+
+    def _of_field(self, rows: slice) -> Array:
+        left, top = -self.canvas.offset[0], rows.start - self.canvas.offset[1]
+        # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
+        values = self.grid.to_pixels(self.nodes, left, top, self.canvas.width, rows.stop - rows.start)
+        return values.astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +249,10 @@ class Sureness(Light):
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         rows, columns = within(part, self.shape)
-        return _relief_at(self.relief, self.canvas, self.canvas.xs[columns], self.canvas.ys[rows], self.camera)[2]
+        xs, ys = self.canvas.xs[columns], self.canvas.ys[rows]
+        if self.canvas.projection is None:
+            return self.relief.part_over(self.relief.confidence, xs, ys)
+        return _relief_at(self.relief, self.canvas, xs, ys, self.camera)[2]
 
 
 def _relief_at(
@@ -424,8 +437,7 @@ class Fetched(Light):
             # both overshoot alike: divided before alpha is clipped
             pixels /= np.maximum(fetch(alpha[..., None], map_x, map_y)[..., 0], LEAST_ALPHA)[..., None]
         np.clip(pixels, *self.range, out=pixels)
-        pixels *= shows[..., None]
-        return pixels
+        return pixels if shows.all() else shown_only(pixels, shows)
 
 
 def fetch(
@@ -461,12 +473,23 @@ def _fetch_tile(
                     _fetch_tile(source, x[rows, columns], y[rows, columns], out[rows, columns], interpolation)
         return
     part = np.ascontiguousarray(source[y0:y1, x0:x1])
+    x, y = x - np.float32(x0), y - np.float32(y0)
+    whole_tile = bool(inside.all())
+    if not whole_tile:
+        x[~inside] = y[~inside] = -9
     # one picture's own border repeated: bicubic needs a pixel beyond the last
-    sampled = cv2.remap(
-        part,
-        np.where(inside, x - x0, -9),
-        np.where(inside, y - y0, -9),
-        interpolation,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    np.copyto(out, sampled.reshape(out.shape), where=inside[..., None])
+    sampled = cv2.remap(part, x, y, interpolation, borderMode=cv2.BORDER_REPLICATE).reshape(out.shape)
+    if whole_tile:
+        out[:] = sampled
+    else:
+        copied_where(inside, sampled, out)
+
+
+def copied_where(mask: NDArray[np.bool_], source: NDArray, out: NDArray) -> None:
+    """Puts the pixels (H, W, C) of a source where a mask (H, W) says so; `np.copyto` takes several times as long."""
+    cv2.copyTo(source, np.ascontiguousarray(mask).view(np.uint8), out)
+
+
+def shown_only(pixels: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Pixels (H, W, C) where a mask (H, W) says so, 0 elsewhere."""
+    return cv2.copyTo(pixels, np.ascontiguousarray(mask).view(np.uint8)).reshape(pixels.shape)

@@ -100,9 +100,11 @@ def _work(folder: Path, stop: _Stop) -> None:
     with undisturbed():  # NumPy prints a traceback of its own where a signal breaks into its loading
         from .cache import default_folder
         from .camera import CameraRequest
+        from .memory import use_again
         from .options import StitchOptions
         from .pipeline import stitch
 
+    use_again()
     _say({"stage": "read", "share": 0.0})
     job = json.loads((folder / "job.json").read_text("utf-8"))
     if job.get("try"):
