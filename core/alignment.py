@@ -31,6 +31,7 @@ from .projection import Projection, round_projection
 from .slack import SlackField
 from .threads import in_order
 from .two_view import MIN_MATCHES, TwoView, estimate
+from .uprights import edges
 from .warp import Warp, build_warp
 
 # With fewer points of detail than this a picture is to blame, not the pair.
@@ -148,7 +149,8 @@ def lay(
 
     steps("warp", 0.0)
     relief = None if dense is None else dense.relief
-    warp = build_warp(field, field.two_view, *cameras, _projection(options, field.two_view), relief)
+    projection = _projection(options, field.two_view, frames[0], cameras)
+    warp = build_warp(field, field.two_view, *cameras, projection, relief)
     return Alignment(cameras, registration.matches, field.two_view, field, warp, registration.warnings, dense)
 
 
@@ -169,11 +171,24 @@ def size_of(picture: Picture) -> tuple[int, int]:
     return width, height
 
 
-def _projection(options: StitchOptions, two_view: TwoView) -> Projection | None:
+def _projection(
+    options: StitchOptions, two_view: TwoView, frame: Frame, cameras: tuple[Camera, Camera]
+) -> Projection | None:
     """The round projection that is asked for, levelled; None for a flat panorama."""
     if options.projection == "perspective":
         return None
-    return round_projection(options.projection, two_view.K, rotation_for(options.level, two_view.R))
+    upright = None
+    if options.level == "auto":
+        (normals, lengths), (normals_too, lengths_too) = (
+            edges(picture, camera, K)
+            for picture, camera, K in zip(
+                (frame.reference, frame.target), cameras, (two_view.K, two_view.K_prime), strict=True
+            )
+        )
+        upright = normals, lengths
+        if np.isfinite(two_view.R).all():
+            upright = np.vstack([normals, normals_too @ two_view.R]), np.concatenate([lengths, lengths_too])
+    return round_projection(options.projection, two_view.K, rotation_for(options.level, two_view.R, upright))
 
 
 def _found_in(frames: Sequence[Frame], steps: Steps) -> Matches:

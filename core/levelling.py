@@ -1,4 +1,4 @@
-"""How a round panorama is turned: its horizon by the pictures' up vectors, or by hand.
+"""How a round panorama is turned: its horizon by upright edges and by how the pictures were held, or by hand.
 
 Angles are those of Hugin and PTGui: where the reference camera looks in the panorama. Yaw to the right of its middle,
 pitch above its horizon, roll clockwise, in degrees.
@@ -10,12 +10,17 @@ import numpy as np
 
 from .epipolar import Array
 from .errors import BadRequest
+from .uprights import agreement
 
 LEVELS = ("auto", "none")
 Level = str | tuple[float, float, float]
 # How far from level people hold cameras (degrees): they see a tilted horizon, and look up and down on purpose.
 ROLL_SIGMA, PITCH_SIGMA = 1.5, 20.0
 ROUNDS = 50
+# How far from how the cameras were held down is looked for (degrees of pitch and of roll), and how finely: steps, and
+# how far off upright edges may be. An edge as long as the picture weighs as much as so many cameras.
+ON_ITS_SIDE = 45.0
+REACH, STEPS, EDGE = (45.0, 25.0), ((1.0, 1.0), (0.2, 0.5), (0.04, 0.35)), 2.0
 
 
 def parse_level(text: str) -> Level:
@@ -31,14 +36,14 @@ def parse_level(text: str) -> Level:
     return yaw, pitch, roll
 
 
-def rotation_for(level: Level, R: Array) -> Array:
+def rotation_for(level: Level, R: Array, edges: tuple[Array, Array] | None = None) -> Array:
     """The rotation (3, 3) from the panorama's axes to the reference camera's.
 
     level: `auto`, `none` (the reference looks straight ahead) or yaw, pitch, roll; R (3, 3) from the reference camera
-    to the target camera, NaN where it is not known.
+    to the target camera, NaN where it is not known; edges: see `gravity_by_edges`.
     """
     if level == "auto":
-        return upright(gravity(R))
+        return upright(gravity(R) if edges is None else gravity_by_edges(R, *edges))
     return turned(*(0.0, 0.0, 0.0) if isinstance(level, str) else level)
 
 
@@ -62,6 +67,39 @@ def gravity(R: Array) -> Array:
         least = np.linalg.eigh(cost)[1][:, 0]
         down = least * np.sign(least @ down)
     return down
+
+
+def gravity_by_edges(R: Array, normals: Array, lengths: Array) -> Array:
+    """The direction down (3,) in the reference camera's frame: of those near `gravity` the likeliest by how both
+    cameras were held and by the upright edges that they saw.
+
+    normals (N, 3), in the reference's frame, and lengths (N,): see `uprights.edges`. All uprights meet in one point of
+    the picture, which is where down is: that tells pitch, too, where there are some to the left and to the right.
+    """
+    held = gravity(R)
+    if not len(normals):
+        return held
+    # from the camera's own axes, but where it was turned on its side
+    base = np.eye(3) if held[1] > np.cos(np.radians(ON_ITS_SIDE)) else upright(held)
+    axes = [np.eye(3), R] if np.isfinite(R).all() else [np.eye(3)]
+    roll_sigma, pitch_sigma = np.radians([ROLL_SIGMA, PITCH_SIGMA])
+    middle, (pitch_reach, roll_reach) = (0.0, 0.0), REACH
+    best = held
+    for step, off in STEPS:
+        pitch, roll = (
+            values.ravel() for values in np.radians(np.meshgrid(
+                middle[0] + np.arange(-pitch_reach, pitch_reach + step / 2, step),
+                middle[1] + np.arange(-roll_reach, roll_reach + step / 2, step),
+            ))
+        )  # fmt: skip
+        down = np.column_stack([np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch), np.sin(pitch)]) @ base.T
+        unlikely = sum(
+            np.log1p(np.square(down @ a[0]) / roll_sigma**2) + np.square(down @ a[2]) / pitch_sigma**2 for a in axes
+        )
+        found = int(np.argmin(unlikely - 2 * EDGE * agreement(down, normals, lengths, float(np.radians(off)))))
+        best, middle = down[found], (float(np.degrees(pitch[found])), float(np.degrees(roll[found])))
+        pitch_reach = roll_reach = 1.5 * step
+    return best
 
 
 def upright(down: Array) -> Array:

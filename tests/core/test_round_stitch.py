@@ -84,7 +84,7 @@ def test_alignment_is_the_flat_panoramas(results: dict[str, StitchResult], small
         ours = result.report["measured"]
         assert abs(ours["alignment_median_px"] - flat["alignment_median_px"]) < 0.02
         assert abs(ours["overlap_psnr_db"] - flat["overlap_psnr_db"]) < 0.1, "measured in the reference's own frame"
-        assert ours["overlap_px"] == flat["overlap_px"] and ours["folds"] < 0.002
+        assert abs(ours["overlap_px"] - flat["overlap_px"]) < 5 and ours["folds"] < 0.002
         assert ours["projectivity_own_px"] < 0.3 and ours["off_line_mean_px"] < 0.3
 
 
@@ -140,13 +140,13 @@ def test_by_hand_the_reference_looks_where_it_is_told_to(small_pair: Pair, known
     assert np.allclose(result.report["canvas"]["projection"]["level"], (90, 30, 0))
 
 
-def test_the_horizon_is_that_of_the_poses_found(results: dict[str, StitchResult]) -> None:
+def test_the_horizon_is_that_of_upright_edges_and_of_the_poses_found(results: dict[str, StitchResult]) -> None:
     for result in results.values():
         projection = result.warp.canvas.projection
         assert projection is not None
-        assert np.array_equal(projection.rotation, rotation_for("auto", result.two_view.R))
         yaw, pitch, roll = angles_of(projection.rotation)
-        assert abs(yaw) < 1e-6 and 0.1 < abs(pitch) < 10 and abs(roll) < 3, "found, and not far from level"
+        assert abs(yaw) < 1e-6 and 0 < abs(pitch) < 0.5 and abs(roll) < 0.5, "the scene's edges are upright"
+        assert abs(angles_of(rotation_for("auto", result.two_view.R))[1]) > 3, "which the poses alone do not tell"
 
 
 @pytest.mark.parametrize("kind", ROUND)
