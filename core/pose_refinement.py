@@ -16,8 +16,10 @@ from .epipolar import (
     Array,
     fundamental_from_pose,
     homogeneous,
+    in_front,
     infinite_homography,
     inverse_intrinsics,
+    poses_from_fundamental,
     project,
     rotation_from_vector,
     sampson_residuals,
@@ -33,6 +35,8 @@ SYSTEMATIC_PX, SYSTEMATIC_GUESS_PX = 0.5, 0.15
 # Where infinity is seen depends on the whole calibration: distortion moves it by this much.
 BEYOND_PX = 2.0
 TAILS = 3.0
+# Parallax below this angle (radians) is rounding and keypoint noise: such a point may lie behind by accident.
+FAR_ANGLE = 2e-3
 NEGLIGIBLE = 1e-3
 
 
@@ -49,6 +53,14 @@ class Pose:
     def F(self) -> Array:
         """The fundamental matrix of the pose, x'ᵀ F x = 0."""
         return fundamental_from_pose(self.K, self.K_prime, self.R, self.t)
+
+
+def pose_of_fundamental(matches: Matches, F: Array, K: Array, K_prime: Array, threshold: float) -> Pose:
+    """The pose of F that has most of the matches within `threshold` px of their lines in front of both cameras."""
+    near = matches.subset(np.abs(sampson_residuals(F, matches.x, matches.y)) < threshold)
+    poses = poses_from_fundamental(F, K, K_prime)
+    front = [in_front(K, K_prime, R, t, near.x, near.y, FAR_ANGLE).sum() for R, t in poses]
+    return Pose(K, K_prime, *poses[int(np.argmax(front))])
 
 
 def refine_pose(

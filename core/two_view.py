@@ -20,7 +20,6 @@ from .epipolar import (
     in_front,
     infinite_homography,
     inverse_intrinsics,
-    poses_from_fundamental,
     sampson_residuals,
 )
 from .errors import DegenerateGeometry, NoOverlap, TooFewMatches
@@ -40,13 +39,13 @@ from .fundamental import (
     shows_parallax,
     transfer_error,
 )
-from .pose_refinement import Pose, refine_pose
+from .pose_refinement import FAR_ANGLE, Pose, pose_of_fundamental, refine_pose
 from .rotation import fit_rotation
+from .zoom import with_two_focals
 
 MIN_MATCHES = 16
 START_PX = 1.0
 INLIER_PX = 2.0
-ZOOM_GAIN = 0.75
 # A second look at the matches with a threshold of so many σ, at most that share of the first.
 SHARP_SIGMAS, SHARP = 3.0, 0.4
 # A rotation may explain a homography's matches so much worse: lenses are not perfect.
@@ -59,8 +58,6 @@ REFINEMENTS = 8
 FIRST_LOOK, IN_EARNEST = 400, 1500
 # Focal lengths in units of the longer side, tried when nothing is known: 19 mm to 200 mm on a 36 mm frame.
 FOCAL_LADDER = (0.5, 0.7, 0.9, 1.2, 1.6, 2.2, 3.2, 5.0)
-# Parallax below this angle (radians) is rounding and keypoint noise: such a point may lie behind by accident.
-FAR_ANGLE = 2e-3
 
 
 @dataclass(frozen=True)
@@ -258,11 +255,12 @@ def _fit_pose(
     # a wide threshold lets in stray matches that the pose bends to; one as sharp as the noise turns out does not
     sharp = min(SHARP_SIGMAS * best[2], SHARP * RANSAC_PX * matches.scale)
     F = robust_fundamental(matches, sharp, seed)
-    again = _best_of_fundamental(matches, F, best[0].K, best[0].K_prime, sharp)
+    again = pose_of_fundamental(matches, F, best[0].K, best[0].K_prime, sharp)
     best = _least_truncated(matches, [best, _refine_with_inliers(matches, again, camera, camera_prime, False)])
-    if not _zoom_is_evident(matches, best[0], camera, camera_prime):
+    zoomed = with_two_focals(matches, best[0], F, camera, camera_prime, best[2])
+    if zoomed is None:
         return *best, False
-    return *_refine_with_inliers(matches, best[0], camera, camera_prime, True), True
+    return *_refine_with_inliers(matches, zoomed, camera, camera_prime, True), True
 
 
 def _best_starts(
@@ -281,7 +279,7 @@ def _best_starts(
     for factor in factors:
         K, K_prime = camera.scaled(factor), camera_prime.scaled(factor)
         for F in candidates if factor == 1.0 else candidates[:1]:
-            starts.append(_best_of_fundamental(few, F, K, K_prime, 2 * RANSAC_PX * matches.scale))
+            starts.append(pose_of_fundamental(few, F, K, K_prime, 2 * RANSAC_PX * matches.scale))
     if homography.inliers.sum() > PLANE_SHARE * len(matches):
         on = few.subset(transfer_error(homography.H, few) < 2 * RANSAC_PX * matches.scale)
         starts += _poses_of_plane(on, homography.H, camera, camera_prime)
@@ -293,14 +291,6 @@ def _best_starts(
     )
     fine = (refine_pose(few, p, camera, camera_prime, sigma, iterations=30) for p, _ in rough[:3])
     return [pose for pose, _ in sorted(fine, key=lambda item: item[1])]
-
-
-def _best_of_fundamental(matches: Matches, F: Array, K: Array, K_prime: Array, threshold: float) -> Pose:
-    """The pose of F that has most of the matches within `threshold` px of their lines in front of both cameras."""
-    near = matches.subset(np.abs(sampson_residuals(F, matches.x, matches.y)) < threshold)
-    poses = poses_from_fundamental(F, K, K_prime)
-    front = [in_front(K, K_prime, R, t, near.x, near.y, FAR_ANGLE).sum() for R, t in poses]
-    return Pose(K, K_prime, *poses[int(np.argmax(front))])
 
 
 def _poses_of_plane(on: Matches, H: Array, camera: Camera, camera_prime: Camera) -> list[Pose]:
@@ -357,21 +347,6 @@ def _least_truncated(
         return float(np.where(front, np.minimum(squared, 9.0), 9.0).sum())
 
     return min(refined, key=lambda item: cost(item[0]))
-
-
-def _zoom_is_evident(matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera) -> bool:
-    """Whether the pictures were clearly taken at two focal lengths.
-
-    A second focal length also soaks up lens distortion, and then leads astray outside the overlap; so it must lower the
-    mean squared residual (in units of START_PX², each at most 9) by ZOOM_GAIN, which a real zoom does at once.
-    """
-    if camera.fixed or camera_prime.fixed:
-        return False
-    few, sigma = matches.thinned(FIRST_LOOK), START_PX * matches.scale
-    zoomed, _ = refine_pose(few, pose, camera, camera_prime, sigma, zoom=True, iterations=20)
-    before, after = (np.minimum((sampson_residuals(p.F, few.x, few.y) / sigma) ** 2, 9.0) for p in (pose, zoomed))
-    explained = (before < 9.0) | (after < 9.0)
-    return bool(explained.any() and (before - after)[explained].mean() > ZOOM_GAIN)
 
 
 def _from_known_cameras(
