@@ -30,12 +30,13 @@ Steps = Callable[[str, float], None]
 class Decided:
     """What was decided before a pixel was mixed; the frames of a clip share it.
 
-    hidden (H, W): what the target cannot see, or would show mirrored; surely (H, W): that of it which the depth order
-    says by itself, which is what the seam goes by: more would leave it no way through leaves; exposure: the target's;
-    from_target (H, W): which side of the seam a pixel lies on, None without a seam; known, cost, price, box: what the
-    seam was cut by (see `find_seam`), None if it was not or they are not kept; roll: by how many columns those four are
-    rolled (see `around`); holes: pixels that the target cannot see and the reference does not show: transparent or
-    filled, but in an average; folds: `metrics.folds` away from what is hidden behind something near.
+    hidden (H, W): what the target cannot see, or would show mirrored; surely (H, W): that of it which the depth
+    order says by itself, which is what the seam goes by: more would leave it no way through leaves (hidden if that
+    is not kept); exposure: the target's; from_target (H, W): which side of the seam a pixel lies on, None without a
+    seam; known, cost, price, box: what the seam was cut by (see `find_seam`), None if it was not or they are not
+    kept; roll: by how many columns those four are rolled (see `around`); holes: pixels that the target cannot see
+    and the reference does not show: transparent or filled, but in an average; folds: `metrics.folds` away from what
+    is hidden behind something near.
     """
 
     hidden: NDArray[np.bool_]
@@ -108,7 +109,10 @@ def composed(
         side = None if found.from_target is None else rolled(found.from_target, -roll)
         found = replace(found, surely=surely, from_target=side)
         if not keep:
-            found = replace(found, known=None, cost=None, price=None, box=None)
+            found = replace(found, surely=hidden, known=None, cost=None, price=None, box=None)
+    if options.holes != "inpaint":
+        holes = holes[:0]
+    del surely, surely_there  # as much as the canvas has pixels, and the bands need the room
 
     steps("blend", 0.0)
     if found.from_target is None:
@@ -142,7 +146,8 @@ def pooled_decision(decisions: Sequence[Decided]) -> Decided:
 
 def _without(layer: Layer, holes: NDArray[np.bool_]) -> Layer:
     """A layer that shows nothing in holes (H, W), and has no colour there either: files keep it under the alpha."""
-    return Layer(Weighed(layer.light, ~holes), np.where(holes, layer.alpha.dtype.type(0), layer.alpha))
+    alpha = np.where(holes, layer.alpha.dtype.type(0), layer.alpha)
+    return Layer(Weighed(layer.light, alpha if alpha.dtype == bool else ~holes), alpha)
 
 
 def _with_seam(

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.blas import sgemm
 
+from .threads import in_order
+
 # Above this a picture is shrunk for features only: SIFT's cost and memory grow with pixels, its useful points hardly
 # do.
 FEATURE_PIXELS = 3_200_000
@@ -135,18 +137,24 @@ def match(a: Features, b: Features, ratio: float = RATIO) -> Matches:
     nearest, nearest_score, second = (np.empty(len(a.points), t) for t in (np.intp, np.float32, np.float32))
     back_score = np.full(len(b.points), -2, np.float32)
     back = np.zeros(len(b.points), np.intp)
-    for start in range(0, len(a.points), 1024):  # in slabs, so that memory stays bounded
+
+    def best_of(start: int) -> tuple[int, NDArray[np.intp], NDArray[np.float32]]:
+        """Fills in what is nearest to some of a; which of them is nearest to each of b, and how near."""
         rows = slice(start, start + 1024)
         score = _products(a.descriptors[rows], b.descriptors)
         best_row = score.argmax(axis=0)
         best = score[best_row, np.arange(score.shape[1])]
-        better = best > back_score
-        back[better], back_score[better] = best_row[better] + start, best[better]
         nearest[rows] = score.argmax(axis=1)
         index = np.arange(len(score))
         nearest_score[rows] = score[index, nearest[rows]]
         score[index, nearest[rows]] = -2
         second[rows] = score.max(axis=1)
+        return start, best_row, best
+
+    # in slabs, so that memory stays bounded
+    for start, best_row, best in in_order(best_of, range(0, len(a.points), 1024)):
+        better = best > back_score
+        back[better], back_score[better] = best_row[better] + start, best[better]
     # unit vectors: |a − b|² = 2 − 2 a·b
     distinct = 2 - 2 * nearest_score < ratio**2 * (2 - 2 * second)
     keep = np.flatnonzero(distinct & (back[nearest] == np.arange(len(a.points))))

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -105,6 +106,11 @@ def part_of(light: AnyLight, part: Part) -> NDArray[np.float32]:
     return out
 
 
+def shown_only(pixels: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Pixels (H, W, C) where a mask (H, W) says so, 0 elsewhere; NumPy's products of the two take twice as long."""
+    return cv2.copyTo(pixels, np.ascontiguousarray(mask).view(np.uint8)).reshape(pixels.shape)
+
+
 def extent(light: AnyLight) -> tuple[float, float]:
     """The least and the most of all its values."""
     if isinstance(light, Coded):
@@ -146,7 +152,10 @@ class Weighed(Light):
         return self.light.shape
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
-        return self.light[part] * self.weight[part][..., None]
+        light, weight = self.light[part], self.weight[part]
+        if weight.dtype != bool:
+            return light * weight[..., None]
+        return light if weight.all() else shown_only(light, weight.astype(bool, copy=False))
 
 
 @dataclass(frozen=True, eq=False)

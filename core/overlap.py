@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import bounds, strips
+from .light import bounds, shown_only, strips
 from .threads import each
 from .tone import to_tones
-from .warp import Layer, shown_only
+from .warp import Layer
 
 WHOLE = 1 - 1 / 255
 # Tones that differ by more than the pictures' general difference and this show different things.

@@ -19,7 +19,21 @@ from .displacement import Field, FieldValues, slid
 from .epipolar import Array, homogeneous, project
 from .errors import BadRequest, NoOverlap
 from .lens import distort, undistort
-from .light import AnyLight, Held, Light, Part, Placed, Weighed, bounds, extent, part_of, strips, whole, within
+from .light import (
+    AnyLight,
+    Held,
+    Light,
+    Part,
+    Placed,
+    Weighed,
+    bounds,
+    extent,
+    part_of,
+    shown_only,
+    strips,
+    whole,
+    within,
+)  # fmt: skip
 from .projection import Projection
 from .threads import each
 from .two_view import TwoView
@@ -420,7 +434,8 @@ class Fetched(Light):
         if picture.alpha is not None:
             fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
             alpha = inside * np.where(fetched > LEAST_ALPHA, np.minimum(fetched, 1.0), np.float32(0))
-        return Fetched(picture, map_x, map_y, alpha > 0, extent(picture.light)), alpha
+        shows = inside if picture.alpha is None else alpha > 0
+        return Fetched(picture, map_x, map_y, shows, extent(picture.light)), alpha
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -488,8 +503,3 @@ def _fetch_tile(
 def copied_where(mask: NDArray[np.bool_], source: NDArray, out: NDArray) -> None:
     """Puts the pixels (H, W, C) of a source where a mask (H, W) says so; `np.copyto` takes several times as long."""
     cv2.copyTo(source, np.ascontiguousarray(mask).view(np.uint8), out)
-
-
-def shown_only(pixels: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Pixels (H, W, C) where a mask (H, W) says so, 0 elsewhere."""
-    return cv2.copyTo(pixels, np.ascontiguousarray(mask).view(np.uint8)).reshape(pixels.shape)
