@@ -17,10 +17,13 @@ Level = str | tuple[float, float, float]
 # How far from level people hold cameras (degrees): they see a tilted horizon, and look up and down on purpose.
 ROLL_SIGMA, PITCH_SIGMA = 1.5, 20.0
 ROUNDS = 50
-# How far from how the cameras were held down is looked for (degrees of pitch and of roll), and how finely: steps, and
-# how far off upright edges may be. An edge as long as the picture weighs as much as so many cameras.
-ON_ITS_SIDE = 45.0
+# How far from its middle line (degrees of pitch and of roll) down is looked for, and how finely: steps, and how far off
+# upright edges may be. An edge as long as the picture weighs as much as EDGE cameras.
 REACH, STEPS, EDGE = (45.0, 25.0), ((1.0, 1.0), (0.2, 0.5), (0.04, 0.35)), 2.0
+# A camera that was turned so far was turned on its side.
+ON_ITS_SIDE = 45.0
+# Edges of any direction speak for some more than for others: by about the root of the sum of their squares.
+CHANCE = 1.0
 
 
 def parse_level(text: str) -> Level:
@@ -96,7 +99,10 @@ def gravity_by_edges(R: Array, normals: Array, lengths: Array) -> Array:
         unlikely = sum(
             np.log1p(np.square(down @ a[0]) / roll_sigma**2) + np.square(down @ a[2]) / pitch_sigma**2 for a in axes
         )
-        found = int(np.argmin(unlikely - 2 * EDGE * agreement(down, normals, lengths, float(np.radians(off)))))
+        speaks = agreement(down, normals, lengths, float(np.radians(off)))
+        if step == STEPS[0][0] and speaks.max() - np.median(speaks) < CHANCE * np.linalg.norm(lengths):
+            return held
+        found = int(np.argmin(unlikely - 2 * EDGE * speaks))
         best, middle = down[found], (float(np.degrees(pitch[found])), float(np.degrees(roll[found])))
         pitch_reach = roll_reach = 1.5 * step
     return best

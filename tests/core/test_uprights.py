@@ -62,6 +62,20 @@ def test_edges_of_nothing_upright_and_none_at_all_leave_it_to_the_cameras() -> N
     assert off(gravity_by_edges(np.eye(3), *leaning), 0, 0) < 20, "no more than people look up or down"
 
 
+def test_edges_of_every_direction_alike_leave_it_to_the_cameras_too() -> None:
+    """A patterned tabletop; all of them on a spiral over the sphere."""
+    z = np.linspace(-1, 1, 1001)[:-1] + 0.001
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(1000)
+    normals = np.column_stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z])
+    lengths = np.full(1000, 0.05)
+    alone = np.full((3, 3), np.nan)
+    assert np.array_equal(gravity_by_edges(alone, normals, lengths), [0, 1, 0])
+    upright = normals.copy()
+    upright[::4] -= np.outer(upright[::4] @ turned(0, 15, 4)[:, 1], turned(0, 15, 4)[:, 1])
+    upright /= np.linalg.norm(upright, axis=1, keepdims=True)
+    assert off(gravity_by_edges(alone, upright, lengths), 15, 4) < 0.3, "but a quarter that meet in a point are not"
+
+
 def test_the_border_of_what_is_transparent_is_no_edge() -> None:
     picture = street(0, 0)
     picture.view[:, :200], alpha = 0, np.ones((480, 640), np.float32)
