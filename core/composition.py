@@ -110,9 +110,10 @@ def composed(
         found = replace(found, surely=surely, from_target=side)
         if not keep:
             found = replace(found, surely=hidden, known=None, cost=None, price=None, box=None)
+        del start
     if options.holes != "inpaint":
-        holes = holes[:0]
-    del surely, surely_there  # as much as the canvas has pixels, and the bands need the room
+        holes = np.zeros(0, bool)
+    del surely, surely_there  # each as large as the canvas, and the bands need the room
 
     steps("blend", 0.0)
     if found.from_target is None:

@@ -91,7 +91,7 @@ def filled(
 
 def _filled(sums: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
     # sums are written over, for there is little else as large in memory
-    whole = np.minimum(weight, 1)
+    whole = weight if weight.max(initial=0) <= 1 else np.minimum(weight, 1)
     if min(weight.shape) <= 2 or whole.min() == 1:
         own = sums / np.maximum(weight, np.float32(1e-6))[..., None]
         mean = sums.sum(axis=(0, 1)) / max(float(weight.sum()), 1e-6)
