@@ -44,13 +44,19 @@ def known_labels(
     What only one shows whole comes from it, what is hidden from the target from the reference where that shows it.
     painted (H, W): -1 and 1 where the artist has decided, 0 elsewhere; it wins wherever the picture shows something.
     """
+    known = np.full(reference.alpha.shape, NOWHERE, np.int8)
+
+    def put(rows: slice) -> None:
+        out, unseen, alpha, alpha_too = known[rows], hidden[rows], reference.alpha[rows], target.alpha[rows]
+        shows, shows_too = alpha > 0, alpha_too > 0
+        out[shows & shows_too] = FREE
+        # a soft edge of one gives way to what the other shows whole
+        whole, whole_too = alpha >= WHOLE, alpha_too >= WHOLE
+        out[shows & (~shows_too | unseen | (whole & ~whole_too))] = FIRST
+        out[shows_too & (~shows | (whole_too & ~whole & ~unseen))] = SECOND
+
+    each(put, strips(known.shape))
     shows, shows_too = reference.alpha > 0, target.alpha > 0
-    known = np.full(shows.shape, NOWHERE, np.int8)
-    known[shows & shows_too] = FREE
-    # a soft edge of one gives way to what the other shows whole
-    whole, whole_too = reference.alpha >= WHOLE, target.alpha >= WHOLE
-    known[shows & (~shows_too | hidden | (whole & ~whole_too))] = FIRST
-    known[shows_too & (~shows | (whole_too & ~whole & ~hidden))] = SECOND
     alone = int((shows & ~shows_too).sum())
     if shows.any() and alone < SURROUNDED * int(shows.sum()):
         # all round it is the target: the cheapest cut would leave nothing of the reference
