@@ -194,12 +194,14 @@ def _projection(
 def _found_in(frames: Sequence[Frame], steps: Steps) -> Matches:
     found = []
     for i, frame in enumerate(frames):
-        pictures = (frame.reference, frame.target)
-        seen, seen_too = in_order(lambda picture: features.detect(picture.view, picture.alpha), pictures)
-        steps("features", (i + 0.9) / len(frames))
-        found.append(features.match(seen, seen_too))
+        seen = []
+        for keypoints in in_order(lambda p: features.detect(p.view, p.alpha), (frame.reference, frame.target)):
+            seen.append(keypoints)
+            steps("features", (i + 0.45 * len(seen)) / len(frames))
+        first, second = seen
+        found.append(features.match(first, second))
         if len(frames) == 1 and len(found[0]) < MIN_MATCHES:
-            _refuse_scarce(len(found[0]), frame, len(seen.points), len(seen_too.points))
+            _refuse_scarce(len(found[0]), frame, len(first.points), len(second.points))
     x, y = np.concatenate([m.x for m in found]), np.concatenate([m.y for m in found])
     return Matches(x, y, max(m.scale for m in found))
 
