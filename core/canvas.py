@@ -131,14 +131,17 @@ class Grid:
         """All nodes (rows, columns, 2)."""
         return np.stack(np.meshgrid(self.xs, self.ys), axis=-1)
 
-    def to_pixels(self, values: NDArray, left: int, top: int, width: int, height: int) -> NDArray[np.float32]:
-        """Node values (rows, columns) as float32 pixels of a rectangle, by cubic convolution.
+    def to_pixels(
+        self, values: NDArray, left: int, top: int, width: int, height: int, every: int = 1
+    ) -> NDArray[np.float32]:
+        """Node values (rows, columns) as float32 pixels of a rectangle, by cubic convolution; every: of so many a side
+        only the first.
 
         Keys 1981 (a = −½), which reproduces affine and quadratic functions; OpenCV's own cubic (a = −¾) does not: it
         would put ripples on every plane.
         """
-        down = _cubic_weights(self.start[1], self.step, self.rows, top, height)
-        across = _cubic_weights(self.start[0], self.step, self.columns, left, width)
+        down = _cubic_weights(self.start[1], self.step, self.rows, range(top, top + height, every))
+        across = _cubic_weights(self.start[0], self.step, self.columns, range(left, left + width, every))
         strips = (down @ np.asarray(values, np.float64)).astype(np.float32)
         return sgemm(1.0, across.T.astype(np.float32), strips.T, trans_a=True).T
 
@@ -158,12 +161,12 @@ class Grid:
         return out
 
 
-def _cubic_weights(start: int, step: int, nodes: int, first: int, count: int) -> Array:
-    """Weights (count, nodes) of the nodes of one axis for the pixels first, first + 1, …"""
-    at = (np.arange(first, first + count) - start - (step - 1) / 2) / step
+def _cubic_weights(start: int, step: int, nodes: int, pixels: range) -> Array:
+    """Weights (len(pixels), nodes) of the nodes of one axis for pixels."""
+    at = (np.array(pixels) - start - (step - 1) / 2) / step
     node = np.clip(np.floor(at).astype(int), 1, nodes - 3)
-    weights = np.zeros((count, nodes))
-    each = np.arange(count)
+    weights = np.zeros((len(pixels), nodes))
+    each = np.arange(len(pixels))
     for k, weight in enumerate(_keys(at - node)):
         weights[each, node + k - 1] = weight
     return weights

@@ -75,7 +75,8 @@ def refine(
     margin = int(MOST_FADE * side) + 16
     if max(side, *cameras[1].size) + 2 * margin > REMAP_LIMIT:
         return Dense(None, f"a picture with a side of {max(side, *cameras[1].size)} px is too long to be searched")
-    sparse = SparseMap.around(field, two_view, *cameras, margin)
+    every = max(1, int(np.sqrt(np.prod(cameras[0].size) / POLISHED)))
+    sparse = SparseMap.around(field, two_view, *cameras, margin, every)
     box = _overlap(sparse, cameras[1].size)
     if box is None:
         return Dense(None, "the overlap is too small")

@@ -22,36 +22,41 @@ Plane = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class SparseMap:
-    """A field on the raw pixels of a box around the reference, which starts at pixel `start` (x, y): inverse_depth
-    (h, w), shift (h, w, 2) px."""
+    """A field on every `step`th raw pixel of a box around the reference, which starts at pixel `start` (x, y):
+    inverse_depth (h, w), shift (h, w, 2) px."""
 
     two_view: TwoView
     camera: Camera
     camera_prime: Camera
     start: tuple[int, int]
+    step: int
     inverse_depth: Plane
     shift: Plane
 
     @staticmethod
-    def around(field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera, margin: int) -> SparseMap:
+    def around(
+        field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera, margin: int, step: int = 1
+    ) -> SparseMap:
         """The field on the reference and a margin (px) around it."""
         width, height = camera.size
         box = (-margin, -margin, width + 2 * margin, height + 2 * margin)
         grid = Grid.over(*box)
         values = field.on_grid(grid, undistort(grid.points, camera) if camera.distortion.any() else None)
-        shift = np.zeros((box[3], box[2], 2), np.float32)
+        inverse_depth = grid.to_pixels(values.inverse_depth, *box, step)
+        shift = np.zeros((*inverse_depth.shape, 2), np.float32)
         if values.shift is not None:
             for k in (0, 1):
-                shift[..., k] = grid.to_pixels(values.shift[..., k], *box)
-        return SparseMap(two_view, camera, camera_prime, box[:2], grid.to_pixels(values.inverse_depth, *box), shift)
+                shift[..., k] = grid.to_pixels(values.shift[..., k], *box, step)
+        return SparseMap(two_view, camera, camera_prime, box[:2], step, inverse_depth, shift)
 
     def smoothed(self, sigma: float, plane: Array) -> SparseMap:
         """The field without bends finer than sigma px; plane m (3,): its affine part, which stays."""
         if sigma < 1:
             return self
         height, width = self.inverse_depth.shape
-        small = max(8, round(8 * width / sigma)), max(8, round(8 * height / sigma))
-        xs, ys = (np.arange(n, dtype=np.float64) + s for n, s in zip((width, height), self.start, strict=True))
+        small = max(8, round(8 * width * self.step / sigma)), max(8, round(8 * height * self.step / sigma))
+        xs, ys = (np.arange(n, dtype=np.float64) * self.step for n in (width, height))
+        xs, ys = xs + self.start[0], ys + self.start[1]
         affine = (plane[0] * xs + plane[2]) + plane[1] * ys[:, None]
         bend = cv2.resize((self.inverse_depth - affine).astype(np.float32), small, interpolation=cv2.INTER_AREA)
         bend = cv2.GaussianBlur(bend, (0, 0), 8.0, borderType=cv2.BORDER_REPLICATE)
@@ -61,7 +66,7 @@ class SparseMap:
     def at(self, raw: Array) -> tuple[Plane, Plane]:
         """Inverse depth (…) and shift (…, 2) at raw points (rows, columns, 2), between pixels by linear
         interpolation."""
-        x, y = (np.ascontiguousarray(raw[..., k] - self.start[k], np.float32) for k in (0, 1))
+        x, y = (np.ascontiguousarray((raw[..., k] - self.start[k]) / self.step, np.float32) for k in (0, 1))
         return (
             cv2.remap(self.inverse_depth, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
             cv2.remap(self.shift, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
