@@ -80,26 +80,27 @@ def composed(
 
     steps("exposure", 0.0)
     box = bounds((reference.alpha > 0) & (target.alpha > 0))
-    if box is not None:
-        target = target.held(around(box, BLOCK, reference.alpha.shape))
+    # asked for twice, and let go before the seam is cut: to fetch it again costs less than the room it takes
+    held = target if box is None else target.held(around(box, BLOCK, reference.alpha.shape))
     if decided:
         exposure = decided.exposure
     elif options.exposure:
-        exposure = match_exposure(reference, target, hidden, floats)
+        exposure = match_exposure(reference, held, hidden, floats)
     else:
         exposure = unchanged(target.light.shape[2])
-    target = exposure.applied(target)
+    held, target = exposure.applied(held), exposure.applied(target)
 
     steps("seam", 0.0)
     if options.blend == "linear":
         found = Decided(hidden, surely, exposure, folds=folded)
         steps("blend", 0.0)
-        return averaged(reference, target), target, found
+        return averaged(reference, held), held, found
     holes = holes_of(hidden, reference, target)
-    seen = _without(target, holes) if holes.any() else target
+    seen, held = (_without(layer, holes) if holes.any() else layer for layer in (target, held))
     roll = decided.roll if decided else roll_for(warp.canvas, reference, seen)
     reference, seen, surely_there = rolled_layer(reference, roll), rolled_layer(seen, roll), rolled(surely, roll)
-    overlap = overlap_of(reference, seen, surely_there) if options.has_seam else None
+    overlap = overlap_of(reference, rolled_layer(held, roll), surely_there) if options.has_seam else None
+    del held
     if decided:
         found = decided
     else:
