@@ -22,7 +22,7 @@ COARSEST, MARGIN = 4, 1.1
 LEAVES_CELL = 1.45
 BETWEEN = (0.25, 0.5, 0.75)
 # Where the map folds is known to blocks of the target, 2^BLOCK px wide and with their neighbours wider than any cell.
-BLOCK = 5
+BLOCK = 4
 STRIP = 2_000_000
 # Confidence of what both pictures show, and of what one shows alone; how far what is hidden may reach beyond what the
 # depth order tells of it, as a share of the target's longer side.
