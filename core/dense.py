@@ -24,6 +24,7 @@ from .line_search import View, search, search_base
 from .polish import likeness, polish
 from .relief import MOST_FADE, Relief, raised
 from .slack import SlackField
+from .threads import in_order
 from .two_view import TwoView
 from .unfolding import unfolded
 from .warp import REMAP_LIMIT, fetch
@@ -85,7 +86,9 @@ def refine(
     reach = float(np.clip(reach, LEAST_REACH * step, MOST_REACH * step))
     lines = Lines.over(base, box, fine)
     field_at = (lines.at(sparse) - lines.inverse_depth) / lines.moved
-    coarse_views, views = ([View.of(p.view, p.alpha, s) for p in pictures] for s in (step, fine))
+    wanted = [(picture, s) for s in (step, fine) for picture in pictures]
+    *coarse_views, first, second = in_order(lambda job: View.of(job[0].view, job[0].alpha, job[1]), wanted)
+    views = first, second
     along, found = search(lines, base, coarse_views[0], coarse_views[1], step, reach)
     along = np.where(found > 0, along, field_at)
     alike = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))

@@ -18,6 +18,7 @@ from .features import Matches
 from .lens import distort
 from .line_map import Lines, Plane, SparseMap
 from .rectify import EpipolarRows
+from .threads import in_order
 
 BLOCK, STEP_COST, JUMP_COST, UNIQUE = 3, 8, 48, 2
 # How much more smoothly is matched at half the size what was not found at full size, and how much that counts.
@@ -107,17 +108,22 @@ def search(
     ideal = rows.points()
     alike = reference.levels.shape[2] == target.levels.shape[2]
     own, other = ((v.levels.astype(np.float32) if alike else v.gray) for v in (reference, target))
-    raw = distort(ideal, sparse.camera)
-    first, seen = reference.sample(own, raw[..., 0], raw[..., 1], cv2.INTER_CUBIC)
-    sent = distort(sparse.target(ideal), sparse.camera_prime)
-    second, seen_too = target.sample(other, sent[..., 0], sent[..., 1], cv2.INTER_CUBIC)
+
+    def of_reference() -> tuple[Plane, NDArray[np.bool_]]:
+        raw = distort(ideal, sparse.camera)
+        return reference.sample(own, raw[..., 0], raw[..., 1], cv2.INTER_CUBIC)
+
+    def of_target() -> tuple[Plane, NDArray[np.bool_]]:
+        sent = distort(sparse.target(ideal), sparse.camera_prime)
+        return target.sample(other, sent[..., 0], sent[..., 1], cv2.INTER_CUBIC)
+
+    (first, seen), (second, seen_too) = in_order(lambda rows_of: rows_of(), (of_reference, of_target))
     a, b = _levels(first), _levels(in_tones_of(first, second, seen & seen_too))
     # where one picture shows nothing, the field is believed
     only, only_too = seen & ~seen_too, seen_too & ~seen
     b[only], a[only_too] = a[only], b[only_too]
     a[~(seen | seen_too)] = b[~(seen | seen_too)] = 128
-    moved, found = _matched(a, b, count)
-    coarse, found_too = _matched_at_half(a, b, count)
+    (moved, found), (coarse, found_too) = in_order(lambda how: how(a, b, count), (_matched, _matched_at_half))
     moved = np.where(found, moved, coarse)
     counts = np.where(found, np.float32(1), found_too * np.float32(COARSE_SHARE))
     arrives = np.rint(np.arange(rows.shape[1]) - moved).astype(int)
