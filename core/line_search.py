@@ -21,6 +21,9 @@ from .rectify import EpipolarRows
 from .threads import in_order
 
 BLOCK, STEP_COST, JUMP_COST, UNIQUE = 3, 8, 48, 2
+# Costs (of a pixel at a place) that are held at once, four bytes each; more rows than that are matched band by band,
+# each with so many rows beside it.
+MOST_COSTS, NEIGHBOURS = 100_000_000, 32
 # How much more smoothly is matched at half the size what was not found at full size, and how much that counts.
 COARSE_SMOOTHER, COARSE_SHARE = 4, 0.1
 # A patch of fewer pixels (share of the rows' side, squared) than this is a speck.
@@ -123,7 +126,8 @@ def search(
     only, only_too = seen & ~seen_too, seen_too & ~seen
     b[only], a[only_too] = a[only], b[only_too]
     a[~(seen | seen_too)] = b[~(seen | seen_too)] = 128
-    (moved, found), (coarse, found_too) = in_order(lambda how: how(a, b, count), (_matched, _matched_at_half))
+    moved, found = _matched(a, b, count)
+    coarse, found_too = _matched_at_half(a, b, count)
     moved = np.where(found, moved, coarse)
     counts = np.where(found, np.float32(1), found_too * np.float32(COARSE_SHARE))
     arrives = np.rint(np.arange(rows.shape[1]) - moved).astype(int)
@@ -163,7 +167,13 @@ def _matched(
         speckleWindowSize=int(SPECK**2 * a.shape[0] * a.shape[1]), speckleRange=SPECK_RANGE,
         mode=cv2.STEREO_SGBM_MODE_HH4,
     )  # fmt: skip
-    found = matcher.compute(a, b).astype(np.float32) / 16
+    height, width = a.shape[:2]
+    found = np.empty((height, width), np.float32)
+    at_once = max(NEIGHBOURS, MOST_COSTS // (width * count))
+    for top in range(0, height, at_once):
+        low, high = max(0, top - NEIGHBOURS), min(height, top + at_once + NEIGHBOURS)
+        part = matcher.compute(a[low:high], b[low:high])[top - low :][:at_once]
+        found[top : top + at_once] = part.astype(np.float32) / 16
     sure = found > least - 1
     return np.where(sure, found, np.float32(0)), sure
 

@@ -4,10 +4,12 @@ wrong by some px."""
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core import line_search
 from edf_stitch.core.displacement import target_points
 from edf_stitch.core.features import Matches
 from edf_stitch.core.line_map import SparseMap
@@ -203,3 +205,28 @@ def test_a_few_matches_that_are_wrong_do_not_widen_the_search() -> None:
     spoiled[:2] += 300
     _, reach_too = search_base(field, replace(Matches(x, y), y=spoiled), pair.plane, 1e9)
     assert reach_too == pytest.approx(reach, rel=0.3)
+
+
+def test_matching_band_by_band_finds_what_matching_at_once_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The costs of all rows at once may be gigabytes."""
+    random = np.random.default_rng(8)
+    wide = cv2.GaussianBlur(random.normal(size=(400, 300)), (0, 0), 1.5)
+    wide = np.clip(128 + 90 * wide / wide.std(), 0, 255)
+    rows = np.arange(400)[:, None]
+    moved = np.rint(4 + 3 * np.sin(rows / 40) + 2 * (rows > 215)).astype(int)
+    first = wide[:, 20:260].astype(np.uint8)
+    second = np.take_along_axis(wide, np.arange(20, 260) + moved, axis=1).astype(np.uint8)
+    at_once, sure = line_search._matched(first, second, 32)
+    assert sure.mean() > 0.8
+    heights: list[int] = []
+    create = cv2.StereoSGBM_create
+
+    def watched(**options: int) -> SimpleNamespace:
+        matcher = create(**options)
+        return SimpleNamespace(compute=lambda a, b: heights.append(len(a)) or matcher.compute(a, b))
+
+    monkeypatch.setattr(line_search, "MOST_COSTS", 50 * 240 * 32)
+    monkeypatch.setattr(cv2, "StereoSGBM_create", watched)
+    banded, sure_too = line_search._matched(first, second, 32)
+    assert len(heights) == 8 and max(heights) == 50 + 2 * line_search.NEIGHBOURS
+    assert (sure != sure_too).mean() < 0.01 and (np.abs(at_once - banded)[sure & sure_too] > 0.5).mean() < 0.002
