@@ -86,9 +86,8 @@ def refine(
     reach = float(np.clip(reach, LEAST_REACH * step, MOST_REACH * step))
     lines = Lines.over(base, box, fine)
     field_at = (lines.at(sparse) - lines.inverse_depth) / lines.moved
-    wanted = [(picture, s) for s in (step, fine) for picture in pictures]
-    *coarse_views, first, second = in_order(lambda job: View.of(job[0].view, job[0].alpha, job[1]), wanted)
-    views = first, second
+    coarse_views = _views(pictures, step)
+    views = coarse_views if fine == step else _views(pictures, fine)
     along, found = search(lines, base, coarse_views[0], coarse_views[1], step, reach)
     along = np.where(found > 0, along, field_at)
     alike = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
@@ -124,6 +123,12 @@ def _overlap(sparse: SparseMap, target_size: tuple[int, int]) -> Box | None:
     high = np.minimum(np.ceil(np.array([columns[-1] + 2, rows[-1] + 2]) * cell), [width, height]).astype(int)
     across, down = (high - low).tolist()
     return (int(low[0]), int(low[1]), across, down) if min(across, down) >= LEAST_SIDE else None
+
+
+def _views(pictures: tuple[Picture, Picture], step: float) -> tuple[View, View]:
+    """Both pictures with `step` px to each of their own."""
+    reference, target = in_order(lambda picture: View.of(picture.view, picture.alpha, step), pictures)
+    return reference, target
 
 
 def _guide(view: NDArray[np.uint8], lines: Lines) -> NDArray[np.float32]:

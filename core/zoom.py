@@ -25,8 +25,8 @@ def with_two_focals(
 ) -> Pose | None:
     """The pose with two focal lengths where they are evident, else None.
 
-    pose: with a common one, px its noise sigma; F: of the matches, free of any camera. A focal length that is given is
-    not doubted.
+    pose: with a common one, sigma px the noise it leaves; F: of the matches, free of any camera. A focal length that is
+    given is not doubted.
     """
     if camera.fixed or camera_prime.fixed:
         return None
