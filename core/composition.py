@@ -80,8 +80,8 @@ def composed(
 
     steps("exposure", 0.0)
     box = bounds((reference.alpha > 0) & (target.alpha > 0))
-    # asked for twice, and let go before the seam is cut: to fetch it again costs less than the room it takes
-    held = target if box is None else target.held(around(box, BLOCK, reference.alpha.shape))
+    # asked for twice unless decided, and let go before the cut: to fetch it again costs less than the room it takes
+    held = target if decided or box is None else target.held(around(box, BLOCK, reference.alpha.shape))
     if decided:
         exposure = decided.exposure
     elif options.exposure:
