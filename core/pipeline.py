@@ -21,7 +21,6 @@ from .features import Matches
 from .images import Picture, in_same_colour_space, load_picture, picture_from_array
 from .inpaint import holes_of
 from .masks import painted_over
-from .memory import give_back
 from .metrics import appearance
 from .options import StitchOptions
 from .progress import Progress
@@ -191,7 +190,7 @@ def compose(
 
 
 class Stopwatch:
-    """Reports each stage, lets it be cancelled, keeps its seconds, and gives back what the one before has freed."""
+    """Reports each stage, lets it be cancelled, and keeps its seconds."""
 
     def __init__(self, progress: Progress) -> None:
         self.seconds: dict[str, float] = {}
@@ -203,7 +202,6 @@ class Stopwatch:
         if self._stage:
             self.seconds[self._stage] = self.seconds.get(self._stage, 0.0) + now - self._since
         self._stage, self._since = stage, now
-        give_back()
         self._progress(stage, fraction)
 
 
