@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.blas import sgemm
 
 from .camera import Camera
 from .epipolar import Array, homogeneous, inverse_intrinsics
@@ -22,6 +22,8 @@ from .projection import Projection, extent
 # Fields are smooth: about this many nodes carry them at any picture size.
 NODES = 20_000
 MIN_STEP = 4
+# Cells of one axis whose pixels are interpolated at once.
+CELLS = 8
 # Limits of what is worth showing: the target stretched more than 4× in length, or reaching further than three pictures
 # away.
 MAX_STRETCH = 4.0
@@ -140,10 +142,12 @@ class Grid:
         Keys 1981 (a = −½), which reproduces affine and quadratic functions; OpenCV's own cubic (a = −¾) does not: it
         would put ripples on every plane.
         """
-        down = _cubic_weights(self.start[1], self.step, self.rows, range(top, top + height, every))
-        across = _cubic_weights(self.start[0], self.step, self.columns, range(left, left + width, every))
-        strips = (down @ np.asarray(values, np.float64)).astype(np.float32)
-        return sgemm(1.0, across.T.astype(np.float32), strips.T, trans_a=True).T
+        down, near = _cubic_weights(self.start[1], self.step, self.rows, range(top, top + height, every))
+        lines = (down @ np.asarray(values, np.float64)[near]).astype(np.float32)
+        out = np.empty((len(lines), -(-width // every)), np.float32)
+        for part, near, across in _across(self.start[0], self.step, self.columns, range(left, left + width, every)):
+            np.matmul(lines[:, near], across, out=out[:, part])
+        return out
 
     def at(self, values: NDArray, points: Array) -> Array:
         """Node values (rows, columns) at points (…, 2), by the same convolution; 0 where a point is NaN or lies beyond
@@ -161,15 +165,29 @@ class Grid:
         return out
 
 
-def _cubic_weights(start: int, step: int, nodes: int, pixels: range) -> Array:
-    """Weights (len(pixels), nodes) of the nodes of one axis for pixels."""
-    at = (np.array(pixels) - start - (step - 1) / 2) / step
+@lru_cache(maxsize=8)  # strip after strip asks for the same
+def _across(start: int, step: int, nodes: int, pixels: range) -> list[tuple[slice, slice, NDArray[np.float32]]]:
+    """Some pixels of one axis after the other, the nodes that count for them, and their weights (n, pixels): so that
+    what is not near is not multiplied."""
+    some = max(1, CELLS * step // pixels.step)
+    out = []
+    for first in range(0, len(pixels), some):
+        part = slice(first, first + some)
+        weights, near = _cubic_weights(start, step, nodes, pixels[part])
+        out.append((part, near, np.ascontiguousarray(weights.T, np.float32)))
+    return out
+
+
+def _cubic_weights(start: int, step: int, nodes: int, pixels: range) -> tuple[Array, slice]:
+    """Weights (len(pixels), n) of the nodes of one axis for pixels, and which n they are: those that count."""
+    at = (np.arange(pixels.start, pixels.stop, pixels.step) - start - (step - 1) / 2) / step
     node = np.clip(np.floor(at).astype(int), 1, nodes - 3)
-    weights = np.zeros((len(pixels), nodes))
+    near = slice(int(node[0]) - 1, int(node[-1]) + 3)
+    weights = np.zeros((len(pixels), near.stop - near.start))
     each = np.arange(len(pixels))
     for k, weight in enumerate(_keys(at - node)):
-        weights[each, node + k - 1] = weight
-    return weights
+        weights[each, node - node[0] + k] = weight
+    return weights, near
 
 
 def _keys(u: Array) -> tuple[Array, Array, Array, Array]:
