@@ -6,6 +6,8 @@ division. So the depth order is in the warp already; a z-buffer over the target'
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +29,8 @@ STRIP = 2_000_000
 # Confidence of what both pictures show, and of what one shows alone; how far what is hidden may reach beyond what the
 # depth order tells of it, as a share of the target's longer side.
 AGREED, ALONE, BESIDE = 0.5, 0.3, 1 / 200
+# Of what `Contested` holds.
+KINDS = (np.intp, np.float32, np.float32, np.float32, np.uint8)
 # In place of -1, 0 or 1: see `turning`.
 NO_TURN = 2
 
@@ -39,17 +43,17 @@ def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDA
     the pixels.
     """
     hidden = np.zeros(warp.map_x.shape, bool)
-    points, near, levels = _contested(warp, two_view, target_size)
-    if not (near > 0).any():
+    contested = _contested(warp, two_view, target_size)
+    if not (contested.near > 0).any():
         return hidden
-    x, y = (values.ravel()[points] for values in (warp.map_x, warp.map_y))
-    order = _ascending(near)
+    points, near = contested.points, contested.near
     found = np.zeros(points.size, bool)
-    for level in np.unique(levels):
-        owner = _owners(x, y, order[levels[order] == level], int(level), target_size)
-        claimed = owner[_cells(x, y, int(level), target_size)]
-        rivals = np.flatnonzero((claimed >= 0) & ~found)
-        rivals = rivals[near[claimed[rivals]] > near[rivals]]
+    for level in np.flatnonzero(np.bincount(contested.levels)).tolist():
+        cells, count = contested.cells(level, target_size)
+        owner = _owners(cells, np.flatnonzero(contested.levels == level), near, count)
+        claimed = owner[cells]
+        # where nobody owns the cell, -1 stands for the last point, and its depth says nothing
+        rivals = np.flatnonzero((near[claimed] > near) & (claimed >= 0) & ~found)
         found[rivals] = _apart(warp, points[rivals], points[claimed[rivals]], LEAVES_CELL * 2.0**level)
     hidden.ravel()[points[found]] = True
     # pixels between the samples of what hides them
@@ -114,38 +118,57 @@ def turned_over(turns: NDArray[np.int8]) -> NDArray[np.bool_]:
     return out if 2 * int(out.sum()) <= int((turns != NO_TURN).sum()) else turns == 1
 
 
-def _contested(
-    warp: Warp, two_view: TwoView, target_size: tuple[int, int]
-) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.uint8]]:
-    """Canvas points (flat indices) that others may hide, with all those others, their inverse depth in the target, and
-    their cells (see `_levels`).
+@dataclass(frozen=True)
+class Contested:
+    """Canvas points (N,), as flat indices, that others may hide, with all those others: where the map sends them
+    (target px), their inverse depth there, and what cells they have (see `_levels`)."""
+
+    points: NDArray[np.intp]
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    near: NDArray[np.float32]
+    levels: NDArray[np.uint8]
+
+    def cells(self, level: int, target_size: tuple[int, int]) -> tuple[NDArray[np.int32], int]:
+        """In which cell of a level each point falls, and how many cells there are."""
+        columns, rows = ((side >> level) + 1 for side in target_size)
+        row, column = ((v + np.float32(0.5)).astype(np.int32) >> level for v in (self.y, self.x))
+        row *= columns
+        row += column
+        return row, rows * columns
+
+
+def _contested(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> Contested:
+    """The points among which something may be hidden.
 
     Along an epipolar line the map is a function of one variable, and continuous between pixels. Where it takes a value
     twice it turns back in between, over that value. So what is hidden lies in the target where the map folds, and
     where it folds nowhere nothing is hidden.
     """
     blocks = _folded_blocks(warp, target_size)
-    if not blocks.any():
-        return np.empty(0, np.intp), np.empty(0, np.float32), np.empty(0, np.uint8)
     height, width = warp.map_x.shape
     rows = max(1, STRIP // width)
 
-    def found_from(top: int) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.uint8]]:
+    def found_from(top: int) -> Contested:
         strip = warp.within((0, top, width, min(rows, height - top)))
         inside = np.flatnonzero(strip.inside(target_size))
-        row, column = ((v.ravel()[inside] + np.float32(0.5)).astype(np.intp) for v in (strip.map_y, strip.map_x))
-        inside = inside[blocks[row >> BLOCK, column >> BLOCK]]
-        if not inside.size:
-            return inside, np.empty(0, np.float32), np.empty(0, np.uint8)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            near = inverse_depth_in_target(strip, two_view).ravel()[inside]
-        known = np.isfinite(near)
-        points = inside[known] + top * width
-        return points, near[known], _levels(warp, points)
+        x, y = (values.ravel()[inside] for values in (strip.map_x, strip.map_y))
+        row, column = ((v + np.float32(0.5)).astype(np.int32) >> BLOCK for v in (y, x))
+        row *= blocks.shape[1]
+        row += column
+        there = np.flatnonzero(blocks.ravel()[row])
+        near = np.empty(0, np.float32)
+        if there.size:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                near = inverse_depth_in_target(strip, two_view).ravel()[inside[there]]
+            known = np.isfinite(near)
+            there, near = (there, near) if known.all() else (there[known], near[known])
+        points = inside[there] + top * width
+        return Contested(points, x[there], y[there], near, _levels(warp, top, strip.map_x.shape[0], points))
 
-    found = list(in_order(found_from, range(0, height, rows)))
-    points, near, levels = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return points, near, levels
+    tops = range(0, height, rows) if blocks.any() else ()
+    found = list(in_order(found_from, tops)) or [Contested(*(np.empty(0, kind) for kind in KINDS))]
+    return Contested(*(np.concatenate([getattr(part, name) for part in found]) for name in Contested.__annotations__))
 
 
 def _folded_blocks(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -201,49 +224,48 @@ def inverse_depth_in_target(warp: Warp, two_view: TwoView) -> NDArray[np.float32
     return np.maximum(d, np.float32(0)) / third
 
 
-def _levels(warp: Warp, points: NDArray[np.intp]) -> NDArray[np.uint8]:
-    """Which cells the canvas fills at its points: log2 of the target px from one canvas pixel to the next, rounded up.
+def _levels(warp: Warp, top: int, rows: int, points: NDArray[np.intp]) -> NDArray[np.uint8]:
+    """Which cells the canvas fills at points of some of its rows: log2 of the target px from one canvas pixel to the
+    next, rounded up.
 
     Of the steps to either side the shorter counts: at the edge of an object the longer one leads off it.
     """
-    step = np.zeros(points.size, np.float32)
-    place = np.divmod(points, warp.map_x.shape[1])
+    if not points.size:
+        return np.empty(0, np.uint8)
+    low, high = max(0, top - 1), min(top + rows + 1, warp.map_x.shape[0])
+    x, y = (values[low:high] for values in (warp.map_x, warp.map_y))
+    longest = np.zeros(x.shape, np.float32)  # squared
     for axis in (0, 1):
-        last = warp.map_x.shape[axis] - 2
-        if last < 0:
+        if x.shape[axis] < 2:
             continue
-        sides = []
-        for begin in (np.clip(place[axis] - 1, 0, last), np.minimum(place[axis], last)):
-            here = (begin, place[1]) if axis == 0 else (place[0], begin)
-            there = (begin + 1, place[1]) if axis == 0 else (place[0], begin + 1)
-            side = np.hypot(*(values[there] - values[here] for values in (warp.map_x, warp.map_y)))
-            sides.append(np.where(np.isfinite(side), side, np.float32(0)))
-        np.maximum(step, np.minimum(*sides), out=step)
-    levels = np.ceil(np.log2(np.maximum(step / np.float32(MARGIN), np.float32(1))))
-    return np.minimum(levels, COARSEST).astype(np.uint8)
+        with np.errstate(invalid="ignore", over="ignore"):
+            step = np.square(np.diff(x, axis=axis))
+            step += np.square(np.diff(y, axis=axis))
+        step[~np.isfinite(step)] = 0
+        # the first and the last pixel have a step to one side only
+        first, last, middle = (_along(axis, part) for part in (slice(0, 1), slice(-1, None), slice(1, -1)))
+        shorter = np.minimum(step[_along(axis, slice(1, None))], step[_along(axis, slice(None, -1))])
+        for part, length in ((first, step[first]), (last, step[last]), (middle, shorter)):
+            np.maximum(longest[part], length, out=longest[part])
+    longer_than = np.float32(MARGIN) ** 2 * 4.0 ** np.arange(COARSEST)
+    return np.searchsorted(longer_than, longest.ravel()[points - low * x.shape[1]]).astype(np.uint8)
 
 
-def _ascending(values: NDArray[np.float32]) -> NDArray[np.intp]:
-    """argsort of values ≥ 0 in linear time: their bits order as they do, and NumPy sorts 16 bits by counting."""
-    bits = np.ascontiguousarray(values, np.float32).view(np.uint32)
-    order = np.argsort((bits & 0xFFFF).astype(np.uint16), kind="stable")
-    return order[np.argsort((bits[order] >> 16).astype(np.uint16), kind="stable")]
-
-
-def _cells(
-    x: NDArray[np.float32], y: NDArray[np.float32], level: int, target_size: tuple[int, int]
-) -> NDArray[np.intp]:
-    columns = (target_size[0] >> level) + 1
-    return ((y + np.float32(0.5)).astype(np.intp) >> level) * columns + ((x + np.float32(0.5)).astype(np.intp) >> level)
+def _along(axis: int, part: slice) -> tuple[slice, ...]:
+    """A part along one axis of an array."""
+    return (*[slice(None)] * axis, part)
 
 
 def _owners(
-    x: NDArray[np.float32], y: NDArray[np.float32], order: NDArray[np.intp], level: int, target_size: tuple[int, int]
+    cells: NDArray[np.int32], points: NDArray[np.intp], near: NDArray[np.float32], count: int
 ) -> NDArray[np.int32]:
-    """For each cell the last in order of those in it, -1 where there is none."""
-    width, height = target_size
-    owner = np.full(((width >> level) + 1) * ((height >> level) + 1), -1, np.int32)
-    owner[_cells(x[order], y[order], level, target_size)] = order  # of equal indices NumPy keeps the last
+    """For each of `count` cells the nearest of some points (indices into cells and near), -1 where none is in it; of
+    equally near ones the last."""
+    owner = np.full(count, -1, np.int32)
+    while points.size:
+        there = cells[points]
+        owner[there] = points  # of equal indices NumPy keeps the last
+        points = points[near[points] > near[owner[there]]]
     return owner
 
 
