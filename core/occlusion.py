@@ -29,8 +29,6 @@ STRIP = 2_000_000
 # Confidence of what both pictures show, and of what one shows alone; how far what is hidden may reach beyond what the
 # depth order tells of it, as a share of the target's longer side.
 AGREED, ALONE, BESIDE = 0.5, 0.3, 1 / 200
-# Of what `Contested` holds.
-KINDS = (np.intp, np.float32, np.float32, np.float32, np.uint8)
 # In place of -1, 0 or 1: see `turning`.
 NO_TURN = 2
 
@@ -166,9 +164,13 @@ def _contested(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> C
         points = inside[there] + top * width
         return Contested(points, x[there], y[there], near, _levels(warp, top, strip.map_x.shape[0], points))
 
-    tops = range(0, height, rows) if blocks.any() else ()
-    found = list(in_order(found_from, tops)) or [Contested(*(np.empty(0, kind) for kind in KINDS))]
-    return Contested(*(np.concatenate([getattr(part, name) for part in found]) for name in Contested.__annotations__))
+    # one strip at least, whose parts have the right types
+    parts = list(in_order(found_from, range(0, height if blocks.any() else 1, rows)))
+    return Contested(
+        *(np.concatenate([part.points for part in parts]), np.concatenate([part.x for part in parts])),
+        *(np.concatenate([part.y for part in parts]), np.concatenate([part.near for part in parts])),
+        np.concatenate([part.levels for part in parts]),
+    )
 
 
 def _folded_blocks(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_]:
