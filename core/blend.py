@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import AnyLight, Light, Part, Retouched, bounds, within
+from .light import AnyLight, Light, Part, Retouched, bounds, for_each_channel, within
 from .multiband import bands_for, correction
 from .overlap import Overlap, distance_inside, distance_to_border
 from .tone import to_light, to_tones
@@ -86,8 +86,9 @@ class Mixed(Light):
         if box is not None:
             share = self.share[part][box]
             weight, weight_too = share * alpha[box], (1 - share) * alpha_too[box]
-            mix = light[box] * weight[..., None] + self.second.light[part][box] * weight_too[..., None]
-            mix /= np.maximum(weight + weight_too, 1e-12)[..., None]
+            total = np.maximum(weight + weight_too, np.float32(1e-12))
+            first, second = (for_each_channel(w / total, light.shape[2]) for w in (weight, weight_too))
+            mix = light[box] * first + self.second.light[part][box] * second
             copied_where(both[box], mix, pixels[box])
         return pixels
 
@@ -138,7 +139,8 @@ def in_bands(reference: Layer, target: Layer, from_target: NDArray[np.bool_], ov
     del overlap  # as large as they are: the peak of memory is ahead
     same = parts.pop()
     change = correction(parts.pop(), same, from_target[region], shown, bands)
-    touched = change.any(axis=2) & shown
+    # channel by channel: NumPy is slow along three at once
+    touched = np.logical_or.reduce([change[..., k] != 0 for k in range(change.shape[2])]) & shown
     return Layer(Evened(out.light, (region[0].start, region[1].start), touched, change), out.alpha)
 
 

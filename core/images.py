@@ -385,15 +385,20 @@ class _Levels:
     def _of(self, rows: slice) -> tuple[np.ndarray, int]:
         """The levels of some rows, in R, G, B, A order, and how many of the pixels are brighter than white."""
         part = self.light[rows, 0 : self.light.shape[1]]
-        brighter = int((part > 1.0).any(axis=2).sum()) if part.max(initial=0) > 1 else 0
+        brighter = 0
+        if part.max(initial=0) > 1:  # channel by channel: NumPy is slow along three at once
+            brighter = int(np.logical_or.reduce([part[..., k] > 1 for k in range(part.shape[2])]).sum())
         if self.flat and self.alpha is not None:
             part = part * self.alpha[rows][..., None]
         coded = encode(part, self.bits, self.curves)
         if self.flat or self.alpha is None:
             return coded, brighter
-        out = np.empty((*coded.shape[:2], 4), coded.dtype)
-        out[..., :3] = coded
-        out[..., 3] = np.rint(np.clip(self.alpha[rows].astype(np.float32), 0, 1) * np.iinfo(coded.dtype).max)
+        most = np.iinfo(coded.dtype).max
+        alpha = self.alpha[rows]
+        levels = alpha * coded.dtype.type(most) if alpha.dtype == bool else np.rint(np.clip(alpha, 0, 1) * most)
+        if coded.shape[2] == 1:
+            coded = cv2.merge([coded] * 3)
+        out = cv2.merge([coded, levels.astype(coded.dtype, copy=False)])
         return out, brighter
 
     def _share(self, counts: Iterable[int]) -> float:

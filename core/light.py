@@ -111,6 +111,11 @@ def shown_only(pixels: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDArray[
     return cv2.copyTo(pixels, np.ascontiguousarray(mask).view(np.uint8)).reshape(pixels.shape)
 
 
+def for_each_channel(values: NDArray[np.float32], channels: int) -> NDArray[np.float32]:
+    """Values (H, W) once for each channel (H, W, C): what NumPy spreads by itself takes four times as long."""
+    return cv2.merge([values] * channels).reshape(*values.shape, channels)
+
+
 def extent(light: AnyLight) -> tuple[float, float]:
     """The least and the most of all its values."""
     if isinstance(light, Coded):
@@ -155,7 +160,7 @@ class Weighed(Light):
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         light, weight = self.light[part], self.weight[part]
         if weight.dtype != bool:
-            return light * weight[..., None]
+            return light * for_each_channel(weight, light.shape[2])
         return light if weight.all() else shown_only(light, weight.astype(bool, copy=False))
 
 

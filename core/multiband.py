@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import strips
+from .light import for_each_channel, strips
 from .threads import each
 
 # Tones less than this away from what they were are what they were.
@@ -48,10 +48,11 @@ def correction(
     blended = _masked_bands(light, share, bands)
 
     def put(rows: slice) -> None:
-        part, over = blended[rows], from_target[rows][..., None]
-        part -= np.where(over, light[rows], np.float32(0))
+        part, whole = blended[rows], light[rows]
+        over = for_each_channel(from_target[rows].astype(np.float32), part.shape[2])
+        part -= over * whole
         # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
-        whole = np.where(over, -light[rows], light[rows])
+        whole = whole * (1 - 2 * over)
         np.clip(part, np.minimum(whole, 0), np.maximum(whole, 0), out=part)
         part[np.abs(part) < NOTHING] = 0
 
@@ -63,7 +64,7 @@ def _weigh(values: NDArray[np.float32], weight: NDArray[np.float32]) -> None:
     """Multiplies values (h, w, C) by a weight (h, w), in place."""
 
     def put(rows: slice) -> None:
-        values[rows] *= weight[rows][..., None]
+        values[rows] *= for_each_channel(weight[rows], values.shape[2])
 
     each(put, strips(values.shape))
 
@@ -86,7 +87,7 @@ def filled(
     """Values (h, w, C) where known, or by how well (0..1), continued smoothly elsewhere (pull and push: means over ever
     larger cells fill what smaller ones leave open; Gortler et al., SIGGRAPH 1996, section 3.4)."""
     weight = known.astype(np.float32)
-    return _filled(values * weight[..., None], weight)
+    return _filled(values * for_each_channel(weight, values.shape[2]), weight)
 
 
 def _filled(sums: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -97,14 +98,14 @@ def _filled(sums: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[n
         mean = sums.sum(axis=(0, 1)) / max(float(weight.sum()), 1e-6)
         return own * whole[..., None] + mean.astype(np.float32) * (1 - whole)[..., None]
     # weights grow on the way up: a cell with a quarter of it known is known
+    channels = sums.shape[2]
     coarser = _filled(4 * _down(sums), 4 * _down(weight[..., None])[..., 0])
     out = _up(coarser, weight.shape)
 
     def put(rows: slice) -> None:
-        known = whole[rows][..., None]
-        out[rows] *= 1 - known
-        sums[rows] /= np.maximum(weight[rows], np.float32(1e-6))[..., None]
-        sums[rows] *= known
+        known = whole[rows]
+        out[rows] *= for_each_channel(1 - known, channels)
+        sums[rows] *= for_each_channel(known / np.maximum(weight[rows], np.float32(1e-6)), channels)
         out[rows] += sums[rows]
 
     each(put, strips(out.shape))
