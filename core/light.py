@@ -111,7 +111,7 @@ def shown_only(pixels: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDArray[
     return cv2.copyTo(pixels, np.ascontiguousarray(mask).view(np.uint8)).reshape(pixels.shape)
 
 
-def for_each_channel(values: NDArray[np.float32], channels: int) -> NDArray[np.float32]:
+def for_each_channel(values: NDArray, channels: int) -> NDArray[np.float32]:
     """Values (H, W) once for each channel (H, W, C): what NumPy spreads by itself takes four times as long."""
     return cv2.merge([values] * channels).reshape(*values.shape, channels)
 
