@@ -352,28 +352,33 @@ def _prune_and_smooth(
     s = sensitivity[index]
     problem = SmoothingProblem.build(matches.x[index], np.median(s) / s / np.sqrt(matches.weights[index]), unit)
     supported = np.full(len(index), True) if matches.given else _supported(matches.x[index], g[index], s, floor)
+    inverse = problem.inverse(SMOOTHING_START)
+    left = np.full(len(index), True)
 
     def drop(keep: NDArray[np.bool_]) -> bool:
         """Take out what neither the threshold nor its neighbours keep; says whether anything went."""
-        nonlocal index, problem, supported
+        nonlocal index, inverse, supported
         keep = keep | supported
         if keep.all() or keep.sum() < MIN_CENTRES:
             return False
-        index, problem, supported = index[keep], problem.subset(keep), supported[keep]
+        index, inverse, supported = index[keep], inverse.subset(keep), supported[keep]
+        left[left] = keep
         return True
 
     # gross errors first: they would bend the spline towards themselves, so each is judged by the spline without it
     while True:
-        error = np.abs(sensitivity[index] * problem.held_out_at(g[index], SMOOTHING_START))
+        error = np.abs(sensitivity[index] * inverse.held_out(g[index]))
         if not drop(error <= max(GROSS_DEVIATIONS * np.median(error) / 0.6745, floor)):
             break
+    problem, left = problem.subset(left), left[left]
     smoothing = best_smoothing(problem, g[index], sensitivity[index])
+    inverse = problem.inverse(smoothing)
     while True:
-        spline, residual = problem.solve(g[index], smoothing)
-        error = np.abs(sensitivity[index] * residual)
+        error = np.abs(sensitivity[index] * inverse.residual(g[index]))
         if not drop(error <= max(PRUNE_SIGMAS * np.sqrt(np.mean(error**2)), floor)):
             break
-    held_out = sensitivity[index] * problem.held_out_at(g[index], smoothing)
+    held_out = sensitivity[index] * inverse.held_out(g[index])
+    spline, residual = problem.subset(left).solve(g[index], smoothing)
     return index, spline, residual, smoothing, float(np.sqrt(np.mean(held_out**2)))
 
 
@@ -397,8 +402,8 @@ def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> f
 
     Large errors count in proportion, not squared: a few depth edges must not decide for the whole picture.
     """
-    parts = [problem.held_out(part, SMOOTHING_LADDER) for part in np.atleast_2d(g.T)]
-    error = np.linalg.norm(parts, axis=0) * sensitivity
+    error = problem.held_out(g, SMOOTHING_LADDER)
+    error = (np.abs(error) if g.ndim == 1 else np.linalg.norm(error, axis=-1)) * sensitivity
     return float(SMOOTHING_LADDER[int(np.argmin(robust_mean(error)))])
 
 

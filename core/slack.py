@@ -100,7 +100,7 @@ def fit_slack(strict: StrictField, matches: Matches) -> SlackField:
     left = _left_across(strict, few)
     ladder = np.maximum(LADDER, STIFFER * strict.fit.smoothing)
     problem = _problem(strict, few)
-    errors = np.linalg.norm([problem.held_out(part, ladder) for part in left.T], axis=0)
+    errors = np.linalg.norm(problem.held_out(left, ladder), axis=-1)
     *score, none = robust_mean(np.vstack([errors, np.linalg.norm(left, axis=1)]))
     best = int(np.argmin(score))
     return _on_matches(strict, kept, float(ladder[best]) if score[best] < (1 - GAIN) * none else np.inf)

@@ -114,20 +114,49 @@ class SmoothingProblem:
         spline = ThinPlateSpline(self.centres, solution[:n], solution[n:], self.centre, self.scale)
         return spline, ((8 * np.pi * smoothing * self.noise**2) * solution[:n].T).T
 
-    def held_out_at(self, values: Array, smoothing: float) -> Array:
-        """Leave-one-out residuals (N,) at one λ: w_i / (S⁻¹)_ii with S the system (Dubrule 1983 for kriging, the same
-        equations)."""
-        n = len(values)
-        inverse = scipy.linalg.inv(self.system(smoothing))
-        return (inverse[:n, :n] @ values) / np.diag(inverse)[:n]
+    def inverse(self, smoothing: float) -> Inverse:
+        """What makes weights of values at λ = smoothing."""
+        projected, out_of = self._projected()
+        n = len(self.noise)
+        # any size will do for what is taken out; the matrix's own keeps all digits
+        size = float(np.trace(projected)) / n
+        projected += size * (out_of @ out_of.T)
+        projected[np.arange(n), np.arange(n)] += 8 * np.pi * smoothing
+        # symmetric, so its transpose is the column-major matrix that LAPACK wants: nothing is copied
+        factor, failed = scipy.linalg.lapack.dpotrf(projected.T, lower=1, clean=0, overwrite_a=1)
+        if failed:
+            raise np.linalg.LinAlgError(f"the matrix of a spline is not positive definite at λ = {smoothing:g}")
+        matrix = cv2.completeSymm(scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)[0].T)
+        matrix -= (out_of @ out_of.T) / (size + 8 * np.pi * smoothing)
+        matrix /= np.outer(self.noise, self.noise)
+        return Inverse(matrix, 8 * np.pi * smoothing * self.noise**2)
 
     def held_out(self, values: Array, ladder: Array) -> Array:
-        """Leave-one-out residuals (len(ladder), N) of values (N,), one row for each λ.
+        """Leave-one-out residuals (len(ladder), N) of values (N,), or (len(ladder), N, k) of (N, k), one row for
+        each λ.
 
-        With v = √D w, on the complement Q of D^-½ M the system is (Qᵀ D^-½ Φ D^-½ Q + 8πλ I) z = …: one
-        eigen-decomposition serves every λ, and the residual at a point the spline never saw is √D_i v_i / G_ii with
-        G = Q (…)⁻¹ Qᵀ (Wahba eq. 4.2.8 in these coordinates). Q is not formed: D^-½ Φ D^-½ is projected, which takes
-        rank-3 updates only, and the three directions taken out get the lowest eigenvalues, to be dropped.
+        One eigen-decomposition serves every λ: with v = √D w the residual at a point the spline never saw is √D_i v_i /
+        G_ii, where G = Q (…)⁻¹ Qᵀ (see `_projected`; Wahba eq. 4.2.8 in these coordinates).
+        """
+        matrix, out_of = self._projected()
+        # the three directions taken out get the lowest eigenvalues, to be dropped
+        matrix -= (1 + np.abs(matrix).sum(axis=1).max()) * (out_of @ out_of.T)
+        eigenvalues, basis = scipy.linalg.eigh(matrix, driver="evd", overwrite_a=True, check_finite=False)
+        eigenvalues, basis = eigenvalues[3:], basis[:, 3:]
+        squared = basis**2
+        projected = basis.T @ (values.T / self.noise).T
+        out = np.empty((len(ladder), *values.shape))
+        for i, smoothing in enumerate(ladder):
+            gain = 1.0 / (np.maximum(eigenvalues, 0.0) + 8 * np.pi * smoothing)
+            scale = self.noise / np.maximum(squared @ gain, 1e-300)
+            out[i] = ((basis @ (gain * projected.T).T).T * scale).T
+        return out
+
+    def _projected(self) -> tuple[Array, Array]:
+        """D^-½ Φ D^-½ on the complement Q of D^-½ M, as (N, N), zero on the three directions (N, 3) of the rest.
+
+        There the system is (Qᵀ D^-½ Φ D^-½ Q + 8πλ I) z = … with v = √D w, positive definite. Q is not formed:
+        projecting takes rank-3 updates only.
         """
         root = self.noise
         polynomial = np.column_stack([self.centres, np.ones(len(root))]) / root[:, None]
@@ -136,15 +165,35 @@ class SmoothingProblem:
         for _ in range(2):  # from the left, then from the right
             matrix -= out_of @ (out_of.T @ matrix)
             matrix = matrix.T
-        matrix -= (1 + np.abs(matrix).sum(axis=1).max()) * (out_of @ out_of.T)
-        eigenvalues, basis = scipy.linalg.eigh(matrix, driver="evd", overwrite_a=True, check_finite=False)
-        eigenvalues, basis = eigenvalues[3:], basis[:, 3:]
-        projected, squared = basis.T @ (values / root), basis**2
-        out = np.empty((len(ladder), len(values)))
-        for i, smoothing in enumerate(ladder):
-            gain = 1.0 / (np.maximum(eigenvalues, 0.0) + 8 * np.pi * smoothing)
-            out[i] = (basis @ (gain * projected)) / np.maximum(squared @ gain, 1e-300) * root
-        return out
+        return matrix, out_of
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """The first N rows and columns P of the inverse of a problem's system at one λ: weights are P values.
+
+    matrix (N, N); pull (N,): 8πλ D.
+    """
+
+    matrix: Array
+    pull: Array
+
+    def residual(self, values: Array) -> Array:
+        """Residuals g − f (N,) of the spline of values (N,)."""
+        return self.pull * (self.matrix @ values)
+
+    def held_out(self, values: Array) -> Array:
+        """Leave-one-out residuals (N,) of values (N,): w_i / P_ii (Dubrule 1983 for kriging, the same equations)."""
+        return (self.matrix @ values) / np.diag(self.matrix)
+
+    def subset(self, keep: NDArray[np.bool_]) -> Inverse:
+        """The same without some of the points, from what is there: a Schur complement."""
+        gone = ~keep
+        rows = self.matrix[keep]
+        across = rows[:, gone]
+        matrix = rows[:, keep]
+        matrix -= across @ np.linalg.solve(self.matrix[np.ix_(gone, gone)], across.T)
+        return Inverse(matrix, self.pull[keep])
 
 
 def spread_points(points: Array, quality: Array, budget: int, spacing: float) -> NDArray[np.intp]:

@@ -127,8 +127,37 @@ def test_leave_one_out_is_what_leaving_out_gives(even: bool) -> None:
     assert on_ladder.shape == (len(ladder), 30)
     for smoothing, row in zip(ladder, on_ladder, strict=True):
         expected = brute_force(points, noise, values, smoothing)
-        assert np.allclose(problem.held_out_at(values, smoothing), expected, rtol=1e-6, atol=1e-8)
+        assert np.allclose(problem.inverse(smoothing).held_out(values), expected, rtol=1e-6, atol=1e-8)
         assert np.allclose(row, expected, rtol=1e-5, atol=1e-7)
+
+
+@pytest.mark.parametrize("smoothing", [1e-6, 1e-3, 1.0])
+def test_the_inverse_makes_what_the_system_makes_also_of_fewer_points(smoothing: float) -> None:
+    points, noise = some_points(5, 80), some_noise(5, 80)
+    values = wavy(points) + 0.1 * np.random.default_rng(5).normal(size=80)
+    problem = SmoothingProblem.build(points, noise, UNIT)
+    inverse, left = problem.inverse(smoothing), np.full(80, True)
+    for gone in ([], [3], [0, 40, 41, 78], list(range(5, 30))):  # each among those that are left
+        keep = np.full(int(left.sum()), True)
+        keep[gone] = False
+        inverse = inverse.subset(keep)
+        left[left] = keep
+        few = problem.subset(left)
+        spline, residual = few.solve(values[left], smoothing)
+        assert np.allclose(inverse.matrix @ values[left], spline.weights, rtol=1e-7, atol=1e-7)
+        assert np.allclose(inverse.residual(values[left]), residual, rtol=1e-7, atol=1e-9)
+        whole = np.linalg.inv(few.system(smoothing))[: len(residual), : len(residual)]
+        assert np.allclose(inverse.matrix, whole, rtol=1e-6, atol=1e-9 * np.abs(whole).max())
+
+
+def test_functions_held_out_together_are_those_held_out_alone() -> None:
+    points, noise = some_points(6, 50), some_noise(6, 50)
+    values = np.column_stack([wavy(points), np.random.default_rng(6).normal(size=50)])
+    problem = SmoothingProblem.build(points, noise, UNIT)
+    together = problem.held_out(values, LADDER)
+    assert together.shape == (len(LADDER), 50, 2)
+    for k in range(2):
+        assert np.allclose(together[..., k], problem.held_out(values[:, k], LADDER), rtol=1e-9, atol=1e-12)
 
 
 def test_cross_validation_recognises_noise_and_bends() -> None:
