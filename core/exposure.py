@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import AnyLight, Light, Part, bounds, part_of
+from .light import STRIP, AnyLight, Light, Part, bounds
+from .threads import in_order
 from .warp import Layer
 
 BLOCK = 8
@@ -81,13 +82,19 @@ def match_exposure(
         return unchanged(channels)
     # whole blocks of the canvas
     rows, columns = (slice(part.start - part.start % BLOCK, part.stop + -part.stop % BLOCK) for part in box)
-    shown = shown[rows, columns]
-    pixels, pixels_too = (part_of(layer.light, (rows, columns)) for layer in (reference, target))
-    for light, unclipped in zip((pixels, pixels_too), floats, strict=True):
-        if not unclipped:
-            for k in range(channels):
-                shown &= light[..., k] < CLIPPED
-    means, means_too = _block_means(pixels, shown), _block_means(pixels_too, shown)
+    at_once = BLOCK * max(1, STRIP // (BLOCK * (columns.stop - columns.start)))
+
+    def means_of(top: int) -> list[NDArray[np.float64]]:
+        part = slice(top, min(rows.stop, top + at_once)), columns
+        pixels, counts = [layer.light[part] for layer in (reference, target)], shown[part]
+        for light, unclipped in zip(pixels, floats, strict=True):
+            if not unclipped:
+                for k in range(channels):
+                    counts = counts & (light[..., k] < CLIPPED)
+        return [_block_means(light, counts) for light in pixels]
+
+    parts = list(in_order(means_of, range(rows.start, rows.stop, at_once)))
+    means, means_too = (np.concatenate(one) for one in zip(*parts, strict=True))
     bright = _bright(means) & _bright(means_too)
     if bright.sum() < LEAST_BLOCKS:
         return unchanged(channels)

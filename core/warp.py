@@ -73,11 +73,13 @@ class Warp:
         """All of the confidence (H, W) float32, None without dense refinement."""
         return None if self.sureness is None else whole(self.sureness)
 
-    def within(self, box: Box) -> Warp:
+    def within(self, box: Box, in_place: bool = False) -> Warp:
         """The part in a box (left, top, width, height) of the canvas; NaN, and no confidence, where that reaches over
-        its edges."""
+        its edges. in_place: the box lies on the canvas, and the whole, whose memory the part takes, is lost."""
         left, top, width, height = box
-        map_x, map_y = (cut(a, box, np.nan) for a in (self.map_x, self.map_y))
+        map_x, map_y = (
+            _cut_in_place(values, box) if in_place else cut(values, box, np.nan) for values in (self.map_x, self.map_y)
+        )
         depth = Placed(self.depth, (-top, -left), (height, width), np.nan)
         sureness = None if self.sureness is None else Placed(self.sureness, (-top, -left), (height, width))
         return Warp(self.canvas.within(box), map_x, map_y, depth, sureness)
@@ -335,7 +337,18 @@ def _trimmed(warp: Warp, camera: Camera, target_size: tuple[int, int]) -> Warp:
     seen |= reference_shown(warp.canvas, camera)
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     left, top = int(columns[0]), int(rows[0])
-    return warp.within((left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top))
+    box = left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top
+    return warp.within(box, in_place=True)
+
+
+def _cut_in_place(array: NDArray[np.float32], box: Box) -> NDArray[np.float32]:
+    """The part of an array (H, W) in a box (left, top, width, height) of it, moved to the front of its memory."""
+    left, top, width, height = box
+    flat = array.reshape(-1)
+    for row in range(height):
+        start = (top + row) * array.shape[1] + left
+        flat[row * width : (row + 1) * width] = flat[start : start + width]
+    return flat[: width * height].reshape(height, width)
 
 
 def reference_map(canvas: Canvas, camera: Camera | None = None) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
