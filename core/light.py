@@ -51,6 +51,12 @@ def strips(shape: tuple[int, ...]) -> Iterator[slice]:
         yield slice(top, min(shape[0], top + rows))
 
 
+def beside(rows: slice, margin: int, height: int) -> tuple[slice, slice]:
+    """Some rows of `height` with so many more on either side, as far as there are; and which of those they are."""
+    near = slice(max(0, rows.start - margin), min(height, rows.stop + margin))
+    return near, slice(rows.start - near.start, rows.stop - near.start)
+
+
 def bounds(mask: NDArray[np.bool_]) -> Part | None:
     """Rows and columns of the smallest box that holds all of a mask (H, W); None where it is empty."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -15,8 +16,9 @@ from .colour import encode
 from .epipolar import Array, distance_to_line
 from .images import Picture
 from .lens import undistort
-from .light import AnyLight, Part, bounds, strips
+from .light import AnyLight, Part, beside, bounds, strips
 from .occlusion import NO_TURN
+from .threads import each, in_order
 from .tone import to_tones
 from .warp import Layer, Warp, fetch
 
@@ -30,7 +32,12 @@ RIM = np.ones((7, 7), np.uint8)
 
 def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
     """Peak signal-to-noise ratio in dB of two 8-bit pictures (H, W, C) over a mask (H, W); inf where they are equal."""
-    error = np.square(a[mask].astype(np.float32) - b[mask].astype(np.float32)).mean(dtype=np.float64)
+
+    def total(rows: slice) -> float:
+        first, second = (picture[rows][mask[rows]].astype(np.float32) for picture in (a, b))
+        return float(np.square(first - second).sum(dtype=np.float64))
+
+    error = sum(in_order(total, strips(mask.shape))) / (int(mask.sum()) * a.shape[2])
     return float("inf") if error == 0 else float(10 * np.log10(255.0**2 / error))
 
 
@@ -43,15 +50,16 @@ def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) ->
     inner = cv2.erode(np.pad(mask.astype(np.uint8), 5), np.ones((11, 11), np.uint8))[5:-5, 5:-5] > 0
     if not inner.any():
         return float("nan")
-    x, y = (_gray(picture).astype(np.float32) for picture in (a, b))
 
     def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
         return cv2.GaussianBlur(values, (11, 11), 1.5)
 
-    mx, my = smooth(x), smooth(y)
-    vx, vy, vxy = smooth(x * x) - mx * mx, smooth(y * y) - my * my, smooth(x * y) - mx * my
-    index = (2 * mx * my + SSIM_C1) * (2 * vxy + SSIM_C2) / ((mx * mx + my * my + SSIM_C1) * (vx + vy + SSIM_C2))
-    return float(index[inner].mean(dtype=np.float64))
+    def total(rows: slice) -> float:
+        near, here = beside(rows, 5, len(mask))
+        x, y = (_gray(picture[near]).astype(np.float32) for picture in (a, b))
+        return float(_similarity(x, y, smooth)[here][inner[rows]].sum(dtype=np.float64))
+
+    return sum(in_order(total, strips(mask.shape))) / int(inner.sum())
 
 
 def _gray(picture: NDArray) -> NDArray:
@@ -128,8 +136,16 @@ def appearance(
     # what else is there may be missing for want of room in 8 bit: light beyond white is looked at as tones
     levels = [_levels(part.light, box, any(floats)) for part in (panorama, reference, target)]
     both = ((reference.alpha > 0) & (target.alpha > 0))[box]
-    whole, first, second = (_gray_levels(part) for part in levels)
-    fidelity = np.maximum(_similarity(whole, first), _similarity(whole, second))[both]
+
+    def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
+        return cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
+
+    def better(rows: slice) -> NDArray[np.float32]:
+        near, here = beside(rows, 3, len(both))
+        whole, first, second = (_gray(part[near].astype(np.float32)) for part in levels)
+        return np.maximum(*(_similarity(whole, part, smooth)[here][both[rows]] for part in (first, second)))
+
+    fidelity = np.concatenate(list(in_order(better, strips(both.shape))))
     seam = math.nan if from_target is None else _seam_visibility(levels, from_target[box], both)
     return {
         "source_fidelity_mean": float(fidelity.mean(dtype=np.float64)),
@@ -142,26 +158,19 @@ def _levels(light: AnyLight, box: Part, floats: bool) -> NDArray:
     rows, columns = box
     shape = (rows.stop - rows.start, columns.stop - columns.start, light.shape[2])
     out = np.empty(shape, np.float32 if floats else np.uint8)
-    for strip in strips(shape):
+
+    def put(strip: slice) -> None:
         part = light[rows.start + strip.start : rows.start + strip.stop, columns]
         out[strip] = np.float32(255) * to_tones(part) if floats else encode(part, 8)
+
+    each(put, strips(shape))
     return out
 
 
-def _gray_levels(levels: NDArray) -> NDArray[np.float32]:
-    """Levels (h, w, C) in gray (h, w), not rounded."""
-    out = np.empty(levels.shape[:2], np.float32)
-    for strip in strips(levels.shape):
-        out[strip] = _gray(levels[strip].astype(np.float32))
-    return out
-
-
-def _similarity(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray:
-    """The structural similarity (H, W) of two gray pictures, 7×7."""
-
-    def smooth(values: NDArray) -> NDArray:
-        return cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
-
+def _similarity(
+    x: NDArray[np.float32], y: NDArray[np.float32], smooth: Callable[[NDArray[np.float32]], NDArray[np.float32]]
+) -> NDArray:
+    """The structural similarity (H, W) of two gray pictures in windows that `smooth` takes means over."""
     mx, my = smooth(x), smooth(y)
     vx, vy, vxy = smooth(x * x) - mx * mx, smooth(y * y) - my * my, smooth(x * y) - mx * my
     return (2 * mx * my + SSIM_C1) * (2 * vxy + SSIM_C2) / ((mx * mx + my * my + SSIM_C1) * (vx + vy + SSIM_C2))

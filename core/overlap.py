@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import bounds, shown_only, strips
+from .light import beside, bounds, shown_only, strips
 from .threads import each
 from .tone import to_tones
 from .warp import Layer
@@ -77,10 +77,10 @@ def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray
     alike = np.empty(shown.shape, bool)
 
     def put(rows: slice) -> None:
-        near = slice(max(0, rows.start - 1), rows.stop + 1)
+        near, here = beside(rows, 1, len(difference))
         # a little blurred: noise is no content
-        blurred = cv2.blur(difference[near], (3, 3)).reshape(difference[near].shape)[rows.start - near.start :]
-        within = [np.abs(blurred[: rows.stop - rows.start, :, k] - middle[k]) <= most[k] for k in range(len(most))]
+        blurred = cv2.blur(difference[near], (3, 3)).reshape(difference[near].shape)[here]
+        within = [np.abs(blurred[..., k] - middle[k]) <= most[k] for k in range(len(most))]
         alike[rows] = np.logical_and.reduce(within)
 
     each(put, strips(difference.shape))

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import AnyLight, Placed, around, bounds, strips
+from .light import AnyLight, Placed, around, beside, bounds, strips
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
 from .overlap import SAME_TONE, WHOLE, Overlap, distance_to_border
 from .threads import each
@@ -77,9 +77,9 @@ def seam_cost(overlap: Overlap, warp: Warp) -> NDArray[np.float32]:
     cost = np.empty(overlap.both.shape, np.float32)
 
     def put(rows: slice) -> None:
-        near = slice(max(0, rows.start - 1), min(len(cost), rows.stop + 1))  # with their neighbours
+        near, here = beside(rows, 1, len(cost))
         box = slice(overlap.box[0].start + near.start, overlap.box[0].start + near.stop), overlap.box[1]
-        cost[rows] = _cost(overlap.difference[near], warp, box)[rows.start - near.start :][: rows.stop - rows.start]
+        cost[rows] = _cost(overlap.difference[near], warp, box)[here]
 
     each(put, strips(cost.shape))
     return cost
