@@ -116,7 +116,8 @@ def register(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> R
     if options.matches is None:
         steps("features", 0.0)
         seen = tuple((p.view, p.alpha) for frame in frames for p in (frame.reference, frame.target))
-        matches = cache.remember("matches", seen, lambda: _found_in(frames, steps))
+        quick = options.preview
+        matches = cache.remember("matches", (*seen, quick), lambda: _found_in(frames, steps, quick))
     else:
         matches = _given(options.matches, frames[0], cameras)
 
@@ -191,11 +192,12 @@ def _projection(
     return round_projection(options.projection, two_view.K, rotation_for(options.level, two_view.R, upright))
 
 
-def _found_in(frames: Sequence[Frame], steps: Steps) -> Matches:
+def _found_in(frames: Sequence[Frame], steps: Steps, quick: bool) -> Matches:
     found = []
+    most = (features.PREVIEW_BUDGET, features.PREVIEW_PIXELS) if quick else ()
     for i, frame in enumerate(frames):
         seen = []
-        for keypoints in in_order(lambda p: features.detect(p.view, p.alpha), (frame.reference, frame.target)):
+        for keypoints in in_order(lambda p: features.detect(p.view, p.alpha, *most), (frame.reference, frame.target)):
             seen.append(keypoints)
             steps("features", (i + 0.45 * len(seen)) / len(frames))
         first, second = seen

@@ -67,6 +67,11 @@ class StitchOptions:
         return self.blend == "multiband" or (self.blend == "feather" and self.seam != "none")
 
     @property
+    def preview(self) -> bool:
+        """A plain average by a smooth field is only looked at: it gets fewer features, at a smaller size."""
+        return self.blend == "linear" and not self.dense
+
+    @property
     def files_read(self) -> list[Path]:
         """The files that these options name."""
         named = (self.camera.cameras, self.matches, self.ignore_reference, self.ignore_target, self.mask)

@@ -217,6 +217,26 @@ def test_each_stage_is_told_and_features_climb(clip: list[Pair], quick: StitchOp
     assert shares == sorted(shares) and shares[0] == 0 and len(shares) == 5 and shares[-1] < 1
 
 
+def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
+    small_pair: Pair, quick: StitchOptions, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(features, "PREVIEW_BUDGET", 500)
+    frame = frame_of(small_pair, quick)
+    real = features.detect
+    asked: list[tuple[int, ...]] = []
+
+    def detect(view: np.ndarray, alpha: np.ndarray | None, *most: int) -> features.Features:
+        asked.append(most)
+        return real(view, alpha, *most)
+
+    monkeypatch.setattr(features, "detect", detect)
+    found = {blend: align([frame], replace(quick, blend=blend), silent) for blend in ("feather", "linear")}
+    assert asked == [(), (), (500, features.PREVIEW_PIXELS), (500, features.PREVIEW_PIXELS)]
+    points = np.stack(np.meshgrid(np.linspace(60, 180, 7), np.linspace(30, 150, 7)), axis=-1).reshape(-1, 2)
+    away = np.linalg.norm(found["feather"].field.sends(points) - found["linear"].field.sends(points), axis=1)
+    assert len(found["linear"].matches) < 0.8 * len(found["feather"].matches) and np.median(away) < 0.5
+
+
 # --- matches given --------------------------------------------------------------------------------------------------
 
 

@@ -194,6 +194,27 @@ def test_the_budget_holds_and_points_cover_the_picture() -> None:
     assert counts.min() > 0.5 * counts.mean()
 
 
+def test_those_that_are_kept_are_described_as_if_all_were() -> None:
+    """The descriptors of points found and of points chosen come from two runs of the pyramid."""
+    picture = texture(300, 400, 1)
+    few, all_of_them = detect(picture, budget=500), detect(picture)
+    distance, index = cKDTree(all_of_them.points).query(few.points)
+    assert len(few.points) == 500 and len(all_of_them.points) > 1000 and not distance.any()
+    # one place may have several orientations, each a descriptor
+    same = [
+        np.array_equal(few.descriptors[i], all_of_them.descriptors[j])
+        for i, place in enumerate(few.points) for j in np.flatnonzero((all_of_them.points == place).all(axis=1))
+    ]  # fmt: skip
+    assert sum(same) == 500
+
+
+def test_a_picture_is_shrunk_to_as_many_pixels_as_asked() -> None:
+    picture = texture(300, 400, 1)
+    whole, shrunk = detect(picture), detect(picture, pixels=300 * 400 // 4)
+    assert (whole.scale, shrunk.scale) == (1.0, 2.0) and 0 < len(shrunk.points) < 0.6 * len(whole.points)
+    assert shrunk.points[:, 0].max() > 350 and shrunk.points[:, 1].max() > 250
+
+
 # --- matching ------------------------------------------------------------------------------------------------------
 
 

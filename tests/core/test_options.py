@@ -29,6 +29,12 @@ def test_the_defaults_are_the_designs() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.parametrize("dense", [True, False])
+@pytest.mark.parametrize("blend", BLENDS)
+def test_a_preview_is_an_average_without_dense_refinement(blend: str, dense: bool) -> None:
+    assert StitchOptions(blend=blend, dense=dense).preview == (blend == "linear" and not dense)
+
+
 def test_nothing_changes_them_afterwards() -> None:
     with pytest.raises(FrozenInstanceError):
         StitchOptions().seed = 3  # type: ignore[misc]
