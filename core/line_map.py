@@ -4,6 +4,7 @@ lines takes them: what dense refinement works on.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import cv2
@@ -18,6 +19,30 @@ from .lens import distort, undistort
 from .two_view import TwoView
 
 Plane = NDArray[np.float32]
+# What is smooth is worked out at every so many-th row and column.
+EVERY = 3
+
+
+def coarse_places(shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Columns and rows of the middles of cells of EVERY × EVERY pixels (of so many rows and columns), with a cell
+    around them."""
+    rows, columns = ((np.arange(-1, -(-count // EVERY) + 1) + 0.5) * EVERY - 0.5 for count in shape[:2])
+    return columns, rows
+
+
+def in_between(shape: tuple[int, ...], work: Callable[[Array, Array], Array]) -> list[Plane]:
+    """The planes (rows, columns) of a smooth function, worked out at `coarse_places`, linear between them.
+
+    work: of columns (n,) and rows (m,) makes (m, n, k). NaN spreads by a cell.
+    """
+    places = coarse_places(shape)
+    size = EVERY * places[0].size, EVERY * places[1].size
+    coarse = work(*places)
+    part = slice(EVERY, EVERY + shape[0]), slice(EVERY, EVERY + shape[1])
+    return [
+        cv2.resize(coarse[..., k].astype(np.float32), size, interpolation=cv2.INTER_LINEAR)[part]
+        for k in range(coarse.shape[-1])
+    ]
 
 
 @dataclass(frozen=True)

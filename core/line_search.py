@@ -16,7 +16,7 @@ from .displacement import inverse_depths
 from .epipolar import Array
 from .features import Matches
 from .lens import distort
-from .line_map import Lines, Plane, SparseMap
+from .line_map import EVERY, Lines, Plane, SparseMap, coarse_places, in_between
 from .rectify import EpipolarRows
 from .threads import in_order
 
@@ -28,12 +28,12 @@ MOST_COSTS, NEIGHBOURS = 100_000_000, 32
 COARSE_SMOOTHER, COARSE_SHARE = 4, 0.1
 # A patch of fewer pixels (share of the rows' side, squared) than this is a speck.
 SPECK, SPECK_RANGE = 0.012, 2
+# Steps of a level in which the target is resampled before its tones are those of the reference.
+FINER = 32
 # Bends finer than this share of the picture's side are taken out of the field, the first that will do; how far all
 # but the furthest matches lie from it (percentile), and how much further is looked.
 BENDS = (0.2, 0.1, 0.05, 0.025, 0.0)
 FURTHEST, REACH, MORE_PX = 99.5, 1.25, 8.0
-# Steps of the tone curve between the pictures.
-TONES = 64
 
 
 @dataclass(frozen=True)
@@ -61,16 +61,20 @@ class View:
         return View(view, gray, shown, (width, height))
 
     def sample(
-        self, picture: NDArray[np.float32], x: NDArray, y: NDArray, interpolation: int = cv2.INTER_LINEAR
-    ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        self, picture: NDArray, x: NDArray, y: NDArray, interpolation: int = cv2.INTER_LINEAR
+    ) -> tuple[NDArray, NDArray[np.bool_]]:
         """A picture of the same shape (h, w[, C]) as `gray` at full px (…), and where (…) that lies on what is
         shown."""
         height, width = self.gray.shape
-        x = ((x + 0.5) * (width / self.size[0]) - 0.5).astype(np.float32)
-        y = ((y + 0.5) * (height / self.size[1]) - 0.5).astype(np.float32)
-        with np.errstate(invalid="ignore"):
-            inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
-        x, y = np.where(inside, x, np.float32(0)), np.where(inside, y, np.float32(0))
+        x, y = (
+            np.multiply(at + np.float32(0.5), np.float32(few / many), dtype=np.float32) - np.float32(0.5)
+            if few != many else np.array(at, np.float32)
+            for at, few, many in ((x, width, self.size[0]), (y, height, self.size[1]))
+        )  # fmt: skip
+        within = cv2.bitwise_and(cv2.inRange(x, 0.0, width - 1.0), cv2.inRange(y, 0.0, height - 1.0))
+        for at in (x, y):
+            cv2.patchNaNs(at, 0.0)
+        inside = within > 0
         if self.shown is not None:
             inside &= cv2.remap(self.shown, x, y, cv2.INTER_LINEAR) > 0.999
         return cv2.remap(picture, x, y, interpolation, borderMode=cv2.BORDER_REPLICATE), inside
@@ -108,49 +112,58 @@ def search(
     epipole = np.linalg.svd(sparse.two_view.F)[2][2]
     count = 16 * max(1, int(np.ceil(2 * reach / step / 16)))
     rows = EpipolarRows.over(epipole, box, step, count * step)
-    ideal = rows.points()
     alike = reference.levels.shape[2] == target.levels.shape[2]
-    own, other = ((v.levels.astype(np.float32) if alike else v.gray) for v in (reference, target))
+    own, other = (v.levels if alike else _levels(v.gray) for v in (reference, target))
+    finer = cv2.multiply(other, float(FINER), dtype=cv2.CV_16U)
+    ways = Ways.of(sparse, rows)
 
-    def of_reference() -> tuple[Plane, NDArray[np.bool_]]:
-        raw = distort(ideal, sparse.camera)
-        return reference.sample(own, raw[..., 0], raw[..., 1], cv2.INTER_CUBIC)
+    def of_reference() -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+        x, y = in_between(rows.shape, lambda u, v: distort(rows.points(u, v), sparse.camera))
+        return reference.sample(own, x, y, cv2.INTER_CUBIC)
 
-    def of_target() -> tuple[Plane, NDArray[np.bool_]]:
-        sent = distort(sparse.target(ideal), sparse.camera_prime)
-        return target.sample(other, sent[..., 0], sent[..., 1], cv2.INTER_CUBIC)
+    def of_target() -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
+        x, y = in_between(rows.shape, lambda u, v: distort(sparse.target(rows.points(u, v)), sparse.camera_prime))
+        return target.sample(finer, x, y, cv2.INTER_CUBIC)
 
-    (first, seen), (second, seen_too) = in_order(lambda rows_of: rows_of(), (of_reference, of_target))
-    a, b = _levels(first), _levels(in_tones_of(first, second, seen & seen_too))
+    (a, seen), (finer_b, seen_too) = in_order(lambda rows_of: rows_of(), (of_reference, of_target))
+    b = in_tones_of(a, finer_b, seen & seen_too)
     # where one picture shows nothing, the field is believed
-    only, only_too = seen & ~seen_too, seen_too & ~seen
-    b[only], a[only_too] = a[only], b[only_too]
-    a[~(seen | seen_too)] = b[~(seen | seen_too)] = 128
+    cv2.copyTo(a, (seen & ~seen_too).view(np.uint8), b)
+    cv2.copyTo(b, (seen_too & ~seen).view(np.uint8), a)
+    neither = ~(seen | seen_too)
+    a[neither] = b[neither] = 128
     moved, found = _matched(a, b, count)
     coarse, found_too = _matched_at_half(a, b, count)
     moved = np.where(found, moved, coarse)
     counts = np.where(found, np.float32(1), found_too * np.float32(COARSE_SHARE))
-    arrives = np.rint(np.arange(rows.shape[1]) - moved).astype(int)
-    counts *= seen & (arrives >= 0) & (arrives < rows.shape[1])
-    counts *= np.take_along_axis(seen_too, np.clip(arrives, 0, rows.shape[1] - 1), axis=1)
-    return _on_nodes(lines, sparse, rows, moved, counts)
+    return _on_nodes(lines, rows, ways, moved, counts * seen, seen_too)
 
 
-def in_tones_of(first: Plane, second: Plane, both: NDArray[np.bool_]) -> Plane:
-    """The second picture (h, w[, C]) with the tones of the first: for each channel the monotone curve that makes their
-    histograms over `both` (h, w) one."""
+def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """The second picture (h, w[, C]), levels times FINER, with the tones of the first: for each channel the monotone
+    curve that makes their histograms over `both` (h, w) one."""
+    ends = 256 * FINER
+    places = np.minimum(np.arange(ends) / FINER, 255.0)
     if not both.any():
-        return second
-    if first.ndim == 3:
-        channels = [in_tones_of(first[..., k], second[..., k], both) for k in range(first.shape[2])]
-        return np.stack(channels, axis=-1)
-    share = np.linspace(0, 1, TONES + 1)
-    own, other = (np.quantile(values[both][::7], share) for values in (second, first))
-    own, index = np.unique(own, return_index=True)
-    return np.interp(second, own, other[index]).astype(np.float32)
+        return np.take(_levels(places), second, mode="clip")
+    mask = both.view(np.uint8)
+
+    def middles(picture: NDArray, k: int, count: int) -> tuple[Array, NDArray[np.bool_]]:
+        """For each level of a channel how many pixels lie below the middle of its own, and which there are."""
+        n = cv2.calcHist([picture], [k], mask, [count], [0, count]).ravel().astype(np.float64)
+        return np.cumsum(n) - n / 2, n > 0
+
+    out = np.empty(second.shape, np.uint8)
+    channels = second.shape[2] if second.ndim == 3 else 1
+    for k in range(channels):
+        (own, held), (other, _) = middles(first, k, 256), middles(second, k, ends)
+        curve = _levels(np.interp(other, own[held], np.flatnonzero(held)))
+        part = np.s_[..., k] if second.ndim == 3 else np.s_[...]
+        out[part] = np.take(curve, second[part], mode="clip")
+    return out
 
 
-def _levels(values: NDArray[np.float32]) -> NDArray[np.uint8]:
+def _levels(values: NDArray) -> NDArray[np.uint8]:
     return np.clip(np.rint(values), 0, 255).astype(np.uint8)
 
 
@@ -191,12 +204,50 @@ def _matched_at_half(a: NDArray[np.uint8], b: NDArray[np.uint8], count: int) -> 
     return moved, (sure_too > 0) & (np.abs(moved) <= count / 2)  # its own range is a multiple of 16, too
 
 
-def _on_nodes(lines: Lines, sparse: SparseMap, rows: EpipolarRows, moved: Plane, counts: Plane) -> tuple[Plane, Plane]:
-    """The same at the nodes, in px along their lines."""
+@dataclass(frozen=True)
+class Ways:
+    """px (rows, n): how far along its line in the target each row is seen, at every EVERY-th column (`coarse_places`);
+    ideal px, from anywhere on the line."""
+
+    px: Plane
+
+    @staticmethod
+    def of(sparse: SparseMap, rows: EpipolarRows) -> Ways:
+        """By the field that the target is resampled by."""
+        u, v = coarse_places(rows.shape)
+        sent = sparse.target(rows.points(u, v))
+        direction = sparse.two_view.e_prime[:2] - sent * sparse.two_view.e_prime[2]
+        # a row's is one line, and is followed one way only
+        direction = np.where(np.isfinite(direction), direction, 0.0).sum(axis=1, keepdims=True)
+        direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-300)
+        px = (sent * direction).sum(axis=-1).astype(np.float32)
+        px = cv2.resize(px, (px.shape[1], EVERY * px.shape[0]), interpolation=cv2.INTER_LINEAR)
+        return Ways(px[EVERY : EVERY + rows.shape[0]])
+
+    def at(self, u: Plane, row: NDArray[np.intp]) -> Plane:
+        """At columns u of whole rows (…)."""
+        place = u * np.float32(1 / EVERY) + np.float32(0.5 + 0.5 / EVERY)
+        before = np.clip(place.astype(np.intp), 0, self.px.shape[1] - 2)
+        place -= before
+        before += row * self.px.shape[1]
+        start, end = np.take(self.px, before), np.take(self.px, before + 1)
+        return start + place * (end - start)
+
+
+def _on_nodes(
+    lines: Lines, rows: EpipolarRows, ways: Ways, moved: Plane, counts: Plane, seen: NDArray[np.bool_]
+) -> tuple[Plane, Plane]:
+    """The same at the nodes, in px along their lines; seen: what of the rows the target shows."""
     u, v = rows.column_row(lines.ideal)
     column = np.clip(np.rint(u).astype(int), 0, rows.shape[1] - 1)
     row = np.clip(np.rint(v).astype(int), 0, rows.shape[0] - 1)
-    arrived = rows.point(u - moved[row, column], v)
-    along = lines.along(sparse.target(arrived) - lines.shift)
-    counts = counts[row, column] * np.isfinite(along)
+    first = row * rows.shape[1]
+    moved, counts = (np.take(values, first + column) for values in (moved, counts))
+    arrives = np.rint(column - moved).astype(int)
+    ends = (arrives >= 0) & (arrives < rows.shape[1])
+    ends &= np.take(seen, first + np.clip(arrives, 0, rows.shape[1] - 1))
+    start = u.astype(np.float32)
+    way = ways.at(start - moved, row) - ways.at(start, row)
+    along = way / (1 - way * lines.third)
+    counts *= ends & np.isfinite(along)
     return np.where(counts > 0, along, np.float32(0)), counts

@@ -56,11 +56,10 @@ class EpipolarRows:
         shape = int(np.ceil((end - begin) * reach / step)) + 1, int(np.ceil((last - first) / step)) + 1
         return EpipolarRows(centre, (first, turn + begin), reach, step, shape)
 
-    def points(self) -> Array:
-        """Points (rows, columns, 2) px of the reference's plane of all rows and columns."""
-        rows, columns = self.shape
-        r = self.start[0] + self.step * np.arange(columns)
-        theta = self.start[1] + np.arange(rows) * (self.step / self.reach)
+    def points(self, u: Array, v: Array) -> Array:
+        """Points (len(v), len(u), 2) px of the reference's plane where columns u and rows v cross."""
+        r = self.start[0] + self.step * u
+        theta = self.start[1] + v * (self.step / self.reach)
         direction = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
         return self.epipole + r[None, :, None] * direction[:, None, :]
 

@@ -26,9 +26,9 @@ def test_there_and_back(epipole: tuple, step: float) -> None:
     u, v = rows.column_row(points)
     np.testing.assert_allclose(rows.point(u, v), points, atol=1e-5)
     assert u.min() >= 0 and v.min() >= -1e-6 and u.max() <= rows.shape[1] - 1 and v.max() <= rows.shape[0] - 1
-    grid = rows.points()
-    assert grid.shape == (*rows.shape, 2)
-    np.testing.assert_allclose(grid[3, 5], rows.point(np.float64(5), np.float64(3)), atol=1e-6)
+    grid = rows.points(np.arange(8), np.array([3, 4.5]))
+    assert grid.shape == (2, 8, 2)
+    np.testing.assert_allclose(grid[1, 5], rows.point(np.float64(5), np.float64(4.5)), atol=1e-6)
 
 
 @pytest.mark.parametrize("epipole", EPIPOLES, ids=str)
