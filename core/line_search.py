@@ -30,6 +30,8 @@ COARSE_SMOOTHER, COARSE_SHARE = 4, 0.1
 SPECK, SPECK_RANGE = 0.012, 2
 # Steps of a level in which the target is resampled before its tones are those of the reference.
 FINER = 32
+# Steps of the tone curve between the pictures.
+TONES = 64
 # Bends finer than this share of the picture's side are taken out of the field, the first that will do; how far all
 # but the furthest matches lie from it (percentile), and how much further is looked.
 BENDS = (0.2, 0.1, 0.05, 0.025, 0.0)
@@ -117,11 +119,11 @@ def search(
     finer = cv2.multiply(other, float(FINER), dtype=cv2.CV_16U)
     ways = Ways.of(sparse, rows)
 
-    def of_reference() -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    def of_reference() -> tuple[NDArray, NDArray[np.bool_]]:
         x, y = in_between(rows.shape, lambda u, v: distort(rows.points(u, v), sparse.camera))
         return reference.sample(own, x, y, cv2.INTER_CUBIC)
 
-    def of_target() -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
+    def of_target() -> tuple[NDArray, NDArray[np.bool_]]:
         x, y = in_between(rows.shape, lambda u, v: distort(sparse.target(rows.points(u, v)), sparse.camera_prime))
         return target.sample(finer, x, y, cv2.INTER_CUBIC)
 
@@ -143,23 +145,21 @@ def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDAr
     """The second picture (h, w[, C]), levels times FINER, with the tones of the first: for each channel the monotone
     curve that makes their histograms over `both` (h, w) one."""
     ends = 256 * FINER
-    places = np.minimum(np.arange(ends) / FINER, 255.0)
     if not both.any():
-        return np.take(_levels(places), second, mode="clip")
-    mask = both.view(np.uint8)
+        return _levels(second / np.float32(FINER))
+    mask, share = both.view(np.uint8), np.linspace(0, 1, TONES + 1)
 
-    def middles(picture: NDArray, k: int, count: int) -> tuple[Array, NDArray[np.bool_]]:
-        """For each level of a channel how many pixels lie below the middle of its own, and which there are."""
+    def quantiles(picture: NDArray, k: int, count: int) -> Array:
+        """Levels of a channel below which such shares lie, each level's own pixels half below it."""
         n = cv2.calcHist([picture], [k], mask, [count], [0, count]).ravel().astype(np.float64)
-        return np.cumsum(n) - n / 2, n > 0
+        held = np.flatnonzero(n)
+        return np.interp(share * n.sum(), (np.cumsum(n) - n / 2)[held], held)
 
     out = np.empty(second.shape, np.uint8)
-    channels = second.shape[2] if second.ndim == 3 else 1
-    for k in range(channels):
-        (own, held), (other, _) = middles(first, k, 256), middles(second, k, ends)
-        curve = _levels(np.interp(other, own[held], np.flatnonzero(held)))
-        part = np.s_[..., k] if second.ndim == 3 else np.s_[...]
-        out[part] = np.take(curve, second[part], mode="clip")
+    for k in range(second.shape[2] if second.ndim == 3 else 1):
+        curve = _levels(np.interp(np.arange(ends), quantiles(second, k, ends), quantiles(first, k, 256)))
+        channel = np.s_[..., k] if second.ndim == 3 else np.s_[...]
+        out[channel] = np.take(curve, second[channel], mode="clip")
     return out
 
 
