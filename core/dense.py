@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .camera import Camera
 from .canvas import Box
 from .displacement import StrictField
-from .edge_aware import broken, edge_weights, smoothed, tied
+from .edge_aware import Smoother, broken, edge_weights, tied
 from .features import Matches
 from .images import Picture
 from .line_map import Lines, Plane, SparseMap
@@ -95,7 +95,7 @@ def refine(
     weights = edge_weights(_guide(pictures[0].view, lines), EDGE)
     weights = tied(broken(weights, along, found > 0, JUMP), plain, TIE)
     share = np.maximum(found * (1 - np.float32(PLAIN_DOUBT) * plain), np.float32(FIELD_SHARE))
-    along = smoothed(along, share, weights, FIRST_SMOOTHNESS)
+    along = Smoother.of(weights, FIRST_SMOOTHNESS).smoothed(along, share)
     polished = polish(lines, views[0], views[1], along, np.maximum(found, np.float32(FIELD_SHARE)), weights, slack)
     confidence = np.clip(polished.likeness, 0, 1) * cv2.blur(found, (9, 9))
     there = _there(lines, polished.along, polished.across, pictures)

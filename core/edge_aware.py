@@ -6,12 +6,14 @@ Min, Choi, Lu, Ham, Sohn and Do, "Fast global image smoothing based on weighted 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-# Attenuation of λ from pass to pass (the paper's eq. 11 for its three passes).
-PASSES, ATTENUATION = 3, 4.0
+# Attenuation of λ from pass to pass (the paper's eq. 11); its third pass changes nothing that could be measured.
+PASSES, ATTENUATION = 2, 4.0
 # An edge of the guide is known to so many pixels.
 NEAR = 7
 MOST = 20.0
@@ -25,7 +27,9 @@ def edge_weights(guide: NDArray[np.float32], sigma: float) -> tuple[NDArray[np.f
 
 
 def broken(
-    weights: tuple[NDArray[np.float32], NDArray[np.float32]], values: NDArray[np.float32], known: NDArray[np.bool_],
+    weights: tuple[NDArray[np.float32], NDArray[np.float32]],
+    values: NDArray[np.float32],
+    known: NDArray[np.bool_],
     step: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """The weights, lowered where known values (H, W) of neighbours differ by more than about `step`, if the guide has
@@ -49,40 +53,74 @@ def tied(
     return weights[0] * (1 + np.float32(strength) * across), weights[1] * (1 + np.float32(strength) * down)
 
 
-def smoothed(
-    values: NDArray[np.float32], confidence: NDArray[np.float32],
-    weights: tuple[NDArray[np.float32], NDArray[np.float32]], strength: float, floor: float = 1e-6,
-) -> NDArray[np.float32]:
-    """values (H, W) smoothed with λ = strength, each counting by its confidence (H, W); what there is none in is filled
-    from its surroundings.
+@dataclass(frozen=True)
+class Smoother:
+    """Smoothing with λ = strength by the same weights, again and again: what the systems need of them."""
 
-    floor: confidence that 0 has everywhere.
-    """
-    layers = np.stack([values * confidence, confidence], axis=0).astype(np.float32)
-    share = 1.5 * ATTENUATION ** (PASSES - 1) / (ATTENUATION**PASSES - 1)
-    across = np.ascontiguousarray(weights[0].T)
-    for number in range(PASSES):
-        lam = np.float32(strength * share / ATTENUATION**number)
-        layers = _along_last(layers.transpose(0, 2, 1), lam * across).transpose(0, 2, 1)
-        layers = _along_last(layers, lam * weights[1])
-    return layers[0] / (layers[1] + np.float32(floor))
+    passes: tuple[tuple[_Systems, _Systems], ...]
+
+    @staticmethod
+    def of(weights: tuple[NDArray[np.float32], NDArray[np.float32]], strength: float) -> Smoother:
+        """weights: see `edge_weights`."""
+        share = 1.5 * ATTENUATION ** (PASSES - 1) / (ATTENUATION**PASSES - 1)
+        across = cv2.transpose(weights[0])
+        lam = [np.float32(strength * share / ATTENUATION**number) for number in range(PASSES)]
+        return Smoother(tuple((_Systems.of(each * across), _Systems.of(each * weights[1])) for each in lam))
+
+    def smoothed(
+        self, values: NDArray[np.float32], confidence: NDArray[np.float32], floor: float = 1e-6
+    ) -> NDArray[np.float32]:
+        """values (H, W), each counting by its confidence (H, W); what there is none in is filled from its surroundings.
+
+        floor: confidence that 0 has everywhere.
+        """
+        upright = values * confidence, confidence
+        for rows, columns in self.passes:
+            height, width = values.shape
+            turned = np.empty((width, 2, height), np.float32)
+            for k in (0, 1):
+                turned[:, k] = cv2.transpose(upright[k])
+            rows.solve(turned)
+            layers = np.empty((height, 2, width), np.float32)
+            for k in (0, 1):
+                layers[:, k] = cv2.transpose(turned[:, k])
+            columns.solve(layers)
+            upright = layers[:, 0], layers[:, 1]
+        return upright[0] / (upright[1] + np.float32(floor))
 
 
-def _along_last(layers: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Solves (1 + w₋ + w₊) u − w₋ u₋ − w₊ u₊ = f along axis 1 of layers (k, n, m), weight (n−1, m): Thomas's
-    algorithm, all lines at once."""
-    count = layers.shape[1]
-    f = np.ascontiguousarray(layers.transpose(1, 0, 2))
-    ratio = np.empty_like(weight)
-    denominator = 1 + weight[0]
-    f[0] /= denominator
-    for i in range(1, count):
-        ratio[i - 1] = weight[i - 1] / denominator
-        denominator = 1 + weight[i - 1] - weight[i - 1] * ratio[i - 1]
-        if i < count - 1:
-            denominator += weight[i]
-        f[i] += weight[i - 1] * f[i - 1]
-        f[i] /= denominator
-    for i in range(count - 2, -1, -1):
-        f[i] += ratio[i] * f[i + 1]
-    return f.transpose(1, 0, 2)
+@dataclass(frozen=True)
+class _Systems:
+    """(1 + w₋ + w₊) u − w₋ u₋ − w₊ u₊ = f along the first axis, for weights (n−1, m): Thomas's algorithm, all m lines
+    at once. ratio (n−1, m), inverse (n, m): of the factors L D Lᵀ."""
+
+    ratio: NDArray[np.float32]
+    inverse: NDArray[np.float32]
+
+    @staticmethod
+    def of(weight: NDArray[np.float32]) -> _Systems:
+        count = weight.shape[0] + 1
+        ratio, inverse = np.empty_like(weight), np.empty((count, weight.shape[1]), np.float32)
+        left = np.ones(weight.shape[1], np.float32)  # of a pixel's own share what the one before has not taken
+        for i in range(count - 1):
+            np.add(left, weight[i], out=inverse[i])
+            np.divide(1, inverse[i], out=inverse[i])
+            np.multiply(weight[i], inverse[i], out=ratio[i])
+            # 1 + w − w²/D as 1 + w (1 − w/D): no difference of large numbers
+            np.multiply(left, ratio[i], out=left)
+            left += 1
+        np.divide(1, left, out=inverse[-1])
+        return _Systems(ratio, inverse)
+
+    def solve(self, f: NDArray[np.float32]) -> None:
+        """Of layers f (n, k, m), in place."""
+        before = np.empty(f.shape[1:], np.float32)
+        lines, ratio, inverse = list(f), list(self.ratio), list(self.inverse)
+        for i in range(1, len(lines)):
+            np.multiply(lines[i - 1], ratio[i - 1], out=before)
+            np.add(lines[i], before, out=lines[i])
+        np.multiply(lines[-1], inverse[-1], out=lines[-1])
+        for i in range(len(lines) - 2, -1, -1):
+            np.multiply(lines[i], inverse[i], out=lines[i])
+            np.multiply(lines[i + 1], ratio[i], out=before)
+            np.add(lines[i], before, out=lines[i])

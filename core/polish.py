@@ -13,12 +13,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .edge_aware import smoothed
+from .edge_aware import Smoother
 from .line_map import Lines, Plane
 from .line_search import View
 
 # (blur of both pictures in px, steps at it)
-SCHEDULE = ((1.0, 2), (0.6, 2))
+SCHEDULE = ((1.0, 1), (0.6, 2))
 WINDOW, SURROUNDINGS = 5, 15
 SMOOTHNESS = 1.5
 # squared gradient (gray levels per px) below which a place says little of its own; in the same unit what the search
@@ -51,6 +51,7 @@ def polish(
     across = np.zeros_like(along)
     start = along
     nodes = lines.nodes
+    smoother = Smoother.of(weights, SMOOTHNESS)
     steps_px = target.gray.shape[1] / target.size[0], target.gray.shape[0] / target.size[1]
     for blur, count in SCHEDULE:
         first, shown = reference.sample(cv2.GaussianBlur(reference.gray, (0, 0), blur), *nodes)
@@ -69,7 +70,7 @@ def polish(
             evidence, wanted = _mean(trust * slope * slope, WINDOW), _mean(trust * slope * left, WINDOW)
             step = (wanted + np.float32(BELIEF) * (start - along)) / (evidence + np.float32(BELIEF + 1))
             share = (evidence + np.float32(LEAST_BELIEF)) / (evidence + np.float32(LITTLE_EVIDENCE)) * known
-            along = smoothed(along + np.clip(step, -1, 1), share, weights, SMOOTHNESS, floor=1e-4)
+            along = smoother.smoothed(along + np.clip(step, -1, 1), share, floor=1e-4)
             if slack:
                 slope = gy * lines.direction[..., 0] - gx * lines.direction[..., 1]
                 across = across + _smooth_step(trust * slope * left, trust * slope * slope, lines.step)
