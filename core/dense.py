@@ -147,11 +147,10 @@ def _plain(lines: Lines, sparse: SparseMap, reference: View) -> Plane:
     away = lines.ideal * epipole[2] - epipole[:2]
     away /= np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-12)
     gray = cv2.GaussianBlur(reference.gray, (0, 0), 1.0)
-    x, y = lines.nodes
     slope = np.zeros(lines.shape, np.float32)
     for k in (0, 1):
         gradient = cv2.Scharr(gray, cv2.CV_32F, 1 - k, k) / 32
-        slope += reference.sample(gradient, x, y)[0] * away[..., k].astype(np.float32)
+        slope += reference.at_nodes(gradient, lines)[0] * away[..., k].astype(np.float32)
     return TEXTURE / (TEXTURE + cv2.blur(slope * slope, (7, 7)))
 
 

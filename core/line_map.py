@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -48,7 +49,7 @@ def in_between(shape: tuple[int, ...], work: Callable[[Array, Array], Array]) ->
 @dataclass(frozen=True)
 class SparseMap:
     """A field on every `step`th raw pixel of a box around the reference, which starts at pixel `start` (x, y):
-    inverse_depth (h, w), shift (h, w, 2) px."""
+    inverse_depth (h, w), shift (h, w, 2) px, None where there is none."""
 
     two_view: TwoView
     camera: Camera
@@ -56,7 +57,7 @@ class SparseMap:
     start: tuple[int, int]
     step: int
     inverse_depth: Plane
-    shift: Plane
+    shift: Plane | None
 
     @staticmethod
     def around(
@@ -68,10 +69,9 @@ class SparseMap:
         grid = Grid.over(*box)
         values = field.on_grid(grid, undistort(grid.points, camera) if camera.distortion.any() else None)
         inverse_depth = grid.to_pixels(values.inverse_depth, *box, step)
-        shift = np.zeros((*inverse_depth.shape, 2), np.float32)
+        shift = None
         if values.shift is not None:
-            for k in (0, 1):
-                shift[..., k] = grid.to_pixels(values.shift[..., k], *box, step)
+            shift = np.stack([grid.to_pixels(values.shift[..., k], *box, step) for k in (0, 1)], axis=-1)
         return SparseMap(two_view, camera, camera_prime, box[:2], step, inverse_depth, shift)
 
     def smoothed(self, sigma: float, plane: Array) -> SparseMap:
@@ -80,22 +80,37 @@ class SparseMap:
             return self
         height, width = self.inverse_depth.shape
         small = max(8, round(8 * width * self.step / sigma)), max(8, round(8 * height * self.step / sigma))
-        xs, ys = (np.arange(n, dtype=np.float64) * self.step for n in (width, height))
-        xs, ys = xs + self.start[0], ys + self.start[1]
-        affine = (plane[0] * xs + plane[2]) + plane[1] * ys[:, None]
-        bend = cv2.resize((self.inverse_depth - affine).astype(np.float32), small, interpolation=cv2.INTER_AREA)
+
+        def affine(columns: int, rows: int) -> tuple[Plane, Plane]:
+            """By x and by y, at the middles of so many cells."""
+            xs, ys = ((np.arange(n) + 0.5) * (all_of / n) - 0.5 for n, all_of in ((columns, width), (rows, height)))
+            xs, ys = xs * self.step + self.start[0], ys * self.step + self.start[1]
+            return (plane[0] * xs + plane[2]).astype(np.float32), (plane[1] * ys).astype(np.float32)[:, None]
+
+        bend = cv2.resize(self.inverse_depth, small, interpolation=cv2.INTER_AREA)
+        for part in affine(*small):
+            bend -= part
         bend = cv2.GaussianBlur(bend, (0, 0), 8.0, borderType=cv2.BORDER_REPLICATE)
         bend = cv2.resize(bend, (width, height), interpolation=cv2.INTER_CUBIC)
-        return replace(self, inverse_depth=(affine + bend).astype(np.float32))
+        for part in affine(width, height):
+            bend += part
+        return replace(self, inverse_depth=bend)
 
     def at(self, raw: Array) -> tuple[Plane, Plane]:
         """Inverse depth (…) and shift (…, 2) at raw points (rows, columns, 2), between pixels by linear
         interpolation."""
-        x, y = (np.ascontiguousarray((raw[..., k] - self.start[k]) / self.step, np.float32) for k in (0, 1))
-        return (
-            cv2.remap(self.inverse_depth, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
-            cv2.remap(self.shift, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
+        return self.between(raw[..., 0], raw[..., 1])
+
+    def between(self, x: NDArray, y: NDArray) -> tuple[Plane, Plane]:
+        """The same at x and y (rows, columns)."""
+        x, y = (
+            np.ascontiguousarray((at - start) / self.step, np.float32)
+            for at, start in zip((x, y), self.start, strict=True)
         )
+        inverse_depth = cv2.remap(self.inverse_depth, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        if self.shift is None:
+            return inverse_depth, np.broadcast_to(np.float32(0), (*x.shape, 2))
+        return inverse_depth, cv2.remap(self.shift, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
     def target(self, ideal: Array) -> Array:
         """Ideal target pixels (…, 2), shift included, of ideal points (rows, columns, 2); NaN behind the target."""
@@ -139,9 +154,9 @@ class Lines:
         x, y = ray[0] / ray[2], ray[1] / ray[2]
         slope_x, slope_y = (e[0] - x * e[2]) / ray[2], (e[1] - y * e[2]) / ray[2]
         speed = np.maximum(np.hypot(slope_x, slope_y), 1e-12)
-        direction = np.stack([slope_x / speed, slope_y / speed], axis=-1).astype(np.float32)
+        direction = _beside(slope_x / speed, slope_y / speed)
         return Lines(
-            box, step, ideal, inverse_depth, np.stack([x, y], axis=-1).astype(np.float32), shift,
+            box, step, ideal, inverse_depth, _beside(x, y), shift,
             (1 / speed).astype(np.float32), direction, (e[2] / ray[2] / speed).astype(np.float32), sparse.camera_prime,
         )  # fmt: skip
 
@@ -152,7 +167,7 @@ class Lines:
 
     def at(self, field: SparseMap) -> Plane:
         """Inverse depth (h, w) that a field has at the nodes."""
-        return field.at(np.stack(self.nodes, axis=-1))[0]
+        return field.between(*self.nodes)[0]
 
     @property
     def nodes(self) -> tuple[Plane, Plane]:
@@ -164,25 +179,38 @@ class Lines:
         x, y = np.meshgrid(x.astype(np.float32), y.astype(np.float32))
         return x, y
 
-    def target(self, along: Plane, across: Plane | None = None) -> tuple[Plane, Plane]:
+    @cached_property
+    def _start(self) -> tuple[Plane, Plane]:
+        """x and y (h, w) of where nodes are seen that do not move."""
+        return self.base[..., 0] + self.shift[..., 0], self.base[..., 1] + self.shift[..., 1]
+
+    def target(self, along: Plane, across: Plane | None = None, rows: slice = slice(None)) -> tuple[Plane, Plane]:
         """Raw target pixels x, y (h, w) after a move of `along` px on the line, as at its start, and of `across` px to
-        its side; NaN behind the target.
+        its side; NaN behind the target. rows: only of these.
 
         A move t changes d by t · moved, and π runs through base + t direction / (1 + t third).
         """
-        share = along / (1 + along * self.third)
-        x = self.base[..., 0] + self.direction[..., 0] * share + self.shift[..., 0]
-        y = self.base[..., 1] + self.direction[..., 1] * share + self.shift[..., 1]
+        along = along[rows]
+        share = along * self.third[rows]
+        share += 1
+        np.divide(along, share, out=share)
+        direction = self.direction[rows]
+        x, y = direction[..., 0] * share, direction[..., 1] * share
+        x += self._start[0][rows]
+        y += self._start[1][rows]
         if across is not None:
-            x, y = x - across * self.direction[..., 1], y + across * self.direction[..., 0]
+            x -= across[rows] * direction[..., 1]
+            y += across[rows] * direction[..., 0]
         if self.camera_prime.distortion.any():
             raw = distort(np.stack([x, y], axis=-1).astype(np.float64), self.camera_prime).astype(np.float32)
             x, y = raw[..., 0], raw[..., 1]
         return x, y
 
-    def along(self, target: Array) -> Plane:
-        """How far (h, w) px along their lines ideal target pixels (h, w, 2) lie, shift not counted: the inverse of
-        `target`."""
-        off = target - self.base
-        share = (off * self.direction).sum(axis=-1)
-        return (share / (1 - share * self.third)).astype(np.float32)
+    def along(self, px: Plane) -> Plane:
+        """The moves (h, w) that lead so many px along the lines: the inverse of `target`."""
+        return px / (1 - px * self.third)
+
+
+def _beside(x: Array, y: Array) -> Plane:
+    """(h, w, 2), each a plane of its own in memory, float32."""
+    return np.moveaxis(np.stack([x, y], dtype=np.float32, casting="same_kind"), 0, -1)

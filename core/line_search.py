@@ -81,6 +81,15 @@ class View:
             inside &= cv2.remap(self.shown, x, y, cv2.INTER_LINEAR) > 0.999
         return cv2.remap(picture, x, y, interpolation, borderMode=cv2.BORDER_REPLICATE), inside
 
+    def at_nodes(self, picture: NDArray[np.float32], lines: Lines) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        """The same at the nodes, of the reference."""
+        left, top, width, height = lines.box
+        if (width, height) != lines.shape[::-1] or self.gray.shape != self.size[::-1]:
+            return self.sample(picture, *lines.nodes)
+        part = slice(int(top), int(top + height)), slice(int(left), int(left + width))
+        shown = np.ones(lines.shape, bool) if self.shown is None else self.shown[part] > 0.999
+        return picture[part], shown
+
 
 def search_base(sparse: SparseMap, matches: Matches, plane: Array, most: float) -> tuple[SparseMap, float]:
     """The field as it is searched around, and how many px along the lines a pixel may lie from it.
@@ -134,8 +143,7 @@ def search(
     cv2.copyTo(b, (seen_too & ~seen).view(np.uint8), a)
     neither = ~(seen | seen_too)
     a[neither] = b[neither] = 128
-    moved, found = _matched(a, b, count)
-    coarse, found_too = _matched_at_half(a, b, count)
+    (moved, found), (coarse, found_too) = in_order(lambda match: match(a, b, count), (_matched, _matched_at_half))
     moved = np.where(found, moved, coarse)
     counts = np.where(found, np.float32(1), found_too * np.float32(COARSE_SHARE))
     return _on_nodes(lines, rows, ways, moved, counts * seen, seen_too)
@@ -247,7 +255,6 @@ def _on_nodes(
     ends = (arrives >= 0) & (arrives < rows.shape[1])
     ends &= np.take(seen, first + np.clip(arrives, 0, rows.shape[1] - 1))
     start = u.astype(np.float32)
-    way = ways.at(start - moved, row) - ways.at(start, row)
-    along = way / (1 - way * lines.third)
+    along = lines.along(ways.at(start - moved, row) - ways.at(start, row))
     counts *= ends & np.isfinite(along)
     return np.where(counts > 0, along, np.float32(0)), counts

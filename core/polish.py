@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 from .edge_aware import Smoother
 from .line_map import Lines, Plane
 from .line_search import View
+from .threads import each
 
 # (blur of both pictures in px, steps at it)
 SCHEDULE = ((1.0, 1), (0.6, 2))
+# Rows of nodes that are worked on at once. Means of what has lost its local mean take two windows beside them.
+STRIP = 128
 WINDOW, SURROUNDINGS = 5, 15
 SMOOTHNESS = 1.5
 # squared gradient (gray levels per px) below which a place says little of its own; in the same unit what the search
@@ -50,53 +53,141 @@ def polish(
     """
     across = np.zeros_like(along)
     start = along
-    nodes = lines.nodes
     smoother = Smoother.of(weights, SMOOTHNESS)
     steps_px = target.gray.shape[1] / target.size[0], target.gray.shape[0] / target.size[1]
+    share, wanted = np.empty_like(along), np.empty_like(along)
     for blur, count in SCHEDULE:
-        first, shown = reference.sample(cv2.GaussianBlur(reference.gray, (0, 0), blur), *nodes)
+        first, shown = reference.at_nodes(cv2.GaussianBlur(reference.gray, (0, 0), blur), lines)
         smooth = cv2.GaussianBlur(target.gray, (0, 0), blur)
-        slopes = [cv2.Scharr(smooth, cv2.CV_32F, 1 - k, k) * (steps_px[k] / 32) for k in (0, 1)]
-        second = np.stack([smooth, *slopes], axis=-1)
+        slopes = [cv2.Scharr(smooth, cv2.CV_32F, 1 - k, k, scale=steps_px[k] / 32) for k in (0, 1)]
+        second = cv2.merge([smooth, *slopes])
         for _ in range(count):
-            fetched, inside = target.sample(second, *lines.target(along, across))
-            there = (inside & shown).astype(np.float32)
-            a, b, gain, _ = _alike(first, np.ascontiguousarray(fetched[..., 0]), there)
-            gx, gy = gain * fetched[..., 1], gain * fetched[..., 2]
-            left = (a - gain * b) * there
-            typical = float(np.median(np.abs(left[::4, ::4][there[::4, ::4] > 0]))) if there.any() else 0.0
-            trust = there / (1 + np.square(left / np.float32(max(2.0, 1.5 * typical))))
-            slope = gx * lines.direction[..., 0] + gy * lines.direction[..., 1]
-            evidence, wanted = _mean(trust * slope * slope, WINDOW), _mean(trust * slope * left, WINDOW)
-            step = (wanted + np.float32(BELIEF) * (start - along)) / (evidence + np.float32(BELIEF + 1))
-            share = (evidence + np.float32(LEAST_BELIEF)) / (evidence + np.float32(LITTLE_EVIDENCE)) * known
-            along = smoother.smoothed(along + np.clip(step, -1, 1), share, floor=1e-4)
+            seen = _compared(lines, first, shown, target, second, along, across)
+
+            def move(rows: slice, seen: _Compared = seen, along: Plane = along) -> None:
+                """What these rows want and how much that counts, into `wanted` and `share`."""
+                near = _with_neighbours(rows, WINDOW, len(along))
+                own = slice(rows.start - near.start, rows.stop - near.start)
+                told = seen.trust(near)
+                told *= seen.slope[near]
+                pull = _mean(told * seen.left[near], WINDOW)[own]
+                told *= seen.slope[near]
+                evidence = _mean(told, WINDOW)[own]
+                pull += np.float32(BELIEF) * (start[rows] - along[rows])
+                pull /= evidence + np.float32(BELIEF + 1)
+                np.add(along[rows], np.clip(pull, -1, 1, out=pull), out=wanted[rows])
+                np.divide(evidence + np.float32(LEAST_BELIEF), evidence + np.float32(LITTLE_EVIDENCE), out=share[rows])
+                share[rows] *= known[rows]
+
+            each(move, _strips(len(along)))
+            along = smoother.smoothed(wanted, share, floor=1e-4)
             if slack:
-                slope = gy * lines.direction[..., 0] - gx * lines.direction[..., 1]
-                across = across + _smooth_step(trust * slope * left, trust * slope * slope, lines.step)
+                trust = seen.trust(slice(None)) * seen.aside
+                across = across + _smooth_step(trust * seen.left, trust * seen.aside, lines.step)
     return Polished(along, across, likeness(lines, reference, target, along, across), share)
 
 
 def likeness(lines: Lines, reference: View, target: View, along: Plane, across: Plane | None = None) -> Plane:
     """Correlation (h, w) of the two pictures around each node after moves along and across its line, 0 where the target
     shows nothing."""
-    first, shown = reference.sample(reference.gray, *lines.nodes)
-    fetched, inside = target.sample(target.gray, *lines.target(along, across))
-    there = (inside & shown).astype(np.float32)
-    return _alike(first, fetched, there)[3] * there
+    first, shown = reference.at_nodes(reference.gray, lines)
+    out = np.empty_like(along)
+
+    def compare(rows: slice) -> None:
+        near = _with_neighbours(rows, 2 * SURROUNDINGS, len(along))
+        fetched, there = target.sample(target.gray, *lines.target(along, across, near))
+        there &= shown[near]
+        a, b, share = _without_means(first[near], fetched, there)
+        both, own, other = (_mean_there(u * v, share) for u, v in ((a, b), (a, a), (b, b)))
+        both /= np.sqrt((own + 1) * (other + 1))
+        both *= there
+        out[rows] = both[rows.start - near.start : rows.stop - near.start]
+
+    each(compare, _strips(len(along)))
+    return out
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """left (h, w): gray levels by which the target is wrong, 0 where not both are seen; slope, aside: levels per px
+    along the lines and across them; there: where both are seen; usual: levels that count half."""
+
+    left: Plane
+    slope: Plane
+    aside: Plane
+    there: NDArray[np.bool_]
+    usual: np.float32
+
+    def trust(self, rows: slice) -> Plane:
+        """0..1 (…, w) of some rows."""
+        out = self.left[rows] * (1 / self.usual)
+        out *= out
+        out += 1
+        return np.divide(self.there[rows], out, out=out)
+
+
+def _compared(
+    lines: Lines, first: Plane, shown: NDArray[np.bool_], target: View, second: NDArray[np.float32], along: Plane,
+    across: Plane,
+) -> _Compared:  # fmt: skip
+    """The reference at the nodes (h, w) beside the target and its slopes (h', w', 3) where the moves lead."""
+    left, slope, aside, there = *(np.empty_like(along) for _ in range(3)), np.empty(along.shape, bool)
+
+    def compare(rows: slice) -> None:
+        near = _with_neighbours(rows, 2 * SURROUNDINGS, len(along))
+        own = slice(rows.start - near.start, rows.stop - near.start)
+        fetched, both_seen = target.sample(second, *lines.target(along, across, near))
+        both_seen &= shown[near]
+        gray, gx, gy = cv2.split(fetched)
+        a, b, share = _without_means(first[near], gray, both_seen)
+        gain = _mean_there(a * b, share)[own]
+        gain += 25
+        gain /= _mean_there(b * b, share)[own] + 25
+        np.clip(gain, np.float32(0.5), np.float32(2), out=gain)
+        there[rows] = both_seen[own]
+        np.multiply(gain, b[own], out=left[rows])
+        np.subtract(a[own], left[rows], out=left[rows])
+        left[rows] *= there[rows]
+        gx, gy = gx[own] * gain, gy[own] * gain
+        x, y = (lines.direction[rows, :, k] for k in (0, 1))
+        np.add(gx * x, gy * y, out=slope[rows])
+        np.subtract(gy * x, gx * y, out=aside[rows])
+
+    each(compare, _strips(len(along)))
+    some = np.abs(left[::4, ::4][there[::4, ::4]])
+    typical = float(np.median(some)) if some.size else 0.0
+    return _Compared(left, slope, aside, there, np.float32(max(2.0, 1.5 * typical)))
+
+
+def _strips(rows: int) -> list[slice]:
+    """Rows that are worked on at once, so that what is made of them stays near the processor."""
+    return [slice(top, min(top + STRIP, rows)) for top in range(0, rows, STRIP)]
+
+
+def _with_neighbours(rows: slice, side: int, count: int) -> slice:
+    """The rows that a window of so many reaches from some of `count` rows."""
+    return slice(max(0, rows.start - side // 2), min(count, rows.stop + side // 2))
 
 
 def _mean(values: Plane, side: int) -> Plane:
     return cv2.blur(values, (side, side), borderType=cv2.BORDER_REFLECT_101)
 
 
-def _alike(a: Plane, b: Plane, there: Plane) -> tuple[Plane, Plane, Plane, Plane]:
-    """Both without their local mean, the local gain from b to a, and their local correlation."""
-    share = np.maximum(_mean(there, SURROUNDINGS), np.float32(1e-3))
-    a, b = (values - _mean(values * there, SURROUNDINGS) / share for values in (a, b))
-    both, own, other = (_mean(v * there, SURROUNDINGS) / share for v in (a * b, a * a, b * b))
-    gain = np.clip((both + 25) / (other + 25), np.float32(0.5), np.float32(2))
-    return a, b, gain, both / np.sqrt((own + 1) * (other + 1))
+def _mean_there(values: Plane, share: Plane | None) -> Plane:
+    """The mean of the surroundings of which a share (None: all) is seen, of values that are 0 elsewhere."""
+    mean = _mean(values, SURROUNDINGS)
+    return mean if share is None else np.divide(mean, share, out=mean)
+
+
+def _without_means(a: Plane, b: Plane, there: NDArray[np.bool_]) -> tuple[Plane, Plane, Plane | None]:
+    """Both without their local mean, 0 where they are not there, and the share of the surroundings that is: None where
+    all is."""
+    if there.all():
+        return a - _mean(a, SURROUNDINGS), b - _mean(b, SURROUNDINGS), None
+    weight = there.astype(np.float32)
+    share = np.maximum(_mean(weight, SURROUNDINGS), np.float32(1e-3))
+    a, b = ((values - _mean_there(values * weight, share)) * weight for values in (a, b))
+    return a, b, share
 
 
 def _smooth_step(wanted: Plane, evidence: Plane, step: float) -> Plane:

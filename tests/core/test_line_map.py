@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -148,14 +149,34 @@ def lines_epipole(sparse: SparseMap) -> np.ndarray:
 
 
 @given(st.floats(-25, 25), st.sampled_from(sorted(MOTIONS)))
-def test_where_a_target_pixel_lies_on_a_line_is_the_inverse(by_hand: SimpleNamespace, move: float, motion: str) -> None:
+def test_the_move_that_leads_so_many_px_along_a_line_is_the_inverse(
+    by_hand: SimpleNamespace, move: float, motion: str
+) -> None:
     _, sparse = make(by_hand, motion)
     lines = Lines.over(sparse, (0, 0, *SIZE), 12.0)
     moves = np.full(lines.shape, move, np.float32)
     with np.errstate(invalid="ignore"):
         ahead = (1 + move * lines.third) > 0.2
-    target = np.stack(lines.target(moves), axis=-1) - lines.shift
-    np.testing.assert_allclose(lines.along(target)[ahead], moves[ahead], atol=5e-3)
+    led = np.stack(lines.target(moves), axis=-1) - np.stack(lines.target(0 * moves), axis=-1)
+    px = (led * lines.direction).sum(axis=-1)
+    np.testing.assert_allclose(lines.along(px)[ahead], moves[ahead], atol=5e-3)
+
+
+def test_some_rows_go_where_they_go_with_all_the_others(made: Made) -> None:
+    lines = Lines.over(made[1], (0, 0, *SIZE), 3.0)
+    rng = np.random.default_rng(3)
+    along, across = (rng.normal(0, 3, lines.shape).astype(np.float32) for _ in range(2))
+    whole, part = lines.target(along, across), lines.target(along, across, slice(5, 9))
+    assert all(np.array_equal(a[5:9], b, equal_nan=True) for a, b in zip(whole, part, strict=True))
+
+
+def test_a_field_without_shift_has_none(by_hand: SimpleNamespace) -> None:
+    _, sparse = make(by_hand, sorted(MOTIONS)[0])
+    still = replace(sparse, shift=None)
+    points = np.random.default_rng(4).uniform(0, 60, (5, 6, 2))
+    none = replace(sparse, shift=np.zeros((*sparse.inverse_depth.shape, 2), np.float32))
+    for a, b in zip(still.at(points), none.at(points), strict=True):
+        assert a.shape == b.shape and np.array_equal(a, b)
 
 
 def test_across_leaves_the_line_by_so_many_px_to_its_side(made: Made) -> None:

@@ -12,7 +12,7 @@ import pytest
 from edf_stitch.core import line_search
 from edf_stitch.core.displacement import target_points
 from edf_stitch.core.features import Matches
-from edf_stitch.core.line_map import SparseMap
+from edf_stitch.core.line_map import Lines, SparseMap
 from edf_stitch.core.line_search import COARSE_SHARE, FINER, View, in_tones_of, search, search_base
 
 from .line_scenes import MARGIN, MOTIONS, SIZE, Field, Scene, scene
@@ -31,6 +31,19 @@ def test_a_view_is_asked_at_px_of_the_full_picture(step: float) -> None:
     at = np.float32(np.linspace(12, 100, 40))[None], np.float32(np.linspace(10, 75, 40))[None]
     found, shown = view.sample(view.gray, *at)
     assert shown.all() and np.abs(found - (40 + at[0] + 0.5 * at[1] - 0.25)).max() < 0.5
+
+
+@pytest.mark.parametrize("covered", [False, True])
+def test_at_the_nodes_it_shows_what_it_shows_there(covered: bool) -> None:
+    """Pixel by pixel, and between pixels."""
+    pair = scene("sideways")
+    alpha = (np.arange(SIZE[1])[:, None] + np.zeros(SIZE[0]) < 90).astype(np.float32) if covered else None
+    for box, step in (((12, 20, 100, 80), 1.0), ((12, 20, 100, 80), 2.0)):
+        lines = Lines.over(pair.field(), box, step)
+        for view in (View.of(pair.reference, alpha, 1.0), View.of(pair.reference, alpha, 2.0)):
+            found, shown = view.at_nodes(view.gray, lines)
+            expected, seen = view.sample(view.gray, *lines.nodes)
+            assert np.array_equal(shown, seen) and np.abs(found - expected).max() < 1e-3 and found.shape == lines.shape
 
 
 def test_colours_become_gray_as_the_eye_weighs_them() -> None:

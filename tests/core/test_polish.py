@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core import polish as polish_module
 from edf_stitch.core.edge_aware import edge_weights
 from edf_stitch.core.line_map import Lines
 from edf_stitch.core.line_search import View
@@ -165,3 +166,19 @@ def test_guesses_do_not_pull_at_what_was_found() -> None:
     even, told = (polish(lines, blank, blank, start, k, weights, False).along for k in (np.ones_like(known), known))
     near = np.s_[20:130, 92:98]
     assert even[near].mean() > 0.3 and told[near].mean() < 0.2 * even[near].mean()
+
+
+def test_strip_by_strip_it_comes_to_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows reach over the strips' borders; also where the target shows not all."""
+    pair = scene("sideways")
+    lines = pair.lines(pair.field())
+    start = nearly(lines, pair)
+    alpha = np.ones(SIZE[::-1], np.float32)
+    alpha[50:70, 80:90] = 0
+    views = pair.views()[0], View.of(pair.target, alpha, 1.0)
+    found = []
+    for rows in (1000, 31):
+        monkeypatch.setattr(polish_module, "STRIP", rows)
+        found.append(polished(pair, lines, start, slack=True, views=views))
+    for name in ("along", "across", "likeness", "evidence"):
+        np.testing.assert_allclose(*(getattr(one, name) for one in found), atol=2e-3, err_msg=name)
