@@ -20,6 +20,7 @@ from .lens import distort, undistort
 from .two_view import TwoView
 
 Plane = NDArray[np.float32]
+Places = NDArray[np.intp]
 # What is smooth is worked out at every so many-th row and column.
 EVERY = 3
 
@@ -184,23 +185,26 @@ class Lines:
         """x and y (h, w) of where nodes are seen that do not move."""
         return self.base[..., 0] + self.shift[..., 0], self.base[..., 1] + self.shift[..., 1]
 
-    def target(self, along: Plane, across: Plane | None = None, rows: slice = slice(None)) -> tuple[Plane, Plane]:
+    def target(
+        self, along: Plane, across: Plane | None = None, part: slice | tuple[Places, Places] = slice(None)
+    ) -> tuple[Plane, Plane]:
         """Raw target pixels x, y (h, w) after a move of `along` px on the line, as at its start, and of `across` px to
-        its side; NaN behind the target. rows: only of these.
+        its side; NaN behind the target. part: only of these rows, or of the nodes (n,) in these rows and
+        columns.
 
         A move t changes d by t · moved, and π runs through base + t direction / (1 + t third).
         """
-        along = along[rows]
-        share = along * self.third[rows]
+        along = along[part]
+        share = along * self.third[part]
         share += 1
         np.divide(along, share, out=share)
-        direction = self.direction[rows]
+        direction = self.direction[part]
         x, y = direction[..., 0] * share, direction[..., 1] * share
-        x += self._start[0][rows]
-        y += self._start[1][rows]
+        x += self._start[0][part]
+        y += self._start[1][part]
         if across is not None:
-            x -= across[rows] * direction[..., 1]
-            y += across[rows] * direction[..., 0]
+            x -= across[part] * direction[..., 1]
+            y += across[part] * direction[..., 0]
         if self.camera_prime.distortion.any():
             raw = distort(np.stack([x, y], axis=-1).astype(np.float64), self.camera_prime).astype(np.float32)
             x, y = raw[..., 0], raw[..., 1]

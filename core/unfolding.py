@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from .canvas import Canvas
 from .line_map import Lines, Plane
 from .occlusion import occluded
+from .threads import each
 from .two_view import TwoView
 from .warp import Warp, jacobian
 
@@ -30,25 +31,47 @@ MOST_MOVED = 8.0
 LEAST_TURN, RIM = 0.1, 5
 # One node in so many tells what is usual.
 SPARSE = 17
+# Nodes that smoothing looks at on each side, at most; rows that are looked at at once.
+REACH, STRIP = 12, 128
 
 
 def unfolded(lines: Lines, two_view: TwoView, target_size: tuple[int, int], along: Plane, across: Plane) -> Plane:
     """The moves (h, w) along the lines without folds outside what is occluded and its rim."""
     around = np.ones((RIM, RIM), np.uint8)
     for _ in range(LOOKS):
-        start = along
-        keep = cv2.dilate(_hidden(lines, two_view, target_size, along, across).astype(np.uint8), around) > 0
+        start, along = along, along.copy()
+        x, y = lines.target(along, across)
+        usual = _usual_area(x, y)
+        folded = _turns_over(x, y, usual)
+        if not folded.any():
+            break
+        free = cv2.dilate(_hidden(lines, two_view, target_size, along, x, y).astype(np.uint8), around) == 0
+        folded &= free
         for number in range(MEDIANS + MEANS):
-            folded = _turns_over(*lines.target(along, across)) & ~keep
             if not folded.any():
                 break
             sigma = LEAST_SIGMA * 2 ** (max(0, number - MEDIANS) / 6)
             reach = np.ones((2 * int(sigma) + 1,) * 2, np.uint8)
-            near = (cv2.dilate(folded.astype(np.uint8), reach) > 0) & ~keep
-            smooth = cv2.medianBlur(along, MEDIAN) if number < MEDIANS else cv2.GaussianBlur(along, (0, 0), sigma)
-            along = np.where(near, smooth, along)
+            near = cv2.dilate(folded.view(np.uint8), reach) & free
+            rows, columns = np.nonzero(near.view(np.bool_))
+            part = _around(rows, along.shape[0]), _around(columns, along.shape[1])
+            if number < MEDIANS:
+                smooth = cv2.medianBlur(np.ascontiguousarray(along[part]), MEDIAN)
+            else:
+                smooth = cv2.GaussianBlur(along[part], (0, 0), sigma)
+            np.copyto(along[part], smooth, where=near[part].view(np.bool_))
+            x[rows, columns], y[rows, columns] = lines.target(along, across, (rows, columns))
+            # these and their neighbours may have come to fold, or no longer do
+            beside = np.flatnonzero(cv2.dilate(near, np.ones((3, 3), np.uint8)).view(np.bool_))
+            folded.ravel()[beside] = _turned(_areas(x, y, beside), usual)
+            folded &= free
         along = _where_little_moved(along, start)
     return along
+
+
+def _around(places: NDArray[np.intp], count: int) -> slice:
+    """What of `count` rows or columns smoothing at some of them looks at."""
+    return slice(max(0, int(places.min(initial=count)) - REACH), min(count, int(places.max(initial=0)) + REACH + 1))
 
 
 def _where_little_moved(along: Plane, start: Plane) -> Plane:
@@ -63,23 +86,51 @@ def _where_little_moved(along: Plane, start: Plane) -> Plane:
     return np.where(most[patch] > MOST_MOVED, start, along)
 
 
-def _turns_over(x: Plane, y: Plane) -> NDArray[np.bool_]:
-    turn = jacobian(x, y)
-    known = turn.ravel()[::SPARSE]
+def _usual_area(x: Plane, y: Plane) -> float:
+    """The area, with its sign, that a map's nodes take up; NaN where it leads nowhere."""
+    known = _areas(x, y, np.arange(0, x.size, SPARSE))
     known = known[np.isfinite(known)]
-    if not known.size:
-        return np.zeros(turn.shape, bool)
-    usual = float(np.median(known))
+    return float(np.median(known)) if known.size else np.nan
+
+
+def _areas(x: Plane, y: Plane, nodes: NDArray[np.intp]) -> NDArray[np.float32]:
+    """The `jacobian` of a map (h, w) at some nodes (flat indices)."""
+    rows, columns = x.shape
+    row, column = np.divmod(nodes, columns)
+    ends = [(nodes - (column > 0), nodes + (column < columns - 1)),
+            (nodes - columns * (row > 0), nodes + columns * (row < rows - 1))]  # fmt: skip
+    (x_across, y_across), (x_down, y_down) = (
+        tuple(np.take(values, after) - np.take(values, before) for values in (x, y)) for before, after in ends
+    )
+    many = ((column > 0) + (column < columns - 1).astype(np.float32)) * (
+        (row > 0) + (row < rows - 1).astype(np.float32)
+    )
+    return np.divide(x_across * y_down - x_down * y_across, many, dtype=np.float32)
+
+
+def _turned(areas: NDArray[np.float32], usual: float) -> NDArray[np.bool_]:
+    """Which areas say that the map turns over."""
     with np.errstate(invalid="ignore"):
-        return turn * np.sign(usual) <= LEAST_TURN * abs(usual)
+        return areas * np.float32(np.sign(usual)) <= np.float32(LEAST_TURN * abs(usual))
+
+
+def _turns_over(x: Plane, y: Plane, usual: float) -> NDArray[np.bool_]:
+    folded = np.empty(x.shape, bool)
+    count = len(x)
+
+    def look(top: int) -> None:
+        near = slice(max(0, top - 1), min(count, top + STRIP + 1))
+        folded[top : top + STRIP] = _turned(jacobian(x[near], y[near]), usual)[top - near.start :][:STRIP]
+
+    each(look, range(0, count, STRIP))
+    return folded
 
 
 def _hidden(
-    lines: Lines, two_view: TwoView, target_size: tuple[int, int], along: Plane, across: Plane
+    lines: Lines, two_view: TwoView, target_size: tuple[int, int], along: Plane, x: Plane, y: Plane
 ) -> NDArray[np.bool_]:
-    """Which nodes (h, w) the target cannot see."""
+    """Which nodes (h, w) the target cannot see; x, y: where they fall."""
     rows, columns = lines.shape
-    x, y = lines.target(along, across)
     left, top, width, height = lines.box
     sx, sy = width / columns, height / rows
     # nodes as the pixels of a canvas of their own
