@@ -144,14 +144,17 @@ def _guide(view: NDArray[np.uint8], lines: Lines) -> NDArray[np.float32]:
 def _plain(lines: Lines, sparse: SparseMap, reference: View) -> Plane:
     """How little (h, w) 0..1 the reference shows around the nodes that a move along their lines would change."""
     epipole = np.linalg.svd(sparse.two_view.F)[2][2]
-    away = lines.ideal * epipole[2] - epipole[:2]
-    away /= np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-12)
     gray = cv2.GaussianBlur(reference.gray, (0, 0), 1.0)
-    slope = np.zeros(lines.shape, np.float32)
+    slope, length = np.zeros((2, *lines.shape), np.float32)
     for k in (0, 1):
-        gradient = cv2.Scharr(gray, cv2.CV_32F, 1 - k, k) / 32
-        slope += reference.at_nodes(gradient, lines)[0] * away[..., k].astype(np.float32)
-    return TEXTURE / (TEXTURE + cv2.blur(slope * slope, (7, 7)))
+        away = (lines.ideal[..., k] * epipole[2] - epipole[k]).astype(np.float32)
+        gradient = cv2.Scharr(gray, cv2.CV_32F, 1 - k, k, scale=1 / 32)
+        slope += reference.at_nodes(gradient, lines)[0] * away
+        away *= away
+        length += away
+    slope *= slope
+    slope /= np.maximum(length, np.float32(1e-24))
+    return TEXTURE / (TEXTURE + cv2.blur(slope, (7, 7)))
 
 
 def _there(lines: Lines, along: Plane, across: Plane, pictures: tuple[Picture, Picture]) -> NDArray[np.bool_]:

@@ -21,8 +21,10 @@ MOST = 20.0
 
 def edge_weights(guide: NDArray[np.float32], sigma: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """exp(−|difference| / σ) between neighbours along rows (H, W−1) and columns (H−1, W) of a guide (H, W[, C])."""
-    guide = guide if guide.ndim == 3 else guide[..., None]
-    across, down = (np.abs(np.diff(guide, axis=axis)).max(axis=2) for axis in (1, 0))
+    across, down = 0.0, 0.0
+    for plane in cv2.split(guide):
+        across = np.maximum(across, cv2.absdiff(plane[:, 1:], plane[:, :-1]))
+        down = np.maximum(down, cv2.absdiff(plane[1:], plane[:-1]))
     return np.exp(across / np.float32(-sigma)), np.exp(down / np.float32(-sigma))
 
 

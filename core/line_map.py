@@ -17,12 +17,15 @@ from .canvas import Box, Grid
 from .displacement import Field, target_points
 from .epipolar import Array
 from .lens import distort, undistort
+from .threads import each
 from .two_view import TwoView
 
 Plane = NDArray[np.float32]
 Places = NDArray[np.intp]
 # What is smooth is worked out at every so many-th row and column.
 EVERY = 3
+# Rows of nodes that are worked on at once.
+STRIP = 32
 
 
 def coarse_places(shape: tuple[int, ...]) -> tuple[Array, Array]:
@@ -69,10 +72,10 @@ class SparseMap:
         box = (-margin, -margin, width + 2 * margin, height + 2 * margin)
         grid = Grid.over(*box)
         values = field.on_grid(grid, undistort(grid.points, camera) if camera.distortion.any() else None)
-        inverse_depth = grid.to_pixels(values.inverse_depth, *box, step)
+        inverse_depth = np.ascontiguousarray(grid.to_pixels(values.inverse_depth, *box, step))
         shift = None
         if values.shift is not None:
-            shift = np.stack([grid.to_pixels(values.shift[..., k], *box, step) for k in (0, 1)], axis=-1)
+            shift = cv2.merge([np.ascontiguousarray(grid.to_pixels(values.shift[..., k], *box, step)) for k in (0, 1)])
         return SparseMap(two_view, camera, camera_prime, box[:2], step, inverse_depth, shift)
 
     def smoothed(self, sigma: float, plane: Array) -> SparseMap:
@@ -146,19 +149,30 @@ class Lines:
         columns, rows = max(1, round(width / step)), max(1, round(height / step))
         xs = left + (np.arange(columns) + 0.5) * (width / columns) - 0.5
         ys = top + (np.arange(rows) + 0.5) * (height / rows) - 0.5
-        raw = np.stack(np.meshgrid(xs, ys), axis=-1)
-        inverse_depth, shift = sparse.at(raw)
-        ideal = undistort(raw, sparse.camera)
+        ideal = np.empty((rows, columns, 2))
+        ideal[..., 0], ideal[..., 1] = xs, ys[:, None]
+        inverse_depth, shift = sparse.at(ideal)
+        ideal = undistort(ideal, sparse.camera)
+        moved, third = np.empty((2, rows, columns), np.float32)
+        base, direction = (np.moveaxis(np.empty((2, rows, columns), np.float32), 0, -1) for _ in range(2))
         H, e = sparse.two_view.H_inf, sparse.two_view.e_prime
-        ray = [H[k, 0] * ideal[..., 0] + H[k, 1] * ideal[..., 1] + (H[k, 2] + e[k] * inverse_depth) for k in range(3)]
-        ray[2][ray[2] <= 1e-6 * np.maximum(np.abs(ray[0]), np.abs(ray[1]))] = np.nan
-        x, y = ray[0] / ray[2], ray[1] / ray[2]
-        slope_x, slope_y = (e[0] - x * e[2]) / ray[2], (e[1] - y * e[2]) / ray[2]
-        speed = np.maximum(np.hypot(slope_x, slope_y), 1e-12)
-        direction = _beside(slope_x / speed, slope_y / speed)
+
+        def work_out(top: int) -> None:
+            part = slice(top, top + STRIP)
+            u, v, d = ideal[part, :, 0], ideal[part, :, 1], inverse_depth[part].astype(np.float64)
+            ray = [H[k, 0] * u + H[k, 1] * v + (H[k, 2] + e[k] * d) for k in range(3)]
+            ray[2][ray[2] <= 1e-6 * np.maximum(np.abs(ray[0]), np.abs(ray[1]))] = np.nan
+            near = 1 / ray[2]
+            x, y = ray[0] * near, ray[1] * near
+            slope_x, slope_y = (e[0] - x * e[2]) * near, (e[1] - y * e[2]) * near
+            per_px = 1 / np.maximum(np.sqrt(slope_x * slope_x + slope_y * slope_y), 1e-12)
+            base[part, :, 0], base[part, :, 1] = x, y
+            direction[part, :, 0], direction[part, :, 1] = slope_x * per_px, slope_y * per_px
+            moved[part], third[part] = per_px, e[2] * near * per_px
+
+        each(work_out, range(0, rows, STRIP))
         return Lines(
-            box, step, ideal, inverse_depth, _beside(x, y), shift,
-            (1 / speed).astype(np.float32), direction, (e[2] / ray[2] / speed).astype(np.float32), sparse.camera_prime,
+            box, step, ideal, inverse_depth, base, shift, moved, direction, third, sparse.camera_prime
         )  # fmt: skip
 
     @property
@@ -213,8 +227,3 @@ class Lines:
     def along(self, px: Plane) -> Plane:
         """The moves (h, w) that lead so many px along the lines: the inverse of `target`."""
         return px / (1 - px * self.third)
-
-
-def _beside(x: Array, y: Array) -> Plane:
-    """(h, w, 2), each a plane of its own in memory, float32."""
-    return np.moveaxis(np.stack([x, y], dtype=np.float32, casting="same_kind"), 0, -1)

@@ -7,6 +7,7 @@ move along the rows. Matching: Hirschmüller, IEEE TPAMI 2008, as OpenCV has it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -40,34 +41,45 @@ FURTHEST, REACH, MORE_PX = 99.5, 1.25, 8.0
 
 @dataclass(frozen=True)
 class View:
-    """A picture to be matched: levels (h, w, C) uint8, gray (h, w) float32, shown (h, w) float32 0 or 1, None where all
-    is; size (W, H) px of the full one."""
+    """A picture to be matched: levels (h, w, C) uint8, shown (h, w) float32 0 or 1, None where all is; full (H, W, C)
+    uint8: what they are of."""
 
     levels: NDArray[np.uint8]
-    gray: Plane
     shown: Plane | None
-    size: tuple[int, int]
+    full: NDArray[np.uint8]
 
     @staticmethod
     def of(view: NDArray[np.uint8], alpha: Plane | None, step: float) -> View:
         """An 8-bit picture (H, W, C) with `step` px to each of its own."""
-        height, width = view.shape[:2]
-        gray = (cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else view[..., 0]).astype(np.float32)
         shown = None if alpha is None else (alpha > 0).astype(np.float32)
-        if step > 1:
-            small = max(1, round(width / step)), max(1, round(height / step))
-            view = cv2.resize(view, small, interpolation=cv2.INTER_AREA).reshape(*small[::-1], -1)
-            gray = cv2.resize(gray, small, interpolation=cv2.INTER_AREA)
-            if shown is not None:
-                shown = (cv2.resize(shown, small, interpolation=cv2.INTER_AREA) > 0.999).astype(np.float32)
-        return View(view, gray, shown, (width, height))
+        if step <= 1:
+            return View(view, shown, view)
+        small = max(1, round(view.shape[1] / step)), max(1, round(view.shape[0] / step))
+        levels = cv2.resize(view, small, interpolation=cv2.INTER_AREA).reshape(*small[::-1], -1)
+        if shown is not None:
+            shown = (cv2.resize(shown, small, interpolation=cv2.INTER_AREA) > 0.999).astype(np.float32)
+        return View(levels, shown, view)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(W, H) px of the full picture."""
+        return self.full.shape[1], self.full.shape[0]
+
+    @cached_property
+    def gray(self) -> Plane:
+        """(h, w) float32, means of gray levels that are not rounded."""
+        full, (height, width) = self.full, self.levels.shape[:2]
+        gray = (cv2.cvtColor(full, cv2.COLOR_RGB2GRAY) if full.shape[2] == 3 else full[..., 0]).astype(np.float32)
+        return (
+            gray if gray.shape == (height, width) else cv2.resize(gray, (width, height), interpolation=cv2.INTER_AREA)
+        )
 
     def sample(
         self, picture: NDArray, x: NDArray, y: NDArray, interpolation: int = cv2.INTER_LINEAR
     ) -> tuple[NDArray, NDArray[np.bool_]]:
-        """A picture of the same shape (h, w[, C]) as `gray` at full px (…), and where (…) that lies on what is
+        """A picture of the same shape (h, w[, C]) as `levels` at full px (…), and where (…) that lies on what is
         shown."""
-        height, width = self.gray.shape
+        height, width = self.levels.shape[:2]
         x, y = (
             np.multiply(at + np.float32(0.5), np.float32(few / many), dtype=np.float32) - np.float32(0.5)
             if few != many else np.array(at, np.float32)
@@ -84,7 +96,7 @@ class View:
     def at_nodes(self, picture: NDArray[np.float32], lines: Lines) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         """The same at the nodes, of the reference."""
         left, top, width, height = lines.box
-        if (width, height) != lines.shape[::-1] or self.gray.shape != self.size[::-1]:
+        if (width, height) != lines.shape[::-1] or self.levels.shape != self.full.shape:
             return self.sample(picture, *lines.nodes)
         part = slice(int(top), int(top + height)), slice(int(left), int(left + width))
         shown = np.ones(lines.shape, bool) if self.shown is None else self.shown[part] > 0.999

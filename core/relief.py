@@ -106,58 +106,76 @@ def raised(
     left, top, width, height = lines.box
     rows, columns = there.shape
     step = width / columns, height / rows
-    moved = np.stack([np.where(there, v, np.float32(0)) for v in (along, across)], axis=-1)
     near = np.abs(along[there])
     limit = MOST_FADE * max(sparse.camera.size)
     fade = float(np.clip(FADE * np.percentile(near, 98) if near.size else 0.0, LEAST_FADE, max(limit, LEAST_FADE)))
     fade /= min(step)
     margin = int(np.ceil(fade)) + 1
-    moved = cv2.copyMakeBorder(moved, *[margin] * 4, cv2.BORDER_CONSTANT)
     inside = np.pad(there, margin)
-    share = fading(outside(inside), fade).astype(np.float32)
-    sure = np.pad(np.where(there, np.clip(confidence, 0, 1), np.float32(0)), margin)
-    moved = _beyond(moved, inside, sure, GIVE_WAY * fade) * share[..., None]
-    more = margin * step[0], margin * step[1]
-    smooth = Lines.over(sparse, (left - more[0], top - more[1], width + 2 * more[0], height + 2 * more[1]),
-                        COARSE * min(step))
-    per_px, *direction = (
-        np.nan_to_num(_resized(np.ascontiguousarray(v), inside.shape))
-        for v in (smooth.moved, smooth.direction[..., 0], smooth.direction[..., 1])
+    share = fading(outside(inside).astype(np.float32), fade).astype(np.float32)
+
+    def widened(values: Plane) -> Plane:
+        return cv2.copyMakeBorder(np.where(there, values, np.float32(0)), *[margin] * 4, cv2.BORDER_CONSTANT)
+
+    sure = widened(np.clip(confidence, 0, 1))
+    weight = _told(inside, sure, GIVE_WAY * fade)
+    to_side = across.any()
+    along, across = (
+        _beyond(widened(values), *weight) * share if values.any() else np.zeros(inside.shape, np.float32)
+        for values in (along, across)
     )
-    shift = np.stack([-moved[..., 1] * direction[1], moved[..., 1] * direction[0]], axis=-1)
+    more = margin * step[0], margin * step[1]
+    smooth = Lines.over(
+        sparse, (left - more[0], top - more[1], width + 2 * more[0], height + 2 * more[1]), COARSE * min(step)
+    )
+    per_px, *direction = (
+        np.nan_to_num(_resized(np.ascontiguousarray(v), inside.shape), copy=False)
+        for v in (smooth.moved, smooth.direction[..., 0], smooth.direction[..., 1])[: 3 if to_side else 1]
+    )
+    shift = np.zeros((*inside.shape, 2), np.float32)
+    if to_side:
+        cv2.merge([-across * direction[1], across * direction[0]], shift)
     start = left + (step[0] - 1) / 2 - more[0], top + (step[1] - 1) / 2 - more[1]
-    return Relief(start, step, moved[..., 0] * per_px, shift, sure)
+    return Relief(start, step, along * per_px, shift, sure)
 
 
-def _beyond(moved: Plane, inside: NDArray[np.bool_], sure: Plane, width: float) -> Plane:
-    """Moves (h, w, 2) of the nodes inside, and beyond them what goes on of those that are sure (h, w).
-
-    A bare sky moves by whatever the search made of it: carried on it would bend the mast before it. The last
-    nodes before the border are doubtful too: they were sought by half a window. Within `width` nodes of the border what
-    is doubtful gives way to what goes on beyond, or the map would jump there.
-    """
+def _told(inside: NDArray[np.bool_], sure: Plane, width: float) -> tuple[Plane, Plane]:
+    """How much (h, w) 0..1 each node counts in what goes on beyond the overlap, and how far it gives way to that."""
     held = cv2.erode(sure, np.ones((RIM, RIM), np.uint8))
     weight = inside * np.clip((held - np.float32(DOUBTED)) / np.float32(SURE - DOUBTED), 0, 1)
-    gone_on = carried_on(moved, weight.astype(np.float32))
-    share = np.clip(1 - distance_inside(inside) / np.float32(width), 0, 1)
-    return moved + (gone_on - moved) * np.where(inside, share, np.float32(1))[..., None]
+    share = np.clip(1 - distance_inside(inside).astype(np.float32) / np.float32(width), 0, 1)
+    return weight.astype(np.float32), np.where(inside, share, np.float32(1)).astype(np.float32)
 
 
-def carried_on(values: NDArray[np.float32], known: Plane) -> NDArray[np.float32]:
-    """values (h, w, k) where known (h, w) is 1; elsewhere what surrounds it, the smoother the further away.
+def _beyond(moved: Plane, weight: Plane, share: Plane) -> Plane:
+    """Moves (h, w) of the nodes inside, and beyond them what goes on of those that are sure; see `_told`.
+
+    A bare sky moves by whatever the search made of it: carried on it would bend the mast before it. The last
+    nodes before the border are doubtful too: they were sought by half a window. Within some nodes of the border what
+    is doubtful gives way to what goes on beyond, or the map would jump there.
+    """
+    gone_on = carried_on(moved, weight)
+    gone_on -= moved
+    gone_on *= share
+    gone_on += moved
+    return gone_on
+
+
+def carried_on(values: Plane, known: Plane) -> Plane:
+    """values (h, w) where known (h, w) is 1; elsewhere what surrounds it, the smoother the further away.
 
     Pull-push over a pyramid (Gortler et al., "The Lumigraph", SIGGRAPH 1996).
     """
     if min(known.shape) < 2 or known.min() >= 1:
-        return values
-    weight = known[..., None]
-    down = cv2.pyrDown(np.concatenate([values * weight, weight], axis=-1))
-    share = np.clip(down[..., -1], 0, 1)
-    coarse = carried_on(
-        down[..., :-1] / np.maximum(down[..., -1:], np.float32(1e-6)), np.minimum(1, share * 4).astype(np.float32)
-    )
-    up = cv2.pyrUp(coarse, dstsize=(known.shape[1], known.shape[0])).reshape(values.shape)
-    return values * weight + up * (1 - weight)
+        return values.copy()
+    weighed = values * known
+    down, share = cv2.pyrDown(weighed), cv2.pyrDown(known)
+    down /= np.maximum(share, np.float32(1e-6))
+    coarse = carried_on(down, np.clip(share * 4, 0, 1))
+    out = cv2.pyrUp(coarse, dstsize=(known.shape[1], known.shape[0]))
+    out *= 1 - known
+    out += weighed
+    return out
 
 
 def _resized(values: Plane, shape: tuple[int, ...]) -> Plane:
