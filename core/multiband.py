@@ -9,14 +9,16 @@ ghost: across it light is evened out and content is cut hard. Beyond the band ev
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import for_each_channel, strips
+from .light import strips
 from .threads import each
 
+Plane: TypeAlias = NDArray[np.float32]
 # Tones less than this away from what they were are what they were.
 NOTHING = 1e-5
 # The width of the coarsest band, as a share of the canvas's diagonal.
@@ -38,35 +40,28 @@ def correction(
     difference (h, w, C): target's tones less the reference's, where `same`; from_target (h, w): which side of the seam
     a pixel lies on, where anything is `shown`. The difference is written over.
     """
-    # on the far side of the seam: what the picture of this side would show there, had it the other's light
-    _weigh(difference, same.astype(np.float32))
-    light = _filled(difference, same.astype(np.float32))
-    del difference  # as large as the overlap: the peak of memory is here
     # a pixel's width to either side, or else the finest band is cut with a pair of scissors
     share = cv2.blur(_from_nearest(from_target, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
-    share = share[..., None]
-    blended = _masked_bands(light, share, bands)
+    weights, shares = _weights(same.astype(np.float32)), [share]
+    while len(shares) <= bands and min(shares[-1].shape) > 2:
+        shares.append(_down(shares[-1]))
+    # one channel after the other: all at once would be the peak of a stitch's memory
+    for k in range(difference.shape[2]):
+        # on the far side of the seam: what the picture of this side would show there, had it the other's light
+        light = _filled(difference[..., k] * weights[0], weights)
+        blended = _masked_bands(light, shares)
 
-    def put(rows: slice) -> None:
-        part, whole = blended[rows], light[rows]
-        over = for_each_channel(from_target[rows].astype(np.float32), part.shape[2])
-        part -= over * whole
-        # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
-        whole = whole * (1 - 2 * over)
-        np.clip(part, np.minimum(whole, 0), np.maximum(whole, 0), out=part)
-        part[np.abs(part) < NOTHING] = 0
+        def put(rows: slice, light: Plane = light, blended: Plane = blended, k: int = k) -> None:
+            change, whole, over = blended[rows], light[rows], from_target[rows]
+            change -= over * whole
+            # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
+            whole = np.where(over, -whole, whole)
+            np.clip(change, np.minimum(whole, 0), np.maximum(whole, 0), out=change)
+            change[np.abs(change) < NOTHING] = 0
+            difference[rows, :, k] = change
 
-    each(put, strips(blended.shape))
-    return blended
-
-
-def _weigh(values: NDArray[np.float32], weight: NDArray[np.float32]) -> None:
-    """Multiplies values (h, w, C) by a weight (h, w), in place."""
-
-    def put(rows: slice) -> None:
-        values[rows] *= for_each_channel(weight[rows], values.shape[2])
-
-    each(put, strips(values.shape))
+        each(put, strips(blended.shape))
+    return difference
 
 
 def _from_nearest(values: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -81,56 +76,59 @@ def _from_nearest(values: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArra
     return by_label[nearest]
 
 
-def filled(
-    values: NDArray[np.float32], known: NDArray[np.bool_] | NDArray[np.float32]
-) -> NDArray[np.float32]:
+def filled(values: NDArray[np.float32], known: NDArray[np.bool_] | NDArray[np.float32]) -> NDArray[np.float32]:
     """Values (h, w, C) where known, or by how well (0..1), continued smoothly elsewhere (pull and push: means over ever
     larger cells fill what smaller ones leave open; Gortler et al., SIGGRAPH 1996, section 3.4)."""
-    weight = known.astype(np.float32)
-    return _filled(values * for_each_channel(weight, values.shape[2]), weight)
+    weights = _weights(known.astype(np.float32))
+    channels = [_filled(values[..., k] * weights[0], weights) for k in range(values.shape[2])]
+    return np.stack(channels, axis=-1)
 
 
-def _filled(sums: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
-    # sums are written over, for there is little else as large in memory
-    whole = weight if weight.max(initial=0) <= 1 else np.minimum(weight, 1)
-    if min(weight.shape) <= 2 or whole.min() == 1:
-        own = sums / np.maximum(weight, np.float32(1e-6))[..., None]
-        mean = sums.sum(axis=(0, 1)) / max(float(weight.sum()), 1e-6)
-        return own * whole[..., None] + mean.astype(np.float32) * (1 - whole)[..., None]
-    # weights grow on the way up: a cell with a quarter of it known is known
-    channels = sums.shape[2]
-    coarser = _filled(4 * _down(sums), 4 * _down(weight[..., None])[..., 0])
-    out = _up(coarser, weight.shape)
+def _weights(weight: Plane) -> list[Plane]:
+    """How well cells are known, from pixels (h, w) up to where all are."""
+    levels = [weight]
+    while min(levels[-1].shape) > 2 and levels[-1].min() < 1:
+        # weights grow on the way up: a cell with a quarter of it known is known
+        levels.append(4 * _down(levels[-1]))
+    return levels
+
+
+def _filled(sums: Plane, weights: list[Plane]) -> Plane:
+    """Sums (h, w) of cells over their weights, continued where these are small; the sums are written over."""
+    weight, *coarser = weights
+    if not coarser:
+        whole = np.minimum(weight, 1)
+        mean = np.float32(sums.sum() / max(float(weight.sum()), 1e-6))
+        return sums / np.maximum(weight, np.float32(1e-6)) * whole + mean * (1 - whole)
+    out = _up(_filled(4 * _down(sums), coarser), weight.shape)
 
     def put(rows: slice) -> None:
-        known = whole[rows]
-        out[rows] *= for_each_channel(1 - known, channels)
-        sums[rows] *= for_each_channel(known / np.maximum(weight[rows], np.float32(1e-6)), channels)
+        whole = np.minimum(weight[rows], 1)
+        out[rows] *= 1 - whole
+        sums[rows] *= whole / np.maximum(weight[rows], np.float32(1e-6))
         out[rows] += sums[rows]
 
     each(put, strips(out.shape))
     return out
 
 
-def _masked_bands(light: NDArray[np.float32], share: NDArray[np.float32], bands: int) -> NDArray[np.float32]:
-    """The sum of the Laplacian bands of `light`, each weighed by the Gaussian level of `share` that goes with it."""
-    if bands == 0 or min(light.shape[:2]) <= 2:
+def _masked_bands(light: Plane, shares: list[Plane]) -> Plane:
+    """The sum of the Laplacian bands of `light` (h, w), each weighed by the Gaussian level of a share that goes with
+    it."""
+    share, *smoother = shares
+    if not smoother:
         return light * share
-    coarser, smooth = _down(light), _down(share)
-    band = _up(coarser, light.shape[:2])
+    coarser = _down(light)
+    band = _up(coarser, light.shape)
     np.subtract(light, band, out=band)
-    _weigh(band, share[..., 0])
-    below = _masked_bands(coarser, smooth, bands - 1)
-    for k in range(band.shape[2]):  # one channel at a time: all at once would be as large as the overlap
-        band[..., k] += _up(np.ascontiguousarray(below[..., k : k + 1]), light.shape[:2])[..., 0]
+    band *= share
+    band += _up(_masked_bands(coarser, smoother), light.shape)
     return band
 
 
-def _down(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    out = cv2.pyrDown(values, borderType=cv2.BORDER_REFLECT_101)
-    return out.reshape(*out.shape[:2], values.shape[2])
+def _down(values: Plane) -> Plane:
+    return cv2.pyrDown(values, borderType=cv2.BORDER_REFLECT_101)
 
 
-def _up(values: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
-    out = cv2.pyrUp(values, dstsize=(shape[1], shape[0]))
-    return out.reshape(shape[0], shape[1], values.shape[2])
+def _up(values: Plane, shape: tuple[int, ...]) -> Plane:
+    return cv2.pyrUp(values, dstsize=(shape[1], shape[0]))

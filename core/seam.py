@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .light import AnyLight, Placed, around, beside, bounds, strips
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
 from .overlap import SAME_TONE, WHOLE, Overlap, distance_to_border
-from .threads import each
+from .threads import each, in_order
 from .warp import Layer, Warp
 
 SEAMS = ("graphcut", "none")
@@ -46,7 +46,7 @@ def known_labels(
     """
     known = np.full(reference.alpha.shape, NOWHERE, np.int8)
 
-    def put(rows: slice) -> None:
+    def put(rows: slice) -> tuple[int, int]:
         out, unseen, alpha, alpha_too = known[rows], hidden[rows], reference.alpha[rows], target.alpha[rows]
         shows, shows_too = alpha > 0, alpha_too > 0
         out[shows & shows_too] = FREE
@@ -54,17 +54,16 @@ def known_labels(
         whole, whole_too = alpha >= WHOLE, alpha_too >= WHOLE
         out[shows & (~shows_too | unseen | (whole & ~whole_too))] = FIRST
         out[shows_too & (~shows | (whole_too & ~whole & ~unseen))] = SECOND
+        return int(shows.sum()), int((shows & ~shows_too).sum())
 
-    each(put, strips(known.shape))
-    shows, shows_too = reference.alpha > 0, target.alpha > 0
-    alone = int((shows & ~shows_too).sum())
-    if shows.any() and alone < SURROUNDED * int(shows.sum()):
+    shown, alone = np.sum(list(in_order(put, strips(known.shape))), axis=0).tolist()
+    if shown and alone < SURROUNDED * shown:
         # all round it is the target: the cheapest cut would leave nothing of the reference
-        inner = distance_to_border(shows)
+        inner = distance_to_border(reference.alpha > 0)
         known[(known == FREE) & (inner > CORE * inner.max())] = FIRST
     if painted is not None:
-        known[(painted < 0) & shows] = FIRST
-        known[(painted > 0) & shows_too] = SECOND
+        known[(painted < 0) & (reference.alpha > 0)] = FIRST
+        known[(painted > 0) & (target.alpha > 0)] = SECOND
     return known
 
 
