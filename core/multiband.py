@@ -40,15 +40,20 @@ def correction(
     difference (h, w, C): target's tones less the reference's, where `same`; from_target (h, w): which side of the seam
     a pixel lies on, where anything is `shown`. The difference is written over.
     """
+    # one channel after the other: all at once would be the peak of a stitch's memory
+    channels = range(difference.shape[2])
+    weights = _weights(same.astype(np.float32))
+    for k in channels:
+        # on the far side of the seam: what the picture of this side would show there, had it the other's light
+        difference[..., k] = _filled(difference[..., k] * weights[0], weights)
+    del weights
     # a pixel's width to either side, or else the finest band is cut with a pair of scissors
     share = cv2.blur(_from_nearest(from_target, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
-    weights, shares = _weights(same.astype(np.float32)), [share]
+    shares = [share]
     while len(shares) <= bands and min(shares[-1].shape) > 2:
         shares.append(_down(shares[-1]))
-    # one channel after the other: all at once would be the peak of a stitch's memory
-    for k in range(difference.shape[2]):
-        # on the far side of the seam: what the picture of this side would show there, had it the other's light
-        light = _filled(difference[..., k] * weights[0], weights)
+    for k in channels:
+        light = np.ascontiguousarray(difference[..., k])
         blended = _masked_bands(light, shares)
 
         def put(rows: slice, light: Plane = light, blended: Plane = blended, k: int = k) -> None:
