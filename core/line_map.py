@@ -116,6 +116,18 @@ class SparseMap:
             return inverse_depth, np.broadcast_to(np.float32(0), (*x.shape, 2))
         return inverse_depth, cv2.remap(self.shift, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
+    def over(self, xs: Array, ys: Array) -> tuple[Plane, Plane]:
+        """The same where evenly spaced columns xs and lines ys of raw px cross."""
+        places = [(at - start) / self.step for at, start in zip((xs, ys), self.start, strict=True)]
+        sides = self.inverse_depth.shape[::-1]
+        if all(_whole(at, side) for at, side in zip(places, sides, strict=True)):
+            (left, top), (width, height) = (int(at[0]) for at in places), (at.size for at in places)
+            part = slice(top, top + height), slice(left, left + width)
+            shift = np.broadcast_to(np.float32(0), (height, width, 2)) if self.shift is None else self.shift[part]
+            return self.inverse_depth[part], shift
+        x, y = np.meshgrid(xs.astype(np.float32), ys.astype(np.float32))
+        return self.between(x, y)
+
     def target(self, ideal: Array) -> Array:
         """Ideal target pixels (…, 2), shift included, of ideal points (rows, columns, 2); NaN behind the target."""
         inverse_depth, shift = self.at(distort(ideal, self.camera))
@@ -145,13 +157,11 @@ class Lines:
     @staticmethod
     def over(sparse: SparseMap, box: Box | tuple[float, float, float, float], step: float) -> Lines:
         """The lines of the pixels of a box (left, top, width, height), in cells of step × step."""
-        left, top, width, height = box
-        columns, rows = max(1, round(width / step)), max(1, round(height / step))
-        xs = left + (np.arange(columns) + 0.5) * (width / columns) - 0.5
-        ys = top + (np.arange(rows) + 0.5) * (height / rows) - 0.5
+        rows, columns = max(1, round(box[3] / step)), max(1, round(box[2] / step))
+        xs, ys = _middles(box, (rows, columns))
         ideal = np.empty((rows, columns, 2))
         ideal[..., 0], ideal[..., 1] = xs, ys[:, None]
-        inverse_depth, shift = sparse.at(ideal)
+        inverse_depth, shift = sparse.over(xs, ys)
         ideal = undistort(ideal, sparse.camera)
         moved, third = np.empty((2, rows, columns), np.float32)
         base, direction = (np.moveaxis(np.empty((2, rows, columns), np.float32), 0, -1) for _ in range(2))
@@ -182,16 +192,13 @@ class Lines:
 
     def at(self, field: SparseMap) -> Plane:
         """Inverse depth (h, w) that a field has at the nodes."""
-        return field.between(*self.nodes)[0]
+        return field.over(*_middles(self.box, self.shape))[0]
 
     @property
     def nodes(self) -> tuple[Plane, Plane]:
         """x and y (h, w) of the nodes, raw px of the reference."""
-        left, top, width, height = self.box
-        rows, columns = self.shape
-        x = left + (np.arange(columns) + 0.5) * (width / columns) - 0.5
-        y = top + (np.arange(rows) + 0.5) * (height / rows) - 0.5
-        x, y = np.meshgrid(x.astype(np.float32), y.astype(np.float32))
+        xs, ys = _middles(self.box, self.shape)
+        x, y = np.meshgrid(xs.astype(np.float32), ys.astype(np.float32))
         return x, y
 
     @cached_property
@@ -227,3 +234,17 @@ class Lines:
     def along(self, px: Plane) -> Plane:
         """The moves (h, w) that lead so many px along the lines: the inverse of `target`."""
         return px / (1 - px * self.third)
+
+
+def _middles(box: Box | tuple[float, float, float, float], shape: tuple[int, int]) -> tuple[Array, Array]:
+    """x and y of the middles of so many (rows, columns) cells of a box (left, top, width, height)."""
+    left, top, width, height = box
+    rows, columns = shape
+    xs = left + (np.arange(columns) + 0.5) * (width / columns) - 0.5
+    return xs, top + (np.arange(rows) + 0.5) * (height / rows) - 0.5
+
+
+def _whole(places: Array, count: int) -> bool:
+    """Whether places are one after the other of 0 … count − 1."""
+    inside = 0 <= places[0] and places[-1] <= count - 1
+    return bool(inside and np.array_equal(places, int(places[0]) + np.arange(places.size)))

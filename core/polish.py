@@ -19,7 +19,7 @@ from .line_search import View
 from .threads import each
 
 # (blur of both pictures in px, steps at it)
-SCHEDULE = ((1.0, 1), (0.6, 2))
+SCHEDULE = ((1.0, 2), (0.6, 1))
 # Rows of nodes that are worked on at once. Means of what has lost its local mean take two windows beside them.
 STRIP = 128
 WINDOW, SURROUNDINGS = 5, 15
