@@ -6,6 +6,7 @@ scipy.optimize takes longer to load than this takes to run, and a stitch is a sh
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,6 @@ from .epipolar import (
     infinite_homography,
     inverse_intrinsics,
     poses_from_fundamental,
-    project,
     rotation_from_vector,
     sampson_residuals,
     skew,
@@ -38,6 +38,8 @@ TAILS = 3.0
 # Parallax below this angle (radians) is rounding and keypoint noise: such a point may lie behind by accident.
 FAR_ANGLE = 2e-3
 NEGLIGIBLE = 1e-3
+# [e_i]ₓ of the three axes: where a small rotation takes a vector.
+_TURNS = np.array([skew(axis) for axis in np.eye(3)])
 
 
 @dataclass(frozen=True)
@@ -129,11 +131,16 @@ def beyond_infinity(pose: Pose, x: Array, y: Array) -> Array:
     F alone trades focal length against rotation almost freely; that the world lies in front of the cameras decides it.
     Without this term a pair of parallel-looking cameras can end with most of its points behind them.
     """
-    q = homogeneous(x) @ infinite_homography(pose.K, pose.K_prime, pose.R).T
+    return _beyond(pose, homogeneous(x).T, np.asarray(y).T)
+
+
+def _beyond(pose: Pose, x: Array, y: Array) -> Array:
+    """`beyond_infinity` of homogeneous x (3, N), y (2 or 3, N)."""
+    q = infinite_homography(pose.K, pose.K_prime, pose.R) @ x
     e = pose.K_prime @ pose.t
-    direction = (e[:2] * q[:, 2:] - q[:, :2] * e[2]) * np.sign(q[:, 2:])
-    length = np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-12)
-    along = np.sum((y - project(q)) * direction, axis=1) / length
+    direction = (e[:2, None] * q[2] - q[:2] * e[2]) * np.sign(q[2])
+    length = np.maximum(np.hypot(direction[0], direction[1]), 1e-12)
+    along = ((y[:2] - q[:2] / q[2]) * direction).sum(axis=0) / length
     return np.minimum(along, 0.0)
 
 
@@ -156,7 +163,8 @@ class _Problem:
         believed = max(sigma, (SYSTEMATIC_GUESS_PX if camera.assumed else SYSTEMATIC_PX) * matches.scale)
         tempered = min(1.0, EFFECTIVE_MATCHES / max(1, len(matches))) * (sigma / believed) ** 2
         self.weight = tempered * matches.weights / max(float(matches.weights.mean()), 1e-300)
-        self.x, self.y = homogeneous(matches.x), homogeneous(matches.y)
+        # (3, N): long rows are what NumPy is quick with
+        self.x, self.y = (np.ascontiguousarray(homogeneous(points).T) for points in (matches.x, matches.y))
 
     def moved(self, pose: Pose, step: Array) -> Pose:
         """The pose after a step in the unknowns."""
@@ -174,8 +182,8 @@ class _Problem:
         return Pose(K, K_prime, rotation_from_vector(omega) @ pose.R, t / np.linalg.norm(t))
 
     def cost(self, pose: Pose) -> float:
-        r = sampson_residuals(pose.F, self.matches.x, self.matches.y) / self.sigma
-        c = beyond_infinity(pose, self.matches.x, self.matches.y) / self.sigma_beyond
+        r = self._sampson(pose.F)[0] / self.sigma
+        c = _beyond(pose, self.x, self.y) / self.sigma_beyond
         # one loss for both: what is off its line anyway has no say about infinity
         return float(self.weight @ np.log1p(r * r + c * c) + sum(e * e for e, _ in self.priors(pose)))
 
@@ -217,10 +225,10 @@ class _Problem:
         F, by_unknowns = self._F_and_derivatives(pose)
         residual, by_F = self._residuals_and_derivative(F)
         normal, gradient = np.zeros((size, size)), np.zeros(size)
-        beyond = beyond_infinity(pose, self.matches.x, self.matches.y)
+        beyond = _beyond(pose, self.x, self.y)
         far = (beyond / self.sigma_beyond) ** 2
         loss = self.weight / (1 + (residual / self.sigma) ** 2 + far)
-        _add(normal, gradient, residual, by_F @ by_unknowns, loss / self.sigma**2)
+        _add(normal, gradient, residual, by_unknowns.T @ by_F, loss / self.sigma**2)
         wrong = far * loss > NEGLIGIBLE * self.weight  # not those that are far off their lines anyway
         if wrong.any():
             derivative = self._beyond_derivative(pose, wrong)
@@ -231,21 +239,22 @@ class _Problem:
         return normal, gradient
 
     def _beyond_derivative(self, pose: Pose, which: NDArray[np.bool_]) -> Array:
-        """Derivatives (n, size) of `beyond_infinity` of some matches on the wrong side by the unknowns."""
+        """Derivatives (size, n) of `beyond_infinity` of some matches on the wrong side by the unknowns."""
         dH, de = self._infinity_derivatives(pose)
-        x, y = self.x[which], self.matches.y[which]
-        q, e = x @ infinite_homography(pose.K, pose.K_prime, pose.R).T, pose.K_prime @ pose.t
-        side = np.sign(q[:, 2:])
-        direction = (e[:2] * q[:, 2:] - q[:, :2] * e[2]) * side
-        length = np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-12)
-        away = y - project(q)
-        along = np.sum(away * direction, axis=1) / length
-        dq, de = x @ dH.transpose(0, 2, 1), de[:, None, :]  # (size, n, 3), (size, 1, 3)
-        d_point = (dq[..., :2] - project(q) * dq[..., 2:]) / q[:, 2:]
-        d_direction = e[:2] * dq[..., 2:] + de[..., :2] * q[:, 2:] - dq[..., :2] * e[2] - q[:, :2] * de[..., 2:]
+        x, y = self.x[:, which], self.y[:2, which]
+        q, e = infinite_homography(pose.K, pose.K_prime, pose.R) @ x, pose.K_prime @ pose.t
+        side = np.sign(q[2])
+        direction = (e[:2, None] * q[2] - q[:2] * e[2]) * side
+        length = np.maximum(np.hypot(direction[0], direction[1]), 1e-12)
+        place = q[:2] / q[2]
+        away = y - place
+        along = (away * direction).sum(axis=0) / length
+        dq, de = dH @ x, de[:, :, None]  # (size, 3, n), (size, 3, 1)
+        d_point = (dq[:, :2] - place * dq[:, 2:]) / q[2]
+        d_direction = e[:2, None] * dq[:, 2:] + de[:, :2] * q[2] - dq[:, :2] * e[2] - q[:2] * de[:, 2:]
         d_direction *= side
-        moved = np.sum(away * d_direction - d_point * direction, axis=-1) / length
-        return (moved - along * np.sum(direction * d_direction, axis=-1) / length**2).T
+        moved = (away * d_direction - d_point * direction).sum(axis=1) / length
+        return moved - along * (direction * d_direction).sum(axis=1) / length**2
 
     def _infinity_derivatives(self, pose: Pose) -> tuple[Array, Array]:
         """Derivatives of H_inf (size, 3, 3) and e' (size, 3) by the unknowns."""
@@ -264,8 +273,8 @@ class _Problem:
                 back: Array = R @ _third_column(K_inv[:, i])
                 by_both = self.principal_sigma * (K_prime @ back + shift @ right)
                 found.append((by_both, self.principal_sigma * shift @ t))
-        found += [(K_prime @ skew(axis) @ right, nothing) for axis in np.eye(3)]
-        found += [(np.zeros((3, 3)), K_prime @ tangent) for tangent in _tangent_basis(t).T]
+        found += [(turned, nothing) for turned in K_prime @ _TURNS @ right]
+        found += [(np.zeros((3, 3)), moved) for moved in (K_prime @ _tangent_basis(t)).T]
         return np.array([dH for dH, _ in found]), np.array([de for _, de in found])
 
     def _F_and_derivatives(self, pose: Pose) -> tuple[Array, Array]:
@@ -285,28 +294,33 @@ class _Problem:
                 aside, aside_prime = (_third_column(inverse[:, i]) for inverse in (K_inv, K_prime_inv))
                 by_both = left @ pose.R @ aside + aside_prime.T @ skew(pose.t) @ right
                 derivatives.append(self.principal_sigma * by_both)
-        derivatives += [left @ skew(axis) @ right for axis in np.eye(3)]
-        derivatives += [K_prime_inv.T @ skew(tangent) @ right for tangent in _tangent_basis(pose.t).T]
-        return left @ right, np.column_stack([d.ravel() for d in derivatives])
+        derivatives += [*(left @ _TURNS @ right)]
+        derivatives += [*(K_prime_inv.T @ np.tensordot(_tangent_basis(pose.t).T, _TURNS, 1) @ right)]
+        return left @ right, np.array(derivatives).reshape(len(derivatives), 9).T
+
+    def _sampson(self, F: Array) -> tuple[Array, Array, Array, Array]:
+        """Sampson residuals (N,), the lines (3, N) in the target and in the reference, and the length (N,) of what is
+        divided by."""
+        line_y, line_x = F @ self.x, F.T @ self.y
+        squared = line_y[0] ** 2 + line_y[1] ** 2 + line_x[0] ** 2 + line_x[1] ** 2
+        root = np.sqrt(np.maximum(squared, 1e-300))
+        return (self.y * line_y).sum(axis=0) / root, line_y, line_x, root
 
     def _residuals_and_derivative(self, F: Array) -> tuple[Array, Array]:
-        """Sampson residuals (N,) and their derivatives by the nine entries of F (N, 9)."""
-        x, y = self.x, self.y
-        line_y, line_x = x @ F.T, y @ F
-        algebraic = np.sum(y * line_y, axis=1)
-        squared = line_y[:, 0] ** 2 + line_y[:, 1] ** 2 + line_x[:, 0] ** 2 + line_x[:, 1] ** 2
-        root = np.sqrt(np.maximum(squared, 1e-300))
-        d_algebraic = y[:, :, None] * x[:, None, :]
-        d_squared = np.zeros_like(d_algebraic)
-        d_squared[:, :2, :] += 2 * line_y[:, :2, None] * x[:, None, :]
-        d_squared[:, :, :2] += 2 * y[:, :, None] * line_x[:, None, :2]
-        derivative = d_algebraic / root[:, None, None] - d_squared * (algebraic / (2 * root**3))[:, None, None]
-        return algebraic / root, derivative.reshape(len(x), 9)
+        """Sampson residuals (N,) and their derivatives by the nine entries of F (9, N)."""
+        residual, line_y, line_x, root = self._sampson(F)
+        shrinks = residual / root**2
+        by_line = self.y / root
+        by_line[:2] -= shrinks * line_y[:2]
+        derivative = by_line[:, None] * self.x
+        derivative[:, :2] -= self.y[:, None] * (shrinks * line_x[:2])
+        return residual, derivative.reshape(9, -1)
 
 
 def _add(normal: Array, gradient: Array, values: Array, jacobian: Array, weight: Array) -> None:
-    normal += (jacobian * weight[:, None]).T @ jacobian
-    gradient += jacobian.T @ (weight * values)
+    """Adds what residuals (n,) with derivatives (size, n) and weights (n,) contribute."""
+    normal += (jacobian * weight) @ jacobian.T
+    gradient += jacobian @ (weight * values)
 
 
 def _third_column(v: Array) -> Array:
@@ -320,5 +334,5 @@ def _tangent_basis(t: Array) -> Array:
     """Two unit vectors (3, 2) perpendicular to t."""
     across = skew(t)
     first = across[:, int(np.argmin(np.abs(t)))]  # t × the axis it is least along
-    first = first / np.linalg.norm(first)
-    return np.column_stack([first, across @ first])
+    first = first / math.sqrt(first @ first)
+    return np.array([first, across @ first]).T

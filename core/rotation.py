@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from .camera import Camera
 from .epipolar import Array, homogeneous, infinite_homography, inverse_intrinsics, project, rotation_from_vector
@@ -38,6 +37,9 @@ def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camer
     Minimises the transfer error in units of `sigma` px, robustly, and the priors of the focal lengths; two that are not
     fixed are expected to change in step.
     """
+    # not at the top: few pairs come here, and it takes longer to load than a preview's field takes to fit
+    from scipy.optimize import least_squares
+
     few = matches.thinned(ENOUGH)
     x = homogeneous(few.x)
     free, free_prime = not camera.fixed, not camera_prime.fixed
