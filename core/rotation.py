@@ -37,8 +37,7 @@ def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camer
     Minimises the transfer error in units of `sigma` px, robustly, and the priors of the focal lengths; two that are not
     fixed are expected to change in step.
     """
-    # not at the top: few pairs come here, and it takes longer to load than a preview's field takes to fit
-    from scipy.optimize import least_squares
+    from scipy.optimize import least_squares  # takes long to load, and few pairs come here
 
     few = matches.thinned(ENOUGH)
     x = homogeneous(few.x)

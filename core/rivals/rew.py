@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from ..canvas import Grid
 from ..displacement import (
@@ -102,6 +101,8 @@ def global_transformation(two_view: TwoView, matches: Matches) -> Array:
     The paper has a rotation only; where the camera really moved it leaves so much to the spline that what lies beyond
     the overlap is off by tens of px. Raises DegenerateGeometry.
     """
+    from scipy.optimize import least_squares  # takes long to load, and other fields do without
+
     H = fit_one_homography(two_view, matches).two_view.H_inf
     K, K_prime, x = two_view.K, two_view.K_prime, homogeneous(matches.x)
     start = nearest_rotation(inverse_intrinsics(K_prime) @ H @ K)

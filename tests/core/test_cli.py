@@ -342,6 +342,12 @@ def test_importing_the_command_loads_nothing_heavy(tmp_path: Path) -> None:
     assert done.stdout == "[]\n" and "is not known" in done.stderr
 
 
+def test_a_stitch_loads_no_optimiser_before_it_needs_one(tmp_path: Path) -> None:
+    code = "import sys, edf_stitch.core.pipeline\nprint('scipy.linalg' in sys.modules, 'scipy.optimize' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.stdout == "True False\n", done.stderr
+
+
 def test_the_same_bytes_whatever_blas_was_told(folder: Path, tmp_path: Path) -> None:
     """BLAS gives other bytes with other thread counts; the command sees to it that there is one."""
     found = []
