@@ -111,7 +111,8 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
         "holes": "transparent", "seed": 0}
     assert report["composition"]["exposure_blocks"] > 100
     assert report["composition"]["exposure_gain"] == pytest.approx([1, 1, 1], abs=0.01)
-    assert report["composition"]["occluded_px"] <= 40
+    # nothing hides anything here: what dense refinement takes for an edge is next to nothing
+    assert report["composition"]["occluded_px"] < result.canvas.width * result.canvas.height / 1000
     assert report["warnings"] == list(result.warnings)
 
 
