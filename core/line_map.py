@@ -4,7 +4,6 @@ lines takes them: what dense refinement works on.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,7 +22,7 @@ from .two_view import TwoView
 Plane = NDArray[np.float32]
 Places = NDArray[np.intp]
 # What is smooth is worked out at every so many-th row and column.
-EVERY = 3
+EVERY = 2
 # Rows of nodes that are worked on at once.
 STRIP = 32
 
@@ -35,14 +34,10 @@ def coarse_places(shape: tuple[int, ...]) -> tuple[Array, Array]:
     return columns, rows
 
 
-def in_between(shape: tuple[int, ...], work: Callable[[Array, Array], Array]) -> list[Plane]:
-    """The planes (rows, columns) of a smooth function, worked out at `coarse_places`, linear between them.
-
-    work: of columns (n,) and rows (m,) makes (m, n, k). NaN spreads by a cell.
-    """
-    places = coarse_places(shape)
-    size = EVERY * places[0].size, EVERY * places[1].size
-    coarse = work(*places)
+def in_between(shape: tuple[int, ...], coarse: Array) -> list[Plane]:
+    """The planes (rows, columns) of a smooth function known (m, n, k) at `coarse_places`, linear between them. NaN
+    spreads by a cell."""
+    size = EVERY * coarse.shape[1], EVERY * coarse.shape[0]
     part = slice(EVERY, EVERY + shape[0]), slice(EVERY, EVERY + shape[1])
     return [
         cv2.resize(coarse[..., k].astype(np.float32), size, interpolation=cv2.INTER_LINEAR)[part]

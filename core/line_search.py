@@ -138,14 +138,16 @@ def search(
     alike = reference.levels.shape[2] == target.levels.shape[2]
     own, other = (v.levels if alike else _levels(v.gray) for v in (reference, target))
     finer = cv2.multiply(other, float(FINER), dtype=cv2.CV_16U)
-    ways = Ways.of(sparse, rows)
+    points = rows.points(*coarse_places(rows.shape))
+    sent = sparse.target(points)
+    ways = Ways.of(sparse.two_view.e_prime, sent, rows)
 
     def of_reference() -> tuple[NDArray, NDArray[np.bool_]]:
-        x, y = in_between(rows.shape, lambda u, v: distort(rows.points(u, v), sparse.camera))
+        x, y = in_between(rows.shape, distort(points, sparse.camera))
         return reference.sample(own, x, y, cv2.INTER_CUBIC)
 
     def of_target() -> tuple[NDArray, NDArray[np.bool_]]:
-        x, y = in_between(rows.shape, lambda u, v: distort(sparse.target(rows.points(u, v)), sparse.camera_prime))
+        x, y = in_between(rows.shape, distort(sent, sparse.camera_prime))
         return target.sample(finer, x, y, cv2.INTER_CUBIC)
 
     (a, seen), (finer_b, seen_too) = in_order(lambda rows_of: rows_of(), (of_reference, of_target))
@@ -232,11 +234,9 @@ class Ways:
     px: Plane
 
     @staticmethod
-    def of(sparse: SparseMap, rows: EpipolarRows) -> Ways:
-        """By the field that the target is resampled by."""
-        u, v = coarse_places(rows.shape)
-        sent = sparse.target(rows.points(u, v))
-        direction = sparse.two_view.e_prime[:2] - sent * sparse.two_view.e_prime[2]
+    def of(e_prime: Array, sent: Array, rows: EpipolarRows) -> Ways:
+        """sent (m, n, 2): where the field sends those places."""
+        direction = e_prime[:2] - sent * e_prime[2]
         # a row's is one line, and is followed one way only
         direction = np.where(np.isfinite(direction), direction, 0.0).sum(axis=1, keepdims=True)
         direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-300)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.epipolar import distance_to_line, homogeneous, project
 from edf_stitch.core.lens import distort, undistort
-from edf_stitch.core.line_map import EVERY, Lines, SparseMap, in_between
+from edf_stitch.core.line_map import EVERY, Lines, SparseMap, coarse_places, in_between
 from edf_stitch.core.two_view import TwoView
 from hypothesis import given
 from hypothesis import strategies as st
@@ -213,7 +213,7 @@ def test_what_is_smooth_is_right_between_the_places_it_is_worked_out_at(shape: t
         return np.stack([3 * x - 2 * y + 500 + 0.001 * x * y, np.where(x + 0 * y > 30, np.nan, y)], axis=-1)
 
     whole = work(np.arange(shape[1]), np.arange(shape[0]))
-    bent, broken = in_between(shape, work)
+    bent, broken = in_between(shape, work(*coarse_places(shape)))
     assert bent.shape == shape and bent.dtype == np.float32
     np.testing.assert_allclose(bent, whole[..., 0], atol=1e-3)
     near = 30 - EVERY
