@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .edge_aware import Smoother
+from .light import beside
 from .line_map import Lines, Plane
 from .line_search import View
 from .threads import each
@@ -66,8 +67,7 @@ def polish(
 
             def move(rows: slice, seen: _Compared = seen, along: Plane = along) -> None:
                 """What these rows want and how much that counts, into `wanted` and `share`."""
-                near = _with_neighbours(rows, WINDOW, len(along))
-                own = slice(rows.start - near.start, rows.stop - near.start)
+                near, own = beside(rows, WINDOW // 2, len(along))
                 told = seen.trust(near)
                 told *= seen.slope[near]
                 pull = _mean(told * seen.left[near], WINDOW)[own]
@@ -94,14 +94,14 @@ def likeness(lines: Lines, reference: View, target: View, along: Plane, across: 
     out = np.empty_like(along)
 
     def compare(rows: slice) -> None:
-        near = _with_neighbours(rows, 2 * SURROUNDINGS, len(along))
+        near, here = beside(rows, SURROUNDINGS, len(along))
         fetched, there = target.sample(target.gray, *lines.target(along, across, near))
         there &= shown[near]
         a, b, share = _without_means(first[near], fetched, there)
         both, own, other = (_mean_there(u * v, share) for u, v in ((a, b), (a, a), (b, b)))
         both /= np.sqrt((own + 1) * (other + 1))
         both *= there
-        out[rows] = both[rows.start - near.start : rows.stop - near.start]
+        out[rows] = both[here]
 
     each(compare, _strips(len(along)))
     return out
@@ -134,8 +134,7 @@ def _compared(
     left, slope, aside, there = *(np.empty_like(along) for _ in range(3)), np.empty(along.shape, bool)
 
     def compare(rows: slice) -> None:
-        near = _with_neighbours(rows, 2 * SURROUNDINGS, len(along))
-        own = slice(rows.start - near.start, rows.stop - near.start)
+        near, own = beside(rows, SURROUNDINGS, len(along))
         fetched, both_seen = target.sample(second, *lines.target(along, across, near))
         both_seen &= shown[near]
         gray, gx, gy = cv2.split(fetched)
@@ -162,11 +161,6 @@ def _compared(
 def _strips(rows: int) -> list[slice]:
     """Rows that are worked on at once, so that what is made of them stays near the processor."""
     return [slice(top, min(top + STRIP, rows)) for top in range(0, rows, STRIP)]
-
-
-def _with_neighbours(rows: slice, side: int, count: int) -> slice:
-    """The rows that a window of so many reaches from some of `count` rows."""
-    return slice(max(0, rows.start - side // 2), min(count, rows.stop + side // 2))
 
 
 def _mean(values: Plane, side: int) -> Plane:
