@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .light import AnyLight, Light, Part, Retouched, bounds, for_each_channel, within
+from .light import AnyLight, Light, Part, Retouched, bounds, for_each_channel, in_any_channel, within
 from .multiband import bands_for, correction
 from .overlap import Overlap, distance_inside, distance_to_border
 from .tone import to_light, to_tones
@@ -139,8 +139,7 @@ def in_bands(reference: Layer, target: Layer, from_target: NDArray[np.bool_], ov
     del overlap  # as large as they are: the peak of memory is ahead
     same = parts.pop()
     change = correction(parts.pop(), same, from_target[region], shown, bands)
-    # channel by channel: NumPy is slow along three at once
-    touched = np.logical_or.reduce([change[..., k] != 0 for k in range(change.shape[2])]) & shown
+    touched = in_any_channel(change != 0) & shown
     return Layer(Evened(out.light, (region[0].start, region[1].start), touched, change), out.alpha)
 
 

@@ -18,7 +18,7 @@ from .containers import foreign_kind, read_structure
 from .decoding import PHOTOGRAPH, check_size, decode_exr, decode_file, quiet_opencv, read_file, turn
 from .errors import BadRequest, UnreadableImage, UnwritableOutput
 from .exr import write_exr
-from .light import AnyLight, Coded, strips, whole
+from .light import AnyLight, Coded, in_any_channel, strips, whole
 from .metadata import Exif, embed, read_exif
 from .output_files import OutputFiles
 from .png import encode_png
@@ -385,9 +385,7 @@ class _Levels:
     def _of(self, rows: slice) -> tuple[np.ndarray, int]:
         """The levels of some rows, in R, G, B, A order, and how many of the pixels are brighter than white."""
         part = self.light[rows, 0 : self.light.shape[1]]
-        brighter = 0
-        if part.max(initial=0) > 1:  # channel by channel: NumPy is slow along three at once
-            brighter = int(np.logical_or.reduce([part[..., k] > 1 for k in range(part.shape[2])]).sum())
+        brighter = int(in_any_channel(part > 1).sum()) if part.max(initial=0) > 1 else 0
         if self.flat and self.alpha is not None:
             part = part * self.alpha[rows][..., None]
         coded = encode(part, self.bits, self.curves)

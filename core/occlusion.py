@@ -167,9 +167,11 @@ def _contested(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> C
     # one strip at least, whose parts have the right types
     parts = list(in_order(found_from, range(0, height if blocks.any() else 1, rows)))
     return Contested(
-        *(np.concatenate([part.points for part in parts]), np.concatenate([part.x for part in parts])),
-        *(np.concatenate([part.y for part in parts]), np.concatenate([part.near for part in parts])),
-        np.concatenate([part.levels for part in parts]),
+        points=np.concatenate([part.points for part in parts]),
+        x=np.concatenate([part.x for part in parts]),
+        y=np.concatenate([part.y for part in parts]),
+        near=np.concatenate([part.near for part in parts]),
+        levels=np.concatenate([part.levels for part in parts]),
     )
 
 

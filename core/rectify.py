@@ -58,10 +58,7 @@ class EpipolarRows:
 
     def points(self, u: Array, v: Array) -> Array:
         """Points (len(v), len(u), 2) px of the reference's plane where columns u and rows v cross."""
-        r = self.start[0] + self.step * u
-        theta = self.start[1] + v * (self.step / self.reach)
-        direction = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
-        return self.epipole + r[None, :, None] * direction[:, None, :]
+        return self.point(u[None, :], v[:, None])
 
     def point(self, u: Array, v: Array) -> Array:
         """Points (…, 2) of columns u and rows v."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .canvas import Canvas
+from .light import beside
 from .line_map import Lines, Plane
 from .occlusion import occluded
 from .threads import each
@@ -62,8 +63,8 @@ def unfolded(lines: Lines, two_view: TwoView, target_size: tuple[int, int], alon
             np.copyto(along[part], smooth, where=near[part].view(np.bool_))
             x[rows, columns], y[rows, columns] = lines.target(along, across, (rows, columns))
             # these and their neighbours may have come to fold, or no longer do
-            beside = np.flatnonzero(cv2.dilate(near, np.ones((3, 3), np.uint8)).view(np.bool_))
-            folded.ravel()[beside] = _turned(_areas(x, y, beside), usual)
+            changed = np.flatnonzero(cv2.dilate(near, np.ones((3, 3), np.uint8)).view(np.bool_))
+            folded.ravel()[changed] = _turned(_areas(x, y, changed), usual)
             folded &= free
         along = _where_little_moved(along, start)
     return along
@@ -116,13 +117,13 @@ def _turned(areas: NDArray[np.float32], usual: float) -> NDArray[np.bool_]:
 
 def _turns_over(x: Plane, y: Plane, usual: float) -> NDArray[np.bool_]:
     folded = np.empty(x.shape, bool)
-    count = len(x)
 
     def look(top: int) -> None:
-        near = slice(max(0, top - 1), min(count, top + STRIP + 1))
-        folded[top : top + STRIP] = _turned(jacobian(x[near], y[near]), usual)[top - near.start :][:STRIP]
+        rows = slice(top, min(top + STRIP, len(x)))
+        near, here = beside(rows, 1, len(x))
+        folded[rows] = _turned(jacobian(x[near], y[near]), usual)[here]
 
-    each(look, range(0, count, STRIP))
+    each(look, range(0, len(x), STRIP))
     return folded
 
 
