@@ -44,7 +44,7 @@ $(OLDEST)/.ready: pyproject.toml .ci/constraints.txt
 	touch $@
 
 test-oldest: $(OLDEST)/.ready
-	$(OLDEST)/bin/python -m pytest -n $(WORKERS) tests/edf_addon tests/core/test_worker.py tests/core/test_seen.py
+	$(OLDEST)/bin/python -m pytest -n $(WORKERS) tests/edf_addon tests/core/commands/test_worker.py tests/core/output/test_inspection.py
 
 # pytest exits 5 where no test is marked so.
 slow: setup

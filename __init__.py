@@ -9,14 +9,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .core.errors import StitchError
     from .core.pipeline import StitchOptions, stitch
+    from .core.system.errors import StitchError
 
     __version__: str
 
 __all__ = ["StitchError", "StitchOptions", "__version__", "register", "stitch", "unregister"]
 
-_HOMES = {"StitchError": ".core.errors", "StitchOptions": ".core.pipeline", "stitch": ".core.pipeline"}
+_HOMES = {"StitchError": ".core.system.errors", "StitchOptions": ".core.options", "stitch": ".core.pipeline"}
 
 
 def register() -> None:

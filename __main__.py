@@ -7,6 +7,6 @@ import sys
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 if __name__ == "__main__":
-    from .core.cli import main
+    from .core.commands.cli import main
 
     sys.exit(main())

@@ -13,31 +13,34 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from . import features
-from .cache import Cache
-from .camera import Camera, cameras_for
-from .dense import Dense, refine
-from .displacement import Field, StrictField
-from .errors import BadRequest, NoOverlap, TooFewMatches
-from .features import Matches
+from .cameras.camera import Camera
+from .cameras.lens import undistort
+from .cameras.matches import Matches
+from .cameras.sources import cameras_for
+from .cameras.two_view import TwoView
+from .dense.refine import Dense, refine
+from .field.field import Field
+from .field.slack import SlackField
+from .field.strict import StrictField
 from .fields import fit_field
-from .images import Picture, resized
-from .lens import undistort
-from .levelling import rotation_for
-from .masks import read_mask, read_painted, without
-from .match_files import read_matches
 from .options import StitchOptions
-from .projection import Projection, round_projection
-from .slack import SlackField
-from .threads import in_order
-from .two_view import MIN_MATCHES, TwoView, estimate
-from .uprights import edges
-from .warp import Warp, build_warp
+from .panorama.levelling import rotation_for
+from .panorama.projection import Projection, round_projection
+from .panorama.upright_edges import edges
+from .panorama.warp import Warp, build_warp
+from .pictures.masks import read_mask, read_painted, without
+from .pictures.picture import Picture, resized
+from .pose import features
+from .pose.estimation import MIN_MATCHES, estimate
+from .pose.match_files import read_matches
+from .system.cache import Cache
+from .system.errors import BadRequest, NoOverlap, TooFewMatches
+from .system.threads import in_order
 
 # With fewer points of detail than this a picture is to blame, not the pair.
 SCARCE = 100
 # Called with a stage's name and how much of it is done.
-Steps = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ def prepare(reference: Picture, target: Picture, options: StitchOptions) -> Fram
 
 
 @dataclass(frozen=True)
-class Registration:
+class Geometry:
     """How two cameras stood, before any field: what all fields of a pair have in common.
 
     cameras, matches, two_view, warnings: as in `Alignment`; ideal: the matches in ideal (undistorted) pixels.
@@ -97,15 +100,15 @@ class Registration:
     warnings: tuple[str, ...]
 
 
-def align(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> Alignment:
+def align(frames: Sequence[Frame], options: StitchOptions, steps: ReportProgress) -> Alignment:
     """Aligns the target of each frame with the reference; all frames share both cameras, hence one alignment.
 
     Raises StitchError and its kinds.
     """
-    return lay(register(frames, options, steps), frames, options, steps)
+    return fit_and_warp(estimate_geometry(frames, options, steps), frames, options, steps)
 
 
-def register(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> Registration:
+def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, steps: ReportProgress) -> Geometry:
     """Matches and two-view geometry of frames that share both cameras. Raises StitchError and its kinds."""
     first, second, sizes = frames[0].reference, frames[0].target, frames[0].full_sizes
     if any(frame.full_sizes != sizes for frame in frames):
@@ -126,11 +129,11 @@ def register(frames: Sequence[Frame], options: StitchOptions, steps: Steps) -> R
     two_view = cache.remember(
         "two_view", (ideal, cameras, options.seed), lambda: estimate(ideal, *cameras, seed=options.seed)
     )
-    return Registration(cameras, matches, ideal, two_view, (*warnings, *two_view.warnings))
+    return Geometry(cameras, matches, ideal, two_view, (*warnings, *two_view.warnings))
 
 
-def lay(
-    registration: Registration, frames: Sequence[Frame], options: StitchOptions, steps: Steps
+def fit_and_warp(
+    registration: Geometry, frames: Sequence[Frame], options: StitchOptions, steps: ReportProgress
 ) -> Alignment:
     """Field and map of the frames whose geometry is known. Raises StitchError and its kinds."""
     cameras, two_view = registration.cameras, registration.two_view
@@ -192,7 +195,7 @@ def _projection(
     return round_projection(options.projection, two_view.K, rotation_for(options.level, two_view.R, upright))
 
 
-def _found_in(frames: Sequence[Frame], steps: Steps, quick: bool) -> Matches:
+def _found_in(frames: Sequence[Frame], steps: ReportProgress, quick: bool) -> Matches:
     found = []
     most = (features.PREVIEW_BUDGET, features.PREVIEW_PIXELS) if quick else ()
     for i, frame in enumerate(frames):

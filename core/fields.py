@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from .displacement import Field, fit_strict
-from .features import Matches
-from .paper import fit_paper
+from .cameras.matches import Matches
+from .cameras.two_view import TwoView
+from .field.field import Field
+from .field.slack import fit_slack
+from .field.strict import fit_strict
 from .rivals.apap import fit_apap
 from .rivals.homography import fit_one_homography
+from .rivals.paper import fit_paper
 from .rivals.rew import fit_rew
-from .slack import fit_slack
-from .two_view import TwoView
-
-RIVALS = ("rew", "apap", "homography")
-FIELDS = ("slack", "strict", "paper", *RIVALS)
-# Those that mean something on every ray, not only in the reference's plane.
-ROUND_FIELDS = ("slack", "strict")
 
 
 def fit_field(

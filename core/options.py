@@ -8,16 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .blend import BLENDS
-from .camera import CameraRequest
-from .crop import CROPS, Crop
-from .displacement import FADES
-from .errors import BadRequest
-from .fields import FIELDS, ROUND_FIELDS
-from .inpaint import HOLES
-from .levelling import LEVELS, Level
-from .projection import PROJECTIONS
-from .seam import SEAMS
+from .cameras.sources import CameraRequest
+from .choices import BLENDS, CROPS, FADES, FIELDS, HOLES, LEVELS, PROJECTIONS, ROUND_FIELDS, SEAMS, Crop, Level
+from .system.errors import BadRequest
 
 LEAST_SCALE = 0.02
 

@@ -11,23 +11,25 @@ from typing import Any
 import numpy as np
 
 from .alignment import Alignment, Frame, align, prepare, size_of
-from .camera import Camera
-from .canvas import Box, Canvas, common
-from .composition import Decided, composed
-from .crop import crop_box
-from .displacement import Field
-from .errors import NoOverlap
-from .features import Matches
-from .images import Picture, in_same_colour_space, load_picture, picture_from_array
-from .inpaint import holes_of
-from .masks import painted_over
-from .metrics import appearance
+from .cameras.camera import Camera
+from .cameras.matches import Matches
+from .cameras.two_view import TwoView
+from .compose.composition import Decided, composed
+from .compose.crop import crop_box
+from .compose.inpaint import holes_of
+from .field.field import Field
+from .measure.metrics import appearance
+from .measure.report import make_report
 from .options import StitchOptions
-from .progress import Progress
-from .report import make_report
-from .threads import in_order
-from .two_view import TwoView
-from .warp import Layer, Warp, cut, reference_box, reference_layer, target_layer
+from .panorama.canvas import Canvas
+from .panorama.layers import Layer, reference_layer, target_layer
+from .panorama.warp import Warp, reference_box
+from .pictures.masks import painted_over
+from .pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
+from .raster.arrays import Box, common, cut
+from .system.errors import NoOverlap
+from .system.progress import Progress
+from .system.threads import in_order
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
 Source = str | Path | np.ndarray | Picture
@@ -37,10 +39,10 @@ Source = str | Path | np.ndarray | Picture
 class StitchResult:
     """A finished panorama and everything it was made of.
 
-    panorama: what is shown on `canvas`, its light worked out where it is asked for (see `light`), as arrays `pixels`
+    panorama: what is shown on `canvas`, its light worked out where it is asked for (see `lazy`), as arrays `pixels`
     (H, W, C) float32 scene-linear and alpha (H, W), straight; the two layers, the warp, occluded
     (H, W) bool (what the target cannot see though the map falls inside it) and from_target (H, W) bool (which side of
-    the seam a pixel lies on, None without a seam) on `warp.canvas`, which is the same, but of a whole sphere the part
+    the seam a pixel lies on, None without a seam) on `canvas`, which is the same, but of a whole sphere the part
     that the pictures cover (see `spread`); what was decided on the whole canvas; the geometry, the field, the matches
     (all, before inlier choice), the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage. Scale and
     crop are done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes` (W, H): of
@@ -79,7 +81,7 @@ class StitchResult:
     @property
     def used_matches(self) -> Matches:
         """The matches that the field stands on, in px of the full pictures: given back, they make the same field."""
-        used = self.matches.subset(np.flatnonzero(self.two_view.inliers)[self.field.fit.kept])
+        used = self.matches.subset(np.flatnonzero(self.two_view.inliers)[self.field.fit.inliers_used])
         x, y = (
             (points + 0.5) * (np.array(full) / np.array(camera.size)) - 0.5
             for points, full, camera in zip((used.x, used.y), self.full_sizes, self.cameras, strict=True)

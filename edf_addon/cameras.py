@@ -1,4 +1,4 @@
-"""Cameras of the scene, as the worker takes them (core/worker.py): lens and place, whatever the picture's size."""
+"""Cameras of the scene, as the worker takes them (core/commands/worker.py): lens and place, at any size."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ..core.epipolar import Array
+from ..core.raster.arrays import Array
 
 # Half sides, px: of the patch that is compared, and of the square that it is looked for in.
 PATCH, SEARCH = 10, 12

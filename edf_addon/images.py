@@ -32,7 +32,7 @@ class Unusable(Exception):
 def describe(
     image: bpy.types.Image, side: str, folder: Path, scene: bpy.types.Scene, user: bpy.types.ImageUser | None = None
 ) -> dict[str, Any]:
-    """The worker's entry for a picture (core/worker.py); what is no file of its own is left in `folder`.
+    """The worker's entry for a picture (core/commands/worker.py); what is no file of its own is left in `folder`.
 
     side: reference or target; scene: whose render a Render Result is; user: of the editor that shows the image, which
     knows the frame of a sequence. Raises Unusable.

@@ -26,7 +26,7 @@ GRACE = 2.0
 LATE = 10.0
 # Bytes: a longer line is none of ours; and what is kept of stderr for a message.
 LONGEST_LINE, LONGEST_TAIL = 1 << 16, 4096
-WORKER = "core.worker"
+WORKER = "core.commands.worker"
 
 
 @dataclass(frozen=True)

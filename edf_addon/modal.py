@@ -51,7 +51,7 @@ class LongWork:
     _timer: Any = None
 
     def prepare(self, context: bpy.types.Context, folder: Path) -> dict[str, Any]:
-        """The job (core/worker.py), with all its files in `folder`. Raises Unusable."""
+        """The job (core/commands/worker.py), with all its files in `folder`. Raises Unusable."""
         raise NotImplementedError
 
     def finish(self, context: bpy.types.Context, folder: Path, result: dict[str, Any]) -> str:

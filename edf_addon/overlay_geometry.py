@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.camera import Camera
-from ..core.epipolar import Array, homogeneous, project
-from ..core.lens import distort, undistort
+from ..core.cameras.camera import Camera
+from ..core.cameras.lens import distort, undistort
+from ..core.cameras.projective import homogeneous, project
+from ..core.raster.arrays import Array
 from .scene_geometry import matrix, projection_of
 
 Colours = NDArray[np.float32]

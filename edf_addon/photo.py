@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 if TYPE_CHECKING:
-    from ..core.metadata import Exif
+    from ..core.pictures.metadata import Exif
 
 # Files larger than this are not read for what they say only.
 LARGEST = 200_000_000
@@ -41,7 +41,7 @@ def _focal(image: bpy.types.Image) -> str:
     exif = _exif(image)
     if exif is None or not all(image.size):
         return ""
-    from ..core.camera import CameraRequest, cameras_for
+    from ..core.cameras.sources import CameraRequest, cameras_for
 
     size, upright = upright_size(image), exif.upright()
     camera = cameras_for(CameraRequest(), (image.name, image.name), (size, size), (upright, upright))[0][0]
@@ -80,8 +80,8 @@ def _of_packed(uid: int, _size: int) -> Exif | None:
 
 def _of_bytes(data: bytes) -> Exif | None:
     try:
-        from ..core.containers import read_structure
-        from ..core.metadata import read_exif
+        from ..core.pictures.containers import read_structure
+        from ..core.pictures.metadata import read_exif
 
         structure = read_structure(data)
     except (ImportError, ValueError):  # a broken library is the panel's first line; here it is no more than silence

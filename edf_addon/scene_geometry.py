@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.blender_camera import BlenderLens, lens_for, matrix_world_of
-from ..core.epipolar import Array, homogeneous
-from ..core.projection import Projection
+from ..core.cameras.blender_camera import BlenderLens, lens_for, matrix_world_of
+from ..core.cameras.projective import homogeneous
+from ..core.panorama.projection import Projection
+from ..core.raster.arrays import Array
 
 # From the reference camera's axes (x right, y down, z ahead) to a world with z up.
 UPRIGHT = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])

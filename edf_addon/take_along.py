@@ -236,7 +236,7 @@ def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
     """Gives the scene a World that shows the panorama where its rig's cameras see it, or those of a new rig would."""
-    from ..core.blender_world import world_rotation
+    from ..core.cameras.blender_world import world_rotation
     from . import scene_geometry
 
     known = editor.known(image)

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import StitchError
+from ..core.system.errors import StitchError
 
 # Set by the extension for its workers: the Blender that they were started from.
 BLENDER_VARIABLE = "EDF_BLENDER"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.camera import CameraRequest
+from ..core.cameras.sources import CameraRequest
 from ..core.pipeline import StitchResult
 from .measures import Truth, figures, hidden_quality, on_the_wide_canvas, truth_of, whole_picture
 from .rendered import RenderedPair

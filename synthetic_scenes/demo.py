@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from ..core.camera import CameraRequest
-from ..core.images import encode_picture
+from ..core.cameras.sources import CameraRequest
 from ..core.options import StitchOptions
-from ..core.output_files import OutputFiles
-from ..core.outputs import OutputRequest, write
+from ..core.output.outputs import OutputRequest, write
+from ..core.pictures.encoding import encode_picture
 from ..core.pipeline import stitch
+from ..core.system.output_files import OutputFiles
 from .measures import figures, on_the_wide_canvas, truth_of, whole_picture
 from .recipes import RECIPES, Difficulty
 from .rendered import rendered_pair

@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.epipolar import (
-    Array,
+from ..core.cameras.projective import (
     distance_to_line,
     fundamental_from_pose,
     homogeneous,
@@ -17,8 +16,9 @@ from ..core.epipolar import (
     project,
     rotation_angle,
 )
-from ..core.two_view import TwoView
-from ..core.warp import fetch
+from ..core.cameras.two_view import TwoView
+from ..core.raster.arrays import Array
+from ..core.raster.sampling import fetch
 from .scene_camera import SceneCamera
 
 # Depths that differ by less than this share are the same surface's.

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.blend import averaged
-from ..core.colour import encode
-from ..core.composition import composed
-from ..core.epipolar import Array, distance_to_line
-from ..core.metrics import appearance, overlap_quality, psnr, shown_points, ssim
+from ..core.cameras.projective import distance_to_line
+from ..core.compose.blend import averaged
+from ..core.compose.composition import composed
+from ..core.measure.metrics import appearance, coverage_samples, overlap_quality, psnr, ssim
 from ..core.options import StitchOptions
+from ..core.panorama.layers import Layer
 from ..core.pipeline import StitchResult
-from ..core.warp import Layer
+from ..core.raster.arrays import Array
+from ..core.raster.colour import encode
 from .ground_truth import TrueGeometry, pose_errors, seen_from, visible
 from .rendered import RenderedPair
 
@@ -76,7 +77,7 @@ def figures(result: StitchResult, truth: Truth) -> dict[str, float]:
         known["f_px"] = float(distance_to_line(view.F, points, true_matches).mean())
     else:
         known["f_px"] = known["epipole_deg"] = math.nan
-    shown = shown_points(result.warp, result.cameras)
+    shown = coverage_samples(result.warp, result.cameras)
     beyond = ~shown.overlap
     off = np.full(1, np.nan)
     if geometry.baseline and beyond.any():
@@ -123,7 +124,7 @@ def composition(result: StitchResult, truth: Truth) -> dict[str, float]:
     composed_psnr_db, composed_ssim: of the whole picture against the true panorama; over_average_db, over_average_ssim:
     by how much that is better than the average's, over the same pixels; overlap_over_average_db: the same in what both
     layers show alone, for beyond it the two pictures do not differ; source_fidelity_mean, source_fidelity_p5,
-    seam_visibility (NaN without a seam): see `metrics.appearance`.
+    seam_visibility (NaN without a seam): see `appearance`.
     """
     floats = (result.reference.bits == 32, result.target.bits == 32)
     reference = result.reference_layer

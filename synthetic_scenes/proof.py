@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.colour import encode
-from ..core.epipolar import distance_to_line, project
-from ..core.metrics import psnr
-from ..core.warp import fetch
+from ..core.cameras.projective import distance_to_line, project
+from ..core.measure.metrics import psnr
+from ..core.raster.colour import encode
+from ..core.raster.sampling import fetch
 from .ground_truth import TrueGeometry, flat, seen_from, steepness, visible
 from .passes import Passes
 from .scene_camera import SceneCamera

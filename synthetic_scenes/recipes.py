@@ -9,8 +9,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ..core.epipolar import Array, homogeneous, infinite_homography, project, rotation_from_vector
-from ..core.errors import BadRequest
+from ..core.cameras.projective import homogeneous, infinite_homography, project, rotation_from_vector
+from ..core.raster.arrays import Array
+from ..core.system.errors import BadRequest
 from .scene_camera import SceneCamera
 
 SENSOR_MM = 36.0  # the longer side of every sensor

@@ -17,8 +17,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..core.blender_camera import lens_for, matrix_world_of
-from ..core.epipolar import homogeneous, project
+from ..core.cameras.blender_camera import lens_for, matrix_world_of
+from ..core.cameras.projective import homogeneous, project
 from .scene_camera import SceneCamera
 from .stage import Stage
 from .worlds import WORLDS

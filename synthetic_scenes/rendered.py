@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.blender_camera import BlenderLens, pose_of
-from ..core.colour import encode
-from ..core.images import encode_picture, load_picture, picture_from_array
-from ..core.output_files import OutputFiles
+from ..core.cameras.blender_camera import BlenderLens, pose_of
+from ..core.pictures.encoding import encode_picture
+from ..core.pictures.picture import load_picture, picture_from_array
+from ..core.raster.colour import encode
+from ..core.system.output_files import OutputFiles
 from .blender_process import run_job
 from .ground_truth import TrueGeometry
 from .passes import read_passes
@@ -27,7 +28,9 @@ from .scene_camera import SceneCamera
 SAMPLES = 24
 VIEWS = ("reference", "target", "wide")
 # Whatever decides about pixels: a change in one of these files makes every cached picture a stranger.
-SOURCES = ("render.py", "stage.py", "worlds.py", "rendered.py", "passes.py", "proof.py", "../core/blender_camera.py")
+SOURCES = (
+    "render.py", "stage.py", "worlds.py", "rendered.py", "passes.py", "proof.py", "../core/cameras/blender_camera.py",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

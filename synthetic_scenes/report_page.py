@@ -8,7 +8,7 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-from ..core.page import STYLE, table
+from ..core.output.page import STYLE, table
 from .thresholds import LEAD, SAYING_RUN, Check, Median, Result, Verdict
 
 # Figures of a run: what people call them, their unit, digits after the point.

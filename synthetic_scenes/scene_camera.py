@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.epipolar import Array
+from ..core.raster.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.colour import encode
-from ..core.epipolar import Array, homogeneous
+from ..core.cameras.projective import homogeneous
 from ..core.pipeline import StitchResult
+from ..core.raster.arrays import Array
+from ..core.raster.colour import encode
 from .measures import Truth
 from .rendered import RenderedPair
 

@@ -11,11 +11,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import StitchError
-from ..core.fields import RIVALS
-from ..core.output_files import OutputFiles
-from ..core.outputs import json_bytes
-from ..core.report import plain
+from ..core.choices import RIVALS
+from ..core.measure.report import plain
+from ..core.output.outputs import json_bytes
+from ..core.system.errors import StitchError
+from ..core.system.output_files import OutputFiles
 from .measures import composition, figures, on_the_wide_canvas, truth_of, whole_picture
 from .recipes import parse_scene
 from .rendered import rendered_pair

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..core.alignment import Frame, Registration, lay, register
-from ..core.camera import CameraRequest
-from ..core.fields import RIVALS
+from ..core.alignment import Frame, Geometry, estimate_geometry, fit_and_warp
+from ..core.cameras.sources import CameraRequest
+from ..core.choices import RIVALS
 from ..core.options import StitchOptions
 from ..core.pipeline import StitchResult, Stopwatch, compose, read_frame
-from ..core.progress import Progress
+from ..core.system.progress import Progress
 from .rendered import RenderedPair
 
 # What is told of the cameras / the field.
@@ -22,7 +22,7 @@ WAYS = (
 PLAIN = StitchOptions(exposure=False, seam="none", blend="feather", measure=False)
 
 
-Shared = dict[str, tuple[Frame, Registration]]
+Shared = dict[str, tuple[Frame, Geometry]]
 
 
 def stitched(pair: RenderedPair, way: str, shared: Shared | None = None) -> StitchResult:
@@ -39,6 +39,6 @@ def stitched(pair: RenderedPair, way: str, shared: Shared | None = None) -> Stit
     shared, steps = {} if shared is None else shared, Stopwatch(Progress())
     if told not in shared:
         frame = read_frame(pair.reference, pair.target, options)
-        shared[told] = frame, register([frame], options, steps)
+        shared[told] = frame, estimate_geometry([frame], options, steps)
     frame, registration = shared[told]
-    return compose(frame, lay(registration, [frame], options, steps), options, steps)
+    return compose(frame, fit_and_warp(registration, [frame], options, steps), options, steps)

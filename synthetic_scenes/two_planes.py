@@ -11,7 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.epipolar import Array, homogeneous, rotation_from_vector
+from ..core.cameras.projective import homogeneous, rotation_from_vector
+from ..core.raster.arrays import Array
 from .scene_camera import SceneCamera
 
 Points = NDArray[np.float32]

@@ -21,10 +21,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..core.batch_outputs import read_json
-from ..core.errors import BadRequest, UnwritableOutput
-from ..core.output_files import OutputFiles
-from ..core.outputs import json_bytes
+from ..core.batch.units import read_json
+from ..core.output.outputs import json_bytes
+from ..core.system.errors import BadRequest, UnwritableOutput
+from ..core.system.output_files import OutputFiles
 from .blender_process import LAST_LINES, render_command
 from .recipes import SIZES, SUITES, parse_scene
 from .scene_process import SCHEMA, file_name

@@ -18,13 +18,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edf_stitch.core.camera import Camera, CameraRequest
-from edf_stitch.core.canvas import Grid
-from edf_stitch.core.displacement import FieldValues
-from edf_stitch.core.epipolar import fundamental_from_pose, infinite_homography, rotation_from_vector
-from edf_stitch.core.images import encode_picture, picture_from_array
+from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.raster.grid import Grid
+from edf_stitch.core.field.field import FieldValues
+from edf_stitch.core.cameras.projective import fundamental_from_pose, infinite_homography, rotation_from_vector
+from edf_stitch.core.pictures.encoding import encode_picture
+from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
-from edf_stitch.core.two_view import TwoView
+from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.synthetic_scenes.two_planes import Pair, make_pair
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers

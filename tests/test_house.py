@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from . import house
+
 ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
 PACKAGES = ("core", "edf_addon", "synthetic_scenes")
@@ -52,15 +54,16 @@ def test_imports_between_our_own_files_are_relative(path):
 def test_arrows_run_one_way(path):
     """core knows neither of the others, and they do not know each other.
 
-    One door is open: a sub-command of core/cli.py may reach for synthetic_scenes when it is called (`edf demo`,
-    `edf validate`), so that there is one command behind all doors.
+    One door is open: a sub-command of core/commands/cli.py may reach for synthetic_scenes when it is called (`edf
+    demo`, `edf validate`), so that there is one command behind all doors.
     """
     home = path.relative_to(ROOT).parts[0]
     for name, is_lazy in imports(path):
         assert home != "core" or name.split(".")[0] != "bpy", "core works without Blender"
         target = name.split(".")[1] if name.startswith(".") else None
         if home in PACKAGES and target in PACKAGES and target not in (home, "core"):
-            assert is_lazy and (path, target) == (ROOT / "core" / "cli.py", "synthetic_scenes"), f"{home} -> {target}"
+            door = ROOT / "core" / "commands" / "cli.py", "synthetic_scenes"
+            assert is_lazy and (path, target) == door, f"{home} -> {target}"
 
 
 def test_core_works_where_bpy_cannot_be_imported():
@@ -122,3 +125,37 @@ def test_nothing_names_a_registrys_host_or_a_place_on_somebodys_machine():
         path = ROOT / name
         if path.is_file():
             assert not pattern.search(path.read_bytes().replace(b"\\", b"/")), name
+
+
+def test_every_module_of_core_stands_in_a_room():
+    """At most six lie directly in core/, and every folder says in its docstring what it is for."""
+    known = house.modules()
+    assert len([name for name in known if "/" not in name]) <= 6
+    assert all(name.count("/") <= 1 for name in known), "rooms have no rooms of their own yet"
+    assert set(house.MAY_IMPORT) == {house.room_of(name) for name in known}
+    for room in {house.room_of(name) for name in known if "/" in name}:
+        tree = ast.parse((ROOT / "core" / room / "__init__.py").read_text("utf-8"))
+        assert ast.get_docstring(tree) and len(tree.body) == 1, room
+    assert 14 <= len({house.room_of(name) for name in known if "/" in name}) <= 18
+
+
+@pytest.mark.parametrize(("room", "imported"), sorted(house.by_room(house.imports()).items()))
+def test_a_room_imports_what_the_table_allows(room, imported):
+    assert not imported - set(house.MAY_IMPORT[room])
+
+
+def test_core_has_no_circle_of_imports():
+    graph = house.imports()
+    rooms = house.by_room(graph)
+    assert not house.circles(graph) and not house.circles(rooms)
+    assert house.floors(graph) <= 18 and house.floors(rooms) <= 12
+    assert house.circles({"a": {"b"}, "b": {"c"}, "c": {"a"}}), "a circle is seen where there is one"
+
+
+def test_names_of_the_first_layout_are_gone():
+    assert not house.old_names()
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_no_file_is_over_400_lines(path):
+    assert len(path.read_text("utf-8").splitlines()) <= 400

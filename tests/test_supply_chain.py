@@ -13,8 +13,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-ROOMS = (".", "core", "core/rivals", "edf_addon", "synthetic_scenes")
-SOURCES = [path for room in ROOMS for path in sorted((ROOT / room).glob("*.py"))]
+ROOMS = (".", "core", "core/*", "edf_addon", "synthetic_scenes")
+SOURCES = [path for room in ROOMS for path in sorted(ROOT.glob(f"{room}/*.py"))]
 NETWORK = re.compile(r"(socket|ssl|http|urllib\.(request|error)|ftplib|smtplib|xmlrpc|requests|urllib3|asyncio)\b")
 LOCKED = re.compile(r"([a-z0-9_]+)==([0-9.]+) --hash=sha256:[0-9a-f]{64}  # (\S+)\.whl")
 
@@ -60,7 +60,7 @@ if sys.argv[1] == "trial":
     import socket
     socket.socket().close()
 else:
-    from edf_stitch.core.cli import main
+    from edf_stitch.core.commands.cli import main
     assert main(sys.argv[1:]) == 0
 print(sorted(set(seen)))
 """
@@ -85,7 +85,7 @@ def test_a_stitch_opens_no_socket_and_starts_no_process(folder, tmp_path):
 @pytest.mark.parametrize("arguments", [["--help"], ["stitch", "--help"], ["batch", "--help"], ["--version"]])
 def test_help_loads_nothing_heavy(arguments):
     """So that it is there at once: 0.05 s; NumPy alone would triple that."""
-    code = "import sys, edf_stitch.core.cli as c; c.main(sys.argv[1:]); print(*sys.modules, file=sys.stderr)"
+    code = "import sys, edf_stitch.core.commands.cli as c; c.main(sys.argv[1:]); print(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=120)
     loaded = {name.split(".")[0] for name in done.stderr.split()}
     assert not loaded & {"numpy", "cv2", "scipy", "poselib", "OpenEXR", "exifread", "tqdm", "bpy"}

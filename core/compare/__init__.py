@@ -1,4 +1,4 @@
-"""`edf compare`: every field on every pair, in one table and one page.
+"""Every field on every pair, in one table and page.
 
-    pairs ──► register once ──► each field: lay, compose, figures, pictures ──► tables, page
+May import every room before it and the pipeline.
 """

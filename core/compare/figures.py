@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..alignment import Registration
-from ..epipolar import Array
-from ..held_out import held_out
-from ..metrics import canvas_quality, off_line_mean, overlap_quality, shown_points
+from ..alignment import Geometry
+from ..measure.held_out import held_out
+from ..measure.metrics import canvas_quality, coverage_samples, off_line_mean, overlap_quality
+from ..measure.projectivity import projectivity
 from ..pipeline import StitchResult
-from ..projectivity import projectivity
+from ..raster.arrays import Array
 
 # What people call a figure, its unit, digits, and whether more is better (None: neither).
 FIGURES: dict[str, tuple[str, str, int, bool | None]] = {
@@ -37,14 +37,14 @@ SHARES = ("folds", "occluded")
 RIM = np.ones((7, 7), np.uint8)
 
 
-def figures_of(result: StitchResult, registration: Registration, independent: Array, seed: int) -> dict[str, float]:
+def figures_of(result: StitchResult, registration: Geometry, independent: Array, seed: int) -> dict[str, float]:
     """The figures of a field's stitch (on the whole flat canvas); NaN where one has no meaning.
 
     Projectivity and distances from lines are by the pair's own F and by `independent`, whatever the field knows of
     them, so that all fields are measured alike; folds are counted outside what is occluded and its rim.
     """
     warp, size = result.warp, result.cameras[1].size
-    shown = shown_points(warp, result.cameras)
+    shown = coverage_samples(warp, result.cameras)
     F = registration.two_view.F
     inliers = registration.ideal.subset(registration.two_view.inliers)
     unseen = held_out(result.field, inliers, shown, seed)

@@ -12,7 +12,7 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-from ..page import STYLE, table
+from ..output.page import STYLE, table
 from .figures import FIGURES
 from .pictures import STRONGER
 from .tables import Summary, best, failures, figure, medians, shown
@@ -25,7 +25,6 @@ KINDS = {
 }  # fmt: skip
 # More fields than there will ever be: each needs a rule of its own to be chosen without a script.
 MOST_FIELDS = 12
-
 BLINK = "\n".join([
     ".best { font-weight: 700; }",
     ".blink { margin: 0.8rem 0; }",

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import BadRequest
+from ..system.errors import BadRequest
 
 SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".webp", ".bmp"))
 # A folder that names its two so may hold other pictures beside them: `edf validate` keeps its true panorama there.

@@ -6,12 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..colour import encode
-from ..metrics import overlap_views
+from ..measure.metrics import overlap_views
 from ..pipeline import StitchResult
+from ..raster.colour import encode
 
 Rgb = NDArray[np.uint8]
-
 # Larger pictures are shrunk to this for the page; differences are looked for before.
 LONGEST = 1600
 QUALITY = 88

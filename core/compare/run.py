@@ -8,16 +8,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..alignment import Frame, Registration, lay, register
-from ..camera import CameraRequest
-from ..errors import BadRequest, Cancelled, StitchError
-from ..fields import FIELDS
+from ..alignment import Frame, Geometry, estimate_geometry, fit_and_warp
+from ..cameras.sources import CameraRequest
+from ..choices import FIELDS
+from ..measure.projectivity import independent_fundamental
 from ..options import StitchOptions
-from ..output_files import OutputFiles
-from ..outputs import json_bytes
+from ..output.outputs import json_bytes
 from ..pipeline import StitchResult, Stopwatch, compose, read_frame
-from ..progress import Progress
-from ..projectivity import independent_fundamental
+from ..system.errors import BadRequest, Cancelled, StitchError
+from ..system.output_files import OutputFiles
+from ..system.progress import Progress
 from .figures import figures_of
 from .page import comparison_page
 from .pairs import PairFiles
@@ -186,7 +186,7 @@ def _compared(
     watch, start = steps.begin("registration"), time.process_time()
     watch("read")
     frame = read_frame(pair.reference, pair.target, options)
-    registration = register([frame], options, watch)
+    registration = estimate_geometry([frame], options, watch)
     seconds = {"registration": time.process_time() - start}
     independent = independent_fundamental(registration.ideal, options.seed)
     outcome = PairOutcome(entry, seconds=seconds)
@@ -226,11 +226,11 @@ def _compared(
 
 
 def _stitched(
-    name: str, frame: Frame, registration: Registration, options: StitchOptions, watch: Stopwatch,
+    name: str, frame: Frame, registration: Geometry, options: StitchOptions, watch: Stopwatch,
     seconds: dict[str, float],
 ) -> StitchResult:  # fmt: skip
     chosen, start = replace(options, field=name), time.process_time()
-    alignment = lay(registration, [frame], chosen, watch)
+    alignment = fit_and_warp(registration, [frame], chosen, watch)
     laid = time.process_time()
     result = compose(frame, alignment, chosen, watch)
     seconds |= {f"{name}: alignment": laid - start, f"{name}: composition": time.process_time() - laid}

@@ -15,7 +15,6 @@ SCHEMA = 1
 # The figures that have a table of their own in Markdown, a row a pair; PSNR and SSIM share one.
 TABLES = ("projectivity_px", "projectivity_independent_px", "held_out_rms_px", "folds", "truth_alignment_px",
           "truth_alignment_p95_px", "truth_whole_psnr_db")  # fmt: skip
-
 Summary = dict[str, Any]
 
 

@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..canvas import Grid
-from ..displacement import FieldValues, Fit, StrictField
-from ..epipolar import Array, homogeneous
-from ..features import Matches
-from ..two_view import TwoView
+from ..cameras.matches import Matches
+from ..cameras.projective import homogeneous
+from ..cameras.two_view import TwoView
+from ..field.field import FieldValues, Fit
+from ..field.strict import StrictField
+from ..raster.arrays import Array
+from ..raster.grid import Grid
 from .homography import LinearEquations, direct_linear, knowing_only
 
 # σ in units of √(W·H) of the reference: the paper's code has 50 to 140 px on pictures of 1 to 3 MP. γ: as there.
@@ -48,9 +50,9 @@ class ApapField:
         points = (grid.points if ideal is None else ideal).reshape(-1, 2)
         start = _in_front(homogeneous(points) @ self.two_view.H_inf.T)
         shape = grid.points.shape
-        return FieldValues(np.full(shape[:2], np.nan), (self.sends(points) - start).reshape(shape))
+        return FieldValues(np.full(shape[:2], np.nan), (self.predict(points) - start).reshape(shape))
 
-    def sends(self, points: Array) -> Array:
+    def predict(self, points: Array) -> Array:
         """Target pixels (N, 2) of points (N, 2)."""
         out = np.empty((len(points), 2))
         rows = max(1, SLAB // len(self.equations.x))
@@ -76,7 +78,7 @@ def fit_apap(strict: StrictField, matches: Matches, sigma: float | None = None, 
     sigma in px, from the picture's size where it is not given. Raises DegenerateGeometry.
     """
     sigma = SIGMA * float(np.sqrt(strict.size[0] * strict.size[1])) if sigma is None else sigma
-    return _field(strict.two_view, matches, sigma, gamma, strict.fit.kept)
+    return _field(strict.two_view, matches, sigma, gamma, strict.fit.inliers_used)
 
 
 def _field(two_view: TwoView, matches: Matches, sigma: float, gamma: float, kept: NDArray[np.bool_]) -> ApapField:
@@ -84,7 +86,7 @@ def _field(two_view: TwoView, matches: Matches, sigma: float, gamma: float, kept
     equations = LinearEquations.of(few.x, few.y, few.weights)
     view = knowing_only(two_view, direct_linear(few.x, few.y, few.weights))
     field = ApapField(view, equations, sigma, gamma, Fit(kept, np.nan, 8 * matches.scale, np.nan, np.nan, np.nan))
-    rms = float(np.sqrt(np.mean(np.sum((field.sends(few.x) - few.y) ** 2, axis=1))))
+    rms = float(np.sqrt(np.mean(np.sum((field.predict(few.x) - few.y) ** 2, axis=1))))
     return replace(field, fit=replace(field.fit, residual_px=rms))
 
 

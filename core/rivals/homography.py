@@ -8,13 +8,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..canvas import Grid
-from ..displacement import FieldValues, Fit, target_points
-from ..epipolar import Array, homogeneous, normalisation
-from ..errors import DegenerateGeometry
-from ..features import Matches
-from ..fundamental import fit_homography, transfer_error
-from ..two_view import TwoView
+from ..cameras.matches import Matches
+from ..cameras.projective import homogeneous, normalisation
+from ..cameras.two_view import TwoView
+from ..field.field import FieldValues, Fit
+from ..field.transfer import target_points
+from ..pose.fundamental import fit_homography, transfer_error
+from ..raster.arrays import Array
+from ..raster.grid import Grid
+from ..system.errors import DegenerateGeometry
 
 # px: what is further off has no say. Parallax is noise to a homography: with the few px of a keypoint's own it would
 # hold on to one plane of the scene, far from the best for all of it.
@@ -41,7 +43,7 @@ class HomographyField:
         """No depth, no shift."""
         return FieldValues(np.full(grid.points.shape[:2], np.nan))
 
-    def sends(self, points: Array) -> Array:
+    def predict(self, points: Array) -> Array:
         """Target pixels (N, 2) of points (N, 2)."""
         return target_points(self.two_view, points, np.full(len(points), np.nan))
 

@@ -12,27 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..canvas import Grid
-from ..displacement import (
-    MIN_CENTRES,
-    PRUNE_FLOOR_PX,
-    PRUNE_SIGMAS,
-    FieldValues,
-    Fit,
-    StrictField,
-    best_smoothing,
-    fade_width,
-    fading,
-    outside_overlap,
-    refuse_no_spread,
-    target_points,
-)
-from ..epipolar import Array, homogeneous, infinite_homography, inverse_intrinsics, project, rotation_from_vector
-from ..features import Matches
-from ..fundamental import transfer_error
-from ..rotation import nearest_rotation
-from ..spline import SmoothingProblem, ThinPlateSpline
-from ..two_view import TwoView
+from ..cameras.matches import Matches
+from ..cameras.projective import homogeneous, infinite_homography, inverse_intrinsics, project, rotation_from_vector
+from ..cameras.two_view import TwoView
+from ..field.fade import fade_width, fading, outside_overlap
+from ..field.field import FieldValues, Fit
+from ..field.spline import SmoothingProblem, ThinPlateSpline
+from ..field.strict import MIN_CENTRES, PRUNE_FLOOR_PX, PRUNE_SIGMAS, StrictField, best_smoothing, refuse_no_spread
+from ..field.transfer import target_points
+from ..pose.fundamental import transfer_error
+from ..pose.rotation import nearest_rotation
+from ..raster.arrays import Array
+from ..raster.grid import Grid
 from .homography import fit_one_homography, knowing_only
 
 # The focal lengths are known better than within this factor; without a bound parallax may drive them anywhere.
@@ -67,7 +58,7 @@ class RewField:
         alpha = fading(outside_overlap(grid, c + bend, self.size, self.target_size), self.fit.fade_px)
         return FieldValues(np.full(points.shape[:2], np.nan), alpha[..., None] * bend)
 
-    def sends(self, points: Array) -> Array:
+    def predict(self, points: Array) -> Array:
         """Target pixels (N, 2) of points (N, 2) of the overlap, where nothing fades."""
         c, bend = self._parts(points)
         return c + bend
@@ -89,9 +80,9 @@ def fit_rew(strict: StrictField, matches: Matches) -> RewField:
     λ by the house's cross-validation, where the paper has one for all pictures (0.001·W·H: 0 to 3 dB worse here).
     Matches given by the user are all kept. Raises DegenerateGeometry.
     """
-    few = matches.subset(strict.fit.kept)
+    few = matches.subset(strict.fit.inliers_used)
     view = knowing_only(strict.two_view, global_transformation(strict.two_view, few))
-    return _bent(view, strict.size, strict.target_size, matches, strict.fit.kept, None)
+    return _bent(view, strict.size, strict.target_size, matches, strict.fit.inliers_used, None)
 
 
 def global_transformation(two_view: TwoView, matches: Matches) -> Array:

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from edf_stitch.core.camera import CameraRequest
-from edf_stitch.core.epipolar import homogeneous, infinite_homography, project, rotation_angle
-from edf_stitch.core.images import load_picture
+from edf_stitch.core.cameras.projective import homogeneous, infinite_homography, project, rotation_angle
+from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchOptions, stitch
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -12,7 +12,7 @@ import numpy as np
 
 def main(reference: str, target: str, out: str) -> None:
     """Stitch two files with one homography."""
-    from edf_stitch.core.features import detect, match
+    from edf_stitch.core.pose.features import detect, match
 
     a, b = cv2.imread(reference), cv2.imread(target)
     matches = match(detect(a[..., ::-1].copy()), detect(b[..., ::-1].copy()))
@@ -44,7 +44,7 @@ def stitcher(reference: str, target: str, out: str) -> None:
 
 def floor(reference: str, target: str, panorama: str, out: str) -> None:
     """Read two files, remap one onto a canvas of the panorama's size, write it."""
-    from edf_stitch.core.containers import read_structure
+    from edf_stitch.core.pictures.containers import read_structure
 
     cv2.imread(reference)
     picture = cv2.imread(target)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from edf_stitch.core.camera import Camera
-from edf_stitch.core.canvas import Grid
-from edf_stitch.core.displacement import FieldValues
-from edf_stitch.core.epipolar import fundamental_from_pose, infinite_homography
-from edf_stitch.core.line_map import Lines, SparseMap
-from edf_stitch.core.line_search import View
-from edf_stitch.core.two_view import TwoView
+from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.projective import fundamental_from_pose, infinite_homography
+from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
+from edf_stitch.core.dense.matching import View
+from edf_stitch.core.field.field import FieldValues
+from edf_stitch.core.raster.grid import Grid
 from edf_stitch.synthetic_scenes.scene_camera import SceneCamera
 from edf_stitch.synthetic_scenes.two_planes import Textures, depth_at, render
 
@@ -77,20 +77,20 @@ class Scene:
     def field(self, truth: bool = False, shift: tuple[float, float] = (0.0, 0.0)) -> SparseMap:
         """The true field, or the plane."""
         depth = self.depth if truth else (lambda points: points @ self.plane[:2] + self.plane[2])
-        return SparseMap.around(Field(depth, shift), self.view, *self.cameras, MARGIN)
+        return SparseMap.over_reference(Field(depth, shift), self.view, *self.cameras, MARGIN)
 
-    def lines(self, field: SparseMap, step: float = 1.0) -> Lines:
+    def lines(self, field: SparseMap, step: float = 1.0) -> EpipolarLines:
         """Of the whole reference."""
-        return Lines.over(field, (0, 0, *SIZE), step)
+        return EpipolarLines.over(field, (0, 0, *SIZE), step)
 
     def views(self, step: float = 1.0) -> tuple[View, View]:
         return View.of(self.reference, None, step), View.of(self.target, None, step)
 
-    def truth(self, lines: Lines) -> np.ndarray:
+    def truth(self, lines: EpipolarLines) -> np.ndarray:
         """The moves (h, w) that are right."""
-        return (self.depth(lines.ideal) - lines.inverse_depth) / lines.moved
+        return (self.depth(lines.ideal) - lines.inverse_depth) / lines.depth_per_px
 
-    def visible(self, lines: Lines) -> np.ndarray:
+    def visible(self, lines: EpipolarLines) -> np.ndarray:
         """Where (h, w) the target shows what the nodes show, some px from its border: the wall hides none of the
         floor, nor the floor of the wall."""
         x, y = lines.target(self.truth(lines).astype(np.float32))

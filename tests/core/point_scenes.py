@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from edf_stitch.core.epipolar import rotation_from_vector
+from edf_stitch.core.cameras.projective import rotation_from_vector
 
 SIZE = (1200, 900)
 FOCAL = 1000.0

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core import features
 from edf_stitch.core.alignment import Alignment, Frame, align, prepare, size_of
-from edf_stitch.core.epipolar import rotation_angle
-from edf_stitch.core.errors import BadRequest, NoOverlap, TooFewMatches
-from edf_stitch.core.images import picture_from_array, resized
+from edf_stitch.core.cameras.projective import rotation_angle
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.pictures.picture import picture_from_array, resized
 from edf_stitch.core.pipeline import Stopwatch, compose
-from edf_stitch.core.progress import Progress
+from edf_stitch.core.pose import features
+from edf_stitch.core.system.errors import BadRequest, NoOverlap, TooFewMatches
+from edf_stitch.core.system.progress import Progress
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at, make_pair
 
@@ -233,7 +233,7 @@ def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
     found = {blend: align([frame], replace(quick, blend=blend), silent) for blend in ("feather", "linear")}
     assert asked == [(), (), (500, features.PREVIEW_PIXELS), (500, features.PREVIEW_PIXELS)]
     points = np.stack(np.meshgrid(np.linspace(60, 180, 7), np.linspace(30, 150, 7)), axis=-1).reshape(-1, 2)
-    away = np.linalg.norm(found["feather"].field.sends(points) - found["linear"].field.sends(points), axis=1)
+    away = np.linalg.norm(found["feather"].field.predict(points) - found["linear"].field.predict(points), axis=1)
     assert len(found["linear"].matches) < 0.8 * len(found["feather"].matches) and np.median(away) < 0.5
 
 
@@ -242,7 +242,7 @@ def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
 
 def rows_of(found: Alignment) -> np.ndarray:
     """The matches that the field stands on, as an array of the user's."""
-    used = found.matches.subset(np.flatnonzero(found.two_view.inliers)[found.field.fit.kept])
+    used = found.matches.subset(np.flatnonzero(found.two_view.inliers)[found.field.fit.inliers_used])
     return np.column_stack([used.x, used.y])
 
 
@@ -264,7 +264,7 @@ def test_given_matches_are_used_as_they_are(
     options = replace(quick, matches=rows)
     found = align([frame_of(small_pair, options)], options, silent)
     assert np.array_equal(np.column_stack([found.matches.x, found.matches.y, found.matches.weights]), rows)
-    assert found.matches.given and found.two_view.inliers.all() and found.field.fit.kept.all()
+    assert found.matches.given and found.two_view.inliers.all() and found.field.fit.inliers_used.all()
     assert any("given matches contradict the rest" in warning for warning in found.warnings)
     assert map_error(small_pair, found) < 0.4
 
@@ -282,8 +282,8 @@ def test_given_matches_follow_the_scale(small_pair: Pair, alone: list[Alignment]
     ideal[:2, 2] -= 0.25
     assert np.allclose(at_half.two_view.K, ideal)
     assert rotation_angle(at_half.two_view.R, at_full.two_view.R) < 0.02
-    sent = (at_half.field.sends((rows[:, :2] + 0.5) / 2 - 0.5) + 0.5) * 2 - 0.5
-    assert np.abs(sent - at_full.field.sends(rows[:, :2])).max() < 0.5
+    sent = (at_half.field.predict((rows[:, :2] + 0.5) / 2 - 0.5) + 0.5) * 2 - 0.5
+    assert np.abs(sent - at_full.field.predict(rows[:, :2])).max() < 0.5
 
 
 @pytest.mark.usefixtures("no_search")

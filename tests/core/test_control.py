@@ -9,15 +9,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.camera import CameraRequest
-from edf_stitch.core.crop import Crop, largest_rectangle
-from edf_stitch.core.epipolar import homogeneous
-from edf_stitch.core.errors import BadRequest
-from edf_stitch.core.fields import FIELDS
-from edf_stitch.core.match_files import matches_csv
+from edf_stitch.core.cameras.projective import homogeneous
+from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.choices import FIELDS, Crop
+from edf_stitch.core.compose.crop import largest_rectangle
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.outputs import warp_bytes
+from edf_stitch.core.output.outputs import warp_bytes
 from edf_stitch.core.pipeline import StitchResult, stitch
+from edf_stitch.core.pose.match_files import matches_csv
+from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at
 
@@ -87,8 +87,8 @@ def test_a_file_of_matches_is_as_good_as_an_array(
 
 def test_used_matches_are_those_the_field_stands_on(small_result: StitchResult) -> None:
     used, fit = small_result.used_matches, small_result.field.fit
-    assert len(used) == fit.kept.sum() <= small_result.two_view.inliers.sum() < len(small_result.matches)
-    sent = small_result.field.sends(used.x)
+    assert len(used) == fit.inliers_used.sum() <= small_result.two_view.inliers.sum() < len(small_result.matches)
+    sent = small_result.field.predict(used.x)
     assert np.sqrt(np.mean(np.sum((sent - used.y) ** 2, axis=1))) < 0.5
     every = {tuple(row) for row in np.column_stack([small_result.matches.x, small_result.matches.y])}
     assert {tuple(row) for row in np.column_stack([used.x, used.y])} <= every
@@ -97,7 +97,7 @@ def test_used_matches_are_those_the_field_stands_on(small_result: StitchResult) 
 def test_used_matches_are_px_of_the_full_pictures(small_pair: Pair, quick: StitchOptions) -> None:
     half = stitch(small_pair.reference, small_pair.target, replace(quick, scale=0.5))
     used = half.used_matches
-    kept = half.matches.subset(np.flatnonzero(half.two_view.inliers)[half.field.fit.kept])
+    kept = half.matches.subset(np.flatnonzero(half.two_view.inliers)[half.field.fit.inliers_used])
     assert np.allclose((used.x + 0.5) / 2 - 0.5, kept.x) and np.allclose((used.y + 0.5) / 2 - 0.5, kept.y)
     assert half.full_sizes == ((WIDTH, HEIGHT), (WIDTH, HEIGHT)) and used.x.max() > WIDTH / 2
 

@@ -7,19 +7,23 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.camera import Camera
-from edf_stitch.core.canvas import Canvas, Grid
-from edf_stitch.core.displacement import FADES, Field, StrictField, fit_strict, target_points
-from edf_stitch.core.epipolar import distance_to_line, homogeneous, project
-from edf_stitch.core.errors import DegenerateGeometry
-from edf_stitch.core.features import Matches
-from edf_stitch.core.fields import FIELDS, RIVALS, fit_field
-from edf_stitch.core.paper import PaperField
-from edf_stitch.core.slack import SlackField
-from edf_stitch.core.two_view import TwoView
-from edf_stitch.core.warp import build_map
+from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.projective import distance_to_line, homogeneous, project
+from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.choices import FADES, FIELDS, RIVALS
+from edf_stitch.core.field.field import Field
+from edf_stitch.core.field.slack import SlackField
+from edf_stitch.core.field.strict import StrictField, fit_strict
+from edf_stitch.core.field.transfer import target_points
+from edf_stitch.core.fields import fit_field
+from edf_stitch.core.panorama.canvas import Canvas
+from edf_stitch.core.panorama.warp import build_map
+from edf_stitch.core.raster.grid import Grid
+from edf_stitch.core.rivals.paper import PaperField
+from edf_stitch.core.system.errors import DegenerateGeometry
 
-from .test_displacement import SIDE, SIZE, VIEWS, curved, overlap, planar, some_matches
+from .field.test_strict import SIDE, SIZE, VIEWS, curved, overlap, planar, some_matches
 
 OURS = tuple(name for name in FIELDS if name not in RIVALS)  # the others: rivals/test_rivals.py
 every_field = pytest.mark.parametrize("name", OURS)
@@ -45,7 +49,7 @@ def test_each_name_makes_its_field() -> None:
 def test_every_field_meets_what_it_never_saw(name: str) -> None:
     field = field_of(name)
     probe, true, _ = some_matches(SIDE, curved, 300, seed=9)
-    error = np.linalg.norm(field.sends(probe) - true, axis=1)
+    error = np.linalg.norm(field.predict(probe) - true, axis=1)
     # 0.3 px of noise in each coordinate of every match; the paper's affine part knows one direction only
     assert np.sqrt((error**2).mean()) < (1.0 if name == "paper" else 0.5)
 
@@ -56,7 +60,7 @@ def test_what_it_sends_is_what_its_grid_says_in_the_overlap(name: str) -> None:
     grid = Grid.over(400, 100, 600, 600)
     values = field.on_grid(grid)
     sent = target_points(SIDE, grid.points, values.inverse_depth) + (0 if values.shift is None else values.shift)
-    expected = field.sends(grid.points.reshape(-1, 2)).reshape(grid.points.shape)
+    expected = field.predict(grid.points.reshape(-1, 2)).reshape(grid.points.shape)
     inside = overlap(field, grid.points)
     assert inside.mean() > 0.5 and np.abs(sent - expected)[inside].max() < 1e-3
 
@@ -66,9 +70,9 @@ def test_a_field_fitted_again_to_its_own_matches_is_the_same(name: str) -> None:
     x, y, _ = some_matches(SIDE, curved, 300, 0.3)
     matches = Matches(x, y, weight=np.random.default_rng(1).uniform(0.5, 2, 300))
     field = fit_field(name, "plane", SIDE, matches, SIZE, SIZE)
-    again = field.refitted(matches.subset(field.fit.kept))
-    assert again.name == name and again.fit.kept.all() and again.fit.smoothing == field.fit.smoothing
-    assert np.abs(again.sends(x) - field.sends(x)).max() < 1e-6
+    again = field.refitted(matches.subset(field.fit.inliers_used))
+    assert again.name == name and again.fit.inliers_used.all() and again.fit.smoothing == field.fit.smoothing
+    assert np.abs(again.predict(x) - field.predict(x)).max() < 1e-6
 
 
 @every_field
@@ -79,9 +83,10 @@ def test_a_field_fitted_again_knows_only_what_it_is_given(name: str) -> None:
     assert hill.sum() > 20
     rest = Matches(x[~hill], y[~hill])
     without = field.refitted(rest)
-    assert len(without.fit.kept) == len(rest) and without.fit.kept.all(), "all are kept, outliers are not sought"
+    used = without.fit.inliers_used
+    assert len(used) == len(rest) and used.all(), "all are kept, outliers are not sought"
     for points, least, most in ((x[hill], 2.0, 50.0), (x[~hill], 0.0, 1.5)):
-        off = np.linalg.norm(without.sends(points) - field.sends(points), axis=1)
+        off = np.linalg.norm(without.predict(points) - field.predict(points), axis=1)
         assert least < np.median(off) < most
     with pytest.raises(DegenerateGeometry):
         field.refitted(Matches(x[:5], y[:5]))
@@ -102,7 +107,7 @@ def test_without_parallax_every_field_is_the_homography(name: str) -> None:
         assert np.nanmax(np.abs(np.stack([warp.map_x, warp.map_y], axis=-1) - expected)) < 1e-3
         assert not warp.inverse_depth.any()
         again = field.refitted(Matches(x[::2], y[::2]))
-        assert np.abs(again.sends(x) - y).max() < 1e-6
+        assert np.abs(again.predict(x) - y).max() < 1e-6
 
 
 # --- the strict field's inverse depth outside the overlap -----------------------------------------------------------

@@ -15,14 +15,14 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.batch_list import read_list
-from edf_stitch.core.camera import CameraRequest, read_camera_file
-from edf_stitch.core.cli import main
-from edf_stitch.core.errors import StitchError
-from edf_stitch.core.masks import read_mask
-from edf_stitch.core.match_files import read_matches
+from edf_stitch.core.batch.list import read_list
+from edf_stitch.core.cameras.sources import CameraRequest, read_camera_file
+from edf_stitch.core.commands.cli import main
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.pictures.masks import read_mask
 from edf_stitch.core.pipeline import StitchResult, stitch
+from edf_stitch.core.pose.match_files import read_matches
+from edf_stitch.core.system.errors import StitchError
 from edf_stitch.synthetic_scenes.two_planes import Pair
 from hypothesis import example, given, settings
 from hypothesis import strategies as st

@@ -8,14 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.blend import BLENDS
-from edf_stitch.core.camera import CameraRequest
-from edf_stitch.core.crop import CROPS
-from edf_stitch.core.displacement import FADES
-from edf_stitch.core.errors import BadRequest
-from edf_stitch.core.fields import FIELDS
+from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, SEAMS
 from edf_stitch.core.options import LEAST_SCALE, StitchOptions
-from edf_stitch.core.seam import SEAMS
+from edf_stitch.core.system.errors import BadRequest
 
 
 def test_the_defaults_are_the_designs() -> None:

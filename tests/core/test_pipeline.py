@@ -11,17 +11,24 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core import features, light, occlusion
-from edf_stitch.core.camera import CameraRequest
-from edf_stitch.core.colour import decode
-from edf_stitch.core.epipolar import (
+from edf_stitch.core.cameras import matches
+from edf_stitch.core.cameras.projective import (
     distance_to_line,
     fundamental_from_pose,
     rotation_angle,
     rotation_from_vector,
     sampson_residuals,
 )
-from edf_stitch.core.errors import (
+from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.compose.multiband import bands_for
+from edf_stitch.core.panorama import visibility
+from edf_stitch.core.panorama.warp import build_map
+from edf_stitch.core.pictures.encoding import encode_picture
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
+from edf_stitch.core.pose import features
+from edf_stitch.core.raster import arrays
+from edf_stitch.core.raster.colour import decode
+from edf_stitch.core.system.errors import (
     BadRequest,
     Cancelled,
     DegenerateGeometry,
@@ -30,11 +37,7 @@ from edf_stitch.core.errors import (
     TooFewMatches,
     UnreadableImage,
 )
-from edf_stitch.core.images import encode_picture
-from edf_stitch.core.multiband import bands_for
-from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
-from edf_stitch.core.progress import STAGES
-from edf_stitch.core.warp import build_map
+from edf_stitch.core.system.progress import STAGES
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry, pose_errors
 from edf_stitch.synthetic_scenes.scene_camera import SceneCamera
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at, make_pair
@@ -318,7 +321,7 @@ def test_the_same_pixels_whichever_strip_is_done_first(
     small_pair: Pair, known: StitchOptions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Small pictures are one strip; here they are dozens, with dense refinement and all."""
-    for module in (light, occlusion):
+    for module in (arrays, visibility):
         monkeypatch.setattr(module, "STRIP", 5_000)
     before, results = cv2.getNumThreads(), []
     try:
@@ -430,7 +433,7 @@ def test_what_cannot_be_stitched_is_refused_with_advice(case: str) -> None:
 
 def test_chance_look_alikes_are_refused(small_pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(9)
-    chance = features.Matches(random.uniform(0, 170, (50, 2)), random.uniform(0, 170, (50, 2)))
+    chance = matches.Matches(random.uniform(0, 170, (50, 2)), random.uniform(0, 170, (50, 2)))
     monkeypatch.setattr(features, "match", lambda *_: chance)
     with pytest.raises((NoOverlap, DegenerateGeometry), match="of 50 matches|50 points look alike") as refused:
         stitch(small_pair.reference, small_pair.target)

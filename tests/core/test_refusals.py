@@ -12,9 +12,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.errors import UnreadableImage
-from edf_stitch.core.images import Picture, encode_picture, load_picture
-from edf_stitch.core.metadata import Exif
+from edf_stitch.core.pictures.encoding import encode_picture
+from edf_stitch.core.pictures.metadata import Exif
+from edf_stitch.core.pictures.picture import Picture, load_picture
+from edf_stitch.core.system.errors import UnreadableImage
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -174,7 +175,7 @@ def test_damage_ends_in_a_picture_or_a_refusal(
 
 
 def test_the_decoders_are_loaded_when_they_are_needed() -> None:
-    program = "import sys, edf_stitch.core.images; print({'OpenEXR', 'exifread', 'bpy'} & set(sys.modules))"
+    program = "import sys, edf_stitch.core.pictures.picture; print({'OpenEXR', 'exifread', 'bpy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-B", "-c", f"import sys; sys.path[:] = {sys.path!r}; {program}"],
                           capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"

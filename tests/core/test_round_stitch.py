@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.crop import largest_rectangle
-from edf_stitch.core.epipolar import homogeneous
-from edf_stitch.core.errors import BadRequest
-from edf_stitch.core.images import load_picture
-from edf_stitch.core.levelling import angles_of, rotation_for, turned
-from edf_stitch.core.metrics import look_up
+from edf_stitch.core.cameras.projective import homogeneous
+from edf_stitch.core.compose.crop import largest_rectangle
+from edf_stitch.core.measure.metrics import look_up
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.output_files import OutputFiles
-from edf_stitch.core.outputs import OutputRequest, warp_bytes, write
+from edf_stitch.core.output.inspection import depth_grid, displacement_px, full_geometry, heat_map, match_rows
+from edf_stitch.core.output.outputs import OutputRequest, warp_bytes, write
+from edf_stitch.core.panorama.levelling import angles_of, rotation_for, turned
+from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchResult, stitch
-from edf_stitch.core.seen import depth_grid, full_geometry, heat_map, match_rows, slide
+from edf_stitch.core.system.errors import BadRequest
+from edf_stitch.core.system.output_files import OutputFiles
 from edf_stitch.synthetic_scenes.two_planes import FLOOR_Y, WALL_Z, Pair, Textures
 
 ROUND = ("cylindrical", "equirectangular")
@@ -218,7 +218,7 @@ def test_what_a_window_shows_of_a_round_panorama(results: dict[str, StitchResult
         geometry = full_geometry(whole)
         assert np.isnan(geometry["S"]).all() and geometry["canvas"] == shape[::-1]
         assert np.nanmedian(match_rows(whole)["errors"]) < 0.5
-        assert np.nanmedian(slide(whole)[whole.target_layer.alpha > 0]) > 1
+        assert np.nanmedian(displacement_px(whole)[whole.target_layer.alpha > 0]) > 1
         picture, (low, high) = heat_map(whole)
         assert (picture[..., 3] > 0).any() and low < high
         grid = depth_grid(whole)

@@ -12,20 +12,21 @@ from types import SimpleNamespace
 
 import bpy
 import numpy as np
-from edf_stitch.core.images import encode_picture, load_picture
+from edf_stitch.core.pictures.encoding import encode_picture
+from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.edf_addon import command
 
 _WRITE = """
 import sys, numpy as np
 from pathlib import Path
-from edf_stitch.core.images import encode_picture
+from edf_stitch.core.pictures.encoding import encode_picture
 given = np.load(sys.argv[2])
 alpha = given["alpha"] if given["alpha"].size else None
 Path(sys.argv[1]).write_bytes(encode_picture(given["pixels"], alpha, 32, ".exr")[0])
 """
 _READ = """
 import sys, numpy as np
-from edf_stitch.core.images import load_picture
+from edf_stitch.core.pictures.picture import load_picture
 p = load_picture(sys.argv[1])
 np.savez(sys.argv[2], pixels=p.pixels, alpha=np.empty(0) if p.alpha is None else p.alpha, view=p.view, bits=p.bits)
 """

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edf_stitch.core.epipolar import homogeneous
-from edf_stitch.core.worker import cameras_of
+from edf_stitch.core.cameras.projective import homogeneous
+from edf_stitch.core.commands.worker import cameras_of
 
 bpy = pytest.importorskip("bpy")
 

@@ -58,7 +58,7 @@ def test_two_focal_lengths_are_both_said_and_an_estimate_says_how_sure():
 
 
 def test_every_stage_of_the_engine_has_words():
-    from edf_stitch.core.progress import STAGES
+    from edf_stitch.core.system.progress import STAGES
 
     for name in STAGES:
         assert explain.stage(name) == explain.STAGES[name]

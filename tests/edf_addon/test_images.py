@@ -7,7 +7,7 @@ import sys
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.images import picture_from_array
+from edf_stitch.core.pictures.picture import picture_from_array
 
 bpy = pytest.importorskip("bpy")
 
@@ -119,7 +119,7 @@ def test_a_float_image_of_another_colour_space_goes_as_blender_converts_it(blend
 @pytest.mark.parametrize("orientation", [1, 3, 6, 8])
 def test_portrait_photographs_end_upright_by_file_and_by_array(blender, tmp_path, orientation):
     """Blender shows them as they are stored; the engine's picture of the array is turned as that of the file."""
-    from edf_stitch.core.worker import _picture
+    from edf_stitch.core.commands.worker import _picture
 
     stored = cv2.resize(gradient()[..., ::-1], (60, 40), interpolation=cv2.INTER_LINEAR)
     tiff = b"II*\0\x08\0\0\0\x01\0" + struct.pack("<HHII", 0x112, 3, 1, orientation) + b"\0\0\0\0"

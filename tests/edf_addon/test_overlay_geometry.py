@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.camera import Camera
-from edf_stitch.core.decoding import turn
-from edf_stitch.core.epipolar import homogeneous, project, rotation_from_vector
-from edf_stitch.core.lens import distort
+from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.lens import distort
+from edf_stitch.core.cameras.projective import homogeneous, project, rotation_from_vector
+from edf_stitch.core.pictures.decoding import turn
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 

@@ -7,7 +7,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from edf_stitch.core.images import encode_picture, load_picture  # noqa: E402
+from edf_stitch.core.pictures.encoding import encode_picture  # noqa: E402
+from edf_stitch.core.pictures.picture import load_picture  # noqa: E402
 from edf_stitch.edf_addon import photo  # noqa: E402
 
 

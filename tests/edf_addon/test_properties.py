@@ -4,7 +4,7 @@ import dataclasses
 import math
 
 import pytest
-from edf_stitch.core.camera import CameraRequest
+from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.options import StitchOptions
 
 properties = pytest.importorskip("edf_stitch.edf_addon.properties")

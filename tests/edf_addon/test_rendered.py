@@ -5,7 +5,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from edf_stitch.core.images import load_picture  # noqa: E402
+from edf_stitch.core.pictures.picture import load_picture  # noqa: E402
 from edf_stitch.edf_addon import compat, take_along  # noqa: E402
 
 pytestmark = pytest.mark.slow

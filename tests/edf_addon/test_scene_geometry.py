@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.blender_camera import pose_of
-from edf_stitch.core.epipolar import homogeneous, project, rotation_from_vector
+from edf_stitch.core.cameras.blender_camera import pose_of
+from edf_stitch.core.cameras.projective import homogeneous, project, rotation_from_vector
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edf_stitch.core.images import picture_from_array
-from edf_stitch.core.progress import STAGES
+from edf_stitch.core.pictures.picture import picture_from_array
+from edf_stitch.core.system.progress import STAGES
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 bpy = pytest.importorskip("bpy")
@@ -380,7 +380,7 @@ def test_what_is_painted_out_is_kept_out(chosen):
 
 
 def test_two_cameras_of_the_scene_give_the_geometry(chosen, small_pair: Pair):
-    from edf_stitch.core.blender_camera import lens_for, matrix_world_of
+    from edf_stitch.core.cameras.blender_camera import lens_for, matrix_world_of
 
     took = {"reference": small_pair.reference_camera, "target": small_pair.target_camera}
     for side, known in took.items():

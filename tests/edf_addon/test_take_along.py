@@ -5,7 +5,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from edf_stitch.core.epipolar import homogeneous, project, rotation_from_vector  # noqa: E402
+from edf_stitch.core.cameras.projective import homogeneous, project, rotation_from_vector  # noqa: E402
 from edf_stitch.edf_addon import compat, result, take_along  # noqa: E402
 
 SIZE, SIZE_PRIME, CANVAS = (400, 300), (320, 480), (560, 360)

@@ -142,7 +142,7 @@ assert bpy.context.scene.edf_stitch.result != panorama
 
 
 def test_an_artists_way_from_two_photographs_to_a_file_and_again_tomorrow(home, pair, tmp_path):
-    from edf_stitch.core.images import load_picture
+    from edf_stitch.core.pictures.picture import load_picture
 
     code = ARTIST.format(paths=[*map(str, pair), str(tmp_path)])
     done = home.run("--python-exit-code", "9", "--python-expr", code)

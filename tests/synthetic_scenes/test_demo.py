@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.errors import UnwritableOutput
+from edf_stitch.core.system.errors import UnwritableOutput
 from edf_stitch.synthetic_scenes import demo
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edf_stitch.core.epipolar import fundamental_from_pose, infinite_homography, rotation_from_vector
-from edf_stitch.core.two_view import TwoView
+from edf_stitch.core.cameras.projective import fundamental_from_pose, infinite_homography, rotation_from_vector
+from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry, flat, pose_errors, seen_from, steepness, visible
 from edf_stitch.synthetic_scenes.scene_camera import SceneCamera
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at

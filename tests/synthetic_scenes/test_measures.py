@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.blend import averaged
-from edf_stitch.core.epipolar import infinite_homography, rotation_from_vector
-from edf_stitch.core.fields import RIVALS
+from edf_stitch.core.cameras.projective import infinite_homography, rotation_from_vector
+from edf_stitch.core.choices import RIVALS
+from edf_stitch.core.compose.blend import averaged
+from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.pipeline import StitchResult
-from edf_stitch.core.warp import Layer
 from edf_stitch.synthetic_scenes.measures import (
     Truth,
     composition,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.epipolar import rotation_angle
-from edf_stitch.core.errors import BadRequest
+from edf_stitch.core.cameras.projective import rotation_angle
+from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry
 from edf_stitch.synthetic_scenes.recipes import (
     FULL,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.colour import encode
+from edf_stitch.core.raster.colour import encode
 from edf_stitch.synthetic_scenes import rendered as module
 from edf_stitch.synthetic_scenes.blender_process import RenderFailed
 from edf_stitch.synthetic_scenes.recipes import RECIPES, Difficulty

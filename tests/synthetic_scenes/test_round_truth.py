@@ -13,13 +13,14 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.blender_camera import lens_for, matrix_world_of
-from edf_stitch.core.blender_world import world_rotation
-from edf_stitch.core.camera import CameraRequest
-from edf_stitch.core.colour import encode
-from edf_stitch.core.images import encode_picture, load_picture
+from edf_stitch.core.cameras.blender_camera import lens_for, matrix_world_of
+from edf_stitch.core.cameras.blender_world import world_rotation
+from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.pictures.encoding import encode_picture
+from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import stitch
+from edf_stitch.core.raster.colour import encode
 from edf_stitch.synthetic_scenes.recipes import RECIPES
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
 

@@ -7,7 +7,7 @@ from copy import deepcopy
 from typing import Any
 
 import pytest
-from edf_stitch.core.fields import RIVALS as ALL_RIVALS
+from edf_stitch.core.choices import RIVALS as ALL_RIVALS
 from edf_stitch.synthetic_scenes.stitches import WAYS as ALL_WAYS
 from edf_stitch.synthetic_scenes.thresholds import MODEL_RUNS, RIVALS, Check, judge, medians
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core import features
-from edf_stitch.core.metrics import psnr
+from edf_stitch.core.measure.metrics import psnr
+from edf_stitch.core.pose import features
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry
 from edf_stitch.synthetic_scenes.two_planes import (
     FLOOR_Y,

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from edf_stitch.core.errors import BadRequest, UnwritableOutput
+from edf_stitch.core.system.errors import BadRequest, UnwritableOutput
 from edf_stitch.synthetic_scenes import validation
 from edf_stitch.synthetic_scenes.recipes import FULL, QUICK, RECIPES
 from edf_stitch.synthetic_scenes.scene_process import WAYS, file_name

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.alignment import Registration
+from edf_stitch.core.alignment import Geometry
 from edf_stitch.core.compare.figures import FIGURES, figures_of
 from edf_stitch.core.compare.tables import shown
-from edf_stitch.core.metrics import canvas_quality, overlap_quality, overlap_views, psnr, ssim
-from edf_stitch.core.outputs import warp_bytes
+from edf_stitch.core.measure.metrics import canvas_quality, overlap_quality, overlap_views, psnr, ssim
+from edf_stitch.core.output.outputs import warp_bytes
 from edf_stitch.core.pipeline import StitchResult
 
 
@@ -38,7 +38,7 @@ def test_canvas_values_are_of_both_pictures_black_outside_the_overlap(small_resu
 def test_folds_are_those_of_the_report(small_result: StitchResult) -> None:
     """Before what turns over was taken for hidden: else no field would have any."""
     report = {**small_result.report, "measured": {**small_result.report["measured"], "folds": 0.125}}
-    nothing = Registration(
+    nothing = Geometry(
         small_result.cameras, small_result.matches, small_result.matches, small_result.two_view, ()
     )
     found = figures_of(replace(small_result, report=report), nothing, small_result.two_view.F, 0)
@@ -46,7 +46,7 @@ def test_folds_are_those_of_the_report(small_result: StitchResult) -> None:
 
 
 def test_every_figure_has_a_name_and_digits(small_result: StitchResult) -> None:
-    registration = Registration(
+    registration = Geometry(
         small_result.cameras, small_result.matches, small_result.matches, small_result.two_view, ()
     )
     found = figures_of(small_result, registration, small_result.two_view.F, 0)

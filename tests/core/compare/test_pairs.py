@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from edf_stitch.core.compare.pairs import find_pairs
-from edf_stitch.core.errors import BadRequest
+from edf_stitch.core.system.errors import BadRequest
 
 
 def touch(folder: Path, *names: str) -> Path:

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.camera import CameraRequest
-from edf_stitch.core.cli import main
+from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.commands.cli import main
 from edf_stitch.core.compare import run as run_module
 from edf_stitch.core.compare.pairs import PairFiles, find_pairs
 from edf_stitch.core.compare.run import FILES, ComparisonRequest, run_comparison
-from edf_stitch.core.errors import BadRequest, Cancelled, DegenerateGeometry, UnwritableOutput
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pipeline import StitchResult, stitch
+from edf_stitch.core.system.errors import BadRequest, Cancelled, DegenerateGeometry, UnwritableOutput
 
 FIELDS = ("slack", "homography")
 
@@ -91,14 +91,14 @@ def test_a_pair_that_fails_is_a_row_that_says_why(folder: Path, tmp_path: Path) 
 def test_a_field_that_fails_stops_no_other(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = run_module.lay
+    real = run_module.fit_and_warp
 
     def lay(registration, frames, options, steps):
         if options.field == "apap":
             raise DegenerateGeometry("nothing to hold on to")
         return real(registration, frames, options, steps)
 
-    monkeypatch.setattr(run_module, "lay", lay)
+    monkeypatch.setattr(run_module, "fit_and_warp", lay)
     summary, code = compared(folder, tmp_path, fields=("apap", "homography"))
     fields = summary["pairs"][0]["fields"]
     assert code == 0 and fields["apap"]["message"] == "nothing to hold on to" and fields["homography"]["figures"]

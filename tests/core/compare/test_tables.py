@@ -8,17 +8,10 @@ import math
 from typing import Any
 
 import pytest
+from edf_stitch.core.choices import FIELDS
 from edf_stitch.core.compare.page import MOST_FIELDS, comparison_page
 from edf_stitch.core.compare.published import published
-from edf_stitch.core.compare.tables import (
-    best,
-    comparison_csv,
-    comparison_markdown,
-    medians,
-    shown,
-    timing_markdown,
-)
-from edf_stitch.core.fields import FIELDS
+from edf_stitch.core.compare.tables import best, comparison_csv, comparison_markdown, medians, shown, timing_markdown
 
 
 def entry(name: str, **psnr: float | None) -> dict[str, Any]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.displacement import fit_strict
-from edf_stitch.core.epipolar import homogeneous, project
-from edf_stitch.core.features import Matches
+from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.projective import homogeneous, project
+from edf_stitch.core.field.strict import fit_strict
 from edf_stitch.core.rivals.apap import GAMMA, SIGMA, fit_apap
 from edf_stitch.core.rivals.homography import direct_linear
 
-from ..test_displacement import SIDE, SIZE, curved, some_matches
+from ..field.test_strict import SIDE, SIZE, curved, some_matches
 
 
 @pytest.fixture(scope="module")
@@ -22,9 +22,9 @@ def matches() -> Matches:
 def test_with_all_weights_alike_it_is_the_homography(matches: Matches) -> None:
     strict = fit_strict(SIDE, matches, SIZE, SIZE)
     whole = project(homogeneous(matches.x) @ direct_linear(*_kept(matches, strict)).T)
-    off = [np.abs(fit_apap(strict, matches, gamma=g).sends(matches.x) - whole).max() for g in (GAMMA, 0.1, 0.5, 1.0)]
+    off = [np.abs(fit_apap(strict, matches, gamma=g).predict(matches.x) - whole).max() for g in (GAMMA, 0.1, 0.5, 1.0)]
     assert off[-1] < 1e-6 and off == sorted(off, reverse=True) and off[0] > 3
-    assert np.abs(fit_apap(strict, matches, sigma=1e7).sends(matches.x) - whole).max() < 1e-3
+    assert np.abs(fit_apap(strict, matches, sigma=1e7).predict(matches.x) - whole).max() < 1e-3
 
 
 def test_a_point_has_the_homography_that_its_weights_give(matches: Matches) -> None:
@@ -41,14 +41,14 @@ def test_a_point_has_the_homography_that_its_weights_give(matches: Matches) -> N
         ])  # fmt: skip
         h = np.linalg.svd(np.r_[weight, weight][:, None] * rows)[2][-1].reshape(3, 3)
         expected = project(homogeneous(np.array(point)) @ (np.linalg.inv(T_prime) @ h @ T).T)
-        assert np.abs(fit_apap(strict, matches).sends(np.array([point])) - expected).max() < 1e-6
+        assert np.abs(fit_apap(strict, matches).predict(np.array([point])) - expected).max() < 1e-6
 
 
 def test_far_from_all_matches_it_is_the_homography(matches: Matches) -> None:
     strict = fit_strict(SIDE, matches, SIZE, SIZE)
     far = np.array([[2600.0, 450.0], [600.0, -900.0]])
     expected = project(homogeneous(far) @ direct_linear(*_kept(matches, strict)).T)
-    assert np.abs(fit_apap(strict, matches).sends(far) - expected).max() < 1e-6
+    assert np.abs(fit_apap(strict, matches).predict(far) - expected).max() < 1e-6
 
 
 def test_weights_of_matches_count() -> None:
@@ -57,11 +57,11 @@ def test_weights_of_matches_count() -> None:
     y = x + np.where(np.arange(len(x))[:, None] < len(x) // 2, 4.0, -4.0)
     heavy = np.where(np.arange(len(x)) < len(x) // 2, 1e6, 1.0)
     sent = fit_apap(fit_strict(SIDE, Matches(x, y, given=True), SIZE, SIZE), Matches(x, y, weight=heavy, given=True))
-    assert np.abs(sent.sends(x[:50]) - x[:50] - 4.0).max() < 0.1
+    assert np.abs(sent.predict(x[:50]) - x[:50] - 4.0).max() < 0.1
 
 
 def _kept(matches: Matches, strict) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    few = matches.subset(strict.fit.kept)
+    few = matches.subset(strict.fit.inliers_used)
     return few.x, few.y, few.weights
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.epipolar import homogeneous, project
-from edf_stitch.core.errors import DegenerateGeometry
-from edf_stitch.core.features import Matches
+from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.projective import homogeneous, project
 from edf_stitch.core.rivals.homography import LEAST_MATCHES, direct_linear, fit_one_homography
+from edf_stitch.core.system.errors import DegenerateGeometry
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ..test_displacement import SIDE, SIZE
+from ..field.test_strict import SIDE, SIZE
 
 properties = settings(max_examples=30)
 small = st.floats(-0.2, 0.2)
@@ -52,8 +52,8 @@ def test_of_two_planes_it_takes_the_larger_and_what_is_far_off_has_no_say() -> N
     near = np.arange(300) < 100
     y = x + np.where(near[:, None], (60.0, 0.0), (10.0, 0.0))
     field = fit_one_homography(SIDE, Matches(x, y))
-    assert np.array_equal(field.fit.kept, ~near) and field.fit.residual_px < 1e-6
-    assert np.abs(field.sends(x) - x - (10.0, 0.0)).max() < 1e-6
+    assert np.array_equal(field.fit.inliers_used, ~near) and field.fit.residual_px < 1e-6
+    assert np.abs(field.predict(x) - x - (10.0, 0.0)).max() < 1e-6
 
 
 def test_the_same_seed_gives_the_same_homography() -> None:

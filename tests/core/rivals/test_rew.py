@@ -6,16 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.canvas import Grid
-from edf_stitch.core.displacement import SMOOTHING_LADDER, fit_strict, target_points
-from edf_stitch.core.epipolar import homogeneous, infinite_homography, project
-from edf_stitch.core.features import Matches
+from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.projective import homogeneous, infinite_homography, project
+from edf_stitch.core.field.spline import ThinPlateSpline
+from edf_stitch.core.field.strict import SMOOTHING_LADDER, fit_strict
+from edf_stitch.core.field.transfer import target_points
+from edf_stitch.core.raster.grid import Grid
 from edf_stitch.core.rivals.homography import direct_linear
 from edf_stitch.core.rivals.rew import RewField, fit_rew, global_transformation
-from edf_stitch.core.spline import ThinPlateSpline
 from scipy.optimize import minimize_scalar
 
-from ..test_displacement import SIDE, SIZE, curved, overlap, planar, some_matches
+from ..field.test_strict import SIDE, SIZE, curved, overlap, planar, some_matches
 
 STILL = replace(SIDE, t=np.zeros(3), e_prime=np.zeros(3), F=np.full((3, 3), np.nan), model="rotation")
 
@@ -29,18 +30,18 @@ def test_it_reproduces_its_matches() -> None:
     """Without noise the least smoothing is the best, and nothing is left."""
     field, matches = rew_of(noise=0.0)
     assert field.fit.smoothing == SMOOTHING_LADDER[0] and field.fit.residual_px < 0.05
-    kept = matches.subset(field.fit.kept)
-    assert len(kept) > 190 and np.abs(field.sends(kept.x) - kept.y).max() < 0.3
+    kept = matches.subset(field.fit.inliers_used)
+    assert len(kept) > 190 and np.abs(field.predict(kept.x) - kept.y).max() < 0.3
 
 
 def test_both_components_of_the_spline_are_thin_plates() -> None:
     """(Φ + 8πλ) w + M a = g and Mᵀ w = 0 for each (DESIGN 1)."""
     field, matches = rew_of()
-    spline, kept = field.spline, matches.subset(field.fit.kept)
+    spline, kept = field.spline, matches.subset(field.fit.inliers_used)
     assert isinstance(spline, ThinPlateSpline) and spline.weights.shape == (len(kept), 2)
     moments = np.column_stack([spline.centres, np.ones(len(kept))]).T @ spline.weights
     assert np.abs(moments).max() < 1e-8 * np.abs(spline.weights).sum()
-    left = kept.y - field.sends(kept.x)
+    left = kept.y - field.predict(kept.x)
     assert np.abs(left - 8 * np.pi * field.fit.smoothing * spline.weights).max() < 1e-6
 
 
@@ -76,9 +77,9 @@ def test_what_lies_beyond_three_sigma_goes_until_none_is_left() -> None:
     strict = fit_strict(SIDE, matches, SIZE, SIZE)
     matches.y[::50] += (0.0, 6.0)  # after the strict field has looked at them
     field = fit_rew(strict, matches)
-    assert not field.fit.kept[::50].any() and field.fit.kept.sum() > 280
-    kept = matches.subset(field.fit.kept)
-    left = kept.y - field.sends(kept.x)
+    assert not field.fit.inliers_used[::50].any() and field.fit.inliers_used.sum() > 280
+    kept = matches.subset(field.fit.inliers_used)
+    left = kept.y - field.predict(kept.x)
     assert (np.abs(left) <= np.maximum(3 * np.sqrt((left**2).mean(axis=0)), 1.0)).all()
 
 
@@ -89,7 +90,7 @@ def test_it_fades_to_the_global_transformation() -> None:
     c = target_points(field.two_view, grid.points, np.zeros(grid.points.shape[:2]))
     assert shift is not None and np.isfinite(shift).all()
     inside = overlap(field, grid.points)
-    sent = field.sends(grid.points.reshape(-1, 2)).reshape(grid.points.shape)
+    sent = field.predict(grid.points.reshape(-1, 2)).reshape(grid.points.shape)
     assert inside.mean() > 0.01 and np.abs((c + shift) - sent)[inside].max() < 1e-9
     assert np.abs(shift[0]).max() == 0 and np.abs(shift[:, 0]).max() == 0
 

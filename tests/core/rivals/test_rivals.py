@@ -8,19 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.camera import Camera
-from edf_stitch.core.canvas import Canvas, Grid
-from edf_stitch.core.displacement import Field, target_points
-from edf_stitch.core.errors import DegenerateGeometry
-from edf_stitch.core.features import Matches
-from edf_stitch.core.fields import RIVALS, fit_field
+from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.choices import RIVALS
+from edf_stitch.core.field.field import Field
+from edf_stitch.core.field.transfer import target_points
+from edf_stitch.core.fields import fit_field
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.outputs import warp_bytes
+from edf_stitch.core.output.outputs import warp_bytes
+from edf_stitch.core.panorama.canvas import Canvas
+from edf_stitch.core.panorama.warp import build_map
 from edf_stitch.core.pipeline import stitch
-from edf_stitch.core.warp import build_map
+from edf_stitch.core.raster.grid import Grid
+from edf_stitch.core.system.errors import DegenerateGeometry
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
-from ..test_displacement import SIDE, SIZE, curved, overlap, planar, some_matches
+from ..field.test_strict import SIDE, SIZE, curved, overlap, planar, some_matches
 
 every_rival = pytest.mark.parametrize("name", RIVALS)
 CAMERAS = (Camera(SIDE.K, SIZE, "test", 0.0), Camera(SIDE.K_prime, SIZE, "test", 0.0))
@@ -36,7 +39,7 @@ def rival(name: str, noise: float = 0.3, count: int = 200) -> Field:
 def test_it_meets_what_it_never_saw_as_well_as_it_can(name: str, most: float) -> None:
     """A hill of thirty px: one homography misses it, the other two follow."""
     probe, true, _ = some_matches(SIDE, curved, 300, seed=9)
-    error = np.linalg.norm(rival(name).sends(probe) - true, axis=1)
+    error = np.linalg.norm(rival(name).predict(probe) - true, axis=1)
     assert np.sqrt((error**2).mean()) < most
     assert (name == "homography") == (np.percentile(error, 95) > 5)
 
@@ -57,7 +60,7 @@ def test_what_it_sends_is_what_its_map_says_in_the_overlap(name: str) -> None:
     canvas = Canvas(600, 500, (-450, -150))
     warp = build_map(field, field.two_view, canvas, *CAMERAS)
     points = np.stack(np.meshgrid(np.arange(0.0, 600, 7), np.arange(0.0, 500, 7)), axis=-1)
-    sent = field.sends((points - canvas.offset).reshape(-1, 2)).reshape(points.shape)
+    sent = field.predict((points - canvas.offset).reshape(-1, 2)).reshape(points.shape)
     inside = overlap(field, points - canvas.offset)
     column, row = np.moveaxis(points.astype(int), -1, 0)
     mapped = np.stack([warp.map_x[row, column], warp.map_y[row, column]], axis=-1)
@@ -69,9 +72,9 @@ def test_fitted_again_to_its_own_matches_it_is_the_same(name: str) -> None:
     x, y, _ = some_matches(SIDE, curved, 300, 0.3)
     matches = Matches(x, y, weight=np.random.default_rng(1).uniform(0.5, 2, 300))
     field = fit_field(name, "plane", SIDE, matches, SIZE, SIZE)
-    again = field.refitted(matches.subset(field.fit.kept))
-    assert again.name == name and again.fit.kept.all()
-    assert np.abs(again.sends(x) - field.sends(x)).max() < 1e-6
+    again = field.refitted(matches.subset(field.fit.inliers_used))
+    assert again.name == name and again.fit.inliers_used.all()
+    assert np.abs(again.predict(x) - field.predict(x)).max() < 1e-6
 
 
 @every_rival
@@ -81,9 +84,10 @@ def test_fitted_again_it_knows_only_what_it_is_given(name: str) -> None:
     hill = np.linalg.norm(x - (700, 450), axis=1) < 200
     kept = np.flatnonzero(~hill)
     without = field.refitted(Matches(x[kept], y[kept]))
-    assert len(without.fit.kept) == len(kept) and without.fit.kept.all(), "all are kept, outliers are not sought"
+    used = without.fit.inliers_used
+    assert len(used) == len(kept) and used.all(), "all are kept, outliers are not sought"
     if name != "homography":  # the hill has no say in that anyway
-        assert np.median(np.linalg.norm(without.sends(x[hill]) - field.sends(x[hill]), axis=1)) > 2
+        assert np.median(np.linalg.norm(without.predict(x[hill]) - field.predict(x[hill]), axis=1)) > 2
     with pytest.raises(DegenerateGeometry):
         field.refitted(Matches(x[:5], y[:5]))
     with pytest.raises(DegenerateGeometry):
@@ -111,8 +115,8 @@ def test_gross_errors_do_not_move_it(name: str) -> None:
     spoiled = np.random.default_rng(3).permutation(300)[:30]
     wrong[spoiled] += np.array([60.0, 5.0])  # along the lines, more or less: what passes an epipolar test
     clean, robust = (fit_field(name, "plane", SIDE, Matches(x, target), SIZE, SIZE) for target in (y, wrong))
-    off = np.linalg.norm(robust.sends(x) - clean.sends(x), axis=1)
-    assert np.median(off) < 0.5 and not robust.fit.kept[spoiled].any()
+    off = np.linalg.norm(robust.predict(x) - clean.predict(x), axis=1)
+    assert np.median(off) < 0.5 and not robust.fit.inliers_used[spoiled].any()
 
 
 @every_rival
@@ -120,7 +124,7 @@ def test_given_matches_are_all_kept(name: str) -> None:
     x, y, _ = some_matches(SIDE, curved, 100, 0.3)
     y[7] += 15
     field = fit_field(name, "plane", SIDE, Matches(x, y, given=True), SIZE, SIZE)
-    assert field.fit.kept.all()
+    assert field.fit.inliers_used.all()
 
 
 @every_rival

@@ -1,0 +1,265 @@
+"""The list of a batch: pairs of pictures and frame ranges of two fixed cameras, from a CSV file."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import unicodedata
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from ..cameras.sources import CameraRequest
+from ..system.errors import BadRequest
+from ..system.text_files import read_lines
+
+COLUMNS = ("reference", "target", "name", "first", "last", "step", "focal_px", "focal35")
+MOST_FRAMES = 1_000_000
+# The frames of a clip that its alignment is estimated over, at most.
+ALIGNED_FRAMES = 5
+_LAYOUT = (
+    "each line holds reference,target and optionally a name; a header names the columns in any order, from: "
+    + ", ".join(COLUMNS)
+)
+# Where the frame's number stands in a file's name: %d, %04d, or #### as Blender and Nuke have it.
+_PLACE = re.compile(r"%(?:0(\d{1,2}))?d|#{2,}")
+_NOT_IN_NAMES = re.compile(r'[\x00-\x1f/\\:*?"<>|]')
+
+
+@dataclass(frozen=True)
+class BatchItem:
+    """One line of a list: a pair of pictures, or a clip of two cameras that stand still.
+
+    name: of its outputs; reference, target: files, or patterns like a_%04d.png or a_####.png where `frames`, the
+    numbers both sides have, is not None; missing: numbers that were to be expected and one side or both lack; camera:
+    what this line says of the cameras, in place of the options. Raises BadRequest for a name no file could have.
+    """
+
+    name: str
+    reference: Path
+    target: Path
+    frames: tuple[int, ...] | None = None
+    missing: tuple[int, ...] = ()
+    camera: CameraRequest | None = None
+
+    def __post_init__(self) -> None:
+        found = _NOT_IN_NAMES.search(self.name)
+        if found or not self.name or self.name.startswith(".") or self.name != self.name.strip():
+            raise BadRequest(
+                f"{self.name!r} is no name for outputs: it names a file, so it must not be empty, start with a dot or "
+                r'a space, or hold any of / \ : * ? " < > |'
+            )
+
+    @property
+    def aligned_on(self) -> tuple[int, ...]:
+        """The frames of a clip that its alignment is estimated over: the first, the last and some evenly between.
+
+        They depend on nothing but the frames, so that every shard and every later run finds the same alignment.
+        """
+        frames = self.frames or ()
+        count = min(len(frames), ALIGNED_FRAMES)
+        return tuple(frames[round(i * (len(frames) - 1) / max(1, count - 1))] for i in range(count))
+
+    def pair(self, frame: int | None = None) -> tuple[Path, Path]:
+        """The two files; of a clip, those of a frame."""
+        if frame is None:
+            return self.reference, self.target
+        return _with_number(self.reference, frame), _with_number(self.target, frame)
+
+    def numbered(self, frame: int) -> str:
+        """The name of a frame's output, with as many digits as the reference's."""
+        return f"{self.name}_{frame:0{_pattern(self.reference).digits}d}"
+
+
+def read_list(path: str | Path) -> list[BatchItem]:
+    """The items of a list, a CSV file in UTF-8 with commas, semicolons or tabs; see COLUMNS.
+
+    Without a header the columns are reference, target and, if there, name. Lines that are empty or start with # are
+    left out. Relative paths start at the list's folder. A missing name is made from the reference's. first, last, step
+    say which frames of patterns are meant; without them all that are there. Whether pictures exist is not asked.
+    Raises BadRequest (content) with the line, UnreadableImage (file).
+    """
+    path = Path(path)
+    items: list[BatchItem] = []
+    lines: dict[str, int] = {}
+    folders = _Folders()
+    for number, row in _rows(path):
+        try:
+            item = _item(row, path.parent, folders)
+        except BadRequest as error:
+            raise BadRequest(f"{path}, line {number}: {error}") from None
+        before = lines.setdefault(same_name(item.name), number)
+        if before != number:
+            raise BadRequest(
+                f"{path}, line {number}: its outputs would be named {item.name!r} like those of line {before}; give "
+                "each its own in a column called name"
+            )
+        items.append(item)
+    if not items:
+        raise BadRequest(f"{path}: nothing to stitch in it; {_LAYOUT}")
+    return items
+
+
+def same_name(name: str) -> str:
+    """What two names share that are one file on some computers: case and the way accents are written aside."""
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+def find_frames(
+    reference: Path, target: Path, first: int | None = None, last: int | None = None, step: int = 1
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Frame numbers of two patterns that both sides have, and those that one side or both lack.
+
+    With first and last: of that range; else of all that are there, as far as bounds are given; every `step`-th. Raises
+    BadRequest for what is no pattern or no range.
+    """
+    return _find_frames(reference, target, first, last, step, _Folders())
+
+
+class _Pattern(NamedTuple):
+    """A file name with a frame's number in it."""
+
+    before: str
+    digits: int
+    after: str
+
+    def number(self, name: str) -> int | None:
+        """The frame's number in a file name, None where it is no frame of this pattern."""
+        if not (name.startswith(self.before) and name.endswith(self.after)):
+            return None
+        number = name[len(self.before) : len(name) - len(self.after)]
+        fits = number.isascii() and number.isdigit() and number == f"{int(number):0{self.digits}d}"
+        return int(number) if fits else None
+
+
+class _Folders(dict[Path, list[str]]):
+    """What lies in folders, each looked into once."""
+
+    def __missing__(self, folder: Path) -> list[str]:
+        try:
+            self[folder] = os.listdir(folder)
+        except OSError:  # told in its turn: there are no frames
+            self[folder] = []
+        return self[folder]
+
+
+def _is_pattern(path: Path) -> bool:
+    return _PLACE.search(path.name) is not None and not path.exists()  # "100%done.jpg" may be just a name
+
+
+def _pattern(path: Path) -> _Pattern:
+    places = list(_PLACE.finditer(path.name))
+    if len(places) != 1:
+        raise BadRequest(f"{path}: a pattern has one place for the frame's number, like a_%04d.png or a_####.png")
+    place = places[0]
+    digits = len(place[0]) if place[0].startswith("#") else int(place[1] or 1)
+    return _Pattern(path.name[: place.start()], digits, path.name[place.end() :])
+
+
+def _with_number(path: Path, frame: int) -> Path:
+    pattern = _pattern(path)
+    return path.with_name(f"{pattern.before}{frame:0{pattern.digits}d}{pattern.after}")
+
+
+def _find_frames(
+    reference: Path, target: Path, first: int | None, last: int | None, step: int, folders: _Folders
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    sides = []
+    for path in (reference, target):
+        numbers = map(_pattern(path).number, folders[path.parent])
+        sides.append({number for number in numbers if number is not None})
+    both, either = sides[0] & sides[1], sides[0] | sides[1]
+    low = min(either, default=0) if first is None else first
+    high = max(either, default=low) if last is None else last
+    if low < 0 or step < 1 or (first is not None and last is not None and last < first):
+        raise BadRequest(f"frames {low} to {high} by {step}: they count from 0, up from first to last, by 1 or more")
+    if (high - low) // step >= MOST_FRAMES:
+        raise BadRequest(f"frames {low} to {high} in steps of {step} are more than {MOST_FRAMES}; split the clip")
+    asked = range(low, high + 1, step)
+    expected = asked if first is not None and last is not None else [n for n in asked if n in either]
+    return tuple(n for n in expected if n in both), tuple(n for n in expected if n not in both)
+
+
+def _item(row: dict[str, str], folder: Path, folders: _Folders) -> BatchItem:
+    for column in ("reference", "target"):
+        if not row.get(column):
+            raise BadRequest(f"the {column} is missing; {_LAYOUT}")
+        parent = Path(row[column]).parent
+        if _PLACE.search(str(parent)) and not (folder / parent).exists():
+            raise BadRequest(f"{row[column]}: the frame's number may stand in the file's name, not in a folder's")
+    reference, target = folder / row["reference"], folder / row["target"]
+    camera = _camera(row)
+    span = {column: _whole_number(row[column], column) for column in ("first", "last", "step") if row.get(column)}
+    if _is_pattern(reference) != _is_pattern(target):
+        raise BadRequest("one side is a pattern of frames and the other is not; both need to be")
+    if not _is_pattern(reference):
+        if span:
+            raise BadRequest(f"{' and '.join(span)} given, but the files are no patterns like a_%04d.png or a_####.png")
+        return BatchItem(row.get("name") or reference.stem, reference, target, camera=camera)
+    frames, missing = _find_frames(
+        reference, target, span.get("first"), span.get("last"), span.get("step", 1), folders
+    )
+    return BatchItem(row.get("name") or _clip_name(reference), reference, target, frames, missing, camera)
+
+
+def _clip_name(reference: Path) -> str:
+    pattern = _pattern(reference)
+    return (pattern.before + pattern.after.rpartition(".")[0]).strip(" ._-") or reference.parent.resolve().name
+
+
+def _camera(row: dict[str, str]) -> CameraRequest | None:
+    focal_px, focal35 = (_numbers(row.get(column, ""), column) for column in ("focal_px", "focal35"))
+    return CameraRequest(focal_px=focal_px, focal35=focal35) if focal_px or focal35 else None
+
+
+def _numbers(cell: str, column: str) -> tuple[float, ...]:
+    """The numbers of a cell, separated by commas, semicolons or spaces; none of an empty one."""
+    try:
+        return tuple(float(part) for part in re.split(r"[\s,;]+", cell)) if cell else ()
+    except ValueError:
+        raise BadRequest(f"{column} is {cell!r}; a number is needed, or two") from None
+
+
+def _whole_number(cell: str, column: str) -> int:
+    if not (cell.isascii() and cell.isdigit() and len(cell) < 10):
+        raise BadRequest(f"{column} is {cell!r}; a whole number from 0 is needed")
+    return int(cell)
+
+
+def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
+    """The named cells of each line that holds some, with its number as editors count, from 1."""
+    separator = ""
+    columns: tuple[str, ...] = ()
+    for number, line in read_lines(path, "the list", _LAYOUT):
+        if not separator:
+            bare = re.sub(r'"[^"]*"', "", line)
+            separator = next((mark for mark in ",;\t" if mark in bare), ",")
+        try:
+            cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True))]
+            if not columns:
+                columns, is_header = _columns(cells)
+                if is_header:
+                    continue
+            if len(cells) > len(columns):
+                raise BadRequest(f"{len(cells)} cells where there are {len(columns)} columns; {_LAYOUT}")
+        except (csv.Error, BadRequest) as error:
+            raise BadRequest(f"{path}, line {number}: {error}") from None
+        yield number, dict(zip(columns, cells, strict=False))  # the last may be left out
+
+
+def _columns(cells: list[str]) -> tuple[tuple[str, ...], bool]:
+    """The names of the columns by a list's first line, and whether that is a header."""
+    names = tuple(cell.lower() for cell in cells)
+    if not {"reference", "target"} & set(names):
+        return COLUMNS[:3], False
+    for column in ("reference", "target"):
+        if column not in names:
+            raise BadRequest(f"the header lacks {column}; {_LAYOUT}")
+    for at, name in enumerate(names):
+        if name not in COLUMNS:
+            raise BadRequest(f"the header names a column {cells[at]!r} that is not known; {_LAYOUT}")
+        if name in names[:at]:
+            raise BadRequest(f"the header names the column {name} twice")
+    return names, True

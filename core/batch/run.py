@@ -1,0 +1,356 @@
+"""Many pairs, and clips of two fixed cameras: one after the other, resumable, in shards; one bad pair stops nothing.
+
+A clip has one alignment, one exposure and one seam, found over frames spread evenly through it: every frame gets the
+same map on the same canvas, cut at the same places, so that nothing swims and nothing flickers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..alignment import Alignment, Frame, align
+from ..compose.composition import Decided, pooled_decision
+from ..options import StitchOptions
+from ..output.outputs import json_bytes
+from ..pictures.picture import Picture
+from ..pipeline import StitchResult, Stopwatch, compose, read_frame, stitch
+from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage
+from ..system.progress import Progress
+from .list import BatchItem
+from .units import BatchRequest, Job, Unit, UnitFiles, plan, read_json
+
+SCHEMA = 1
+# What the parts of the work take, in pairs: for the progress only.
+ALIGNMENT_WEIGHT, FRAME_WEIGHT = 3.0, 0.3
+# Exit codes by how much they matter: not to be stitched, a file, what was asked for.
+_EXIT_CODES = (3, 4, 2)
+# What of the report's figures a line about an item tells.
+_FIGURES = {
+    "alignment_median_px": "alignment {:.2f} px", "overlap_psnr_db": "PSNR {:.2f} dB", "overlap_ssim": "SSIM {:.3f}",
+}  # fmt: skip
+Tell = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class FrameTrouble:
+    """Why there is no panorama of a frame."""
+
+    frame: int
+    message: str
+    exit_code: int
+
+
+@dataclass(frozen=True)
+class Frames:
+    """What became of a clip's frames in this shard; missing: numbers that one side or both lack."""
+
+    done: int = 0
+    skipped: int = 0
+    failed: tuple[FrameTrouble, ...] = ()
+    missing: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How an item ended.
+
+    status: "done", "skipped" (it was there) or "failed" (of a clip: any frame); message, exit_code: why, empty and 0
+    where nothing failed; panorama: its path below the folder, of a clip that of its first frame; size: (W, H) px;
+    measured: the report's figures, where there is one.
+    """
+
+    name: str
+    status: str
+    message: str = ""
+    exit_code: int = 0
+    warnings: tuple[str, ...] = ()
+    panorama: str = ""
+    size: tuple[int, int] | None = None
+    measured: dict[str, Any] = field(default_factory=dict)
+    frames: Frames | None = None
+
+    def in_words(self, figures: bool = False) -> str:
+        """A line about it, with the figures that matter most if asked for."""
+        words = [self.status if self.status == "skipped" else "×".join(map(str, self.size or ())) or self.status]
+        if self.frames is not None:
+            words.append(f"{self.frames.done} frames done, {self.frames.skipped} skipped")
+        for name, form in _FIGURES.items():
+            if figures and self.measured.get(name) is not None:
+                words.append(form.format(self.measured[name]))
+        return f"failed: {self.message}" if self.exit_code else ", ".join(words)
+
+
+@dataclass(frozen=True)
+class BatchSummary:
+    """What became of a batch so far: of `total` items those that are through, in order."""
+
+    outcomes: tuple[Outcome, ...]
+    total: int
+    interrupted: bool = False
+
+    @property
+    def exit_code(self) -> int:
+        """0, or the failure's that matters most: 3 before 4 before 2."""
+        return _worst(outcome.exit_code for outcome in self.outcomes)
+
+    def count(self, status: str) -> int:
+        """How many items ended so."""
+        return sum(outcome.status == status for outcome in self.outcomes)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What batch.json holds: no seconds, no dates."""
+        counts = {status: self.count(status) for status in ("done", "skipped", "failed")}
+        return {
+            "schema": SCHEMA, "total": self.total, **counts, "interrupted": self.interrupted,
+            "exit_code": self.exit_code, "items": [asdict(outcome) for outcome in self.outcomes],
+        }  # fmt: skip
+
+
+def run_batch(
+    items: Sequence[BatchItem],
+    options: StitchOptions,
+    request: BatchRequest,
+    progress: Tell | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    finished: Callable[[Outcome, int, int], None] | None = None,
+) -> BatchSummary:
+    """Stitches this shard's items into the request's folder, where a summary of them lies after each.
+
+    progress(what is being done, share of everything) and cancelled() are called between the steps of the work,
+    finished(outcome, its number from 1, their count) after each item. What goes wrong with an item is in its outcome.
+    Raises StitchError before the work (see `plan`), UnwritableOutput where the summary cannot be written. Cancelled
+    and KeyboardInterrupt keep what is finished and leave nothing of what is not.
+    """
+    jobs = plan(items, options, request)
+    weights = [_weight(job) for job in jobs]
+    meter = _Meter(progress, cancelled, sum(weights))
+    outcomes: list[Outcome] = []
+
+    def summed_up(interrupted: bool = False) -> BatchSummary:
+        summary = BatchSummary(tuple(outcomes), len(jobs), interrupted)
+        with UnitFiles(overwrite=True) as files:
+            files.add(request.summary, json_bytes(summary.as_dict()))
+        return summary
+
+    summary = summed_up()
+    try:
+        for number, job in enumerate(jobs, 1):
+            meter.begin(f"[{number}/{len(jobs)}]", sum(weights[: number - 1]))
+            outcomes.append(_outcome(job, meter))
+            summary = summed_up()
+            if finished is not None:
+                finished(outcomes[-1], number, len(jobs))
+    except (KeyboardInterrupt, Cancelled):
+        summed_up(interrupted=True)
+        raise
+    return summary
+
+
+class _Meter:
+    """Turns the progress of each piece of the work into that of all of it."""
+
+    def __init__(self, progress: Tell | None, cancelled: Callable[[], bool] | None, total: float) -> None:
+        self.cancelled = cancelled
+        self._progress, self._total = progress, total
+        self._label, self._done = "", 0.0
+
+    def begin(self, label: str, done: float) -> None:
+        """An item begins, after so much of the total."""
+        self._label, self._done = label, done
+
+    def piece(self, weight: float) -> Tell:
+        """The progress of the next piece of the item, which has this weight in the total."""
+        start = self._done
+        self._done += weight
+
+        def tell(stage: str, share: float) -> None:
+            if self._progress is not None:
+                self._progress(f"{self._label} {stage}", min(1.0, (start + weight * share) / self._total))
+
+        return tell
+
+    def stopwatch(self, weight: float) -> Stopwatch:
+        """The same for work that is done in steps of its own."""
+        return Stopwatch(Progress(self.piece(weight), self.cancelled))
+
+
+def _weight(job: Job) -> float:
+    if job.item.frames is None:
+        return float(len(job.todo))
+    return ALIGNMENT_WEIGHT + FRAME_WEIGHT * (len(job.todo) + len(job.item.aligned_on)) if job.todo else 0.0
+
+
+def _outcome(job: Job, meter: _Meter) -> Outcome:
+    """Does what there is to do for an item. Raises Cancelled only: whatever goes wrong with it stops no other."""
+    try:
+        return _pair(job, meter) if job.item.frames is None else _clip(job, meter)
+    except Cancelled:
+        raise
+    except Exception as error:
+        code, message = _trouble(error)
+        frames = None if job.item.frames is None else Frames(missing=job.item.missing)
+        return Outcome(job.item.name, "failed", message, code, frames=frames)
+
+
+def _trouble(error: Exception) -> tuple[int, str]:
+    """Exit code and message."""
+    if isinstance(error, StitchError):
+        return error.exit_code, str(error)
+    if isinstance(error, MemoryError):
+        return StitchError.exit_code, "not enough memory for pictures of this size; use smaller ones"
+    return StitchError.exit_code, f"internal error, please report it: {type(error).__name__}: {error}"
+
+
+def _worst(codes: Iterable[int]) -> int:
+    found = set(codes)
+    return next((code for code in _EXIT_CODES if code in found), 0)
+
+
+def _pair(job: Job, meter: _Meter) -> Outcome:
+    for unit in job.todo:
+        unit.write(stitch(*unit.pictures, unit.options, meter.piece(1.0), meter.cancelled))
+    return _with_report(job, Outcome(job.item.name, "done" if job.todo else "skipped"))
+
+
+def _with_report(job: Job, outcome: Outcome) -> Outcome:
+    """The outcome with what the item's report says; another shard's report may be yet to come."""
+    for unit in job.units:
+        if unit.panorama is not None:
+            outcome = replace(outcome, panorama=unit.panorama.relative_to(unit.request.folder).as_posix())
+            break
+    report = next((read_json(unit.report) for unit in job.units if unit.report), {})
+    if report:
+        canvas, warnings = report["canvas"], dict.fromkeys((*report["warnings"], *outcome.warnings))
+        size = canvas["width"], canvas["height"]
+        outcome = replace(outcome, size=size, measured=report["measured"], warnings=tuple(warnings))
+    return outcome
+
+
+@dataclass(frozen=True)
+class _Locked:
+    """What all frames of a clip share: alignment, exposure and seam, full sizes of the pictures, options with the crop
+    settled."""
+
+    alignment: Alignment
+    decided: Decided
+    sizes: tuple[tuple[int, int], tuple[int, int]]
+    options: StitchOptions
+
+
+def _clip(job: Job, meter: _Meter) -> Outcome:
+    item = job.item
+    if not item.frames:
+        raise UnreadableImage(f"no frame of {item.reference} has its like in {item.target}; check names and numbers")
+    warnings: dict[str, None] = {}
+    if item.missing:
+        warnings[f"frames {_listed(item.missing)} are missing on one side or both and were left out"] = None
+    failed: list[FrameTrouble] = []
+    frames = [unit for unit in job.todo if unit.frame is not None]
+    if job.todo:
+        locked = _lock(job, meter)
+    size = None
+    for unit in frames:
+        try:
+            size, more = _frame(unit, locked, meter.stopwatch(FRAME_WEIGHT))
+            warnings |= dict.fromkeys(more)
+        except Cancelled:
+            raise
+        except Exception as error:
+            code, message = _trouble(error)
+            failed.append(FrameTrouble(unit.frame or 0, message, code))
+    count = sum(unit.frame is not None for unit in job.units)
+    outcome = Outcome(
+        item.name,
+        "failed" if failed else "done" if job.todo else "skipped",
+        f"{len(failed)} of {count} frames; frame {failed[0].frame}: {failed[0].message}" if failed else "",
+        _worst(trouble.exit_code for trouble in failed),
+        tuple(warnings),
+        size=size,
+        frames=Frames(len(frames) - len(failed), count - len(frames), tuple(failed), item.missing),
+    )
+    return _with_report(job, outcome)
+
+
+def _lock(job: Job, meter: _Meter) -> _Locked:
+    """What the frames of a clip share; also writes its report, where that is due, from the first frame it was taken
+    from."""
+    item, options, steps = job.item, job.options, meter.stopwatch(ALIGNMENT_WEIGHT)
+    used = _readable(item, options, steps)
+    shown = next(iter(used))
+    sizes = used[shown].full_sizes
+    alignment = align(list(used.values()), options, steps)
+    quick = replace(options, crop="full", measure=False)
+    decided = pooled_decision([
+        compose(
+            read_frame(*item.pair(number), options), alignment, quick, meter.stopwatch(FRAME_WEIGHT), keep=True
+        ).decided
+        for number in used
+    ])
+    reports = [unit for unit in job.todo if unit.frame is None]
+    crop = options.crop
+    if reports or crop == "inscribed":
+        frame = read_frame(*item.pair(shown), options)
+        result = compose(frame, alignment, options, meter.stopwatch(FRAME_WEIGHT), decided)
+        if crop == "inscribed":  # what one frame shows decides for all: the frames of a clip have one size
+            whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
+            crop = (x - left - whole[0], y - top - whole[1], result.canvas.width, result.canvas.height)
+        about = {"frames": list(item.frames or ()), "aligned_on": list(used), "shown": shown}
+        for unit in reports:
+            unit.write(replace(result, report={**result.report, "clip": about}))
+    return _Locked(alignment, decided, sizes, replace(options, crop=crop, measure=False))
+
+
+def _readable(item: BatchItem, options: StitchOptions, steps: Stopwatch) -> dict[int, Frame]:
+    """The frames that a clip is aligned on, as far as they can be read and have the size of the first of them."""
+    used: dict[int, Frame] = {}
+    troubles: list[StitchError] = []
+    for at, number in enumerate(item.aligned_on):
+        steps("read", at / len(item.aligned_on))
+        try:
+            frame = _without_light(read_frame(*item.pair(number), options))
+        except StitchError as trouble:  # told again when it is the frame's turn
+            troubles.append(trouble)
+            continue
+        if not used or frame.full_sizes == next(iter(used.values())).full_sizes:
+            used[number] = frame
+    if not used:
+        frames = _listed(item.aligned_on)
+        raise type(troubles[0])(f"none of the frames {frames} can be used to align the clip: {troubles[0]}")
+    return used
+
+
+def _without_light(frame: Frame) -> Frame:
+    """The frame without its float pixels, most of its memory: alignment looks at the views only."""
+
+    def bare(picture: Picture) -> Picture:
+        return replace(picture, light=np.broadcast_to(np.float32(np.nan), picture.light.shape))
+
+    return replace(frame, reference=bare(frame.reference), target=bare(frame.target))
+
+
+def _frame(unit: Unit, locked: _Locked, steps: Stopwatch) -> tuple[tuple[int, int], list[str]]:
+    """Stitches one frame; returns the panorama's (W, H) and warnings."""
+    steps("read")
+    frame = read_frame(*unit.pictures, locked.options)
+    if frame.full_sizes != locked.sizes:
+        found, needed = (" and ".join(f"{w}×{h}" for w, h in sizes) for sizes in (frame.full_sizes, locked.sizes))
+        raise BadRequest(f"the pictures have {found} pixels, the clip {needed}: one alignment is for one camera each")
+    result: StitchResult = compose(frame, locked.alignment, locked.options, steps, locked.decided)
+    height, width = result.panorama.alpha.shape
+    return (width, height), unit.write(result)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """Numbers in words, runs shortened: 3, 7–9."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1][1:] = [number]
+        else:
+            runs.append([number])
+    words = ["–".join(map(str, run)) for run in runs]
+    return ", ".join(words[:10]) + (", …" if len(words) > 10 else "")

@@ -1,0 +1,66 @@
+"""One picture's camera as it is known before matching."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Where the axis meets the sensor is not its middle: about so far off, in units of the longer side.
+PRINCIPAL_SIGMA = 0.01
+# Beliefs, as standard deviations of log f. Phone makers round and measure before distortion correction: 2-7 % off seen.
+EXIF_SIGMA, CROPPED_SIGMA, ASSUMED_SIGMA = 0.05, 0.2, 0.4
+
+
+@dataclass(frozen=True)
+class Camera:
+    """One picture's camera as known before matching.
+
+    K (3, 3) px with integer pixel centres; size (W, H) px; source in words; log_sigma: standard deviation of log f
+    (0: fixed); distortion (5,) OpenCV's k1, k2, p1, p2, k3; pose (R, t) world to camera, where given; principal_sigma:
+    standard deviation of the principal point in units of the longer side (0: fixed).
+    """
+
+    K: NDArray[np.float64]
+    size: tuple[int, int]
+    source: str
+    log_sigma: float
+    distortion: NDArray[np.float64] = field(default_factory=lambda: np.zeros(5))
+    pose: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    principal_sigma: float = 0.0
+
+    @property
+    def focal(self) -> float:
+        """Horizontal focal length in px."""
+        return float(self.K[0, 0])
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the focal length may not be changed by the matches."""
+        return self.log_sigma == 0
+
+    @property
+    def assumed(self) -> bool:
+        """Whether nothing was known of the focal length."""
+        return self.log_sigma == ASSUMED_SIGMA
+
+    def scaled(self, factor: float) -> NDArray[np.float64]:
+        """K with its focal length times `factor`."""
+        return zoomed(self.K, factor)
+
+    def resized(self, size: tuple[int, int]) -> Camera:
+        """The camera of its picture resized to (W, H) px."""
+        factor = np.array(size) / np.array(self.size)
+        K = self.K.copy()
+        K[:2] *= factor[:, None]
+        K[:2, 2] += (factor - 1) / 2  # pixel centres are integers: the corner lies at −½
+        return replace(self, K=K, size=size)
+
+
+def zoomed(K: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+    """K (3, 3) with its focal length times `factor`."""
+    out = K.copy()
+    out[0, 0] *= factor
+    out[1, 1] *= factor
+    return out

@@ -1,0 +1,86 @@
+"""Lens distortion in OpenCV's five-parameter form, made safe outside the picture.
+
+x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + tangential terms (Brown 1971). A polynomial says nothing beyond the radius it was
+fitted on and may fold back into the picture there; past the trusted radius its displacement is carried on in proportion
+to the radius.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..raster.arrays import Array
+from .camera import Camera
+
+
+def distort(points: Array, camera: Camera) -> Array:
+    """Ideal pixels (…, 2) to raw pixels of the camera's picture."""
+    if not camera.distortion.any():
+        return points
+    ideal = _normalised(points, camera)
+    return _pixels(_distorted(ideal, camera.distortion, _trusted_radius(camera)), camera)
+
+
+def undistort(points: Array, camera: Camera) -> Array:
+    """Raw pixels (…, 2) to ideal pixels: the inverse of `distort`, by fixed-point iteration with Newton's safeguard."""
+    if not camera.distortion.any():
+        return points
+    raw = _normalised(points, camera)
+    limit = _trusted_radius(camera)
+    ideal = raw.copy()
+    for _ in range(60):
+        # where the lens stretches by more than 1, a full step would overshoot for ever
+        step = (raw - _distorted(ideal, camera.distortion, limit)) / np.maximum(1.0, _stretch(ideal, camera, limit))
+        ideal += step
+        if np.nanmax(np.abs(step), initial=0.0) < 1e-12:
+            break
+    return _pixels(ideal, camera)
+
+
+def _stretch(ideal: Array, camera: Camera, limit: float) -> Array:
+    """Derivative (…, 1) of the raw radius by the ideal one."""
+    k1, k2, _, _, k3 = camera.distortion
+    radius = np.sqrt((ideal**2).sum(axis=-1, keepdims=True))
+    r2 = np.minimum(radius, limit) ** 2
+    inner = 1 + 3 * k1 * r2 + 5 * k2 * r2**2 + 7 * k3 * r2**3
+    outer = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+    return np.where(radius < limit, inner, outer)
+
+
+def _trusted_radius(camera: Camera) -> float:
+    """The largest ideal normalised radius where the radial polynomial still grows by half of an ideal lens, up to where
+    its raw radius is 1.2 × the corner's."""
+    width, height = camera.size
+    corners = _normalised(np.array([[0.0, 0], [width, 0], [0, height], [width, height]]), camera)
+    reach = 1.2 * float(np.hypot(corners[:, 0], corners[:, 1]).max())
+    r = np.linspace(0, 3 * reach, 1200)  # while the slope is at least a half, twice `reach` is as far as it takes
+    k1, k2, _, _, k3 = camera.distortion
+    slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
+    raw = r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+    return float(r[int(np.argmax((slope < 0.5) | (raw > reach)))])
+
+
+def _distorted(ideal: Array, distortion: Array, limit: float) -> Array:
+    k1, k2, p1, p2, k3 = distortion
+    radius = np.sqrt((ideal**2).sum(axis=-1, keepdims=True))
+    inward = np.minimum(1.0, limit / np.maximum(radius, 1e-12))
+    p = ideal * inward
+    x, y = p[..., :1], p[..., 1:]
+    r2 = x * x + y * y
+    radial = k1 * r2 + k2 * r2**2 + k3 * r2**3
+    dx = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    dy = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    return ideal + np.concatenate([dx, dy], axis=-1) / inward
+
+
+def _normalised(points: Array, camera: Camera) -> Array:
+    K = camera.K
+    y = (points[..., 1] - K[1, 2]) / K[1, 1]
+    x = (points[..., 0] - K[0, 2] - K[0, 1] * y) / K[0, 0]
+    return np.stack([x, y], axis=-1)
+
+
+def _pixels(normalised: Array, camera: Camera) -> Array:
+    K = camera.K
+    x, y = normalised[..., 0], normalised[..., 1]
+    return np.stack([K[0, 0] * x + K[0, 1] * y + K[0, 2], K[1, 1] * y + K[1, 2]], axis=-1)

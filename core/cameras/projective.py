@@ -1,0 +1,117 @@
+"""The two-view formulas everything else stands on: F, H_inf, the epipole, distances, cheirality.
+
+Convention, everywhere: pixel centres are integers; the target camera sees a world point X of the reference camera's
+frame at R X + t; x' is a target pixel, x a reference pixel; x'ᵀ F x = 0. Source of the formulas: Hartley and Zisserman,
+Multiple View Geometry, 2nd ed., chapters 9 (F, epipoles, pose from E), 11.4 (Sampson distance) and 13.1 (H_inf).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..raster.arrays import Array
+
+
+def homogeneous(points: NDArray) -> Array:
+    """(…, 2) points as (…, 3) with a one behind."""
+    points = np.asarray(points, np.float64)
+    return np.concatenate([points, np.ones((*points.shape[:-1], 1))], axis=-1)
+
+
+def project(rays: Array) -> Array:
+    """π(a, b, c) = (a/c, b/c) of (…, 3) vectors; the caller looks after c > 0."""
+    return rays[..., :2] / rays[..., 2:]
+
+
+def normalisation(points: Array) -> Array:
+    """The similarity (3, 3) that moves points to mean 0 and mean distance √2 (H&Z 4.4.4)."""
+    centre = points.mean(axis=0)
+    scale = np.sqrt(2) / max(float(np.linalg.norm(points - centre, axis=1).mean()), 1e-12)
+    return np.array([[scale, 0, -scale * centre[0]], [0, scale, -scale * centre[1]], [0, 0, 1.0]])
+
+
+def skew(v: Array) -> Array:
+    """The matrix [v]ₓ with [v]ₓ w = v × w."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def rotation_from_vector(omega: Array) -> Array:
+    """Rodrigues' formula: rotation vector in radians (3,) to a rotation matrix (3, 3)."""
+    angle = float(np.linalg.norm(omega))
+    if angle < 1e-12:
+        return np.eye(3) + skew(omega)
+    axis = skew(omega / angle)
+    return np.eye(3) + np.sin(angle) * axis + (1 - np.cos(angle)) * axis @ axis
+
+
+def rotation_angle(R1: Array, R2: Array) -> float:
+    """Angle between two rotations in degrees; 2·asin form, exact to rounding for small angles."""
+    return float(np.degrees(2 * np.arcsin(min(1.0, np.linalg.norm(R1 - R2) / (2 * np.sqrt(2))))))
+
+
+def inverse_intrinsics(K: Array) -> Array:
+    """K⁻¹ of [[fx, s, cx], [0, fy, cy], [0, 0, 1]], written out: a refinement asks for it thousands of times."""
+    fx, s, cx, fy, cy = K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2]
+    return np.array([[1 / fx, -s / (fx * fy), (s * cy - cx * fy) / (fx * fy)], [0, 1 / fy, -cy / fy], [0, 0, 1]])
+
+
+def infinite_homography(K: Array, K_prime: Array, R: Array) -> Array:
+    """H_inf = K' R K⁻¹, sign kept, so that H_inf p has a positive third part in front of the target camera."""
+    return K_prime @ R @ inverse_intrinsics(K)
+
+
+def fundamental_from_pose(K: Array, K_prime: Array, R: Array, t: Array) -> Array:
+    """F = K'⁻ᵀ [t]ₓ R K⁻¹, scaled to Frobenius norm 1."""
+    F = inverse_intrinsics(K_prime).T @ skew(t) @ R @ inverse_intrinsics(K)
+    return F / np.linalg.norm(F)
+
+
+def sampson_residuals(F: Array, x: Array, y: Array) -> Array:
+    """Signed first-order distance in px of matches x ↔ y (N, 2) from satisfying yᵀ F x = 0 (H&Z eq. 11.9, rooted)."""
+    line_y, line_x, algebraic = _lines(F, x, y)
+    gradient = line_y[:, 0] ** 2 + line_y[:, 1] ** 2 + line_x[:, 0] ** 2 + line_x[:, 1] ** 2
+    return algebraic / np.sqrt(np.maximum(gradient, 1e-300))
+
+
+def distance_to_line(F: Array, x: NDArray, y: NDArray) -> Array:
+    """Distance in px of each target point y from the epipolar line F x of its reference point x."""
+    line_y, _, algebraic = _lines(F, x, y)
+    return np.abs(algebraic) / np.maximum(np.hypot(line_y[:, 0], line_y[:, 1]), 1e-300)
+
+
+def _lines(F: Array, x: NDArray, y: NDArray) -> tuple[Array, Array, Array]:
+    a, b = homogeneous(x), homogeneous(y)
+    line_y, line_x = a @ F.T, b @ F
+    return line_y, line_x, np.sum(b * line_y, axis=1)
+
+
+def poses_from_fundamental(F: Array, K: Array, K_prime: Array) -> list[tuple[Array, Array]]:
+    """The four (R, t) of E = K'ᵀ F K (H&Z result 9.19), |t| = 1; `most_in_front` picks among them."""
+    U, _, Vt = np.linalg.svd(K_prime.T @ F @ K)
+    U *= np.sign(np.linalg.det(U))
+    Vt *= np.sign(np.linalg.det(Vt))
+    W = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    t = U[:, 2]
+    return [(R, sign * t) for R in (U @ W @ Vt, U @ W.T @ Vt) for sign in (1.0, -1.0)]
+
+
+def in_front(K: Array, K_prime: Array, R: Array, t: Array, x: Array, y: Array, slack: float = 0.0) -> NDArray[np.bool_]:
+    """Which matches (N, 2) triangulate in front of both cameras.
+
+    Depths along both rays from the closest points of the two rays, r the reference ray and r' the target ray; `slack`
+    is the sine of the parallax angle below which a point counts as infinitely far, hence in front, if its rays agree in
+    direction.
+    """
+    ray = homogeneous(x) @ inverse_intrinsics(K).T
+    ray_prime = homogeneous(y) @ inverse_intrinsics(K_prime).T
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    ray_prime /= np.linalg.norm(ray_prime, axis=1, keepdims=True)
+    turned = ray @ R.T
+    cosine = np.sum(turned * ray_prime, axis=1)
+    along, along_prime = turned @ t, ray_prime @ t
+    # Z turned + t = Z' r' in least squares: both depths times (1 − cos²)
+    depth = cosine * along_prime - along
+    depth_prime = along_prime - cosine * along
+    far = (1 - cosine**2 < slack**2) & (cosine > 0)
+    return far | ((depth > 0) & (depth_prime > 0))

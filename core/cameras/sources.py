@@ -1,0 +1,212 @@
+"""Where intrinsics come from: given, a camera file, EXIF, or an assumption; and how far to believe them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..system.errors import BadRequest, UnreadableImage
+from .camera import ASSUMED_SIGMA, CROPPED_SIGMA, EXIF_SIGMA, PRINCIPAL_SIGMA, Camera
+from .sensors import sensor_diagonal
+
+if TYPE_CHECKING:
+    from ..pictures.metadata import Exif
+
+# Diagonal of the 36 × 24 mm frame that "35 mm equivalent" refers to.
+FULL_FRAME_DIAGONAL = float(np.hypot(36.0, 24.0))
+
+
+@dataclass(frozen=True)
+class CameraRequest:
+    """What the user said about the cameras; one value serves both pictures, two are reference and target.
+
+    focal_px, focal_mm with sensor_mm (sensor width), focal35; principal (x, y) or (x, y, x', y') px; cameras: a camera
+    file's path or its content (see `read_camera_file`).
+    """
+
+    focal_px: tuple[float, ...] = ()
+    focal_mm: tuple[float, ...] = ()
+    sensor_mm: tuple[float, ...] = ()
+    focal35: tuple[float, ...] = ()
+    principal: tuple[float, ...] = ()
+    cameras: str | Path | dict[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        ways = [self.focal_px, self.focal_mm, self.focal35, (self.cameras,) if self.cameras is not None else ()]
+        if sum(bool(way) for way in ways) > 1:
+            raise BadRequest(
+                "give the focal length one way only: px, mm with sensor width, 35 mm equivalent, or a camera file"
+            )
+        if bool(self.focal_mm) != bool(self.sensor_mm):
+            raise BadRequest(
+                "--focal-mm and --sensor-mm go together: the focal length and the sensor's width, both in mm"
+            )
+        for name, values in (
+            ("focal length", (*self.focal_px, *self.focal_mm, *self.focal35)),
+            ("sensor width", self.sensor_mm),
+        ):
+            if any(not np.isfinite(v) or v <= 0 for v in values):
+                raise BadRequest(f"a {name} must be a number above 0")
+        if any(len(v) > 2 for v in (self.focal_px, self.focal_mm, self.sensor_mm, self.focal35)):
+            raise BadRequest("give one focal length for both pictures, or two: reference,target")
+        if len(self.principal) not in (0, 2, 4) or not np.isfinite(self.principal).all():
+            raise BadRequest("--principal takes X,Y for both pictures or X,Y,X2,Y2")
+
+
+def cameras_for(
+    request: CameraRequest,
+    names: tuple[str, str],
+    sizes: tuple[tuple[int, int], tuple[int, int]],
+    exifs: tuple[Exif, Exif],
+) -> tuple[tuple[Camera, Camera], list[str]]:
+    """Both pictures' cameras by DESIGN 4's order, and warnings about what contradicts itself.
+
+    names: as a camera file would call the pictures; sizes: (W, H) px after orientation was applied. Raises BadRequest.
+    """
+    warnings: list[str] = []
+    if request.cameras is not None:
+        first, second = read_camera_file(request.cameras, names, sizes)
+    else:
+        first, second = (_one_camera(request, i, sizes[i], exifs[i], warnings) for i in (0, 1))
+        if first.assumed != second.assumed:  # one lens took both pictures more often than not
+            known, unknown = (second, first) if first.assumed else (first, second)
+            guess = known.focal * max(unknown.size) / max(known.size)
+            borrowed = _camera(guess, unknown.size, f"the other picture ({known.source})", CROPPED_SIGMA)
+            first, second = (borrowed, second) if first.assumed else (first, borrowed)
+    if request.principal:
+        values = (*request.principal, *request.principal)[:4]
+        first, second = (_with_principal_point(c, values[2 * i : 2 * i + 2]) for i, c in enumerate((first, second)))
+    return (first, second), warnings
+
+
+def _one_camera(request: CameraRequest, index: int, size: tuple[int, int], exif: Exif, warnings: list[str]) -> Camera:
+    def pick(values: tuple[float, ...]) -> float:
+        return values[min(index, len(values) - 1)]
+
+    if request.focal_px:
+        return _camera(pick(request.focal_px), size, "given in px", 0.0)
+    if request.focal_mm:
+        # the sensor's width lies along the picture's longer side, however the camera was turned
+        return _camera(pick(request.focal_mm) / pick(request.sensor_mm) * max(size), size, "given in mm", 0.0)
+    if request.focal35:
+        return _camera(_from_35mm(pick(request.focal35), size), size, "given as 35 mm equivalent", 0.0)
+    return _from_exif(exif, size, ("reference", "target")[index], warnings)
+
+
+def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]) -> Camera:
+    """EXIF's 35 mm equivalent, else its focal length with the sensor's size, else 0.9·max(W, H)."""
+    found: list[tuple[float, str]] = []
+    if exif.focal35_mm:
+        found.append((_from_35mm(exif.focal35_mm, size), "EXIF 35 mm equivalent"))
+    diagonal = sensor_diagonal(exif.make, exif.model)
+    if exif.focal_mm and diagonal:
+        found.append((exif.focal_mm / diagonal * float(np.hypot(*size)), "EXIF focal length and sensor table"))
+    if exif.focal_mm and exif.focal_plane_x_per_mm and exif.width and exif.height:
+        shrink = max(size) / max(exif.width, exif.height)
+        found.append((exif.focal_mm * exif.focal_plane_x_per_mm * shrink, "EXIF focal length and sensor resolution"))
+    found = [(f, source) for f, source in found if 0.2 * max(size) < f < 50 * max(size)]
+    if not found:
+        return _camera(0.9 * max(size), size, "assumed (0.9 × the longer side)", ASSUMED_SIGMA)
+    focal, source = found[0]
+    for other, other_source in found[1:]:
+        if abs(np.log(other / focal)) > 0.15:
+            warnings.append(
+                f"the {name}'s EXIF contradicts itself: {focal:.0f} px by {source}, {other:.0f} px by "
+                f"{other_source}; the first is used"
+            )
+    sigma = EXIF_SIGMA
+    if exif.width and exif.height:
+        aspect, original = max(size) / min(size), max(exif.width, exif.height) / min(exif.width, exif.height)
+        if abs(np.log(aspect / original)) > 0.03:
+            sigma = CROPPED_SIGMA
+            warnings.append(
+                f"the {name} was cropped since it was taken ({exif.width}×{exif.height} in EXIF, {size[0]}×{size[1]} "
+                "now): its EXIF focal "
+                "length is only a hint; give the focal length if you know it"
+            )
+    return _camera(focal, size, source, sigma)
+
+
+def _from_35mm(focal35: float, size: tuple[int, int]) -> float:
+    return focal35 * float(np.hypot(*size)) / FULL_FRAME_DIAGONAL
+
+
+def _camera(focal: float, size: tuple[int, int], source: str, log_sigma: float) -> Camera:
+    K = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1.0]])
+    return Camera(K, size, source, log_sigma, principal_sigma=PRINCIPAL_SIGMA)
+
+
+def _with_principal_point(camera: Camera, principal: tuple[float, ...]) -> Camera:
+    K = camera.K.copy()
+    K[:2, 2] = principal
+    return replace(camera, K=K, principal_sigma=0.0)
+
+
+def read_camera_file(
+    source: str | Path | dict[str, Any], names: tuple[str, str], sizes: tuple[tuple[int, int], tuple[int, int]]
+) -> tuple[Camera, Camera]:
+    """Cameras of the two pictures from a JSON file or its content.
+
+    Layout: {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "R": 3×3?, "t": [3]?}}} with NAME the
+    picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes, integer pixel centres. Raises
+    BadRequest (content), UnreadableImage (file).
+    """
+    if not isinstance(source, dict):
+        try:
+            source = json.loads(Path(source).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise UnreadableImage(f"the camera file cannot be read: {error}") from error
+        except (ValueError, RecursionError) as error:
+            raise BadRequest(f"the camera file is not JSON: {error}") from error
+    table = source.get("cameras", source) if isinstance(source, dict) else None
+    if not isinstance(table, dict):
+        raise BadRequest('a camera file holds {"cameras": {"NAME": {"K": [[…]], "R": [[…]], "t": […]}}}')
+    out = []
+    for name, role, size in zip(names, ("reference", "target"), sizes, strict=True):
+        entry = table.get(name, table.get(role))
+        if not isinstance(entry, dict):
+            raise BadRequest(
+                f"the camera file has no camera named {name!r} or {role!r}; it has: {', '.join(map(str, table))}"
+            )
+        out.append(_camera_from_entry(entry, name, size))
+    if (out[0].pose is None) != (out[1].pose is None):
+        raise BadRequest("the camera file gives R and t for one picture only: give both or neither")
+    return out[0], out[1]
+
+
+def _camera_from_entry(entry: dict[str, Any], name: str, size: tuple[int, int]) -> Camera:
+    K = _matrix(entry, "K", (3, 3), name)
+    if not (K[0, 0] > 0 and K[1, 1] > 0 and np.allclose(K[2], (0, 0, 1)) and K[1, 0] == 0):
+        raise BadRequest(f"the camera of {name}: K must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with fx, fy above 0")
+    distortion = np.zeros(5)
+    if entry.get("distortion") is not None:
+        try:
+            values = np.asarray(entry["distortion"], np.float64).ravel()
+        except (TypeError, ValueError):
+            values = np.full(1, np.nan)
+        if len(values) > 5 or not np.isfinite(values).all():
+            raise BadRequest(f"the camera of {name}: distortion is at most k1, k2, p1, p2, k3")
+        distortion[: len(values)] = values
+    pose = None
+    if entry.get("R") is not None or entry.get("t") is not None:
+        R, t = _matrix(entry, "R", (3, 3), name), _matrix(entry, "t", (3,), name)
+        U, S, Vt = np.linalg.svd(R)
+        if np.abs(S - 1).max() > 1e-3 or np.linalg.det(R) < 0:
+            raise BadRequest(f"the camera of {name}: R is not a rotation matrix")
+        pose = (U @ Vt, t)  # files carry six digits: the nearest true rotation
+    return Camera(K, size, "camera file", 0.0, distortion, pose)
+
+
+def _matrix(entry: dict[str, Any], key: str, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
+    try:
+        value = np.asarray(entry[key], np.float64)
+    except (KeyError, TypeError, ValueError):
+        value = np.empty(0)
+    if value.shape != shape or not np.isfinite(value).all():
+        raise BadRequest(f"the camera of {name}: {key} must be {'×'.join(map(str, shape))} numbers")
+    return value

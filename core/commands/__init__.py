@@ -1,0 +1,4 @@
+"""The command line and the worker process that Blender starts.
+
+May import everything in core.
+"""

@@ -1,0 +1,176 @@
+"""The options of the command line that say how a pair is stitched, and what they become."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..choices import BLENDS, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS
+
+if TYPE_CHECKING:
+    from ..options import StitchOptions
+
+
+
+def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> None:
+    """Adds everything that decides about a panorama; where files go is each command's own, as is `--field` where one
+    command stitches with several."""
+    camera = parser.add_argument_group(
+        "cameras", "One value serves both pictures; two are for REF,TARGET. Without any: EXIF, or an estimate."
+    )
+    camera.add_argument("--focal-px", type=_numbers, default=(), metavar="F[,F2]", help="focal length in pixels")
+    camera.add_argument(
+        "--focal-mm", type=_numbers, default=(), metavar="F[,F2]", help="focal length in mm (with --sensor-mm)"
+    )
+    camera.add_argument(
+        "--sensor-mm",
+        type=_numbers,
+        default=(),
+        metavar="W[,W2]",
+        help="width of the sensor in mm, along the longer side",
+    )
+    camera.add_argument("--focal35", type=_numbers, default=(), metavar="F[,F2]", help="35 mm equivalent focal length")
+    camera.add_argument(
+        "--principal",
+        type=_numbers,
+        default=(),
+        metavar="X,Y[,X2,Y2]",
+        help="principal point in pixels (default: the middle)",
+    )
+    camera.add_argument(
+        "--cameras", type=Path, metavar="FILE.json", help="per picture K, optionally distortion, R and t"
+    )
+
+    control = parser.add_argument_group("control")
+    control.add_argument(
+        "--matches", type=Path, metavar="FILE.csv", help="x,y,x2,y2[,weight] in px: used as given, nothing is searched"
+    )
+    control.add_argument(
+        "--ignore-ref", type=Path, metavar="MASK", help="a picture, white where REF is to be ignored altogether"
+    )
+    control.add_argument("--ignore-target", type=Path, metavar="MASK", help="the same for TARGET")
+    control.add_argument(
+        "--scale", type=float, default=1.0, metavar="S", help="resize both pictures by S ≤ 1 first, for a fast preview"
+    )
+    control.add_argument(
+        "--crop", default="full", metavar="CROP",
+        help="full (default), inscribed (the largest full rectangle), reference (its frame), or X,Y,W,H in px",
+    )  # fmt: skip
+
+    how = parser.add_argument_group("how")
+    if with_field:
+        how.add_argument(
+            "--field",
+            default="slack",
+            type=_choice(FIELDS),
+            metavar="FIELD",
+            help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), "
+            "paper, or one that knows no depth: rew, apap, homography",
+        )
+    how.add_argument(
+        "--fade",
+        default="plane",
+        type=_choice(FADES),
+        metavar="FADE",
+        help="what it fades to outside the overlap: plane (default; the one that carries on beyond the border) or "
+        "infinity",
+    )
+    how.add_argument(
+        "--dense",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
+    )
+    how.add_argument(
+        "--projection",
+        default="perspective",
+        type=_choice(PROJECTIONS),
+        metavar="PROJECTION",
+        help="perspective (default: REF keeps every pixel), cylindrical, or equirectangular (the whole sphere)",
+    )
+    how.add_argument(
+        "--level",
+        default="auto",
+        metavar="LEVEL",
+        help="of the other two: auto (default: the horizon by how the cameras were held), none, or YAW,PITCH,ROLL of "
+        "REF in degrees (right, up, clockwise); write --level=-5,0,0 where it begins with a minus",
+    )
+    how.add_argument(
+        "--blend",
+        default="multiband",
+        type=_choice(BLENDS),
+        metavar="BLEND",
+        help="multiband (default: light evened out across the seam, detail cut), feather, or linear (plain average)",
+    )
+    how.add_argument(
+        "--seam", default="graphcut", type=_choice(SEAMS), metavar="SEAM",
+        help="graphcut (default: where the pictures look most alike) or none (midway between their borders)",
+    )  # fmt: skip
+    how.add_argument(
+        "--mask", type=Path, metavar="MASK",
+        help="painted over the whole panorama: black from REF, white from TARGET, gray or transparent: the seam's",
+    )  # fmt: skip
+    how.add_argument(
+        "--exposure", action=argparse.BooleanOptionalAction, default=True,
+        help="match TARGET's exposure and white balance to REF's (default)",
+    )  # fmt: skip
+    how.add_argument(
+        "--holes", default="transparent", type=_choice(HOLES), metavar="HOLES",
+        help="what neither camera saw behind something near: transparent (default) or inpaint (filled smoothly)",
+    )  # fmt: skip
+    how.add_argument(
+        "--cache", action=argparse.BooleanOptionalAction, default=True,
+        help="keep features, geometry and field for the next stitch of the same pictures (default; EDF_CACHE: where)",
+    )  # fmt: skip
+    how.add_argument("--seed", type=int, default=0, metavar="N", help="seed of every random choice (default 0)")
+
+
+def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
+    """What the parsed arguments ask for. Raises BadRequest."""
+    from ..cameras.sources import CameraRequest
+    from ..compose.crop import parse_crop
+    from ..options import StitchOptions
+    from ..panorama.levelling import parse_level
+    from ..system.cache import default_folder
+
+    return StitchOptions(
+        field=getattr(args, "field", "slack"),
+        fade=args.fade,
+        camera=CameraRequest(
+            args.focal_px, args.focal_mm, args.sensor_mm, args.focal35, args.principal, args.cameras
+        ),
+        matches=args.matches,
+        ignore_reference=args.ignore_ref,
+        ignore_target=args.ignore_target,
+        projection=args.projection,
+        level=parse_level(args.level),
+        scale=args.scale,
+        crop=parse_crop(args.crop),
+        dense=args.dense,
+        blend=args.blend,
+        seam=args.seam,
+        mask=args.mask,
+        exposure=args.exposure,
+        holes=args.holes,
+        seed=args.seed,
+        measure=measure,
+        cache=default_folder() if args.cache else None,
+    )
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 1200 or 1200,1180") from None
+
+
+def _choice(known: tuple[str, ...]) -> Callable[[str], str]:
+    def parse(text: str) -> str:
+        if text not in known:
+            raise argparse.ArgumentTypeError(f"{text!r} is not known; choose from: {', '.join(known)}")
+        return text
+
+    return parse

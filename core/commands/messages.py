@@ -1,0 +1,78 @@
+"""What the command line says on stderr: a summary, warnings, and how far the work is."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+# Of one item; every frame of a clip may have its own.
+_MOST_WARNINGS = 5
+
+
+def say(line: str) -> None:
+    """A line on stderr, above the bar where there is one."""
+    if sys.stderr.isatty():
+        from tqdm import tqdm
+
+        tqdm.write(line, file=sys.stderr)
+    else:
+        print(line, file=sys.stderr, flush=True)
+
+
+def print_summary(report: dict, seconds: dict[str, float]) -> None:
+    view, field, measured = report["two_view"], report["field"], report["measured"]
+    focal = ", ".join(f"{value:.1f}" for value in view["focal_px"])
+
+    def said(value: float | None, form: str) -> str:
+        return "-" if value is None else format(value, form)
+
+    lines = [
+        f"{view['model']}: {view['why']}",
+        f"focal length {focal} px ({view['focal_source']}; ± {said(view['focal_deviation'], '.1%')}, at infinity ± "
+        f"{said(view['h_inf_spread_px'], '.1f')} px)",
+        f"field {field['kind']}: {field['centres']} points, {field['pruned']} left out, λ {field['smoothing']:.1e}",
+        f"alignment {said(measured['alignment_median_px'], '.2f')} px (median), "
+        f"{said(measured['alignment_p95_px'], '.2f')} px (95 %), {said(measured['off_line_mean_px'], '.2f')} px off "
+        "their lines (mean)",
+        f"held out: {said(measured['held_out_rms_px'], '.2f')} px (RMS of five folds), "
+        f"{said(measured['held_out_towards_rms_px'], '.2f')} px towards the part only the target shows",
+        f"projectivity {said(measured['projectivity_own_px'], '.2f')} px, by an independent F "
+        f"{said(measured['projectivity_independent_px'], '.2f')} px",
+        f"overlap PSNR {said(measured['overlap_psnr_db'], '.2f')} dB, SSIM {said(measured['overlap_ssim'], '.3f')}",
+        "seconds: " + ", ".join(f"{stage} {value:.2f}" for stage, value in seconds.items()),
+    ]
+    print("\n".join(f"edf: {line}" for line in lines), file=sys.stderr)
+
+
+@contextmanager
+def progress_shown(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """A bar on a terminal, one plain line for each stage elsewhere, nothing when quiet."""
+    if quiet:
+        yield lambda stage, total: None
+    elif sys.stderr.isatty():
+        from tqdm import tqdm
+
+        with tqdm(
+            total=100, bar_format="{desc:<9}{bar}{percentage:3.0f} % {elapsed}", leave=False, file=sys.stderr
+        ) as bar:
+
+            def move(stage: str, total: float) -> None:
+                # tqdm draws ten times a second at most: a new stage is shown all the same
+                changed = bar.desc != stage
+                bar.set_description_str(stage, refresh=False)
+                bar.update(round(100 * total) - bar.n)
+                if changed:
+                    bar.refresh()
+
+            yield move
+    else:
+        last = ""
+
+        def tell(stage: str, total: float) -> None:
+            nonlocal last
+            if stage != last:
+                print(f"edf: {stage} ({total:.0%})", file=sys.stderr, flush=True)
+                last = stage
+
+        yield tell

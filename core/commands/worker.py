@@ -1,0 +1,271 @@
+"""One stitch for a program that watches, as a process of its own: `python -m edf_stitch.core.commands.worker FOLDER`.
+
+FOLDER/job.json says what to do; everything made lies in FOLDER afterwards, with result.json as its index. stdout
+carries one JSON object a line: {"stage", "share"} while working, at the end {"done": true} or {"error", "kind",
+"exit_code"}. The work ends on SIGINT (Windows: CTRL_BREAK) and when stdin closes, so that it never outlives whoever
+started it; FOLDER goes then too. Exit status as the command's (DESIGN 5).
+
+job.json: `reference`, `target`: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as shown; "exif_of": a
+file whose EXIF (orientation included) belongs to the array. `options`: fields of StitchOptions, their `camera` those of
+CameraRequest. `cameras`: {"reference", "target"}: {"lens": fields of BlenderLens but the resolution, "matrix_world"}.
+`masks`: {"reference", "target"}: .npy of pictures, rows as shown; {"seam"}: over the whole panorama. `matches`: .npy
+(N, 5) x, y, x2, y2, weight; weight 0 leaves a match out. `take`: which of "layers", "masks", "depth" to leave as
+pictures. Relative paths start at FOLDER. Or `try` alone: load the libraries, and no more.
+"""
+
+from __future__ import annotations
+
+import _thread
+import json
+import os
+import shutil
+import signal
+import sys
+import threading
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+SIDES = ("reference", "target")
+# Of the whole work; the rest is encoding what the window wants to have.
+STITCH_SHARE = 0.9
+# All that a stitch may load sooner or later, besides the standard library.
+LIBRARIES = ("numpy", "cv2", "scipy.linalg", "scipy.optimize", "poselib", "OpenEXR", "exifread")
+
+
+def main(folder: Path) -> int:
+    """Does the job in a folder; returns the exit status."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before NumPy loads: the same bytes for any number of cores
+    stop = _Stop()
+    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):  # whatever the parent had them set to
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), stop)
+    try:
+        return _status(folder, stop)
+    except BrokenPipeError:  # nobody listens: the parent has ended, and stdin was not yet found closed
+        stop.orphaned = True
+        return 130
+    finally:
+        # here and not in the thread that noticed: only now nothing writes or reads there any more
+        if stop.orphaned:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+class _Stop:
+    """The handler of signals that ask to stop. It breaks into the work once, and never into what tidies up after it."""
+
+    def __init__(self) -> None:
+        self.asked = self.orphaned = False
+        self.may_break_in = True
+
+    def __call__(self, _number: int, _frame: object) -> None:
+        self.asked = True
+        if self.may_break_in:
+            self.may_break_in = False
+            raise KeyboardInterrupt
+
+
+def _status(folder: Path, stop: _Stop) -> int:
+    try:
+        threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
+        try:
+            _work(folder, stop)
+        finally:
+            stop.may_break_in = False
+    except (KeyboardInterrupt, Exception) as error:
+        # a library that is interrupted while it loads makes an ImportError of it
+        return _report_error(KeyboardInterrupt() if stop.asked else error)
+    _say({"done": True})
+    return 0
+
+
+def _report_error(error: BaseException) -> int:
+    """Says why there is no result; returns the exit status."""
+    if isinstance(error, KeyboardInterrupt):
+        return _fail("Cancelled", "cancelled", 130)
+    if isinstance(error, ImportError):
+        return _fail("Broken", f"a library of EDF Stitch cannot be loaded ({error}); reinstall EDF Stitch", 3)
+    if isinstance(error, MemoryError):
+        return _fail("OutOfMemory", "not enough memory for pictures of this size; stitch them at a smaller scale", 3)
+    exit_code = getattr(error, "exit_code", None)
+    if exit_code is None:
+        return _fail("Bug", f"internal error, please report it: {type(error).__name__}: {error}", 3)
+    return _fail(type(error).__name__, str(error), exit_code)
+
+
+def _work(folder: Path, stop: _Stop) -> None:
+    from ..system.output_files import undisturbed
+
+    with undisturbed():  # NumPy prints a traceback of its own where a signal breaks into its loading
+        from ..cameras.sources import CameraRequest
+        from ..options import StitchOptions
+        from ..pipeline import stitch
+        from ..system.cache import default_folder
+        from ..system.memory import use_again
+
+    use_again()
+    _say({"stage": "read", "share": 0.0})
+    job = json.loads((folder / "job.json").read_text("utf-8"))
+    if job.get("try"):
+        for name in LIBRARIES:
+            import_module(name)
+        (folder / "result.json").write_text("{}")
+        return
+    (reference, turn), (target, turn_prime) = (_picture(folder, job[side]) for side in SIDES)
+    camera = {key: _tuples(value) for key, value in job["options"].pop("camera", {}).items()}
+    if job.get("cameras"):
+        camera = {"cameras": cameras_of(job["cameras"], (reference, target))}
+    masks = job.get("masks", {})
+    rows = _array(folder / job["matches"]) if job.get("matches") else None
+    options = StitchOptions(
+        **{key: _tuples(value) for key, value in job["options"].items()}, camera=CameraRequest(**camera),
+        matches=None if rows is None else rows[rows[:, 4] > 0],
+        ignore_reference=_mask(folder, masks.get("reference"), turn),
+        ignore_target=_mask(folder, masks.get("target"), turn_prime), mask=_mask(folder, masks.get("seam"), 1),
+        cache=default_folder(),
+    )  # fmt: skip
+    result = stitch(
+        reference, target, options, lambda stage, share: _say({"stage": stage, "share": share * STITCH_SHARE}),
+        lambda: stop.asked,  # where Python swallowed the interruption, as it does in what tidies up after an object
+    )  # fmt: skip
+    _write(folder, result.spread_out(), rows, job.get("take", []), (turn, turn_prime))
+
+
+def cameras_of(entries: dict[str, Any], pictures: tuple[Any, Any]) -> dict[str, Any]:
+    """What CameraRequest.cameras takes, of Blender's cameras (see job.json) and the upright pictures they took."""
+    import numpy as np
+
+    from ..alignment import size_of
+    from ..cameras.blender_camera import BlenderLens, pose_of
+
+    table = {}
+    for side, picture in zip(SIDES, pictures, strict=True):
+        lens = BlenderLens(**{**entries[side]["lens"], "resolution": size_of(picture)})
+        R, t = pose_of(np.array(entries[side]["matrix_world"], np.float64))
+        table[side] = {"K": lens.intrinsics, "R": R, "t": t}
+    # by the pictures' names, which come first: a reference may well be called "target"
+    names = [picture.name for picture in pictures]
+    return table if names[0] == names[1] else dict(zip(names, table.values(), strict=True))
+
+
+def _picture(folder: Path, entry: dict[str, Any]) -> tuple[Any, int]:
+    """The upright picture of a job's entry, and the orientation that its arrays and masks are turned by."""
+    from ..pictures.containers import read_structure
+    from ..pictures.decoding import read_file, turn
+    from ..pictures.metadata import Exif, read_exif
+    from ..pictures.picture import load_picture, picture_from_array
+
+    if "path" in entry:
+        path = folder / entry["path"]  # an absolute path stays as it is
+        picture = load_picture(path)
+        return replace(picture, name=entry["name"]), picture.exif.orientation
+    exif = Exif()
+    if entry.get("exif_of"):
+        structure = read_structure(read_file(folder / entry["exif_of"]))
+        exif = read_exif(structure.exif) if structure is not None else exif
+    picture = picture_from_array(turn(_array(folder / entry["array"]), exif.orientation), entry["name"])
+    return replace(picture, exif=exif.upright()), exif.orientation
+
+
+def _mask(folder: Path, name: str | None, orientation: int) -> Any:
+    from ..pictures.decoding import turn
+
+    return None if name is None else turn(_array(folder / name)[..., None], orientation)[..., 0]
+
+
+def _array(path: Path) -> Any:
+    import numpy as np
+
+    return np.load(path, allow_pickle=False)
+
+
+def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[int, int]) -> None:
+    """Everything the window may ask for, with result.json as the index."""
+    from ..output import inspection as seen
+    from ..output.outputs import json_bytes
+    from ..pictures.encoding import encode_picture
+
+    kind = ".png" if result.bits == 8 else ".exr"
+    files: dict[str, str] = {}
+
+    def add(name: str, data: bytes, suffix: str = kind) -> None:
+        files[name] = f"{name.replace(' ', '_')}{suffix}"
+        (folder / files[name]).write_bytes(data)
+        _say({"stage": "write", "share": min(0.99, STITCH_SHARE + 0.01 * len(files))})
+
+    def picture(pixels: Any, alpha: Any) -> bytes:
+        return encode_picture(pixels, alpha, result.bits, kind, result.reference.icc, result.reference.exif)[0]
+
+    add("panorama", picture(result.panorama.light, _unless_opaque(result.panorama.alpha)))
+    for side, layer in zip(SIDES, (result.reference_layer, result.target_layer), strict=True):
+        if "layers" in take:
+            add(f"{side} layer", picture(layer.light, layer.alpha))
+        if "masks" in take:
+            add(f"{side} mask", _png((layer.alpha.astype("float32") * 255).round().astype("uint8")), ".png")
+    if "masks" in take:
+        add("occluded", _png(result.occluded.astype("uint8") * 255), ".png")
+        if result.inpainted.any():
+            add("inpainted", _png(result.inpainted.astype("uint8") * 255), ".png")
+        if result.from_target is not None:
+            add("seam", _png(_painted(result.from_target, result.panorama.alpha > 0)), ".png")
+        if result.warp.confidence is not None:
+            add("confidence", _png((result.warp.confidence * 255).round().astype("uint8")), ".png")
+    if "depth" in take and seen.has_depth(result.two_view):
+        add("inverse depth", encode_picture(result.warp.inverse_depth[..., None], None, 32, ".exr")[0], ".exr")
+    heat, heat_range = seen.heat_map(result)
+    add("heat", _png(heat), ".png")
+    add("difference", _png(seen.difference(result)), ".png")
+    matches = seen.match_rows(result) if rows is None else seen.given_rows(result, rows)
+    index = {
+        "files": files, "report": result.report, "warnings": result.warnings, "bits": result.bits,
+        "heat_range": heat_range, "geometry": seen.full_geometry(result), "orientations": turns,
+        "has_depth": seen.has_depth(result.two_view), "depth": seen.depth_grid(result), "matches": matches,
+        "seconds": result.seconds,
+    }  # fmt: skip
+    (folder / "result.json").write_bytes(json_bytes(index))
+
+
+def _png(values: Any) -> bytes:
+    """uint8 (H, W) or RGBA (H, W, 4): values, not light, so without a profile or a curve."""
+    import cv2
+
+    return cv2.imencode(".png", values if values.ndim == 2 else cv2.cvtColor(values, cv2.COLOR_RGBA2BGRA))[1].tobytes()
+
+
+def _painted(from_target: Any, shows: Any) -> Any:
+    """A seam in the form of a painted one: RGBA (H, W, 4), white from the target, transparent where nothing shows."""
+    import numpy as np
+
+    gray, alpha = (np.where(mask, 255, 0).astype(np.uint8) for mask in (from_target, shows))
+    return np.dstack([gray, gray, gray, alpha])
+
+
+def _unless_opaque(alpha: Any) -> Any:
+    return None if alpha.min() >= 1.0 else alpha
+
+
+def _tuples(value: Any) -> Any:
+    """JSON knows lists where options are tuples."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _say(line: dict[str, Any]) -> None:
+    print(json.dumps(line), flush=True)
+
+
+def _fail(kind: str, words: str, exit_code: int) -> int:
+    _say({"error": words, "kind": kind, "exit_code": exit_code})
+    return exit_code
+
+
+def _end_with_parent(stop: _Stop) -> None:
+    # not sys.stdin.buffer: Python aborts on its way out when a thread still holds that one's lock
+    while os.read(0, 4096):
+        pass
+    stop.orphaned = True
+    _thread.interrupt_main()
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

@@ -1,0 +1,146 @@
+"""Exposure and white balance: one gain per channel, in scene-linear light, that makes the target match the reference.
+
+The reference keeps its values. Measured on means over small blocks, which forgive an alignment that is a pixel off,
+and by a median, which forgives what moved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..panorama.layers import Layer
+from ..raster.arrays import STRIP, Part, bounds
+from ..raster.lazy import AnyImage, LazyImage
+from ..system.threads import in_order
+
+BLOCK = 8
+# Light (of white 1) from which pictures of 8 and 16 bits are taken for clipped: level 250 of 255, for JPEG rings.
+CLIPPED = 0.956
+# Blocks darker than this share of the median tell more about noise and flare than about exposure.
+DARK = 0.05
+# A block counts where so much of it can be seen in both; with fewer blocks than that nothing is known.
+LEAST_SHOWN, LEAST_BLOCKS = 0.5, 20
+# Beyond a factor of this it is not an exposure but two pictures of different light.
+LARGEST = 16.0
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """gain (C,): the target's light is multiplied by it; spread (C,): half of the blocks' own ratios lie within this
+    share of it; blocks: how many it was measured on, 0 where it is unknown and 1."""
+
+    gain: NDArray[np.float32]
+    spread: NDArray[np.float32]
+    blocks: int
+
+    def applied(self, target: Layer) -> Layer:
+        """The target's layer as the reference's camera would have exposed it."""
+        if (self.gain == 1).all():
+            return target
+        return Layer(Exposed(target.light, self.gain), target.alpha)
+
+
+@dataclass(frozen=True, eq=False)
+class Exposed(LazyImage):
+    """Light times a gain (C,)."""
+
+    light: AnyImage
+    gain: NDArray[np.float32]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.light.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        light = self.light[part]
+        height, width, channels = light.shape
+        # along whole rows: along a pixel's channels alone NumPy is slow
+        return (light.reshape(height, width * channels) * np.tile(self.gain, width)).reshape(light.shape)
+
+
+def unchanged(channels: int) -> Exposure:
+    """No compensation."""
+    return Exposure(np.ones(channels, np.float32), np.full(channels, np.nan, np.float32), 0)
+
+
+def match_exposure(
+    reference: Layer, target: Layer, hidden: NDArray[np.bool_], floats: tuple[bool, bool]
+) -> Exposure:
+    """The gain per channel from what both layers show of the same.
+
+    hidden (H, W): where the target shows something else; floats: whether reference and target come from float pictures,
+    which do not clip.
+    """
+    channels = reference.light.shape[2]
+    shown = (reference.alpha > 1 - 1 / 255) & (target.alpha > 1 - 1 / 255) & ~hidden
+    box = bounds(shown)
+    if box is None:
+        return unchanged(channels)
+    # whole blocks of the canvas
+    rows, columns = (slice(part.start - part.start % BLOCK, part.stop + -part.stop % BLOCK) for part in box)
+    at_once = BLOCK * max(1, STRIP // (BLOCK * (columns.stop - columns.start)))
+
+    def means_of(top: int) -> list[NDArray[np.float64]]:
+        part = slice(top, min(rows.stop, top + at_once)), columns
+        pixels, counts = [layer.light[part] for layer in (reference, target)], shown[part]
+        for light, unclipped in zip(pixels, floats, strict=True):
+            if not unclipped:
+                for k in range(channels):
+                    counts = counts & (light[..., k] < CLIPPED)
+        return [_block_means(light, counts) for light in pixels]
+
+    parts = list(in_order(means_of, range(rows.start, rows.stop, at_once)))
+    means, means_too = (np.concatenate(one) for one in zip(*parts, strict=True))
+    bright = _bright(means) & _bright(means_too)
+    if bright.sum() < LEAST_BLOCKS:
+        return unchanged(channels)
+    ratios = np.log(means[bright]) - np.log(means_too[bright])
+    # what the eye would weigh: errors in tones, which grow about as the root of light
+    weights = np.sqrt(means[bright].mean(axis=1))
+    middle = np.array([_weighted_median(ratios[:, k], weights) for k in range(channels)])
+    spread = np.median(np.abs(ratios - middle), axis=0)
+    if np.abs(middle).max() > np.log(LARGEST):
+        return unchanged(channels)
+    return Exposure(np.exp(middle).astype(np.float32), spread.astype(np.float32), int(bright.sum()))
+
+
+def pooled(exposures: list[Exposure]) -> Exposure:
+    """One exposure for several frames of two fixed cameras: the middle of theirs."""
+    known = [exposure for exposure in exposures if exposure.blocks]
+    if not known:
+        return exposures[0]
+    gain, spread = (np.median([getattr(e, name) for e in known], axis=0) for name in ("gain", "spread"))
+    return Exposure(gain.astype(np.float32), spread.astype(np.float32), sum(e.blocks for e in known))
+
+
+def _block_means(pixels: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Means (N, C) of what is shown in blocks of BLOCK² px, of those blocks where enough is."""
+    height, width = (BLOCK * (side // BLOCK) for side in shown.shape)
+    if not height or not width:
+        return np.zeros((0, pixels.shape[2]))
+    size = (width // BLOCK, height // BLOCK)
+    weight = shown[:height, :width].astype(np.float32)
+    share = cv2.resize(weight, size, interpolation=cv2.INTER_AREA)
+    enough = share >= LEAST_SHOWN
+    means = [
+        cv2.resize(pixels[:height, :width, k] * weight, size, interpolation=cv2.INTER_AREA)[enough] / share[enough]
+        for k in range(pixels.shape[2])
+    ]
+    return np.stack(means, axis=-1).astype(np.float64)
+
+
+def _bright(means: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Blocks (N,) of which no channel is dark, beside the blocks in general."""
+    typical = float(np.median(means.mean(axis=1))) if len(means) else 0.0
+    return means.min(axis=1, initial=np.inf) > max(DARK * typical, 0.0)
+
+
+def _weighted_median(values: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
+    order = np.argsort(values, kind="stable")
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, total[-1] / 2)])

@@ -1,0 +1,65 @@
+"""Filling what neither camera saw, where that is asked for: smoothly, from what lies behind; no detail is made up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..panorama.layers import Layer
+from ..raster.arrays import Part, bounds, with_margin
+from ..raster.lazy import AnyImage, Retouched
+from ..raster.log_encoding import log_decode, log_encode
+from ..raster.pull_push import filled
+
+# Pixels around a hole that it is filled from, and what the near ones among them count beside the far ones.
+REACH, NEAR = 12, 1e-3
+
+
+def holes_of(hidden: NDArray[np.bool_], reference: Layer, target: Layer) -> NDArray[np.bool_]:
+    """Where (H, W) neither camera saw anything: what is hidden (H, W) from the target's, and the reference's did not
+    look there."""
+    return hidden & (reference.alpha == 0) & (target.alpha > 0)
+
+
+def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage) -> Layer:
+    """A layer that shows something in its holes (H, W), too: a smooth continuation of what lies around them, opaque.
+
+    inverse_depth (H, W): a hole is what something near hid, so it is filled from what is further away than halfway to
+    that. Everywhere else every pixel stays what it was.
+    """
+    extent = bounds(holes)
+    if extent is None:
+        return panorama
+    box = with_margin(extent, REACH, holes.shape)
+    missing = holes[box]
+    rim = cv2.dilate(missing.astype(np.uint8), np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8)) > 0
+    beside = rim & ~missing & (panorama.alpha[box] > 0)
+    weight = beside * np.where(_far(inverse_depth[box], missing, beside), np.float32(1), np.float32(NEAR))
+    tones = filled(log_encode(panorama.light[box]), weight)
+    at = box[0].start, box[1].start
+    alpha = panorama.alpha.copy()
+    alpha[box][missing] = 1
+    return Layer(Patched(panorama.light, at, missing, log_decode(tones)), alpha)
+
+
+def _far(inverse_depth: NDArray, missing: NDArray[np.bool_], beside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where (h, w) it is further away than halfway from what is missing to the nearest that lies beside it."""
+    depth = np.nan_to_num(inverse_depth).astype(np.float32)
+    behind = filled(depth[..., None], missing.astype(np.float32))[..., 0]
+    size = np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8)
+    nearest = cv2.dilate(np.where(beside, depth, depth.min()).astype(np.float32), size)
+    return depth <= (behind + np.maximum(nearest, behind)) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Patched(Retouched):
+    """Light with the pixels of a patch (h, w, C) in place of those that are touched."""
+
+    patch: NDArray[np.float32]
+
+    def anew(self, before: NDArray[np.float32], there: Part) -> NDArray[np.float32]:
+        """See `Retouched`."""
+        return self.patch[there][self.touched[there]]

@@ -1,0 +1,97 @@
+"""What moved between the two pictures, people above all, and at whose time it is to be seen.
+
+Things that moved look different though all round them the pictures agree, and are wider than what parallax could hide
+there. A panorama shows the reference's time on one side and the target's on the other. Nearer to what the target alone
+shows a thing belongs to the target's time, and else to the reference's: so nobody is cut in two, nor seen twice by
+walking over the seam, unless he walked past the middle of the overlap.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..panorama.layers import Layer
+from ..panorama.warp import Warp
+from ..raster.distance import distance_inside
+from .overlap import Overlap
+
+# It is looked for at so many px across the overlap at most: whatever is narrower than THIN of them is none.
+ACROSS, THIN = 1000, 4
+# It differs by so much in tones at least, and what differs less than that agrees.
+STRONG, ALIKE = 0.15, 0.08
+# A thing's surroundings: so many px round it, of which this share shows the same in both pictures.
+ROUND, AGREES = 5, 0.7
+# How many times as wide as the parallax round it: what is hidden behind a thing is as wide as that at most.
+WIDER = 2.0
+# More than this share of the overlap is no thing.
+LARGEST = 0.25
+
+
+def times(
+    overlap: Overlap, warp: Warp, reference: Layer, target: Layer, hidden: NDArray[np.bool_]
+) -> NDArray[np.int8]:
+    """Of what moved, at whose time it is to be seen (h, w), in the overlap's box: -1 at the reference's, 1 at the
+    target's; 0 where nothing moved. hidden (H, W): what the target cannot see."""
+    rows, columns = overlap.box
+    step = -(-max(overlap.both.shape) // ACROSS)
+    size = tuple(-(-side // step) for side in overlap.both.shape[::-1])
+    # of a cell what is true of most of it
+    both, unseen = (
+        cv2.resize(np.ascontiguousarray(part).view(np.uint8), size, interpolation=cv2.INTER_AREA) > 0
+        for part in (overlap.both, hidden[overlap.box])
+    )
+    seen = both & (cv2.dilate(unseen.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
+    difference = cv2.resize(overlap.difference, size, interpolation=cv2.INTER_AREA).reshape(*size[::-1], -1)
+    away = np.abs(cv2.blur(difference, (3, 3)).reshape(difference.shape)).max(axis=2)
+    same, apart = both & (away < ALIKE), (seen & (away > STRONG)).astype(np.uint8)
+    things = cv2.morphologyEx(apart, cv2.MORPH_OPEN, np.ones((THIN, THIN), np.uint8))
+    # head and legs of one are one
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        cv2.morphologyEx(things, cv2.MORPH_CLOSE, np.ones((ROUND, ROUND), np.uint8)), connectivity=8
+    )
+    here = np.s_[rows.start : rows.stop : step, columns.start : columns.stop : step]
+    moves = [values[here] for values in (warp.map_x, warp.map_y)]
+    shows, shows_too = reference.alpha[::step, ::step] > 0, target.alpha[::step, ::step] > 0
+    reach = [distance_inside(~alone) for alone in (shows & ~shows_too, shows_too & ~shows)]
+    near = [_in_box(values, (rows.start // step, columns.start // step), size) for values in reach]
+
+    out = np.zeros(labels.shape, np.int8)
+    for label in range(1, count):
+        left, top, width, height, area = stats[label]
+        if area > LARGEST * both.sum():
+            continue
+        part = np.s_[max(0, top - ROUND) : top + height + ROUND, max(0, left - ROUND) : left + width + ROUND]
+        thing = labels[part] == label
+        if _moving(thing, both[part], same[part], [values[part] for values in moves], step):
+            whole = cv2.dilate(thing.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+            far, far_too = (float(np.median(values[part][thing])) for values in near)
+            out[part][whole & both[part]] = 1 if far_too < far else -1
+    return cv2.resize(out, overlap.both.shape[::-1], interpolation=cv2.INTER_NEAREST) * overlap.both
+
+
+def _moving(
+    thing: NDArray[np.bool_], both: NDArray[np.bool_], same: NDArray[np.bool_], moves: list[NDArray[np.float32]],
+    step: int,
+) -> bool:
+    """Whether the pictures agree all round a thing (h, w), on one surface, or nearly: then it moved."""
+    size = 2 * ROUND + 1
+    ring = (cv2.dilate(thing.astype(np.uint8), np.ones((size, size), np.uint8)) > 0) & ~thing & both
+    agrees = ring & same
+    if agrees.sum() < AGREES * ring.sum() or agrees.sum() < 3 * ROUND:
+        return False
+    places = np.column_stack([*np.nonzero(agrees), np.ones(int(agrees.sum()))])
+    targets = np.column_stack([values[agrees] for values in moves])
+    if not np.isfinite(targets).all():
+        return False
+    left_over = targets - places @ np.linalg.lstsq(places, targets, rcond=None)[0]
+    parallax = np.hypot(*np.ptp(left_over, axis=0)) / step
+    inner = np.pad(thing, 1).astype(np.uint8)
+    across = 2 * float(cv2.distanceTransform(inner, cv2.DIST_L2, cv2.DIST_MASK_5).max())
+    return across > WIDER * parallax
+
+
+def _in_box(values: NDArray[np.float32], corner: tuple[int, int], size: tuple[int, ...]) -> NDArray[np.float32]:
+    part = values[corner[0] : corner[0] + size[1], corner[1] : corner[1] + size[0]]
+    return np.pad(part, [(0, size[1] - part.shape[0]), (0, size[0] - part.shape[1])], mode="edge")

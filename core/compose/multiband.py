@@ -1,0 +1,96 @@
+"""Blending across a seam in several bands (Burt and Adelson, ACM TOG 1983): fine detail changes over within a pixel or
+two, broad light over as many as the coarsest band is wide.
+
+What is blended is the *difference* of the two pictures, in tones, where they show the same; elsewhere it is continued
+smoothly from there. So a picture's border, a hole or a thing that only one of them sees leaves no dark fringe and no
+ghost: across it light is evened out and content is cut hard. Beyond the band every pixel stays bit for bit what it was.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..raster.arrays import strips
+from ..raster.pull_push import _down, _filled, _up, _weights
+from ..system.threads import each
+
+Plane: TypeAlias = NDArray[np.float32]
+# Tones less than this away from what they were are what they were.
+NOTHING = 1e-5
+# The width of the coarsest band, as a share of the canvas's diagonal.
+WIDTH = 1 / 50
+FEWEST, MOST = 3, 7
+
+
+def bands_for(canvas: NDArray) -> int:
+    """How many bands a canvas (H, W, …) is blended in."""
+    return int(np.clip(np.rint(math.log2(WIDTH * math.hypot(canvas.shape[0], canvas.shape[1]))), FEWEST, MOST))
+
+
+def correction(
+    difference: NDArray[np.float32], same: NDArray[np.bool_], from_target: NDArray[np.bool_],
+    shown: NDArray[np.bool_], bands: int,
+) -> NDArray[np.float32]:
+    """What is to be added to the tones (h, w, C) of pictures cut hard along a seam, so that they blend.
+
+    difference (h, w, C): target's tones less the reference's, where `same`; from_target (h, w): which side of the seam
+    a pixel lies on, where anything is `shown`. The difference is written over.
+    """
+    # one channel after the other: all at once would be the peak of a stitch's memory
+    channels = range(difference.shape[2])
+    weights = _weights(same.astype(np.float32))
+    for k in channels:
+        # on the far side of the seam: what the picture of this side would show there, had it the other's light
+        difference[..., k] = _filled(difference[..., k] * weights[0], weights)
+    del weights
+    # a pixel's width to either side, or else the finest band is cut with a pair of scissors
+    share = cv2.blur(_from_nearest(from_target, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
+    shares = [share]
+    while len(shares) <= bands and min(shares[-1].shape) > 2:
+        shares.append(_down(shares[-1]))
+    for k in channels:
+        light = np.ascontiguousarray(difference[..., k])
+        blended = _masked_bands(light, shares)
+
+        def put(rows: slice, light: Plane = light, blended: Plane = blended, k: int = k) -> None:
+            change, whole, over = blended[rows], light[rows], from_target[rows]
+            change -= over * whole
+            # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
+            whole = np.where(over, -whole, whole)
+            np.clip(change, np.minimum(whole, 0), np.maximum(whole, 0), out=change)
+            change[np.abs(change) < NOTHING] = 0
+            difference[rows, :, k] = change
+
+        each(put, strips(blended.shape))
+    return difference
+
+
+def _from_nearest(values: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Values (h, w) where known, elsewhere those of the nearest pixel that is."""
+    if known.all() or not known.any():
+        return values
+    _, nearest = cv2.distanceTransformWithLabels(
+        (~known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    by_label = np.zeros(int(nearest.max()) + 1, bool)
+    by_label[nearest[known]] = values[known]
+    return by_label[nearest]
+
+
+def _masked_bands(light: Plane, shares: list[Plane]) -> Plane:
+    """The sum of the Laplacian bands of `light` (h, w), each weighed by the Gaussian level of a share that goes with
+    it."""
+    share, *smoother = shares
+    if not smoother:
+        return light * share
+    coarser = _down(light)
+    band = _up(coarser, light.shape)
+    np.subtract(light, band, out=band)
+    band *= share
+    band += _up(_masked_bands(coarser, smoother), light.shape)
+    return band

@@ -1,0 +1,80 @@
+"""Where two layers show something at once, and how they differ there: what seam and blending look at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..panorama.layers import Layer
+from ..raster.arrays import beside, bounds, shown_only, strips
+from ..raster.log_encoding import log_encode
+from ..system.threads import each
+
+WHOLE = 1 - 1 / 255
+# Tones that differ by more than the pictures' general difference and this show different things.
+SAME_TONE, SAME_SIGMAS = 0.06, 4.0
+# Pixels around what the target cannot see in which its edge may still lie.
+EDGE = 3
+SAMPLES = 100_000
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """The part of the canvas in which both layers show something.
+
+    box: rows and columns of the canvas; both (h, w): where both show something; difference (h, w, C) float32: target's
+    tones less the reference's, 0 elsewhere; same (h, w): where they also show the same thing, so that what remains of
+    the difference is light, which may be blended, and not content, which must not.
+    """
+
+    box: tuple[slice, slice]
+    both: NDArray[np.bool_]
+    difference: NDArray[np.float32]
+    same: NDArray[np.bool_]
+
+
+def overlap_of(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Overlap | None:
+    """The overlap of two layers on one canvas; None where they do not meet. hidden (H, W): what the target cannot
+    see."""
+    both = (reference.alpha > 0) & (target.alpha > 0)
+    box = bounds(both)
+    if box is None:
+        return None
+    both = both[box]
+    difference = np.empty((*both.shape, reference.light.shape[2]), np.float32)
+
+    def put(rows: slice) -> None:
+        part = slice(box[0].start + rows.start, box[0].start + rows.stop), box[1]
+        tones = log_encode(target.light[part])
+        tones -= log_encode(reference.light[part])
+        difference[rows] = shown_only(tones, both[rows])
+
+    each(put, strips(difference.shape))
+    edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) > 0
+    same = both & ~edge
+    return Overlap(box, both, difference, same & _alike(difference, same))
+
+
+def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where the difference is about what it is in general."""
+    places = np.flatnonzero(shown)
+    if not places.size:
+        return shown
+    sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // SAMPLES)]]
+    middle = np.median(sample, axis=0)
+    sigma = 1.4826 * np.median(np.abs(sample - middle), axis=0)
+    most = np.maximum(SAME_SIGMAS * sigma, SAME_TONE)
+    alike = np.empty(shown.shape, bool)
+
+    def put(rows: slice) -> None:
+        near, here = beside(rows, 1, len(difference))
+        # a little blurred: noise is no content
+        blurred = cv2.blur(difference[near], (3, 3)).reshape(difference[near].shape)[here]
+        within = [np.abs(blurred[..., k] - middle[k]) <= most[k] for k in range(len(most))]
+        alike[rows] = np.logical_and.reduce(within)
+
+    each(put, strips(difference.shape))
+    return alike

@@ -1,0 +1,79 @@
+"""A whole sphere ends at ±180° on paper only: its columns are rolled so that the canvas ends where the pictures do not
+meet, and what is composed there goes on across that line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..panorama.canvas import Canvas
+from ..panorama.layers import Layer
+from ..panorama.warp import Warp
+from ..raster.arrays import Part, within
+from ..raster.lazy import AnyImage, LazyImage
+
+
+def roll_for(canvas: Canvas, reference: Layer, target: Layer) -> int:
+    """By how many columns to the left a canvas that goes all round is rolled before it is composed; 0: it ends already
+    where nothing is shown, or does not go round.
+
+    It ends in the middle of the widest gap: where neither picture shows anything, else (round a pole) where the two
+    have least in common.
+    """
+    if canvas.projection is None or canvas.projection.sphere is None or canvas.width < canvas.whole[2]:
+        return 0
+    shows, shows_too = reference.alpha > 0, target.alpha > 0
+    crowd = (shows & shows_too).sum(axis=0) * (canvas.height + 1) + (shows | shows_too).sum(axis=0)
+    if crowd[0] == crowd[-1] == 0:
+        return 0
+    # the longest run of the least, round the end
+    least = np.flatnonzero(crowd == crowd.min())
+    gaps = np.split(least, np.flatnonzero(np.diff(least) > 1) + 1)
+    if len(gaps) > 1 and gaps[0][0] == 0 and gaps[-1][-1] == canvas.width - 1:
+        gaps[0] = np.concatenate([gaps.pop(), gaps[0] + canvas.width])
+    widest = max(gaps, key=len)
+    return int(widest[len(widest) // 2]) % canvas.width
+
+
+def rolled(values: NDArray, columns: int) -> NDArray:
+    """An array (H, W, …) whose first column is the one of that number; the same object for 0."""
+    return np.roll(values, -columns, axis=1) if columns else values
+
+
+def rolled_layer(layer: Layer, columns: int) -> Layer:
+    """The same of a layer."""
+    if not columns:
+        return layer
+    return Layer(WrappedImage(layer.light, columns % layer.alpha.shape[1]), rolled(layer.alpha, columns))
+
+
+def rolled_maps(warp: Warp, columns: int) -> Warp:
+    """A warp with its values rolled. Its canvas is not: that still says what is seen where before."""
+    if not columns:
+        return warp
+    map_x, map_y, inverse_depth = (rolled(values, columns) for values in (warp.map_x, warp.map_y, warp.inverse_depth))
+    confidence = None if warp.confidence is None else rolled(warp.confidence, columns)
+    return Warp(warp.canvas, map_x, map_y, inverse_depth, confidence)
+
+
+@dataclass(frozen=True, eq=False)
+class WrappedImage(LazyImage):
+    """Light whose first column is that of number `columns` (0 to W − 1) of another."""
+
+    light: AnyImage
+    columns: int
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.light.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        rows, across = within(part, self.shape)
+        width = self.shape[1]
+        begin, end = across.start + self.columns, across.stop + self.columns
+        pieces = [(begin, min(end, width)), (max(begin, width) - width, end - width)]
+        found = [self.light[rows, slice(low, high)] for low, high in pieces if low < high]
+        return found[0] if len(found) == 1 else np.concatenate(found or [self.light[rows, slice(0, 0)]], axis=1)

@@ -1,0 +1,81 @@
+"""Rows along epipolar lines: the reference's plane resampled so that whatever moves with depth moves along a row.
+
+Polar coordinates around the epipole (Pollefeys, Koch and Van Gool, ICCV 1999), of one picture only: the other one is
+first warped into the reference's plane, where both share their epipolar lines. It does for an epipole in the picture,
+beside it or far away what a rectifying homography does for the last alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..raster.arrays import Array
+
+# An epipole at infinity is set this many picture sides away: its lines then spread by a hundredth of a pixel.
+FAR = 1e6
+
+
+@dataclass(frozen=True)
+class EpipolarRows:
+    """Row v, column u ↔ point p = c + r (cos θ, sin θ), r = r0 + u q, θ = θ0 + v q / r1; q px a step.
+
+    epipole c (2,) px of the reference's plane; start (r0, θ0); reach r1: the largest distance, where rows lie q px
+    apart; shape (rows, columns).
+    """
+
+    epipole: Array
+    start: tuple[float, float]
+    reach: float
+    step: float
+    shape: tuple[int, int]
+
+    @staticmethod
+    def over(epipole: Array, box: Array, step: float, margin: float) -> EpipolarRows:
+        """Rows that cover a rectangle (left, top, right, bottom) px, with a margin (px) before and behind, along them.
+
+        epipole (3,): homogeneous, of the same plane.
+        """
+        low, high = box[:2], box[2:]
+        middle, side = (low + high) / 2, float((high - low).max())
+        away = epipole[:2] - epipole[2] * middle
+        if np.linalg.norm(away) >= abs(epipole[2]) * FAR * side:
+            centre = middle + FAR * side * away / np.linalg.norm(away)
+        else:
+            centre = epipole[:2] / epipole[2]
+        u = np.linspace(0, 1, 65)
+        edge = np.concatenate([np.column_stack(p) for p in ((u, 0 * u), (u, 0 * u + 1), (0 * u, u), (0 * u + 1, u))])
+        r, theta = _polar(low + edge * (high - low) - centre, middle - centre)
+        reach, turn = float(r.max()), float(np.arctan2(*(middle - centre)[::-1]))
+        first, last = max(float(r.min()) - margin, 0.0), reach + margin
+        begin, end = float(theta.min()), float(theta.max())
+        if ((centre >= low) & (centre <= high)).all():
+            # rows run once around and a little further: both ends need neighbours
+            first, begin, end = 0.0, -1.1 * np.pi, 1.1 * np.pi
+        shape = int(np.ceil((end - begin) * reach / step)) + 1, int(np.ceil((last - first) / step)) + 1
+        return EpipolarRows(centre, (first, turn + begin), reach, step, shape)
+
+    def points(self, u: Array, v: Array) -> Array:
+        """Points (len(v), len(u), 2) px of the reference's plane where columns u and rows v cross."""
+        return self.point(u[None, :], v[:, None])
+
+    def point(self, u: Array, v: Array) -> Array:
+        """Points (…, 2) of columns u and rows v."""
+        r = self.start[0] + self.step * u
+        theta = self.start[1] + v * (self.step / self.reach)
+        return self.epipole + r[..., None] * np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+
+    def column_row(self, points: Array) -> tuple[Array, Array]:
+        """u and v (…) of points (…, 2) px of the reference's plane."""
+        rows, _ = self.shape
+        middle = self.start[1] + (rows - 1) / 2 * (self.step / self.reach)
+        r, theta = _polar(points - self.epipole, np.array([np.cos(middle), np.sin(middle)]))
+        return (r - self.start[0]) / self.step, (theta + (middle - self.start[1])) * (self.reach / self.step)
+
+
+def _polar(away: Array, zero: Array) -> tuple[Array, Array]:
+    """Distance, and angle from the direction `zero` (2,) in (−π, π], of vectors (…, 2)."""
+    cosine, sine = zero / max(float(np.linalg.norm(zero)), 1e-12)
+    along, across = away @ np.array([cosine, sine]), away @ np.array([-sine, cosine])
+    return np.hypot(along, across), np.arctan2(across, along)

@@ -1,0 +1,53 @@
+"""From a canvas point and its inverse depth to the target pixel, and back: x' ~ H_inf p + d e'."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..cameras.projective import homogeneous, project
+from ..cameras.two_view import TwoView
+from ..raster.arrays import Array
+
+
+def target_points(two_view: TwoView, points: Array, inverse_depth: Array) -> Array:
+    """π(H_inf p + d e') (…, 2) for points (…, 2) and d (…); NaN where the point lies behind the target camera."""
+    x, y = points[..., 0], points[..., 1]
+    return np.stack(transfer(two_view, [(h[0] * x + h[1] * y) + h[2] for h in two_view.H_inf], inverse_depth), axis=-1)
+
+
+def transfer(two_view: TwoView, infinite: list[Array], inverse_depth: Array) -> tuple[Array, Array]:
+    """x and y (…) of π(q + d e') for the three coordinates (…) of q = H_inf p (see `Canvas.project_rows`) and d (…);
+    NaN where the point lies behind the target camera."""
+    e = two_view.e_prime
+    depth = inverse_depth if e.any() else 0.0  # without a baseline depth, known or not (NaN), moves nothing
+    a, b, c = (part + depth * e[k] for k, part in enumerate(infinite))
+    # relative to the ray's own length: less than this in front is behind for any picture
+    c = np.where(c <= 1e-6 * np.maximum(np.abs(a), np.abs(b)), np.nan, c)
+    return a / c, b / c
+
+
+def inverse_depths(two_view: TwoView, x: Array, y: Array) -> tuple[Array, Array]:
+    """d_i = argmin |π(q_i + d e') − y_i| along each epipolar line, and s_i = |∂π/∂d| there in px per unit of d.
+
+    Started at −(y×q)·(y×e') / |y×e'|², then Gauss-Newton; q = H_inf x. NaN where that runs behind the target camera.
+    """
+    q = homogeneous(x) @ two_view.H_inf.T
+    e = two_view.e_prime
+    yh = homogeneous(y)
+    cross_e = np.cross(yh, e)
+    d = -np.sum(np.cross(yh, q) * cross_e, axis=1) / np.maximum(np.sum(cross_e**2, axis=1), 1e-300)
+    for _ in range(8):
+        ray = q + d[:, None] * e
+        slope = _slope(ray, e)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = np.sum(slope * (y - project(ray)), axis=1) / np.maximum(np.sum(slope**2, axis=1), 1e-300)
+        d = np.where(np.isfinite(step), d + step, d)
+    ray = q + d[:, None] * e
+    behind = ray[:, 2] <= 0
+    return np.where(behind, np.nan, d), np.where(behind, np.nan, np.linalg.norm(_slope(ray, e), axis=1))
+
+
+def _slope(ray: Array, e: Array) -> Array:
+    """∂π(ray)/∂d when the ray moves by e per unit of d."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (e[:2] * ray[:, 2:] - ray[:, :2] * e[2]) / ray[:, 2:] ** 2

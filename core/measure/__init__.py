@@ -1,0 +1,4 @@
+"""From a finished stitch to figures.
+
+May import every room before it.
+"""

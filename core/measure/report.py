@@ -1,0 +1,208 @@
+"""The report: everything that was measured and decided, as plain JSON-ready values."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..cameras.lens import undistort
+from ..field.slack import SlackField
+from ..panorama.canvas import Canvas
+from ..panorama.levelling import angles_of
+from ..panorama.warp import build_map
+from .held_out import held_out
+from .metrics import coverage_samples, look_up, off_line_mean, overlap_quality
+from .projectivity import independent_fundamental, projectivity
+
+if TYPE_CHECKING:
+    from ..alignment import Alignment
+    from ..cameras.camera import Camera
+    from ..cameras.two_view import TwoView
+    from ..compose.composition import Decided
+    from ..dense.refine import Dense
+    from ..options import StitchOptions
+    from ..pictures.picture import Picture
+
+SCHEMA = 1
+# More inliers than this behind infinity means that the focal length, hence H_inf, is doubtful.
+NEGATIVE_SHARE = 0.02
+# Holes that take up more of the canvas than this can be seen in the panorama as a whole.
+HOLES = 1e-4
+
+
+def make_report(
+    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment, canvas: Canvas, decided: Decided,
+    appearance: dict[str, float],
+) -> tuple[dict[str, Any], list[str]]:
+    """The report of a stitch that shows `canvas`, and warnings in plain words drawn from it.
+
+    decided: about its composition (hole_px: pixels that neither picture sees, beyond the reference and behind something
+    near; inpainted_px: how many of them were filled); appearance: of the panorama (see `appearance`).
+    No seconds, no dates: the same input gives the same report.
+    """
+    cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
+    field = alignment.field
+    measured = _measured(options, pictures, alignment) | {"folds": decided.folds} | appearance
+    report = {
+        "schema": SCHEMA,
+        "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
+        "options": {
+            "field": options.field, "fade": options.fade, "dense": options.dense, "projection": options.projection,
+            "level": options.level, "scale": options.scale, "crop": options.crop, "blend": options.blend,
+            "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
+        },
+        "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
+        "two_view": {
+            "model": two_view.model, "why": two_view.why, "focal_source": two_view.focal_source,
+            "focal_px": [two_view.K[0, 0], two_view.K_prime[0, 0]], "focal_deviation": two_view.focal_deviation,
+            "h_inf_spread_px": two_view.h_inf_spread,
+            "K": two_view.K, "K_prime": two_view.K_prime, "R": two_view.R, "t": two_view.t,
+            "F": two_view.F, "H_inf": two_view.H_inf, "e_prime": two_view.e_prime,
+        },
+        "field": {
+            "kind": field.name, "smoothing": field.fit.smoothing, "centres": int(field.fit.inliers_used.sum()),
+            "pruned": int(two_view.inliers.sum() - field.fit.inliers_used.sum()), "plane": field.plane,
+            "fade_px": field.fit.fade_px, "residual_px": field.fit.residual_px, "held_out_px": field.fit.held_out_px,
+            "negative_share": field.fit.negative_share,
+            "slack_px": field.slack_px if isinstance(field, SlackField) else 0.0,
+            "dense": _dense_entry(alignment.dense),
+        },
+        "canvas": {
+            "width": canvas.width, "height": canvas.height,
+            "offset": None if canvas.projection else canvas.offset, "cropped": canvas.cropped,
+            "projection": _projection_entry(canvas, two_view),
+        },
+        "composition": {
+            "exposure_gain": decided.exposure.gain, "exposure_spread": decided.exposure.spread,
+            "exposure_blocks": decided.exposure.blocks, "occluded_px": int(decided.hidden.sum()),
+            "hole_px": decided.holes, "inpainted_px": decided.holes if options.holes == "inpaint" else 0,
+        },
+        "measured": measured,
+    }  # fmt: skip
+    warnings = _warnings(alignment, measured["folds"])
+    if decided.holes > HOLES * alignment.warp.map_x.size:
+        shown = (
+            "filled smoothly from around there" if options.holes == "inpaint" else
+            "transparent there (black in a JPEG); --holes inpaint fills them"
+        )  # fmt: skip
+        warnings.append(
+            f"{decided.holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
+            f"{shown}; --crop reference shows none of them"
+        )
+    return plain(report), warnings
+
+
+def _measured(
+    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment
+) -> dict[str, float]:
+    """The figures of an alignment; those that cost time only where options.measure asks for them. NaN: undefined."""
+    cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
+    field, warp = alignment.field, alignment.warp
+    inliers = matches.subset(two_view.inliers)
+    error = np.linalg.norm(look_up(warp, inliers.x, cameras[0]) - inliers.y, axis=1)
+    error = error[np.isfinite(error)]
+    shown = coverage_samples(warp, cameras)
+    measured = {
+        "alignment_median_px": _median(error),
+        "alignment_p95_px": float(np.percentile(error, 95)) if error.size else math.nan,
+        "off_line_mean_px": off_line_mean(two_view.F, shown),
+        "negative_share": field.fit.negative_share,
+    }
+    if not options.measure:
+        return measured
+    ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
+    # where the pair has no F of its own, none that matches give means anything
+    independent = independent_fundamental(ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
+    unseen = held_out(field, ideal.subset(two_view.inliers), shown, options.seed)
+    # pixels are compared in the reference's own frame, where only one of the two pictures is resampled
+    framed = warp
+    if warp.canvas.projection is not None:
+        relief = None if alignment.dense is None else alignment.dense.relief
+        framed = build_map(field, two_view, Canvas(*cameras[0].size, (0, 0)), *cameras, relief)
+    return measured | overlap_quality(*pictures, framed) | {
+        "projectivity_own_px": projectivity(two_view.F, shown),
+        "projectivity_independent_px": projectivity(independent, shown),
+        "projectivity_points": int((~shown.overlap).sum()),
+        "held_out_rms_px": unseen.rms_px,
+        "held_out_median_px": unseen.median_px,
+        "held_out_towards_rms_px": unseen.towards_rms_px,
+    }  # fmt: skip
+
+
+def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
+    two_view, field, warp = alignment.two_view, alignment.field, alignment.warp
+    out = []
+    if field.fit.negative_share > NEGATIVE_SHARE:
+        out.append(
+            f"{field.fit.negative_share:.0%} of the points lie beyond infinity: the focal length "
+            f"({two_view.K[0, 0]:.0f} px) is doubtful, and with it depth and H_inf; the picture itself hardly "
+            "depends on it"
+        )
+    if not warp.canvas.projection and (warp.canvas.width, warp.canvas.height) == alignment.cameras[0].size:
+        out.append("the target shows nothing beyond the reference's edges: the panorama is no larger than that")
+    if warp.canvas.cropped:
+        out.append(
+            "the pictures reach too far up or down for a cylinder and were cropped there; --projection equirectangular "
+            "shows them whole"
+            if warp.canvas.projection
+            else "the target reaches too far to the side to be shown whole in a flat picture: its far end was cropped; "
+            "--projection cylindrical or equirectangular shows it"
+        )
+    if fold_share > 0.005:
+        out.append(f"the warp folds over in {fold_share:.1%} of the target: look for doubled or torn things there")
+    return out
+
+
+def _projection_entry(canvas: Canvas, two_view: TwoView) -> dict[str, Any]:
+    """How canvas pixels become rays in the reference camera's frame (see `projection`); level: yaw, pitch and roll of
+    the reference in degrees, as --level takes them."""
+    if canvas.projection is None:
+        focal = float(np.sqrt(two_view.K[0, 0] * two_view.K[1, 1]))
+        kind, centre, rotation = "perspective", two_view.K[:2, 2], np.eye(3)
+    else:
+        kind, focal, centre = canvas.projection.kind, canvas.projection.focal, np.array(canvas.projection.centre)
+        rotation = canvas.projection.rotation
+    return {
+        "kind": kind, "focal_px": focal, "centre": centre + np.array(canvas.offset), "rotation": rotation,
+        "level": angles_of(rotation),
+    }  # fmt: skip
+
+
+def _picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:
+    return {
+        "name": picture.name, "width": camera.size[0], "height": camera.size[1], "bits": picture.bits,
+        "alpha": picture.alpha is not None, "icc": picture.icc is not None,
+        "camera": {
+            "focal_px": camera.focal, "source": camera.source, "fixed": camera.fixed, "distortion": camera.distortion,
+        },
+    }  # fmt: skip
+
+
+def _dense_entry(dense: Dense | None) -> dict[str, Any]:
+    if dense is None or dense.relief is None:
+        return {"used": False, "why": "not asked for" if dense is None else dense.why}
+    return {
+        "used": True, "reach_px": dense.reach_px, "found": dense.found, "moved_px": dense.moved_px,
+        "across_px": dense.across_px,
+    }  # fmt: skip
+
+
+def _median(values: np.ndarray) -> float:
+    return float(np.median(values)) if values.size else math.nan
+
+
+def plain(value: Any) -> Any:
+    """The same with lists for arrays, Python numbers for NumPy's, and None for what JSON has no word for (NaN,
+    infinity)."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,4 @@
+"""From cameras and a field to a canvas, its map, its layers, and what each picture cannot see.
+
+May import system, raster, pictures, cameras and field.
+"""

@@ -1,0 +1,219 @@
+"""The plane the panorama lives in: its size and where the reference lies in it; grids of nodes over it.
+
+Canvas pixels are pixels of that plane moved by whole numbers. The plane is the reference's own, so that the reference
+is pasted exactly, or that of a round panorama (see `projection`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.camera import Camera
+from ..cameras.lens import distort, undistort
+from ..cameras.projective import homogeneous, inverse_intrinsics
+from ..raster.arrays import Array, Box
+from ..raster.grid import NODES, Grid
+from ..system.errors import OutputTooLarge
+from .projection import Projection, extent
+
+# Limits of what is worth showing: the target stretched more than 4× in length, or reaching further than three pictures
+# away.
+MAX_STRETCH = 4.0
+MAX_REACH = 3.0
+MAX_PIXELS = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """width, height px; offset: canvas pixel (x, y) of the plane's pixel (0, 0), in a flat panorama the reference's;
+    cropped: part of the pictures runs off the canvas; projection: of a round panorama, None for a flat one."""
+
+    width: int
+    height: int
+    offset: tuple[int, int]
+    cropped: bool = False
+    projection: Projection | None = None
+
+    @property
+    def xs(self) -> Array:
+        """x of the columns, px of the plane."""
+        return np.arange(-self.offset[0], self.width - self.offset[0], dtype=np.float64)
+
+    @property
+    def ys(self) -> Array:
+        """y of the lines, px of the plane."""
+        return np.arange(-self.offset[1], self.height - self.offset[1], dtype=np.float64)
+
+    @property
+    def whole(self) -> Box:
+        """The whole panorama in px of the canvas: itself, but of a sphere all of it."""
+        sphere = None if self.projection is None else self.projection.sphere
+        if sphere is None:
+            return 0, 0, self.width, self.height
+        return sphere[0] + self.offset[0], sphere[1] + self.offset[1], sphere[2], sphere[3]
+
+    def within(self, box: Box) -> Canvas:
+        """The canvas of a box (left, top, width, height) of it."""
+        left, top, width, height = box
+        return replace(self, width=width, height=height, offset=(self.offset[0] - left, self.offset[1] - top))
+
+    def of_reference(self, points: Array, camera: Camera | None = None) -> Array:
+        """Canvas px (…, 2) of raw pixels (…, 2) of the reference; camera: its, if its lens matters."""
+        if self.projection is not None:
+            points = self.projection.of_reference(points if camera is None else undistort(points, camera))
+        return points + np.array(self.offset, np.float64)
+
+    def project_rows(self, rows: Array, xs: Array, ys: Array, camera: Camera | None = None) -> list[Array]:
+        """rows (k, 3) times canvas points p, each (len(ys), len(xs)), for columns xs and lines ys in px of the plane.
+        camera: the reference's, if its lens matters.
+
+        p is the homogeneous ideal pixel of the reference, with p_3 = 1 in a flat panorama and |K⁻¹ p| = 1 in a round
+        one (see `projection`): what lies ahead of the reference camera has p_3 > 0.
+        """
+        if self.projection is not None:
+            return self.projection.project_rows(rows, xs, ys)
+        if camera is not None and camera.distortion.any():
+            raw = np.stack(np.broadcast_arrays(xs[None, :], ys[:, None]), axis=-1)
+            return list(np.moveaxis(homogeneous(undistort(raw, camera)) @ rows.T, -1, 0))
+        return [(row[0] * xs)[None, :] + (row[1] * ys[:, None] + row[2]) for row in rows]
+
+    def on_reference(self, xs: Array, ys: Array, camera: Camera | None = None) -> tuple[Array, Array]:
+        """Raw pixels (len(ys), len(xs), 2) of the reference at columns xs and lines ys in px of the plane, NaN behind
+        its camera; and p_3 there."""
+        a, b, c = self.project_rows(np.eye(3), xs, ys, camera)
+        c = np.where(c > 1e-6 * np.maximum(np.abs(a), np.abs(b)), c, np.nan)
+        ideal = np.stack([a / c, b / c], axis=-1)
+        return ideal if camera is None else distort(ideal, camera), c
+
+
+def bounding_canvas(
+    target_at: Callable[[Grid], Array], reference: Box, target_size: tuple[int, int], reach: Array,
+    projection: Projection | None = None,
+) -> Canvas:  # fmt: skip
+    """A canvas, small to within a cell, that holds the reference and every well-behaved part of the target.
+
+    target_at(grid) gives target pixels (rows, columns, 2), NaN behind the camera; reference: where it lies,
+    target_size: (W, H), reach (4,): left, top, right, bottom that the target is expected to reach (see
+    `expected_reach`), all in px of the plane. Raises OutputTooLarge.
+    """
+    left, top, right, bottom = reach
+    limits = np.array([-np.inf, -np.inf, np.inf, np.inf]) if projection is None else projection.limits
+    # a sphere has no far side that grows without end
+    max_stretch = np.inf if projection is not None and projection.sphere else MAX_STRETCH
+    cropped = False
+    for _ in range(2):  # the second pass looks closer at what the first found
+        grid = Grid.over(int(left), int(top), max(1, int(right - left)), max(1, int(bottom - top)), nodes=NODES // 10)
+        target = target_at(grid)
+        seen = _inside(target, target_size)
+        stretched = seen & (_area_ratio(target, grid.step) < 1 / max_stretch**2)
+        useful = seen & ~stretched
+        new = np.array([reference[0], reference[1], reference[0] + reference[2], reference[1] + reference[3]])
+        if useful.any():
+            rows, columns = np.flatnonzero(useful.any(axis=1)), np.flatnonzero(useful.any(axis=0))
+            xs, ys, margin = grid.xs, grid.ys, grid.step
+            # a node sees its own cell; the picture's edge lies between it and its neighbour
+            new = np.array(
+                [xs[columns[0]] - margin, ys[rows[0]] - margin, xs[columns[-1]] + margin, ys[rows[-1]] + margin]
+            )
+        left, top, right, bottom = _union(new, reference, limits)
+        cropped = cropped or bool(stretched.any())
+    canvas = Canvas(right - left, bottom - top, (-left, -top), cropped, projection)
+    _, _, width, height = canvas.whole
+    if width * height > MAX_PIXELS:
+        raise OutputTooLarge(
+            f"the panorama would have {width}×{height} pixels, {MAX_PIXELS // 1_000_000} million at most: "
+            "use smaller pictures, or --scale"
+        )
+    return canvas
+
+
+def expected_reach(corners: Array, size: tuple[int, int], target_size: tuple[int, int]) -> tuple[Array, bool]:
+    """A rectangle (left, top, right, bottom) that holds the reference and the target's corners, bounded; and whether it
+    was cut.
+
+    corners (N, 2): the target's outline in the reference's plane, NaN where it lies behind the reference camera.
+    """
+    width, height = size
+    far = MAX_REACH * max(*size, *target_size)
+    finite = corners[np.isfinite(corners).all(axis=1)]
+    cut = len(finite) < len(corners)
+    lowest = np.array([0.0, 0.0])
+    highest = np.array([width, height], np.float64)
+    if cut:  # the outline runs to infinity somewhere: look everywhere within reach
+        lowest, highest = lowest - far, highest + far
+    elif len(finite):
+        margin = 0.1 * max(width, height)
+        lowest, highest = (
+            np.minimum(lowest, finite.min(axis=0) - margin),
+            np.maximum(highest, finite.max(axis=0) + margin),
+        )
+    limit_low, limit_high = np.array([-far, -far]), np.array([width + far, height + far])
+    cut = cut or bool((lowest < limit_low).any() or (highest > limit_high).any())
+    return np.concatenate([np.maximum(lowest, limit_low), np.minimum(highest, limit_high)]), cut
+
+
+def round_reach(
+    projection: Projection, H_plane: Array, outline: Array, camera: Camera, camera_prime: Camera
+) -> tuple[Box, Array, bool]:
+    """Where a round panorama's plane holds the reference, and both pictures (left, top, right, bottom), with a margin;
+    and whether it cuts them.
+
+    H_plane (3, 3): from the reference to the target by a plane; outline (N, 3): of the target, as canvas points p by
+    it.
+    """
+    to_ray = inverse_intrinsics(projection.K)
+
+    def shows(matrix: Array, picture: Camera) -> Callable[[Array], bool]:
+        return lambda ray: bool(_inside(_raw(matrix @ projection.K @ ray, picture), picture.size))
+
+    own = homogeneous(undistort(border(camera.size), camera))
+    extents = [
+        extent(projection, outline @ to_ray.T, shows(matrix, picture))
+        for outline, matrix, picture in ((own, np.eye(3), camera), (outline, H_plane, camera_prime))
+    ]
+    limits = projection.limits
+    margin = 0.1 * max(camera.size)
+    (low, high) = np.minimum(*extents)[:2], np.maximum(*extents)[2:]
+    cut = projection.sphere is None and bool((low < limits[:2]).any() or (high > limits[2:]).any())
+    reach = np.concatenate([np.maximum(low - margin, limits[:2]), np.minimum(high + margin, limits[2:])])
+    left, top = np.floor(np.maximum(extents[0][:2], limits[:2])).astype(int)
+    right, bottom = np.ceil(np.minimum(extents[0][2:], limits[2:])).astype(int) + 1
+    return (int(left), int(top), int(right - left), int(bottom - top)), reach, cut
+
+
+def border(size: tuple[int, int]) -> Array:
+    """Points (N, 2) all around a picture of (W, H) px, in order."""
+    width, height = size
+    u = np.linspace(0, 1, 32, endpoint=False)
+    around = [np.column_stack(p) for p in ((u, 0 * u), (0 * u + 1, u), (1 - u, 0 * u + 1), (0 * u, 1 - u))]
+    return np.concatenate(around) * np.array([width - 1.0, height - 1.0])
+
+
+def _raw(point: Array, camera: Camera) -> Array:
+    """The raw pixel (2,) of a canvas point's image p (3,), NaN behind the camera."""
+    ahead = point[2] > 1e-6 * np.abs(point[:2]).max()
+    return distort(point[:2] / point[2], camera) if ahead else np.full(2, np.nan)
+
+
+def _union(box: Array, reference: Box, limits: Array) -> tuple[int, int, int, int]:
+    """left, top, right, bottom of what holds both a box given so and the reference, as far as the plane goes."""
+    left, top, width, height = reference
+    low = np.maximum(np.minimum([left, top], np.floor(box[:2])), limits[:2])
+    high = np.minimum(np.maximum([left + width, top + height], np.ceil(box[2:]) + 1), limits[2:])
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+
+def _inside(target: Array, size: tuple[int, int]) -> NDArray[np.bool_]:
+    with np.errstate(invalid="ignore"):
+        return (target >= 0).all(axis=-1) & (target[..., 0] <= size[0] - 1) & (target[..., 1] <= size[1] - 1)
+
+
+def _area_ratio(target: Array, step: int) -> Array:
+    """Target pixels per canvas pixel, from differences between nodes."""
+    dx, dy = np.gradient(target, step, axis=1), np.gradient(target, step, axis=0)
+    with np.errstate(invalid="ignore"):
+        return np.nan_to_num(np.abs(dx[..., 0] * dy[..., 1] - dx[..., 1] * dy[..., 0]), nan=np.inf)

@@ -1,0 +1,76 @@
+"""Where a map turns over."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..system.threads import each
+from .visibility import STRIP
+from .warp import Warp
+
+# What is occluded is known to 3 px.
+RIM = np.ones((7, 7), np.uint8)
+
+
+def folds(turns: NDArray[np.int8], hidden: NDArray[np.bool_] | None = None) -> float:
+    """Share of the pixels that show the target where the map turns over (its Jacobian changes sign).
+
+    turns (H, W): see `turning`; hidden (H, W): what the target cannot see does not count, nor its rim: there one thing
+    ends before another.
+    """
+    counts = turns != NO_TURN
+    if hidden is not None:
+        counts &= cv2.dilate(hidden.astype(np.uint8), RIM) == 0
+    back, flat, on = (int(np.count_nonzero(counts & (turns == way))) for way in (-1, 0, 1))
+    total = back + flat + on
+    # the median's own way is the right one: what most pixels do, or nearly
+    usual = back if 2 * back >= total else on if 2 * on >= total else flat
+    return (total - usual) / total if total else 0.0
+
+
+# In place of -1, 0 or 1: see `turning`.
+NO_TURN = 2
+
+
+def turning(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.int8]:
+    """Which way (H, W) the map turns its pixels: 1 as they are, -1 mirrored, 0 flattened; NO_TURN where it does not
+    show the target, or nothing is known to the right or below. target_size: (W, H) px."""
+    height, width = warp.map_x.shape
+    out = np.full((height, width), NO_TURN, np.int8)
+    rows = max(1, STRIP // width)
+
+    def put(top: int) -> None:
+        bottom = min(top + rows, height - 1)
+        strip = warp.within((0, top, width, bottom + 1 - top))
+        with np.errstate(invalid="ignore", over="ignore"):
+            area = cell_areas(strip.map_x, strip.map_y)
+            counts = strip.inside(target_size)[:-1, :-1] & np.isfinite(area)
+            out[top:bottom, :-1] = np.where(counts, np.sign(area), NO_TURN)
+
+    each(put, range(0, height - 1, rows))
+    return out
+
+
+def turned_over(turns: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Where (H, W) a map turns over (see `turning`): it would show the target mirrored, which no surface in view does.
+
+    That is how a map jumps back from the rim of a near thing that it knows too little of to know what the rim hides.
+    """
+    out = turns == -1
+    # where one picture is a mirror image, not being mirrored is what stands out
+    return out if 2 * int(out.sum()) <= int((turns != NO_TURN).sum()) else turns == 1
+
+
+def jacobian(x: NDArray, y: NDArray) -> NDArray:
+    """Area (H, W) that a map's (x, y) takes up for each of its pixels, by central differences; its sign changes where
+    the map turns over. NaN beside what is not finite."""
+    return np.gradient(x, axis=1) * np.gradient(y, axis=0) - np.gradient(x, axis=0) * np.gradient(y, axis=1)
+
+
+def cell_areas(x: NDArray, y: NDArray) -> NDArray:
+    """Signed area (H − 1, W − 1) that a map (x, y) (H, W) spans between each pixel and its right and lower neighbours;
+    its sign changes where the map turns over. NaN beside what is not finite."""
+    turn: NDArray = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1])
+    return turn - (x[1:, :-1] - x[:-1, :-1]) * (y[:-1, 1:] - y[:-1, :-1])

@@ -1,0 +1,127 @@
+"""Pictures on the canvas: pasted, or fetched through a map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.camera import Camera
+from ..raster.arrays import Box, Part, bounds, cut, shown_only
+from ..raster.lazy import AnyImage, Held, LazyImage, Placed, Weighed, extent, part_of, whole
+from ..raster.sampling import fetch
+from .canvas import Canvas
+from .warp import Warp, _inside, reference_map
+
+if TYPE_CHECKING:
+    from ..pictures.picture import Picture
+
+# Where less than this of a pixel is shown, its colour is rounding.
+LEAST_ALPHA = 1e-2
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One picture on the canvas: light (H, W, C) float32 scene-linear, as an array or worked out where it is asked for
+    (see `lazy`); straight alpha (H, W), float32 in [0, 1] or, where nothing is half seen through, bool; 0 where it
+    shows nothing."""
+
+    light: AnyImage
+    alpha: NDArray[np.float32] | NDArray[np.bool_]
+
+    @property
+    def pixels(self) -> NDArray[np.float32]:
+        """All of its light as an array."""
+        return whole(self.light)
+
+    def within(self, box: Box) -> Layer:
+        """The part in a box (left, top, width, height) of the canvas; nothing where that reaches over its edges."""
+        left, top, width, height = box
+        if (left, top, height, width) == (0, 0, *self.alpha.shape):
+            return self
+        return Layer(Placed(self.light, (-top, -left), (height, width)), cut(self.alpha, box))
+
+    def keep(self, part: Part) -> Layer:
+        """The same, with the light of a part, which is asked for more than once, kept as an array."""
+        return Layer(Held(self.light, (part[0].start, part[1].start), part_of(self.light, part)), self.alpha)
+
+
+def reference_layer(picture: Picture, canvas: Canvas, camera: Camera | None = None) -> Layer:
+    """The reference on the canvas: pasted pixel for pixel on a flat one, fetched like the target on a round one.
+
+    camera: the reference's, if its lens matters.
+    """
+    if canvas.projection is not None:
+        return _fetched_layer(picture, *reference_map(canvas, camera))
+    height, width, _ = picture.light.shape
+    x, y = canvas.offset
+    alpha = np.zeros((canvas.height, canvas.width), bool if picture.alpha is None else np.float32)
+    alpha[y : y + height, x : x + width] = True if picture.alpha is None else picture.alpha
+    return Layer(Placed(picture.light, (y, x), (canvas.height, canvas.width)), alpha)
+
+
+def target_layer(picture: Picture, warp: Warp) -> Layer:
+    """The target fetched through the map; alpha by what it was in the picture, 0 outside it."""
+    return _fetched_layer(picture, warp.map_x, warp.map_y)
+
+
+def _fetched_layer(picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32]) -> Layer:
+    """A picture through a map of its raw pixels (H, W)."""
+    height, width, channels = picture.light.shape
+    inside = _inside(map_x, map_y, (width, height))
+    box = bounds(inside)
+    if box is None:
+        return Layer(np.broadcast_to(np.float32(0), (*inside.shape, channels)), inside)
+    light, alpha = Fetched.of(picture, map_x[box], map_y[box], inside[box])
+    placed = Placed(light, (box[0].start, box[1].start), (inside.shape[0], inside.shape[1]))
+    if picture.alpha is None:
+        return Layer(placed, inside)
+    whole_alpha = np.zeros(inside.shape, np.float32)
+    whole_alpha[box] = alpha
+    return Layer(placed, whole_alpha)
+
+
+@dataclass(frozen=True, eq=False)
+class Fetched(LazyImage):
+    """A picture (h, w, C) through a map of its raw pixels (H, W), bicubic in scene-linear float.
+
+    Colours are weighted by alpha while interpolating, so that transparent pixels never bleed. Bicubic overshoot is held
+    to the range of the picture itself: a black edge never turns negative. shows (H, W): where it shows anything.
+    """
+
+    picture: Picture
+    map_x: NDArray[np.float32]
+    map_y: NDArray[np.float32]
+    shows: NDArray[np.bool_]
+    range: tuple[float, float]
+
+    @staticmethod
+    def of(
+        picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32], inside: NDArray[np.bool_]
+    ) -> tuple[Fetched, NDArray]:
+        """A picture through a map, and its alpha (H, W); inside (H, W): where the map falls inside the picture."""
+        alpha: NDArray = inside
+        if picture.alpha is not None:
+            fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
+            alpha = inside * np.where(fetched > LEAST_ALPHA, np.minimum(fetched, 1.0), np.float32(0))
+        shows = inside if picture.alpha is None else alpha > 0
+        return Fetched(picture, map_x, map_y, shows, extent(picture.light)), alpha
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return *self.map_x.shape, self.picture.light.shape[2]
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        alpha, shows = self.picture.alpha, self.shows[part]
+        if not shows.any():
+            return np.zeros((*shows.shape, self.shape[2]), np.float32)
+        map_x, map_y = self.map_x[part], self.map_y[part]
+        pixels = fetch(self.picture.light if alpha is None else Weighed(self.picture.light, alpha), map_x, map_y)
+        if alpha is not None:
+            # both overshoot alike: divided before alpha is clipped
+            pixels /= np.maximum(fetch(alpha[..., None], map_x, map_y)[..., 0], LEAST_ALPHA)[..., None]
+        np.clip(pixels, *self.range, out=pixels)
+        return pixels if shows.all() else shown_only(pixels, shows)

@@ -1,0 +1,136 @@
+"""How a round panorama is turned: its horizon by upright edges and by how the pictures were held, or by hand.
+
+Angles are those of Hugin and PTGui: where the reference camera looks in the panorama. Yaw to the right of its middle,
+pitch above its horizon, roll clockwise, in degrees.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..choices import LEVELS, Level
+from ..raster.arrays import Array
+from ..system.errors import BadRequest
+from .upright_edges import agreement
+
+# How far from level people hold cameras (degrees): they see a tilted horizon, and look up and down on purpose.
+ROLL_SIGMA, PITCH_SIGMA = 1.5, 20.0
+ROUNDS = 50
+# How far from its middle line (degrees of pitch and of roll) down is looked for, and how finely: steps, and how far off
+# upright edges may be. An edge as long as the picture weighs as much as EDGE cameras.
+REACH, STEPS, EDGE = (45.0, 25.0), ((1.0, 1.0), (0.2, 0.5), (0.04, 0.35)), 2.0
+# A camera that was turned so far was turned on its side.
+ON_ITS_SIDE = 45.0
+# Edges of any direction speak for some more than for others: by about the root of the sum of their squares.
+CHANCE = 1.0
+
+
+def parse_level(text: str) -> Level:
+    """One of LEVELS, or (yaw, pitch, roll), from the command line's word. Raises BadRequest."""
+    if text in LEVELS:
+        return text
+    try:
+        yaw, pitch, roll = (float(part) for part in text.split(","))
+    except ValueError:
+        raise BadRequest(
+            f"the level {text!r} is not known; choose from: {', '.join(LEVELS)}, or give YAW,PITCH,ROLL in degrees"
+        ) from None
+    return yaw, pitch, roll
+
+
+def rotation_for(level: Level, R: Array, edges: tuple[Array, Array] | None = None) -> Array:
+    """The rotation (3, 3) from the panorama's axes to the reference camera's.
+
+    level: `auto`, `none` (the reference looks straight ahead) or yaw, pitch, roll; R (3, 3) from the reference camera
+    to the target camera, NaN where it is not known; edges: see `gravity_by_edges`.
+    """
+    if level == "auto":
+        return upright(gravity(R) if edges is None else gravity_by_edges(R, *edges))
+    return turned(*(0.0, 0.0, 0.0) if isinstance(level, str) else level)
+
+
+def gravity(R: Array) -> Array:
+    """The direction down (3,) in the reference camera's frame, from how both cameras were held.
+
+    Brown and Lowe (IJCV 2007, section 4) take the direction that is square to all cameras' x axes, which nobody tilts
+    on purpose. With two cameras that look almost the same way that is anything, so here each camera counts as level
+    too, far more loosely: u minimises Σ ln(1 + (x_i·u)² / σ_roll²) + (z_i·u)² / σ_pitch². The logarithm lets go of a
+    camera that was turned on its side. Without R the reference stands alone.
+    """
+    axes = [np.eye(3), R] if np.isfinite(R).all() else [np.eye(3)]  # rows: x, y, z of a camera in the reference's frame
+    mean = sum(a[1] for a in axes)
+    down = mean / np.linalg.norm(mean) if mean[1] > 0.5 else np.array([0.0, 1.0, 0.0])
+    roll_sigma, pitch_sigma = np.radians([ROLL_SIGMA, PITCH_SIGMA])
+    for _ in range(ROUNDS):
+        cost = sum(
+            np.outer(a[0], a[0]) / (roll_sigma**2 + (a[0] @ down) ** 2) + np.outer(a[2], a[2]) / pitch_sigma**2
+            for a in axes
+        )
+        least = np.linalg.eigh(cost)[1][:, 0]
+        down = least * np.sign(least @ down)
+    return down
+
+
+def gravity_by_edges(R: Array, normals: Array, lengths: Array) -> Array:
+    """The direction down (3,) in the reference camera's frame: of those near `gravity` the likeliest by how both
+    cameras were held and by the upright edges that they saw.
+
+    normals (N, 3), in the reference's frame, and lengths (N,): see `uprights.edges`. All uprights meet in one point of
+    the picture, which is where down is: that tells pitch, too, where there are some to the left and to the right.
+    """
+    held = gravity(R)
+    if not len(normals):
+        return held
+    # from the camera's own axes, but where it was turned on its side
+    base = np.eye(3) if held[1] > np.cos(np.radians(ON_ITS_SIDE)) else upright(held)
+    axes = [np.eye(3), R] if np.isfinite(R).all() else [np.eye(3)]
+    roll_sigma, pitch_sigma = np.radians([ROLL_SIGMA, PITCH_SIGMA])
+    middle, (pitch_reach, roll_reach) = (0.0, 0.0), REACH
+    best = held
+    for step, off in STEPS:
+        pitch, roll = (
+            values.ravel() for values in np.radians(np.meshgrid(
+                middle[0] + np.arange(-pitch_reach, pitch_reach + step / 2, step),
+                middle[1] + np.arange(-roll_reach, roll_reach + step / 2, step),
+            ))
+        )  # fmt: skip
+        down = np.column_stack([np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch), np.sin(pitch)]) @ base.T
+        unlikely = sum(
+            np.log1p(np.square(down @ a[0]) / roll_sigma**2) + np.square(down @ a[2]) / pitch_sigma**2 for a in axes
+        )
+        speaks = agreement(down, normals, lengths, float(np.radians(off)))
+        if step == STEPS[0][0] and speaks.max() - np.median(speaks) < CHANCE * np.linalg.norm(lengths):
+            return held
+        found = int(np.argmin(unlikely - 2 * EDGE * speaks))
+        best, middle = down[found], (float(np.degrees(pitch[found])), float(np.degrees(roll[found])))
+        pitch_reach = roll_reach = 1.5 * step
+    return best
+
+
+def upright(down: Array) -> Array:
+    """The rotation (3, 3) from a panorama whose y axis is `down` (3,), in the reference's frame, and in whose middle
+    the reference's direction lies."""
+    ahead = np.array([0.0, 0.0, 1.0]) - down[2] * down
+    ahead /= np.linalg.norm(ahead)
+    return np.column_stack([np.cross(down, ahead), down, ahead])
+
+
+def turned(yaw: float, pitch: float, roll: float) -> Array:
+    """The rotation (3, 3) from the panorama's axes to those of a camera at these angles (degrees)."""
+    (sy, sp, sr), (cy, cp, cr) = (f(np.radians([yaw, pitch, roll])) for f in (np.sin, np.cos))
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_x = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
+    about_z = np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]])
+    return (about_y @ about_x @ about_z).T
+
+
+def angles_of(rotation: Array) -> tuple[float, float, float]:
+    """yaw, pitch, roll in degrees of a rotation (3, 3): the inverse of `turned`; straight up or down, roll is 0."""
+    to_panorama = rotation.T
+    pitch = np.arcsin(np.clip(-to_panorama[1, 2], -1, 1))
+    if abs(to_panorama[1, 2]) > 1 - 1e-12:
+        yaw, roll = np.arctan2(-to_panorama[2, 0], to_panorama[0, 0]), 0.0
+    else:
+        yaw = np.arctan2(to_panorama[0, 2], to_panorama[2, 2])
+        roll = np.arctan2(to_panorama[1, 0], to_panorama[1, 1])
+    return float(np.degrees(yaw)), float(np.degrees(pitch)), float(np.degrees(roll))

@@ -1,0 +1,173 @@
+"""A Picture becomes the bytes of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ..raster.arrays import in_any_channel, strips
+from ..raster.colour import Curve, encode, icc_channels, parse_icc
+from ..raster.lazy import AnyImage, whole
+from ..system.errors import BadRequest, UnwritableOutput
+from ..system.output_files import OutputFiles
+from ..system.threads import in_order
+from .decoding import quiet_opencv
+from .exr import write_exr
+from .metadata import Exif, embed
+from .picture import _curves
+from .png import encode_png
+
+# suffix: container, bits it can hold
+_WRITABLE = {
+    ".png": ("png", 16), ".jpg": ("jpeg", 8), ".jpeg": ("jpeg", 8), ".tif": ("tiff", 16), ".tiff": ("tiff", 16),
+    ".exr": ("exr", 32),
+}
+_JPEG_LONGEST_SIDE = 65500  # libjpeg's limit
+_JPEG_QUALITY = 95
+
+
+def output_bits(bits: Iterable[int], suffix: str) -> int:
+    """Bits per channel of an output: the deepest input's, as far as the file kind goes; EXR is always 32.
+
+    suffix: with its dot, any case. Raises BadRequest for a kind that is not written.
+    """
+    kind, most = _writable(suffix)
+    return 32 if kind == "exr" else min(max(bits), most)
+
+
+def _writable(suffix: str) -> tuple[str, int]:
+    known = _WRITABLE.get(suffix.lower())
+    if known is None:
+        raise BadRequest(f"pictures are not written as {suffix or 'files of no kind'}; use {', '.join(_WRITABLE)}")
+    return known
+
+
+def encode_picture(
+    pixels: AnyImage, alpha: np.ndarray | None, bits: int, suffix: str, icc: bytes | None = None,
+    exif: Exif | None = None,
+) -> tuple[bytes, tuple[str, ...]]:
+    """The bytes of a picture file, and warnings.
+
+    pixels: light as in Picture; alpha, icc, exif: as there; bits: the deepest input's (8, 16 or 32); suffix: .png,
+    .jpg, .jpeg, .tif, .tiff or .exr. JPEG gets black where alpha says so, the others keep alpha. EXR holds linear sRGB,
+    premultiplied. Raises BadRequest for other suffixes, UnwritableOutput where the picture does not fit into the kind
+    of file.
+    """
+    kind, _ = _writable(suffix)
+    depth = output_bits((bits,), suffix)
+    exif = exif or Exif()
+    profile = parse_icc(icc) if icc is not None else None
+    if kind == "exr":
+        if profile is not None and pixels.shape[2] == 3:
+            pixels = cv2.transform(np.ascontiguousarray(whole(pixels), np.float32), profile.to_srgb.astype(np.float32))
+        return write_exr(pixels, alpha, exif), ()
+    height, width = pixels.shape[:2]
+    if kind == "jpeg" and max(width, height) > _JPEG_LONGEST_SIDE:
+        raise UnwritableOutput(f"JPEG holds {_JPEG_LONGEST_SIDE} pixels a side, not {width} × {height}; use .png")
+    # none of the files has gray with alpha
+    channels = 3 if alpha is not None and kind != "jpeg" else pixels.shape[2]
+    if icc is not None and icc_channels(icc) != channels:
+        icc = None
+    levels = _Levels(pixels, alpha, depth, _curves(icc, channels), kind == "jpeg")
+    if kind == "png":
+        encoded, brighter = levels.as_png()
+    else:
+        coded, brighter = levels.as_array()
+        encoded = _by_opencv(coded, suffix)
+    warnings: tuple[str, ...] = ()
+    if bits == 32:
+        lost = f", and {brighter:.2%} of its pixels, brighter than white, were clipped" if brighter else ""
+        warnings = (f"float input was written display-encoded with {depth} bits{lost}; .exr keeps it",)
+    return embed(encoded, kind, exif, icc, straight_alpha=levels.shape[2] == 4), warnings
+
+
+def _by_opencv(coded: np.ndarray, suffix: str) -> bytes:
+    """The file of levels (H, W, C) in B, G, R, A order."""
+    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if _WRITABLE[suffix.lower()][0] == "jpeg" else []
+    try:
+        with quiet_opencv():
+            done, encoded = cv2.imencode(suffix.lower(), coded, options)
+    except (cv2.error, MemoryError):
+        done = False
+    if not done:
+        height, width = coded.shape[:2]
+        raise UnwritableOutput(f"{width} × {height} pixels do not fit into a {suffix} file; use .exr or a smaller size")
+    return encoded.tobytes()
+
+
+@dataclass(frozen=True, eq=False)
+class _Levels:
+    """Light as files hold it: levels (H, W, 1, 3 or 4) of 8 or 16 bits. flat: black where alpha says so, instead of
+    alpha."""
+
+    light: AnyImage
+    alpha: np.ndarray | None
+    bits: int
+    curves: tuple[Curve, ...]
+    flat: bool
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(H, W, C)."""
+        height, width, channels = self.light.shape
+        return height, width, channels if self.alpha is None or self.flat else 4  # no gray with alpha
+
+    def as_png(self) -> tuple[bytes, float]:
+        """The file, and the share of pixels brighter than white."""
+        beyond: list[int] = []
+
+        def levels(rows: slice) -> np.ndarray:
+            out, brighter = self._of(rows)
+            beyond.append(brighter)
+            return out
+
+        return encode_png(self.shape, self.bits, levels), self._share(beyond)
+
+    def as_array(self) -> tuple[np.ndarray, float]:
+        """All of them as OpenCV writes them, in B, G, R, A order, and the share of pixels brighter than white."""
+        out = np.empty(self.shape, np.uint8 if self.bits == 8 else np.uint16)
+        order = {1: [0], 3: [2, 1, 0], 4: [2, 1, 0, 3]}[self.shape[2]]
+
+        def put(rows: slice) -> int:
+            levels, brighter = self._of(rows)
+            for to, channel in enumerate(order):
+                out[rows, :, to] = levels[..., channel]
+            return brighter
+
+        return out, self._share(in_order(put, strips(self.shape)))
+
+    def _of(self, rows: slice) -> tuple[np.ndarray, int]:
+        """The levels of some rows, in R, G, B, A order, and how many of the pixels are brighter than white."""
+        part = self.light[rows, 0 : self.light.shape[1]]
+        brighter = int(in_any_channel(part > 1).sum()) if part.max(initial=0) > 1 else 0
+        if self.flat and self.alpha is not None:
+            part = part * self.alpha[rows][..., None]
+        coded = encode(part, self.bits, self.curves)
+        if self.flat or self.alpha is None:
+            return coded, brighter
+        most = np.iinfo(coded.dtype).max
+        alpha = self.alpha[rows]
+        levels = alpha * coded.dtype.type(most) if alpha.dtype == bool else np.rint(np.clip(alpha, 0, 1) * most)
+        if coded.shape[2] == 1:
+            coded = cv2.merge([coded] * 3)
+        out = cv2.merge([coded, levels.astype(coded.dtype, copy=False)])
+        return out, brighter
+
+    def _share(self, counts: Iterable[int]) -> float:
+        return sum(counts) / max(1, self.shape[0] * self.shape[1])
+
+
+def save_picture(
+    path: str | Path, pixels: np.ndarray, alpha: np.ndarray | None, bits: int, icc: bytes | None = None,
+    exif: Exif | None = None, overwrite: bool = False,
+) -> tuple[str, ...]:
+    """Writes a picture file, whole or not at all. Arguments, warnings returned and errors: see `encode_picture`."""
+    with OutputFiles(overwrite) as files:
+        files.check(path)
+        data, warnings = encode_picture(pixels, alpha, bits, Path(path).suffix, icc, exif)
+        files.add(path, data)
+    return warnings

@@ -1,0 +1,153 @@
+"""OpenEXR in and out: which of a render's many channels are the picture, and where it lies in its frame."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..raster.arrays import strips
+from ..raster.lazy import AnyImage
+from ..system.errors import UnreadableImage
+from ..system.threads import each
+from .metadata import SOFTWARE, Exif
+
+
+class ExrPixels(NamedTuple):
+    """pixels: float32 H×W×C (1 or 3) as stored, premultiplied; alpha: float32 H×W as stored, or None; warning or ""."""
+
+    pixels: np.ndarray
+    alpha: np.ndarray | None
+    warning: str
+
+
+class _Layer(NamedTuple):
+    name: str
+    colours: list[np.ndarray]
+    alpha: np.ndarray | None
+    part: Any
+
+
+def read_exr(data: bytes, check: Callable[[list[tuple[int, int]], int], None]) -> ExrPixels:
+    """Reads the picture of an EXR file: R, G, B or Y, with A where there is one; in a render the Combined pass.
+
+    check(sizes, samples) is asked before pixels are read and raises what it likes; sizes: (W, H) of all windows;
+    samples: numbers in all channels together. The data window is placed in the display window; what lies outside is
+    transparent. Raises UnreadableImage where no layer has the colours, RuntimeError or ValueError (from OpenEXR) where
+    the file is damaged.
+    """
+    import OpenEXR
+
+    # OpenEXR prints a line to sys.stdout for a damaged part and leaves it out.
+    with contextlib.redirect_stdout(io.StringIO()):
+        headers = OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True).parts
+        sizes = [(_window(part.header["displayWindow"])[1], _window(part.header["dataWindow"])[1]) for part in headers]
+        samples = sum(
+            width * height * len(part.header["channels"])
+            for part, (_, (width, height)) in zip(headers, sizes, strict=True)
+        )
+        check([size for both in sizes for size in both], samples)
+        parts = OpenEXR.File(io.BytesIO(data), separate_channels=True).parts
+    if len(parts) < len(headers):
+        raise ValueError("damaged part")
+    layers = list(_layers(parts))
+    if not layers:
+        raise UnreadableImage("no layer with the channels R, G, B or Y; render a colour pass (Combined) into the file")
+    best = min(layers, key=_rank)  # the first of equals
+    pixels, alpha = _in_display_window(best)
+    others = [layer.name for layer in layers if layer is not best and _rank(layer) == _rank(best)]
+    warning = ""
+    if _rank(best) > 2 and len(layers) > 1:
+        warning = f"no combined picture among the layers of the file; the layer {best.name!r} was taken"
+    elif others:
+        warning = f"several pictures in the file; {best.name!r} was taken, not {', '.join(map(repr, others))}"
+    return ExrPixels(pixels, alpha, warning)
+
+
+def _layers(parts: list[Any]) -> Iterator[_Layer]:
+    for part in parts:
+        # Channels of one layer share everything before the last dot; a part's name stands for a missing prefix.
+        groups: dict[str, dict[str, np.ndarray]] = {}
+        for name, channel in part.channels.items():
+            layer, _, component = name.rpartition(".")
+            groups.setdefault(layer, {})[component.upper()] = channel.pixels
+        for layer, found in groups.items():
+            colours = [found[name] for name in "RGB" if name in found]
+            if len(colours) < 3:
+                colours = [found["Y"]] if "Y" in found else []
+            # Depth and normals come as X, Y, Z
+            if not colours or (len(colours) == 1 and ("X" in found or "Z" in found)):
+                continue
+            if len({colour.shape for colour in colours}) > 1:  # subsampled
+                continue
+            name = layer or (str(part.header.get("name", "")) if len(parts) > 1 else "")
+            alpha = found.get("A")
+            yield _Layer(name, colours, alpha if alpha is not None and alpha.shape == colours[0].shape else None, part)
+
+
+def _rank(layer: _Layer) -> int:
+    """0 the unnamed layer, 1 Blender's Composite, 2 a view layer's Combined pass, 3 anything else."""
+    steps = layer.name.split(".")
+    if layer.name == "" or layer.name.lower() in ("rgb", "rgba"):
+        return 0
+    if "Combined" in steps:
+        return 1 if steps[0] == "Composite" else 2
+    return 3
+
+
+def _window(window: Any) -> tuple[tuple[int, int], tuple[int, int]]:
+    """((x, y), (width, height)) of an EXR box, whose corners are both inside."""
+    (left, top), (right, bottom) = ((int(corner[0]), int(corner[1])) for corner in window)
+    return (left, top), (right - left + 1, bottom - top + 1)
+
+
+def _in_display_window(layer: _Layer) -> tuple[np.ndarray, np.ndarray | None]:
+    pixels = np.dstack(layer.colours).astype(np.float32)
+    alpha = None if layer.alpha is None else layer.alpha.astype(np.float32)
+    (left, top), data_size = _window(layer.part.header["dataWindow"])
+    (frame_left, frame_top), frame_size = _window(layer.part.header["displayWindow"])
+    x, y = left - frame_left, top - frame_top
+    if (x, y) == (0, 0) and data_size == frame_size:
+        return pixels, alpha
+    whole = np.zeros((frame_size[1], frame_size[0], pixels.shape[2]), np.float32)
+    whole_alpha = np.zeros(whole.shape[:2], np.float32)
+    frame = np.s_[max(y, 0) : max(y + data_size[1], 0), max(x, 0) : max(x + data_size[0], 0)]
+    inside = whole[frame].shape
+    source = np.s_[max(-y, 0) : max(-y, 0) + inside[0], max(-x, 0) : max(-x, 0) + inside[1]]
+    whole[frame] = pixels[source]
+    whole_alpha[frame] = 1.0 if alpha is None else alpha[source]
+    return whole, whole_alpha
+
+
+def write_exr(pixels: AnyImage, alpha: np.ndarray | None, exif: Exif) -> bytes:
+    """A 32-bit ZIP-compressed EXR file in memory.
+
+    pixels: float32 H×W×C (1 or 3), scene-linear in Rec. 709 primaries, straight; stored premultiplied. alpha: float32
+    H×W or None. Photographer, time and camera go into the standard attributes.
+    """
+    import OpenEXR
+
+    names = "RGB" if pixels.shape[2] == 3 else "Y"
+    channels = {name: np.empty(pixels.shape[:2], np.float32) for name in names}
+
+    def put(rows: slice) -> None:
+        part = pixels[rows, 0 : pixels.shape[1]]
+        stored = part if alpha is None else part * alpha[rows][..., None]
+        for index, name in enumerate(names):
+            channels[name][rows] = stored[..., index]
+
+    each(put, strips(pixels.shape))
+    if alpha is not None:
+        channels["A"] = np.ascontiguousarray(alpha, np.float32)
+    texts = {
+        "owner": exif.text(33432) or exif.text(315), "capDate": exif.text(36867) or exif.text(306),
+        "comments": " ".join(filter(None, (exif.make, exif.model, exif.lens))), "software": SOFTWARE,
+    }
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    stream = io.BytesIO()
+    with OpenEXR.File(header | {name: text for name, text in texts.items() if text}, channels) as file:
+        file.write(stream)
+    return stream.getvalue()

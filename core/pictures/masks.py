@@ -1,0 +1,124 @@
+"""Masks of what is to be ignored in a picture: from a file or an array, and into the picture's alpha.
+
+What a picture does not show is in nobody's way: features, metrics, warp and blend all leave out what alpha hides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..raster.lazy import extent
+from ..system.errors import BadRequest
+from .decoding import DRAWING
+from .picture import Picture, load_picture, picture_from_array
+
+# Less than this of a picture left is a mask that means something else.
+LEAST_LEFT = 0.01
+# Share of white up to which paint is black, and from the other end white.
+PAINTED = 0.25
+# Share of white by which a colour may differ and still be one: rounding, and compression that is not lossless.
+ONE_COLOUR = 8 / 255
+
+
+def read_mask(source: str | Path | np.ndarray, size: tuple[int, int], name: str) -> NDArray[np.bool_]:
+    """An ignore mask (H, W) for a picture of `size` (W, H) px, True where the picture is to be ignored.
+
+    source: any picture file that can be read, or an array as for `picture_from_array`, or of bool. White (brighter than
+    half) is ignored. Where there is alpha and what it shows has one colour, alpha decides; otherwise colour times
+    alpha does. Another size is stretched (nearest) where the shape is the picture's to within a pixel. name: of the
+    picture in messages, like "the reference".
+    Raises UnreadableImage (file), BadRequest (a mask of another shape, of labels instead of white, or of everything).
+    """
+    label = f"the mask of {name}" if isinstance(source, np.ndarray) else f"{source}: the mask of {name}"
+    picture = _picture(source, label)
+    _refuse_labels(picture, label)
+    mask = _stretched(_white(picture), size, label)
+    left = 1 - float(mask.mean())
+    if left < LEAST_LEFT:
+        raise BadRequest(
+            f"{label} leaves {left:.1%} of the picture, at least {LEAST_LEFT:.0%} is needed: white is ignored, black "
+            "is kept; invert the mask if it was painted the other way round"
+        )
+    return mask
+
+
+def read_painted(source: str | Path | np.ndarray) -> NDArray[np.int8]:
+    """What an artist painted over a panorama (h, w), at its own size: -1 from the reference where it is black, 1 from
+    the target where it is white, 0 where it is gray or transparent and the seam decides.
+
+    source: any picture file that can be read, or an array as for `picture_from_array`. Raises UnreadableImage (file).
+    """
+    picture = _picture(source, "the mask of the seam")
+    values = _gray(picture)
+    painted = np.zeros(values.shape, np.int8)
+    painted[values < PAINTED], painted[values > 1 - PAINTED] = -1, 1
+    if picture.alpha is not None:
+        painted[picture.alpha <= 0.5] = 0
+    return painted
+
+
+def painted_over(painted: NDArray[np.int8], size: tuple[int, int]) -> NDArray[np.int8]:
+    """The same on a panorama of `size` (W, H) px. Raises BadRequest where its shape is another one."""
+    return _stretched(painted, size, "the mask of the seam", "the whole panorama")
+
+
+def without(picture: Picture, mask: NDArray[np.bool_]) -> Picture:
+    """The picture with alpha 0 where the mask (H, W) is True; the same picture where it is True nowhere."""
+    if not mask.any():
+        return picture
+    alpha = np.ones(mask.shape, np.float32) if picture.alpha is None else picture.alpha
+    return replace(picture, alpha=np.where(mask, np.float32(0), alpha))
+
+
+def _picture(source: str | Path | np.ndarray, label: str) -> Picture:
+    if not isinstance(source, np.ndarray):
+        return load_picture(source, DRAWING)
+    return picture_from_array(source.astype(np.uint8) * 255 if source.dtype == bool else source, label)
+
+
+def _refuse_labels(picture: Picture, label: str) -> None:
+    """Masks of 0 and 1 look black and would ignore nothing, without a word."""
+    if picture.bits < 32 and picture.alpha is None and picture.view.max() <= 1 and extent(picture.light)[1] > 0:
+        raise BadRequest(f"{label} holds nothing but black and almost black; save what is to be ignored as white (255)")
+
+
+def _white(picture: Picture) -> NDArray[np.bool_]:
+    """Where the mask says ignore (h, w), at its own size."""
+    gray = _gray(picture)
+    if picture.alpha is None:
+        return gray > 0.5
+    shown = _values(picture)[picture.alpha > 0.5]
+    one_colour = not len(shown) or np.ptp(shown, axis=0).max() <= ONE_COLOUR
+    return (picture.alpha if one_colour else gray * picture.alpha) > 0.5
+
+
+def _values(picture: Picture) -> NDArray[np.float32]:
+    """A float picture's view is exposed for the eye; its values themselves are the mask."""
+    return picture.pixels if picture.bits == 32 else picture.view.astype(np.float32) / 255
+
+
+def _gray(picture: Picture) -> NDArray[np.float32]:
+    values = _values(picture)
+    return values[..., 0] if values.shape[2] == 1 else cv2.cvtColor(values, cv2.COLOR_RGB2GRAY)
+
+
+def _stretched(mask: NDArray, size: tuple[int, int], label: str, what: str = "the picture") -> NDArray:
+    width, height = size
+    own_height, own_width = mask.shape
+    if (own_width, own_height) == size:
+        return mask
+    # some scale brings both sides to within a pixel, of the smaller of the two
+    (w, h), (small_w, small_h) = sorted([(own_width, own_height), size], reverse=True, key=lambda s: s[0] * s[1])
+    if max((small_w - 1) / w, (small_h - 1) / h) > min((small_w + 1) / w, (small_h + 1) / h):
+        raise BadRequest(
+            f"{label} has {own_width}×{own_height} pixels, {what} has {width}×{height}: a mask needs "
+            f"{what}'s size, or its shape at another size, upright"
+        )
+    rows = (2 * np.arange(height) + 1) * own_height // (2 * height)
+    columns = (2 * np.arange(width) + 1) * own_width // (2 * width)
+    return mask[np.ix_(rows, columns)]

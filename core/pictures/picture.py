@@ -1,0 +1,260 @@
+"""Pictures come in, and pictures go out: any file or array to one kind of Picture, and back to a file.
+
+A Picture holds light. Display encoding, ICC curves, orientation, premultiplied alpha and channel order are dealt with
+here, once on the way in and once on the way out, so that no other room has to know about them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
+from ..raster.lazy import AnyImage, Coded, whole
+from ..system.errors import BadRequest, UnreadableImage
+from .containers import foreign_kind, read_structure
+from .decoding import PHOTOGRAPH, check_size, decode_exr, decode_file, read_file, turn
+from .metadata import Exif, read_exif
+
+_READABLE = "PNG, JPEG, TIFF, EXR, WebP or BMP"
+_MOST_NOT_FINITE = 0.5
+_ADVICE = {
+    "camera RAW": "develop it in a RAW converter and export a 16-bit TIFF",
+    "HEIC/HEIF": "export it as JPEG or TIFF", "AVIF": "export it as PNG or JPEG",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture from outside, upright (any EXIF orientation has been applied), row 0 on top.
+
+    light: float32 H×W×C, C = 1 or 3 (R, G, B), scene-linear, straight (not multiplied by alpha), in the primaries of
+    `icc` or, where that is None, of sRGB; of 8 and 16 bits it is worked out where it is asked for (see `lazy`), of all
+    pixels as `pixels`. alpha: float32 H×W in [0, 1], None when opaque everywhere. view: uint8 H×W×C,
+    the display-encoded picture that features and photometric metrics see. bits: 8, 16 or 32 (float) of the source.
+    exif: see `Exif.upright`; its orientation is the source's and is done with. icc: the embedded profile or None. name:
+    file name or "array". warnings: what the user should know.
+    """
+
+    light: AnyImage
+    alpha: np.ndarray | None
+    view: np.ndarray
+    bits: int
+    exif: Exif
+    icc: bytes | None
+    name: str
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """All of its light as an array (H, W, C) float32."""
+        return whole(self.light)
+
+
+def load_picture(path: str | Path, pixels_per_byte: int = PHOTOGRAPH) -> Picture:
+    """Reads a PNG, JPEG, TIFF, EXR, WebP or BMP file.
+
+    8, 16 or 32 bits (float), gray or colour, with or without alpha. pixels_per_byte: see `check_size`. Raises
+    UnreadableImage, with what was found and what to do, for everything else: missing, damaged, cut off, too large (over
+    400 megapixels or 65535 pixels a side) for memory or for its own length, HEIC and camera RAW.
+    """
+    path = Path(path)
+    try:
+        return _load(path, pixels_per_byte)
+    except UnreadableImage as error:
+        raise UnreadableImage(f"{path}: {error}") from error
+
+
+def _load(path: Path, pixels_per_byte: int) -> Picture:
+    data = read_file(path)
+    foreign = foreign_kind(data, path.suffix.lower())
+    if foreign:
+        raise UnreadableImage(f"{foreign} pictures cannot be read; {_ADVICE[foreign]}")
+    structure = read_structure(data)
+    if structure is None:
+        raise UnreadableImage(f"not a picture of a known kind; export it as {_READABLE}")
+    if structure.kind == "exr":
+        raw, warnings = decode_exr(data, pixels_per_byte)
+        return _picture(raw, True, Exif(), None, path.name, warnings)
+    if structure.damage:
+        kind = structure.kind.upper()
+        raise UnreadableImage(f"the {kind} file is damaged: {structure.damage}; copy or export it again")
+    check_size(structure.width, structure.height, len(data), pixels_per_byte)
+    exif = read_exif(structure.exif)
+    if structure.tiff is not None:  # the value that decoding set aside, in BigTIFF too, which ExifRead does not know
+        exif = replace(exif, orientation=structure.tiff.orientation if 1 <= structure.tiff.orientation <= 8 else 1)
+    raw, warnings = decode_file(data, structure)
+    associated = structure.tiff is not None and structure.tiff.extra == 1
+    return _picture(turn(raw, exif.orientation), associated, exif.upright(), structure.icc, path.name, warnings)
+
+
+def picture_from_array(array: np.ndarray, name: str = "array") -> Picture:
+    """A Picture from an array (copied).
+
+    array: uint8 or uint16, display-encoded sRGB; float32 or float64, scene-linear with sRGB primaries. H×W or H×W×C
+    with C = 1 gray, 2 gray and alpha, 3 RGB, 4 RGBA; straight alpha; row 0 on top. Raises BadRequest for every other
+    array.
+    """
+    if not isinstance(array, np.ndarray):
+        raise BadRequest(f"{name}: a NumPy array is needed, not {type(array).__name__}")
+    dtype = array.dtype.newbyteorder("=")
+    if dtype not in (np.uint8, np.uint16, np.float32, np.float64):
+        raise BadRequest(f"{name}: {array.dtype} values; uint8, uint16, float32 or float64 are needed")
+    if array.ndim not in (2, 3) or array.size == 0 or (array.ndim == 3 and array.shape[2] > 4):
+        raise BadRequest(f"{name}: an array of the shape {array.shape}; height × width (× 1 to 4 channels) is needed")
+    raw = array[..., None] if array.ndim == 2 else array
+    raw = np.array(raw, dtype=np.float32 if dtype == np.float64 else dtype, order="C")
+    try:
+        return _picture(raw, False, Exif(), None, name, [])
+    except UnreadableImage as error:
+        raise BadRequest(f"{name}: {error}") from error
+
+
+def _picture(
+    raw: np.ndarray, associated: bool, exif: Exif, icc: bytes | None, name: str, warnings: list[str]
+) -> Picture:
+    """raw: upright H×W×1..4 in R, G, B, A order; associated: the colours are multiplied by alpha as stored."""
+    channels = 1 if raw.shape[2] < 3 else 3
+    colour, stored_alpha = raw[..., :channels], raw[..., channels] if raw.shape[2] > channels else None
+    light: AnyImage
+    alpha = None
+    if stored_alpha is not None:
+        full = 1.0 if raw.dtype == np.float32 else float(np.iinfo(raw.dtype).max)
+        alpha = np.clip(stored_alpha.astype(np.float32) / np.float32(full), 0.0, 1.0)  # NaN stays
+    if associated and alpha is not None:
+        colour = _straight(colour, alpha)
+    colour = np.ascontiguousarray(colour)
+    # RGB profiles on gray pictures are common and harmless: gray stays gray. Anything else does not fit the pixels
+    # (CMYK turned to RGB by the decoder) or is damaged.
+    if icc is not None and icc_channels(icc) not in (channels, 3):
+        warnings = [*warnings, "its colour profile does not fit its pixels; taken as sRGB"]
+        icc = None
+    if raw.dtype == np.float32:
+        light, alpha, share = _finite(colour, alpha)
+        if share > _MOST_NOT_FINITE:
+            raise UnreadableImage(f"{share:.0%} of the pixels are not finite numbers; render or export it again")
+        if share > 0:
+            warnings = [*warnings, f"{share:.2%} of the pixels are not finite numbers; they are taken as transparent"]
+        view = _float_view(light, _exposure(light, alpha))
+    else:
+        light = Coded(colour, _curves(icc, channels))
+        # 65535 / 255 = 257; OpenCV rounds
+        view = colour if raw.dtype == np.uint8 else cv2.convertScaleAbs(colour, alpha=1 / 257).reshape(colour.shape)
+    if alpha is not None and (alpha >= 1.0).all():
+        alpha = None
+    icc = icc if icc is not None and icc_channels(icc) == channels else None
+    return Picture(light, alpha, view, raw.dtype.itemsize * 8, exif, icc, name, tuple(warnings))
+
+
+def _straight(colour: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    """Colours divided by alpha, in the encoding they were multiplied in; 0 where alpha is 0."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        straight = np.where(alpha[..., None] == 0, np.float32(0), colour / alpha[..., None])
+    if colour.dtype == np.float32:
+        return straight.astype(np.float32)
+    return np.rint(np.clip(straight, 0, np.iinfo(colour.dtype).max)).astype(colour.dtype)
+
+
+def _finite(colour: np.ndarray, alpha: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None, float]:
+    """Colours and alpha with 0 wherever one of the values is not finite, and the share of such pixels."""
+    good = np.isfinite(colour).all(axis=2)
+    if alpha is not None:
+        good &= np.isfinite(alpha)
+    if good.all():
+        return colour, alpha, 0.0
+    alpha = np.where(good, np.float32(1) if alpha is None else alpha, np.float32(0))
+    return np.where(good[..., None], colour, np.float32(0)), alpha, 1.0 - float(good.mean())
+
+
+def _exposure(pixels: np.ndarray, alpha: np.ndarray | None) -> float:
+    """The factor that brings the light of a float picture into the range of a display.
+
+    Half way (in stops) between the factor that puts the median on middle gray and the one that keeps the brightest
+    hundredth from clipping: a bright sky then leaves features in the shade, and a shade leaves some in the sky.
+    """
+    light = pixels.max(axis=2)
+    light = light[light > 0] if alpha is None else light[(light > 0) & (alpha > 0)]
+    if light.size == 0:
+        return 1.0
+    middle, bright = (float(value) for value in np.percentile(light[:: max(1, light.size // 1_000_000)], (50, 99)))
+    return float(np.clip(np.sqrt(0.18 / middle * 0.9 / bright), 1e-37, 1e37))
+
+
+def _float_view(pixels: np.ndarray, exposure: float) -> np.ndarray:
+    with np.errstate(over="ignore"):
+        return encode(pixels * np.float32(exposure), 8)
+
+
+def _curves(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
+    """The curves for pixels of so many channels; sRGB where the profile is missing or not understood."""
+    profile = parse_icc(icc) if icc is not None else None
+    if profile is None:
+        return (srgb_curve(),)
+    if channels == 1 and len(profile.curves) == 3:
+        return profile.curves[1:2]
+    return profile.curves
+
+
+def resized(picture: Picture, scale: float) -> Picture:
+    """The picture made smaller by `scale` (at most 1), each new pixel the mean light of what it covers."""
+    height, width = picture.light.shape[:2]
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    if size == (width, height):
+        return picture
+
+    def shrink(array: np.ndarray) -> np.ndarray:
+        return cv2.resize(array, size, interpolation=cv2.INTER_AREA).reshape(size[1], size[0], *array.shape[2:])
+
+    if picture.alpha is None:
+        return replace(picture, light=shrink(picture.pixels), view=shrink(picture.view))
+    alpha = shrink(picture.alpha)
+    pixels = shrink(picture.pixels * picture.alpha[..., None]) / np.maximum(alpha, 1e-6)[..., None]
+    return replace(picture, light=pixels, alpha=alpha, view=shrink(picture.view))
+
+
+def in_same_colour_space(a: Picture, b: Picture) -> tuple[Picture, Picture]:
+    """Both pictures with the same primaries, the same number of channels and, for two float pictures, comparable views.
+
+    Equal profiles are kept (light stays in their primaries); otherwise each picture with a profile is converted to
+    linear sRGB and loses it. A profile that is not understood counts as sRGB then, with a warning. Gray beside colour
+    gets three channels. Returns new pictures; the given ones stay as they are.
+    """
+    if a.icc != b.icc:
+        a, b = _to_srgb(a), _to_srgb(b)
+    if a.light.shape[2] != b.light.shape[2]:
+        a, b = _three_channels(a), _three_channels(b)
+    if a.bits == b.bits == 32:
+        ours, theirs = _exposure(a.pixels, a.alpha), _exposure(b.pixels, b.alpha)
+        # One factor keeps the same thing equally bright in both; over two stops apart, seeing anything comes first.
+        if 0.25 <= ours / theirs <= 4.0:
+            shared = float(np.sqrt(ours * theirs))
+            a, b = (replace(one, view=_float_view(one.pixels, shared)) for one in (a, b))
+    return a, b
+
+
+def _to_srgb(picture: Picture) -> Picture:
+    if picture.icc is None:
+        return picture
+    profile = parse_icc(picture.icc)
+    if profile is None:
+        warning = "its colour profile is no matrix profile and not the other picture's; its colours are taken as sRGB"
+        return replace(picture, icc=None, warnings=(*picture.warnings, warning))
+    if profile.gray:
+        return replace(picture, icc=None)
+    pixels = cv2.transform(picture.pixels, profile.to_srgb.astype(np.float32))
+    view = _float_view(pixels, _exposure(pixels, picture.alpha)) if picture.bits == 32 else encode(pixels, 8)
+    return replace(picture, light=pixels, view=view, icc=None)
+
+
+def _three_channels(picture: Picture) -> Picture:
+    if picture.light.shape[2] == 3:
+        return picture
+    light = picture.light
+    if isinstance(light, Coded) and len(light.curves) == 1:
+        light = Coded(np.repeat(light.levels, 3, axis=2), light.curves)
+    else:
+        light = np.repeat(whole(light), 3, axis=2)
+    return replace(picture, light=light, view=np.repeat(picture.view, 3, axis=2))

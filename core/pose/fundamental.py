@@ -1,0 +1,184 @@
+"""What the matches agree on before any camera is known: a fundamental matrix and a homography, against chance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import poselib
+from numpy.typing import NDArray
+
+from ..cameras.matches import Matches
+from ..cameras.projective import homogeneous, project, sampson_residuals
+from ..raster.arrays import Array
+from ..system.errors import DegenerateGeometry, NoOverlap
+
+# A chance F gathers its 7 points and whatever lies within the threshold of its lines; this many is beyond chance.
+MIN_INLIERS = 15
+RANSAC_PX = 1.5
+LEAST_PX = 0.05  # no keypoint is placed better
+# Points that stray less than this share of the picture's shorter side from a line tell no geometry.
+LEAST_SPREAD = 0.008
+# Off the homography: so many σ, at least so many px. On a line: so many σ.
+OFF_SIGMAS, OFF_PX, ON_SIGMAS = 5.0, 0.75, 3.5
+# Matches off the homography along their lines that are beyond coincidence: so many, such a share of all that lie on
+# lines (feature positions have heavy tails), and so many times those across.
+LEAST_OFF, LEAST_SHARE, ALONG_TO_ACROSS = 8, 0.025, 3.0
+# log of the number of coincidences as good that random matches would bring: noise is not as random as that
+COINCIDENCE = -25.0
+
+
+def fundamental_candidates(matches: Matches, seed: int) -> list[Array]:
+    """Fundamental matrices (3, 3) worth refining, best first.
+
+    PoseLib's LO-RANSAC and OpenCV's MAGSAC++, each with a sharp and a wide threshold: where a lens bends lines, a sharp
+    one locks on to a part of the picture. Raises NoOverlap when no more agree than chance would bring.
+    """
+    found: list[Array] = []
+    for factor in (1.0, 2.0):
+        threshold = factor * RANSAC_PX * matches.scale
+        found.append(robust_fundamental(matches, threshold, seed))
+        cv2.setRNGSeed(seed)
+        try:
+            F, _ = cv2.findFundamentalMat(matches.x, matches.y, cv2.USAC_MAGSAC, threshold, 0.9999, 20000)
+        except cv2.error:  # an assertion of its own about points that determine nothing
+            continue
+        if F is not None and F.shape == (3, 3):
+            found.append(F)
+    threshold = RANSAC_PX * matches.scale
+    ranked = []
+    for F in found:
+        if np.isfinite(F).all() and F.any():
+            residual = np.abs(sampson_residuals(F, matches.x, matches.y))
+            # linear within the threshold, so that one sharp and one wide F compare fairly
+            ranked.append((np.minimum(residual / threshold, 1.0).sum(), F, int((residual < threshold).sum())))
+    ranked.sort(key=lambda item: item[0])
+    agree = ranked[0][2] if ranked else 0
+    needed = max(MIN_INLIERS, int(np.ceil(0.08 * len(matches))))
+    if agree < needed:
+        raise NoOverlap(
+            f"{len(matches)} points look alike but only {agree} agree on a camera motion, at least {needed} needed: "
+            "the pictures seem to have no content in common"
+        )
+    return [F for _, F, _ in ranked]
+
+
+def explained_by(F: Array, matches: Matches) -> tuple[NDArray[np.bool_], float]:
+    """Which matches (N,) lie on the lines of F, and the noise of a Sampson distance among them in px."""
+    residual = np.abs(sampson_residuals(F, matches.x, matches.y))
+    on = residual < RANSAC_PX * matches.scale
+    # σ from the median absolute residual of a normal distribution
+    sigma = float(np.median(residual[on])) / 0.6745 if on.any() else 0.0
+    return on, max(sigma, LEAST_PX * matches.scale)
+
+
+def robust_fundamental(matches: Matches, threshold: float, seed: int) -> Array:
+    """The fundamental matrix (3, 3) with most matches within `threshold` px, by PoseLib's LO-RANSAC."""
+    options = {"max_epipolar_error": threshold, "seed": seed, "max_iterations": 20000}
+    return np.asarray(poselib.estimate_fundamental(matches.x, matches.y, options, {})[0])
+
+
+def refuse_chance(matches: Matches, F: Array, size: tuple[int, int]) -> None:
+    """Raises NoOverlap where so many points on their lines would be found among matches drawn at random.
+
+    The expected number of such findings, a contrario (Moisan and Stival, IJCV 2004, eq. 10): (n − 7) C(n, k) C(k, 7)
+    α^(k − 7) with α the chance of a point lying within the threshold of a line.
+    """
+    threshold = RANSAC_PX * matches.scale
+    n, k = len(matches), int(explained_by(F, matches)[0].sum())
+    alpha = min(1.0, 2 * threshold * math.hypot(*size) / (size[0] * size[1]))
+    findings = math.log(n - 7) + _log_choose(n, k) + _log_choose(k, 7) + (k - 7) * math.log(alpha)
+    if findings > 0:
+        raise NoOverlap(
+            f"{n} points look alike, but the {k} that agree on a camera motion could agree by chance: the pictures "
+            "seem to have no content in common"
+        )
+
+
+def _log_choose(n: int, k: int) -> float:
+    return math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
+
+
+@dataclass(frozen=True)
+class Homography:
+    """H (3, 3), target ~ H reference; error (N,) px of each match, infinite behind the camera; `inliers` (N,); sigma:
+    noise of a coordinate in px."""
+
+    H: Array
+    error: Array
+    inliers: NDArray[np.bool_]
+    sigma: float
+
+
+def fit_homography(matches: Matches, seed: int) -> Homography:
+    """The homography that explains most matches, by PoseLib's LO-RANSAC."""
+    options = {"max_reproj_error": 2 * RANSAC_PX * matches.scale, "seed": seed, "max_iterations": 10000}
+    H, info = poselib.estimate_homography(matches.x, matches.y, options, {})
+    inliers = np.asarray(info["inliers"], bool)
+    H = np.asarray(H, np.float64)
+    if not np.isfinite(H).all() or inliers.sum() < 4:
+        return Homography(np.eye(3), np.full(len(matches), np.inf), np.zeros(len(matches), bool), matches.scale)
+    # the sign that has the inliers in front
+    H = H * np.sign(np.median(homogeneous(matches.x[inliers]) @ H[2])) / np.linalg.norm(H)
+    error = transfer_error(H, matches)
+    # the median length of a normal vector of two components is 1.1774 σ; both pictures contribute
+    sigma = max(float(np.median(error[inliers])) / 1.1774 / math.sqrt(2), LEAST_PX * matches.scale)
+    return Homography(H, error, inliers, sigma)
+
+
+def transfer_error(H: Array, matches: Matches) -> Array:
+    """|π(H x) − y| (N,) px; infinite where H x lies behind the camera."""
+    ray = homogeneous(matches.x) @ H.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = np.linalg.norm(project(ray) - matches.y, axis=1)
+    return np.where(ray[:, 2] > 0, error, np.inf)
+
+
+def refuse_without_spread(matches: Matches, F: Array, size: tuple[int, int], target_size: tuple[int, int]) -> None:
+    """Raises DegenerateGeometry where the matches that F explains lie in one spot or on one line of a picture."""
+    agree, _ = explained_by(F, matches)
+    for points, picture_size in ((matches.x[agree], size), (matches.y[agree], target_size)):
+        centred = points - np.median(points, axis=0)
+        # nine in ten, and a direction that few strays cannot turn: they span no area
+        weight = np.ones(len(centred))
+        for _ in range(10):
+            direction = np.linalg.svd(centred * weight[:, None], full_matrices=False)[2][1]
+            distance = np.abs(centred @ direction)
+            weight = 1 / np.maximum(distance, matches.scale)
+        across = float(np.percentile(distance, 90))
+        if across < max(LEAST_SPREAD * min(picture_size), 2 * matches.scale):
+            raise DegenerateGeometry(
+                f"the {int(agree.sum())} matching points all lie in one spot or on one line: that tells nothing about "
+                "how the cameras stood; pictures are needed that share an area, with detail all over it"
+            )
+
+
+def shows_parallax(matches: Matches, F: Array, homography: Homography, target_size: tuple[int, int]) -> bool:
+    """Whether matches leave the homography along the lines of F, more than noise and coincidence would make them.
+
+    Noise, outliers and a homography that fits badly scatter matches along their lines and across them alike; parallax
+    only along. And an F has two degrees of freedom more than its homography: among random outliers some would always
+    be found on the lines of some F, so their number must be beyond that, a contrario (cf. `refuse_chance`).
+    """
+    line = homogeneous(matches.x) @ F.T
+    normal = line[:, :2] / np.maximum(np.hypot(line[:, 0], line[:, 1]), 1e-300)[:, None]
+    ray = homogeneous(matches.x) @ homography.H.T
+    front = ray[:, 2] > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moved = np.where(front[:, None], matches.y - project(ray), np.inf)
+    explained, sigma = explained_by(F, matches)
+    on, off = ON_SIGMAS * sigma, max(OFF_SIGMAS * sigma, OFF_PX * matches.scale)
+    with np.errstate(invalid="ignore"):
+        along = np.abs(moved[:, 1] * normal[:, 0] - moved[:, 0] * normal[:, 1])
+        across = np.abs(np.sum(moved * normal, axis=1))
+        distance = np.abs(np.sum(matches.y * normal, axis=1) + line[:, 2] / np.hypot(line[:, 0], line[:, 1]))
+    parallax = int(((distance < on) & ((along > off) | ~front)).sum())
+    scatter = int((front & (across > off) & (along < on)).sum())
+    astray = int((~front | (np.maximum(along, across) > off)).sum())
+    # a band of the picture's diagonal times twice the tolerance
+    alpha = min(1.0, 2 * on * math.hypot(*target_size) / (target_size[0] * target_size[1]))
+    coincidences = 2 * math.log(max(astray, 2)) + _log_choose(astray, parallax) + parallax * math.log(alpha)
+    enough = parallax >= max(LEAST_OFF, LEAST_SHARE * explained.sum()) and parallax > ALONG_TO_ACROSS * scatter
+    return bool(enough and coincidences < COINCIDENCE)

@@ -1,0 +1,133 @@
+"""Parts, boxes and masks of arrays, without any camera."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+# left, top, width, height in px
+Box = tuple[int, int, int, int]
+
+
+def common(box: Box, other: Box) -> Box:
+    """What two boxes that meet have in common."""
+    left, top = max(box[0], other[0]), max(box[1], other[1])
+    right, bottom = min(box[0] + box[2], other[0] + other[2]), min(box[1] + box[3], other[1] + other[3])
+    return left, top, right - left, bottom - top
+
+
+Array = NDArray[np.float64]
+# Pixels that are worked out at a time.
+STRIP = 1_000_000
+# Rows and columns, with bounds that lie in the picture.
+Part: TypeAlias = tuple[slice, slice]
+
+
+def strips(shape: tuple[int, ...]) -> Iterator[slice]:
+    """The rows of a picture (H, W, …), some at a time."""
+    rows = max(1, STRIP // max(1, shape[1]))
+    for top in range(0, shape[0], rows):
+        yield slice(top, min(shape[0], top + rows))
+
+
+def beside(rows: slice, margin: int, height: int) -> tuple[slice, slice]:
+    """Some rows of `height` with so many more on either side, as far as there are; and which of those they are."""
+    near = slice(max(0, rows.start - margin), min(height, rows.stop + margin))
+    return near, slice(rows.start - near.start, rows.stop - near.start)
+
+
+def bounds(mask: NDArray[np.bool_]) -> Part | None:
+    """Rows and columns of the smallest box that holds all of a mask (H, W); None where it is empty."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return None
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def within(part: Part, shape: tuple[int, ...]) -> Part:
+    """The same rows and columns of a picture (H, W, …), none beyond its edges."""
+    rows, columns = (slice(*one.indices(side)[:2]) for one, side in zip(part, shape, strict=False))
+    return rows, columns
+
+
+def with_margin(part: Part, margin: int, shape: tuple[int, ...]) -> Part:
+    """The same rows and columns and a margin around them, none beyond the edges of a picture (H, W, …)."""
+    rows, columns = (slice(max(0, one.start - margin), one.stop + margin) for one in part)
+    return within((rows, columns), shape)
+
+
+def meet(
+    part: Part, shape: tuple[int, ...], at: tuple[int, int], inner: tuple[int, ...]
+) -> tuple[Part, Part] | None:
+    """Where a part of a picture (H, W, …) meets another (h, w, …) whose first pixel lies `at` (row, column) of it: rows
+    and columns of what the part gives, and of the other; None where they do not meet."""
+    part = within(part, shape)
+    ends = [(max(p.start, a), min(p.stop, a + side)) for p, a, side in zip(part, at, inner, strict=False)]
+    if any(low >= high for low, high in ends):
+        return None
+    (rows, columns), (rows_there, columns_there) = (
+        [slice(low - start, high - start) for (low, high), start in zip(ends, starts, strict=True)]
+        for starts in ((part[0].start, part[1].start), at)
+    )
+    return (rows, columns), (rows_there, columns_there)
+
+
+def shown_only(pixels: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Pixels (H, W, C) where a mask (H, W) says so, 0 elsewhere; NumPy's products of the two take twice as long."""
+    return cv2.copyTo(pixels, np.ascontiguousarray(mask).view(np.uint8)).reshape(pixels.shape)
+
+
+def for_each_channel(values: NDArray, channels: int) -> NDArray[np.float32]:
+    """Values (H, W) once for each channel (H, W, C): what NumPy spreads by itself takes four times as long."""
+    return cv2.merge([values] * channels).reshape(*values.shape, channels)
+
+
+def in_any_channel(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where (H, W) something holds in any channel (H, W, C); NumPy's own `any` takes several times as long over so few.
+    """
+    return np.logical_or.reduce([holds[..., k] for k in range(holds.shape[2])])
+
+
+Plane = NDArray[np.float32]
+# Narrower than this is a speck.
+SPECK = 7
+
+
+def without_specks(hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Of what the target cannot see (H, W) that which is more than a speck."""
+    return cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8)) > 0
+
+
+def cut(array: NDArray, box: Box, beyond: float = 0.0) -> NDArray:
+    """The part of an array (H, W, …) in a box (left, top, width, height); `beyond` where that reaches over its edges.
+    """
+    left, top, width, height = box
+    right, bottom = left + width, top + height
+    if left >= 0 and top >= 0 and right <= array.shape[1] and bottom <= array.shape[0]:
+        return np.ascontiguousarray(array[top:bottom, left:right])
+    out = np.zeros((height, width, *array.shape[2:]), array.dtype)  # a sphere is mostly empty: memory untouched is free
+    if beyond:
+        out[:] = beyond
+    part = array[max(0, top) : bottom, max(0, left) : right]
+    y, x = max(0, -top), max(0, -left)
+    out[y : y + part.shape[0], x : x + part.shape[1]] = part
+    return out
+
+
+def cut_in_place(array: NDArray[np.float32], box: Box) -> NDArray[np.float32]:
+    """The part of an array (H, W) in a box (left, top, width, height) of it, moved to the front of its memory."""
+    left, top, width, height = box
+    flat = array.reshape(-1)
+    for row in range(height):
+        start = (top + row) * array.shape[1] + left
+        flat[row * width : (row + 1) * width] = flat[start : start + width]
+    return flat[: width * height].reshape(height, width)
+
+
+def copied_where(mask: NDArray[np.bool_], source: NDArray, out: NDArray) -> None:
+    """Puts the pixels (H, W, C) of a source where a mask (H, W) says so; `np.copyto` takes several times as long."""
+    cv2.copyTo(source, np.ascontiguousarray(mask).view(np.uint8), out)

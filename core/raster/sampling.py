@@ -1,0 +1,60 @@
+"""Samples of a picture at the places of a map, in tiles."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..system.threads import each
+from .arrays import copied_where
+from .lazy import LazyImage
+
+# cv2.remap wants every side below 32767; tiles also keep its working memory small.
+TILE = 1024
+REMAP_LIMIT = 32000
+
+
+def fetch(
+    source: NDArray | LazyImage, map_x: NDArray[np.float32], map_y: NDArray[np.float32],
+    interpolation: int = cv2.INTER_CUBIC,
+) -> NDArray:
+    """Samples (H, W, C) of a source (h, w, C) at map positions, in tiles, of the source's type; 0 where the map leaves
+    the picture."""
+    out = np.zeros((*map_x.shape, source.shape[2]), source.dtype)
+    tops, lefts = (range(0, side, TILE) for side in map_x.shape)
+    each(
+        lambda tile: _fetch_tile(source, map_x[tile], map_y[tile], out[tile], interpolation),
+        [(slice(top, top + TILE), slice(left, left + TILE)) for top in tops for left in lefts],
+    )
+    return out
+
+
+def _fetch_tile(
+    source: NDArray | LazyImage, x: NDArray[np.float32], y: NDArray[np.float32], out: NDArray, interpolation: int
+) -> None:
+    height, width = source.shape[:2]
+    with np.errstate(invalid="ignore"):
+        inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
+    if not inside.any():
+        return
+    x0, x1 = max(0, int(x[inside].min()) - 2), min(width, int(x[inside].max()) + 4)
+    y0, y1 = max(0, int(y[inside].min()) - 2), min(height, int(y[inside].max()) + 4)
+    if max(x1 - x0, y1 - y0) > REMAP_LIMIT and max(out.shape[:2]) > 1:  # a tile that shrinks a huge picture: quarter it
+        half = (max(1, out.shape[0] // 2), max(1, out.shape[1] // 2))
+        for rows in (slice(None, half[0]), slice(half[0], None)):
+            for columns in (slice(None, half[1]), slice(half[1], None)):
+                if out[rows, columns].size:
+                    _fetch_tile(source, x[rows, columns], y[rows, columns], out[rows, columns], interpolation)
+        return
+    part = np.ascontiguousarray(source[y0:y1, x0:x1])
+    x, y = x - np.float32(x0), y - np.float32(y0)
+    whole_tile = bool(inside.all())
+    if not whole_tile:
+        x[~inside] = y[~inside] = -9
+    # one picture's own border repeated: bicubic needs a pixel beyond the last
+    sampled = cv2.remap(part, x, y, interpolation, borderMode=cv2.BORDER_REPLICATE).reshape(out.shape)
+    if whole_tile:
+        out[:] = sampled
+    else:
+        copied_where(inside, sampled, out)

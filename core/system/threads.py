@@ -1,0 +1,60 @@
+"""Work on parts that know nothing of each other, by several threads at once: NumPy, OpenCV and zlib let others run.
+
+As many as OpenCV uses (`cv2.setNumThreads`). What comes out is the same whatever their number, as long as the parts
+are: they are cut by size alone.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+import cv2
+
+# More would be waiting for memory, and each holds a part of it.
+MOST = 8
+Part = TypeVar("Part")
+Result = TypeVar("Result")
+_here = threading.local()
+
+
+def count() -> int:
+    """How many threads work at once; one within the work of another, which has its share already."""
+    return 1 if getattr(_here, "working", False) else max(1, min(MOST, cv2.getNumThreads()))
+
+
+def in_order(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[Result]:
+    """What `work` makes of each part, in the parts' order.
+
+    At most `count()` results are begun or waiting to be taken, so that memory stays bounded. The first error among the
+    parts is raised when it is its turn; then, or where nobody asks for more, no further part is begun.
+    """
+    at_once = count()
+    if at_once == 1:
+        yield from map(work, parts)
+        return
+    begun: deque[Future[Result]] = deque()
+    with ThreadPoolExecutor(at_once, "edf", _start) as pool:
+        try:
+            for part in parts:
+                if len(begun) == at_once:
+                    yield begun.popleft().result()
+                begun.append(pool.submit(work, part))
+            while begun:
+                yield begun.popleft().result()
+        finally:
+            for waiting in begun:
+                waiting.cancel()
+
+
+def each(work: Callable[[Part], object], parts: Iterable[Part]) -> None:
+    """Does the work on each part, for what it writes."""
+    for _ in in_order(work, parts):
+        pass
+
+
+def _start() -> None:
+    _here.working = True

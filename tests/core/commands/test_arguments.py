@@ -1,0 +1,123 @@
+"""The command line's options: what each becomes, and that it offers what core offers, no more and no less."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, HOLES, SEAMS
+from edf_stitch.core.commands.arguments import add_options, options_from
+from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.system.errors import BadRequest
+
+
+def parsed(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    return parser.parse_args(words)
+
+
+def options(*words: str) -> StitchOptions:
+    return options_from(parsed(*words), measure=False)
+
+
+def test_without_any_the_defaults_are_pythons() -> None:
+    assert options() == StitchOptions(measure=False)
+    assert options_from(parsed(), measure=True) == StitchOptions()
+
+
+def test_it_offers_what_core_offers() -> None:
+    for name, choices in (("field", FIELDS), ("fade", FADES), ("blend", BLENDS), ("seam", SEAMS), ("crop", CROPS)):
+        for choice in choices:
+            assert getattr(options(f"--{name}", choice), name) == choice
+
+
+@pytest.mark.parametrize(("words", "expected"), [
+    (["--focal-px", "1200"], CameraRequest(focal_px=(1200.0,))),
+    (["--focal-px", "1200,1180.5"], CameraRequest(focal_px=(1200.0, 1180.5))),
+    (["--focal-mm", "35", "--sensor-mm", "36"], CameraRequest(focal_mm=(35.0,), sensor_mm=(36.0,))),
+    (["--focal-mm", "35,50", "--sensor-mm", "36,23.5"], CameraRequest(focal_mm=(35.0, 50.0), sensor_mm=(36.0, 23.5))),
+    (["--focal35", "28"], CameraRequest(focal35=(28.0,))),
+    (["--focal35", "28,35"], CameraRequest(focal35=(28.0, 35.0))),
+    (["--principal", "119,90"], CameraRequest(principal=(119.0, 90.0))),
+    (["--principal", "119,90,120,89", "--focal-px", "1e3"],
+     CameraRequest(focal_px=(1000.0,), principal=(119.0, 90.0, 120.0, 89.0))),
+    (["--principal=-5,90"], CameraRequest(principal=(-5.0, 90.0))),
+    (["--cameras", "c.json"], CameraRequest(cameras=Path("c.json"))),
+])  # fmt: skip
+def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest) -> None:
+    assert options(*words) == StitchOptions(camera=expected, measure=False)
+
+
+@pytest.mark.parametrize(("words", "expected"), [
+    (["--field", "strict", "--fade", "plane", "--projection", "perspective", "--seam", "none"],
+     {"field": "strict", "seam": "none"}),
+    (["--field", "paper", "--fade", "infinity"], {"field": "paper", "fade": "infinity"}),
+    (["--matches", "m.csv", "--ignore-ref", "a.png", "--ignore-target", "b.png"],
+     {"matches": Path("m.csv"), "ignore_reference": Path("a.png"), "ignore_target": Path("b.png")}),
+    (["--ignore-target", "b.png"], {"ignore_target": Path("b.png")}),
+    (["--scale", "0.5", "--crop", "inscribed"], {"scale": 0.5, "crop": "inscribed"}),
+    (["--crop", "3,4,50,60"], {"crop": (3, 4, 50, 60)}), (["--crop", "reference"], {"crop": "reference"}),
+    (["--dense"], {}),
+    (["--no-dense", "--no-exposure"], {"dense": False, "exposure": False}), (["--exposure", "--seam", "graphcut"], {}),
+    (["--holes", "inpaint"], {"holes": "inpaint"}), (["--holes", "transparent"], {}),
+    (["--mask", "m.png"], {"mask": Path("m.png")}),
+    (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {"blend": "feather"}),
+    (["--projection", "perspective"], {}), (["--projection", "cylindrical"], {"projection": "cylindrical"}),
+    (["--projection", "equirectangular", "--level=-5,2.5,0"],
+     {"projection": "equirectangular", "level": (-5.0, 2.5, 0.0)}),
+    (["--level", "auto"], {}), (["--level", "none"], {"level": "none"}),
+    (["--seed", "7"], {"seed": 7}), (["--seed", "2147483647"], {"seed": 2147483647}),
+])  # fmt: skip
+def test_how_it_is_done(words: list[str], expected: dict) -> None:
+    assert options(*words) == StitchOptions(measure=False, **expected)
+
+
+@pytest.mark.parametrize("words", [
+    ["--field", "nonsense"], ["--field", ""], ["--fade", "slowly"], ["--blend", ""], ["--seam", "x"], ["--seed", "x"],
+    ["--seed", "1.5"], ["--scale", "x"], ["--focal-px", "abc"], ["--focal-px", ""], ["--focal-px", "1,,2"],
+    ["--focal-px"], ["--projection", "flat"], ["--sensor-mm", "1;2"],
+], ids=" ".join)  # fmt: skip
+def test_what_makes_no_sense_is_refused_by_the_parser(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as leaving:
+        parsed(*words)
+    assert leaving.value.code == 2 and words[0] in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [
+    *(["--focal-px", text] for text in ("0", "-5", "nan", "inf", "1,2,3")), ["--focal-mm", "35"], ["--sensor-mm", "36"],
+    ["--sensor-mm", "0", "--focal-mm", "1"], ["--principal", "1"], ["--principal", "1,2,3"], ["--principal", "inf,1"],
+    ["--focal-px", "9", "--focal35", "28"], ["--focal35", "28", "--cameras", "c.json"], ["--seed=-1"],
+    ["--seed", "2147483648"], *(["--scale", text] for text in ("0", "1.5", "nan", "inf")), ["--scale=-0.5"],
+    *(["--crop", text] for text in ("tight", "", "1,2,3", "1,2,3,4,5", "0,0,0,5", "0,0,5,0", "1.5,0,5,5", "Full")),
+], ids=" ".join)  # fmt: skip
+def test_what_cannot_be_is_refused_before_the_work(words: list[str]) -> None:
+    with pytest.raises(BadRequest) as refused:
+        options(*words)
+    assert refused.value.exit_code == 2 and len(str(refused.value)) > 20
+
+
+def test_the_help_names_every_option_and_choice() -> None:
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    said = parser.format_help()
+    for word in (*(f"--{name}" for name in (
+        "focal-px", "focal-mm", "sensor-mm", "focal35", "principal", "cameras", "matches", "ignore-ref",
+        "ignore-target", "scale", "crop", "field", "fade", "dense", "projection", "blend", "seam", "mask",
+        "exposure", "holes", "seed",
+    )), *FIELDS, *FADES, *BLENDS, *SEAMS, *HOLES, *CROPS):  # fmt: skip
+        assert word in said, word
+
+
+def test_reading_them_loads_nothing_heavy() -> None:
+    code = (
+        "import argparse, sys, edf_stitch.core.commands.arguments as a\n"
+        "parser = argparse.ArgumentParser(); a.add_options(parser); parser.parse_args(['--field', 'strict'])\n"
+        "print(sorted({'numpy', 'cv2', 'scipy'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
+    assert done.stdout == "[]\n"

@@ -1,0 +1,60 @@
+"""What neither camera saw, filled."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from edf_stitch.core.compose.inpaint import inpainted
+from edf_stitch.core.panorama.layers import Layer
+
+SHAPE = 80, 120
+HOLES = np.zeros(SHAPE, bool)
+HOLES[20:50, 60:72] = True
+
+
+def layer(light: np.ndarray, opaque: bool = True) -> Layer:
+    """A picture that shows nothing in the holes."""
+    alpha = ~HOLES if opaque else np.where(HOLES, 0, 0.5).astype(np.float32)
+    return Layer(np.where(HOLES[..., None], 0, light).astype(np.float32), alpha)
+
+
+def slope(most: float) -> np.ndarray:
+    """Light that rises smoothly from left to right, other in each channel."""
+    x = np.linspace(0.2, 1, SHAPE[1])[None, :, None] * [1.0, 0.5, 0.25] * most
+    return np.broadcast_to(x, (*SHAPE, 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize("most", [0.01, 1.0, 1000.0])
+@pytest.mark.parametrize("opaque", [True, False])
+def test_a_smooth_picture_goes_on_through_its_holes_at_any_brightness(most: float, opaque: bool) -> None:
+    light, flat = slope(most), np.zeros(SHAPE, np.float32)
+    out = inpainted(layer(light, opaque), HOLES, flat)
+    assert np.abs(out.pixels / light - 1)[HOLES].max() < 0.15
+    assert (out.alpha[HOLES] == 1).all() and np.array_equal(out.alpha[~HOLES], layer(light, opaque).alpha[~HOLES])
+    assert np.array_equal(out.pixels[~HOLES], layer(light).pixels[~HOLES]), "all else is bit for bit what it was"
+
+
+def test_it_is_filled_from_what_lies_behind_and_not_from_what_hid_it() -> None:
+    depth = np.full(SHAPE, 0.1, np.float32)
+    depth[:, :60] = 0.8  # the near thing, to the left
+    light = np.full((*SHAPE, 3), 0.5, np.float32)
+    light[:, :60] = [4.0, 0.01, 0.01]
+    out = inpainted(layer(light), HOLES, depth)
+    assert np.abs(out.pixels[HOLES] - 0.5).max() < 0.05
+    surrounded = depth.copy()
+    surrounded[...] = 0.8
+    surrounded[HOLES] = 0.1
+    only = inpainted(layer(light), HOLES, surrounded).pixels[HOLES]
+    assert (only > 0).all() and only[:, 0].max() > 1, "nothing far beside it: from what there is"
+
+
+def test_it_gives_the_same_wherever_it_is_asked_for() -> None:
+    out = inpainted(layer(slope(1.0)), HOLES, np.zeros(SHAPE, np.float32))
+    whole = out.pixels
+    for rows, columns in ((slice(0, 20), slice(0, 120)), (slice(25, 60), slice(63, 90)), (slice(70, 80), slice(5, 9))):
+        assert np.array_equal(out.light[rows, columns], whole[rows, columns])
+
+
+def test_without_holes_nothing_is_done() -> None:
+    before = layer(slope(1.0))
+    assert inpainted(before, np.zeros(SHAPE, bool), np.zeros(SHAPE, np.float32)) is before

@@ -1,0 +1,97 @@
+"""Who walked between the pictures is seen at one time: the nearer picture's; what parallax explains, nobody moved."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.compose import moving_things
+from edf_stitch.core.compose.moving_things import times
+from edf_stitch.core.compose.overlap import overlap_of
+from edf_stitch.core.compose.seam import find_seam, known_labels, seam_cost, target_price
+from edf_stitch.core.panorama.layers import Layer
+
+H, W = 240, 400
+LEFT, RIGHT = slice(0, 280), slice(120, 400)
+NOTHING = np.zeros((H, W), bool)
+WALKER, FAR = np.s_[90:150, 240:262], np.s_[90:150, 130:152]
+
+
+def ground() -> np.ndarray:
+    noise = np.random.default_rng(3).random((H, W, 3)).astype(np.float32)
+    return 0.3 + 0.2 * cv2.GaussianBlur(noise, (0, 0), 2)
+
+
+def layer(columns: slice, pixels: np.ndarray) -> Layer:
+    alpha = np.zeros((H, W), np.float32)
+    alpha[:, columns] = 1
+    return Layer(pixels * alpha[..., None], alpha)
+
+
+def warp(**more: Any) -> Any:
+    x, y = np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32))
+    return SimpleNamespace(**({"map_x": x, "map_y": y, "lazy_confidence": None} | more))
+
+
+def found(reference: np.ndarray, target: np.ndarray, hidden: np.ndarray = NOTHING, **more: Any) -> np.ndarray:
+    """The times on the whole canvas."""
+    first, second = layer(LEFT, reference), layer(RIGHT, target)
+    overlap = overlap_of(first, second, hidden)
+    assert overlap is not None
+    out = np.zeros((H, W), np.int8)
+    out[overlap.box] = times(overlap, warp(**more), first, second, hidden)
+    return out
+
+
+@pytest.mark.parametrize("across", [1000, 120])
+def test_who_moved_belongs_to_the_picture_that_is_alone_nearer_by(across: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(moving_things, "ACROSS", across)
+    reference, target = ground(), ground()
+    reference[WALKER], target[FAR] = 0.02, 0.9
+    when = found(reference, target)
+    assert (when[WALKER] == 1).mean() > 0.95 and (when[FAR] == -1).mean() > 0.95
+    assert (when != 0).sum() < 2 * 72 * 34, "and nothing further than 6 px off did"
+
+
+def test_who_walks_out_of_the_reference_is_seen_once() -> None:
+    """He stands in the overlap in the reference, beyond it in the target; the cheapest cut alone shows both."""
+    reference, target = ground(), ground()
+    reference[WALKER] = 0.02
+    target[90:150, 300:322] = 0.02
+    first, second = layer(LEFT, reference), layer(RIGHT, target)
+    overlap = overlap_of(first, second, NOTHING)
+    assert overlap is not None
+    known, cost = known_labels(first, second, NOTHING), seam_cost(overlap, warp())
+    when = times(overlap, warp(), first, second, NOTHING)
+    alone, together = (
+        find_seam(known, cost, target_price(overlap, NOTHING, given), overlap.box) for given in (None, when)
+    )
+    assert not alone[WALKER].any() and together[WALKER].all()
+
+
+def test_what_parallax_hides_did_not_move() -> None:
+    """A strip beside a near thing, as wide as that is nearer; or known to be hidden."""
+    reference, target = ground(), ground()
+    strip = np.s_[90:150, 230:242]
+    reference[strip] = 0.02
+    jump = warp().map_x
+    jump[:, 242:] += 12
+    assert not found(reference, target, map_x=jump).any()
+    hidden = NOTHING.copy()
+    hidden[strip] = True
+    assert not found(reference, target, hidden).any()
+    assert found(reference, target)[strip].any()
+
+
+def test_leaves_light_and_large_parts_are_no_things() -> None:
+    rng = np.random.default_rng(1)
+    leaves = ground()
+    leaves[:, 120:280] = cv2.resize(rng.random((60, 40, 3)).astype(np.float32), (160, H))
+    assert not found(leaves, ground()).any()
+    assert not found(ground(), 1.3 * ground()).any()
+    half = ground()
+    half[:, 160:280] = 0.9
+    assert not found(half, ground()).any()

@@ -1,0 +1,119 @@
+"""Folds that noise makes go; the jump from a near thing to a far one stays."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
+from edf_stitch.core.dense.unfolding import unfolded
+from edf_stitch.core.panorama.canvas import Canvas
+from edf_stitch.core.panorama.folding import jacobian
+from edf_stitch.core.panorama.visibility import occluded
+from edf_stitch.core.panorama.warp import Warp
+
+from ..line_scenes import Field
+
+SIZE = (160, 120)
+FAR, NEAR = 0.02, 0.12  # 20 px apart
+CARD = np.s_[35:85, 60:110]
+
+
+@pytest.fixture(params=["to the right", "to the left", "forward"])
+def made(request: pytest.FixtureRequest, by_hand: SimpleNamespace) -> tuple[TwoView, EpipolarLines]:
+    """A wall, whose field is right."""
+    camera = by_hand.camera(SIZE, 200.0)
+    t = {"to the right": (-1, 0.05, 0.0), "to the left": (1, 0.1, 0.05), "forward": (0.05, 0.0, -1)}[request.param]
+    view = by_hand.view(camera, camera, (0.0, 0, 0), t)
+    sparse = SparseMap.over_reference(Field(lambda points: np.full(points.shape[:-1], FAR)), view, camera, camera, 10)
+    return view, EpipolarLines.over(sparse, (0, 0, *SIZE), 1.0)
+
+
+def folded(lines: EpipolarLines, along: np.ndarray) -> np.ndarray:
+    turn = jacobian(*lines.target(along, np.zeros_like(along)))
+    return turn <= 0
+
+
+def noisy(view: TwoView, lines: EpipolarLines, along: np.ndarray) -> int:
+    """How many nodes turn over that do not lie at the rim of what is hidden."""
+    rim = cv2.dilate(hidden(view, lines, along).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    return int((folded(lines, along) & ~rim).sum())
+
+
+def hidden(view: TwoView, lines: EpipolarLines, along: np.ndarray) -> np.ndarray:
+    depth = (lines.inverse_depth + along * lines.depth_per_px).astype(np.float32)
+    warp = Warp(Canvas(*SIZE, (0, 0)), *lines.target(along), depth)
+    return occluded(warp, view, SIZE)
+
+
+def noise(shape: tuple[int, int], much: float, sigma: float) -> np.ndarray:
+    values = cv2.GaussianBlur(np.random.default_rng(4).normal(size=shape).astype(np.float32), (0, 0), sigma)
+    return values * np.float32(much / values.std())
+
+
+def test_noise_that_turns_the_map_over_is_smoothed_and_nothing_else(made: tuple[TwoView, EpipolarLines]) -> None:
+    view, lines = made
+    along = np.zeros(lines.shape, np.float32)
+    along[50:80, 100:140] = noise((30, 40), 1.5, 1.0)
+    along[20:40, 100:140] = noise((20, 40), 1.8, 1.6)  # coarser
+    assert noisy(view, lines, along) > 80
+    found = unfolded(lines, view, SIZE, along, np.zeros_like(along))
+    assert found.dtype == np.float32 and noisy(view, lines, found) <= 1
+    assert np.array_equal(found[:, :70], along[:, :70]), "what does not fold is not touched"
+    assert np.abs(found).max() <= np.abs(along).max()
+
+
+def test_what_is_right_beside_a_wrong_node_keeps_its_place(made: tuple[TwoView, EpipolarLines]) -> None:
+    view, lines = made
+    right = np.zeros(lines.shape, np.float32)
+    right[:, 110:] = 0.6  # a step too small to fold
+    along = right.copy()
+    along[30:90:9, 105:116:9] += 4.0
+    wrong = along != right
+    assert noisy(view, lines, along) > 8
+    found = unfolded(lines, view, SIZE, along, np.zeros_like(along))
+    assert noisy(view, lines, found) == 0
+    assert np.abs(found - right)[~wrong].max() < 0.05
+
+
+def test_a_map_without_folds_stays_as_it_is(made: tuple[TwoView, EpipolarLines]) -> None:
+    view, lines = made
+    along = noise(lines.shape, 1.0, 15.0)
+    if abs(view.t[2]) > 0.5:  # forward: at the epipole nothing may move
+        y, x = np.indices(lines.shape)
+        epipole = view.e_prime[:2] / view.e_prime[2]
+        along *= np.minimum(1, np.hypot(x - epipole[0], y - epipole[1]) / 30)
+    assert not folded(lines, along).any()
+    assert np.array_equal(unfolded(lines, view, SIZE, along, np.zeros_like(along)), along)
+
+
+def test_a_near_thing_keeps_its_rim(made: tuple[TwoView, EpipolarLines]) -> None:
+    """Where it hides the wall the map has to turn over, and may."""
+    view, lines = made
+    depth = np.full(lines.shape, FAR)
+    depth[CARD] = NEAR
+    along = ((depth - lines.inverse_depth) / lines.depth_per_px).astype(np.float32)
+    behind = hidden(view, lines, along)
+    assert behind.sum() > 200 and folded(lines, along).any()
+    found = unfolded(lines, view, SIZE, along, np.zeros_like(along))
+    assert (np.abs(found - along) > 0.5).mean() < 0.02
+    middle = np.zeros(lines.shape, bool)
+    middle[CARD] = True
+    middle = cv2.erode(middle.astype(np.uint8), np.ones((13, 13), np.uint8)) > 0
+    assert np.abs(found - along)[middle].max() < 0.5, "the thing itself"
+    assert hidden(view, lines, found).sum() > 0.7 * behind.sum(), "and what it hides"
+
+
+def test_a_node_behind_the_target_hurts_nobody(made: tuple[TwoView, EpipolarLines]) -> None:
+    view, lines = made
+    base = lines.base.copy()
+    base[:10] = np.nan
+    broken = EpipolarLines(lines.box, lines.step, lines.ideal, lines.inverse_depth, base, lines.shift,
+                   lines.depth_per_px, lines.direction, lines.w_rate, lines.camera_prime)  # fmt: skip
+    along = np.zeros(lines.shape, np.float32)
+    along[50:80, 100:140] = noise((30, 40), 1.5, 1.0)
+    found = unfolded(broken, view, SIZE, along, np.zeros_like(along))
+    assert np.isfinite(found).all() and noisy(view, broken, found) <= 1

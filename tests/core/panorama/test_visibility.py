@@ -1,0 +1,246 @@
+"""What the target cannot see is found, to a pixel; what it can see is never called hidden."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.cameras.projective import homogeneous, infinite_homography
+from edf_stitch.core.panorama import visibility
+from edf_stitch.core.panorama.canvas import Canvas
+from edf_stitch.core.panorama.folding import turned_over, turning  # fmt: skip
+from edf_stitch.core.panorama.visibility import BESIDE, by_agreement, inverse_depth_in_target, occluded
+from edf_stitch.core.panorama.warp import Warp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ..point_scenes import turned_by, unit
+
+OFFSET = (40, 25)
+SHAPE = (230, 360)  # of the canvas, larger than the target
+TARGET = (300, 200)
+K = np.array([[280.0, 0, 150], [0, 280, 100], [0, 0, 1]])
+
+
+@dataclass
+class Cards:
+    """Cards parallel to the reference's picture before a wall at depth 10: (left, top, right, bottom, depth) each, in
+    the reference camera's frame, baselines as unit."""
+
+    cards: tuple[tuple[float, float, float, float, float], ...]
+    R: np.ndarray
+    t: np.ndarray
+    zoom: float = 1.0
+
+    @property
+    def K_prime(self) -> np.ndarray:
+        return np.diag([self.zoom, self.zoom, 1.0]) @ K
+
+    @property
+    def view(self) -> Any:
+        return SimpleNamespace(H_inf=infinite_homography(K, self.K_prime, self.R), e_prime=self.K_prime @ self.t)
+
+    @property
+    def target_size(self) -> tuple[int, int]:
+        return round(TARGET[0] * self.zoom), round(TARGET[1] * self.zoom)
+
+    def seen_along(self, place: np.ndarray, rays: np.ndarray) -> np.ndarray:
+        """Distance along rays (…, 3) from a place to what is seen first, in lengths of the rays."""
+        nearest = (10.0 - place[2]) / rays[..., 2]
+        for left, top, right, bottom, depth in self.cards:
+            along = (depth - place[2]) / rays[..., 2]
+            x, y = place[0] + along * rays[..., 0], place[1] + along * rays[..., 1]
+            hit = (x >= left) & (x <= right) & (y >= top) & (y <= bottom) & (along > 0)
+            nearest = np.where(hit, np.minimum(nearest, along), nearest)
+        return nearest
+
+    def warp(self, depth: np.ndarray) -> Warp:
+        d = 1 / depth
+        x = homogeneous(points()) @ self.view.H_inf.T + d[..., None] * self.view.e_prime
+        x[x[..., 2] <= 0] = np.nan
+        maps = ((x[..., k] / x[..., 2]).astype(np.float32) for k in range(2))
+        return Warp(Canvas(SHAPE[1], SHAPE[0], OFFSET), *maps, d.astype(np.float32))
+
+    def truth(self) -> tuple[Warp, np.ndarray]:
+        """The true warp, and what is really hidden from the target by cards that the canvas shows."""
+        rays = homogeneous(points()) @ np.linalg.inv(K).T
+        depth = self.seen_along(np.zeros(3), rays)
+        world = rays * depth[..., None]
+        place = -self.R.T @ self.t
+        warp = self.warp(depth)
+        return warp, warp.inside(self.target_size) & (self.seen_along(place, world - place) < 1 - 1e-6)
+
+
+def points() -> np.ndarray:
+    x, y = np.meshgrid(np.arange(SHAPE[1]) - OFFSET[0], np.arange(SHAPE[0]) - OFFSET[1])
+    return np.stack([x, y], axis=-1).astype(float)
+
+
+CARDS = ((-1.2, -0.8, 0.0, 0.9, 4.0), (-0.1, -0.5, 0.6, 0.4, 3.0))
+SIDEWAYS = Cards(CARDS, turned_by(0, -3, 1), unit(-1, 0.1, 0.05))
+
+
+@pytest.mark.parametrize("cards", [
+    SIDEWAYS,
+    replace(SIDEWAYS, t=unit(1, 0.2, -0.3), R=turned_by(1, 4, -2)),
+    replace(SIDEWAYS, t=unit(0.2, 0.1, -1.0), R=np.eye(3)),  # a step forward: the epipole lies in the picture
+    replace(SIDEWAYS, R=turned_by(0, -3, 33)),  # a camera held aslant
+    replace(SIDEWAYS, zoom=2.9),  # target pixels between the canvas's samples
+    replace(SIDEWAYS, zoom=0.4),  # many canvas pixels on each target pixel
+], ids=["sideways", "other side", "forward", "aslant", "target finer", "target coarser"])  # fmt: skip
+def test_finds_what_cards_hide(cards: Cards) -> None:
+    warp, hidden = cards.truth()
+    found = occluded(warp, cards.view, cards.target_size)
+    assert found.dtype == bool and found.shape == SHAPE
+    assert hidden.mean() > 0.005, "else there is nothing to find"
+    right = (found & hidden).sum()
+    assert right >= 0.8 * found.sum(), "precision"
+    assert right >= 0.8 * hidden.sum(), "recall"
+
+
+def test_the_nearest_to_the_target_owns_the_pixel_not_the_nearest_to_the_reference() -> None:
+    """x'₃ / d is the depth in front of the target camera, in baselines."""
+    warp, hidden = SIDEWAYS.truth()
+    near = inverse_depth_in_target(warp, SIDEWAYS.view)
+    world = homogeneous(points()) @ np.linalg.inv(K).T / warp.inverse_depth[..., None]
+    there = (world @ SIDEWAYS.R.T + SIDEWAYS.t)[..., 2]
+    assert np.allclose(near, 1 / there, rtol=1e-4)
+
+
+@settings(max_examples=20)
+@given(
+    st.floats(-60, 60), st.floats(-60, 60), st.floats(1.5, 20), st.floats(0.3, 3), st.integers(0, 2**16),
+)  # fmt: skip
+def test_a_plane_hides_nothing_of_itself(yaw: float, pitch: float, depth: float, zoom: float, seed: int) -> None:
+    """However obliquely either camera sees it, and at any magnification."""
+    random = np.random.default_rng(seed)
+    normal = turned_by(pitch, yaw, 0)[:, 2]
+    d = (homogeneous(points()) @ np.linalg.inv(K).T) @ normal / (depth * normal[2])
+    cards = Cards((), turned_by(*random.uniform(-15, 15, 3)), unit(*random.normal(size=3)), zoom)
+    with np.errstate(divide="ignore"):
+        warp = cards.warp(1 / d)
+    assert not occluded(warp, cards.view, cards.target_size).any()
+
+
+def test_a_smooth_hill_without_folds_hides_nothing() -> None:
+    x, y = np.moveaxis(points(), -1, 0)
+    d = 0.12 + 0.05 * np.sin(x / 25) * np.cos(y / 30)
+    warp = SIDEWAYS.warp(1 / d)
+    assert (np.diff(warp.map_x, axis=1) > 0).all()
+    assert not occluded(warp, SIDEWAYS.view, TARGET).any()
+    steep = SIDEWAYS.warp(1 / (0.4 + 0.38 * np.sin(x / 25) * np.cos(y / 30)))
+    assert (np.diff(steep.map_x, axis=1) < 0).any()
+    assert occluded(steep, SIDEWAYS.view, TARGET).any(), "where the map folds, something is hidden"
+
+
+@pytest.mark.parametrize("t", [(-1, 0.1, 0.05), (1, 0.2, -0.3), (0.2, 0.1, -1.0)])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_where_the_map_folds_is_all_that_has_to_be_looked_at(
+    t: tuple[float, ...], mirrored: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = replace(SIDEWAYS, t=unit(*t))
+    warp, _ = scene.truth()
+    if mirrored:
+        warp = replace(warp, map_x=scene.target_size[0] - 1 - warp.map_x)
+    monkeypatch.setattr(visibility, "STRIP", 5000)  # in several pieces
+    seen = visibility._folded_blocks(warp, scene.target_size)
+    assert seen.any()
+    found = occluded(warp, scene.view, scene.target_size)
+    monkeypatch.setattr(visibility, "_folded_blocks", lambda *_: np.ones_like(seen))
+    assert found.any() and (found == occluded(warp, scene.view, scene.target_size)).all()
+
+
+def test_infinity_and_beyond_are_one_depth() -> None:
+    warp, _ = SIDEWAYS.truth()
+    d = warp.inverse_depth - 0.3  # the wall and most of the cards behind infinity
+    far = replace(warp, depth=np.minimum(d, 0).astype(np.float32))
+    assert not occluded(far, SIDEWAYS.view, TARGET).any()
+    assert (inverse_depth_in_target(far, SIDEWAYS.view) == 0).all()
+
+
+def test_without_depth_nothing_is_hidden() -> None:
+    warp, _ = SIDEWAYS.truth()
+    unknown = replace(warp, depth=np.full(SHAPE, np.nan, np.float32))
+    assert not occluded(unknown, SIDEWAYS.view, TARGET).any()
+    same_place = SimpleNamespace(H_inf=SIDEWAYS.view.H_inf, e_prime=np.zeros(3))
+    assert not occluded(replace(warp, depth=np.zeros(SHAPE, np.float32)), same_place, TARGET).any()
+
+
+def test_only_what_falls_into_the_target_counts() -> None:
+    warp, _ = SIDEWAYS.truth()
+    x = warp.map_x.copy()
+    x[:, :150] = np.nan
+    found = occluded(replace(warp, map_x=x), SIDEWAYS.view, TARGET)
+    assert not found[:, :150].any() and not (found & ~warp.inside(TARGET)).any()
+
+
+# --- what turns over ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("strip", [10**6, 700])  # in one piece, and in strips of two rows
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_what_turns_over_is_found_and_nothing_else(
+    monkeypatch: pytest.MonkeyPatch, strip: int, mirrored: bool
+) -> None:
+    monkeypatch.setattr(visibility, "STRIP", strip)
+    y, x = np.mgrid[0:60, 0:350].astype(np.float32)
+    x[20:31, 100:120] = 219 - x[20:31, 100:120]
+    warp = Warp(Canvas(350, 60, (0, 0)), 349 - x if mirrored else x, y, np.zeros_like(x))
+    found = turned_over(turning(warp, (350, 60)))
+    assert found[20:30, 100:119].all() and not found[:18].any() and not found[33:].any()
+    assert found.sum() < 20 * 22
+    outside = Warp(warp.canvas, x * 0 - 9, y, warp.inverse_depth)
+    assert not turned_over(turning(outside, (350, 60))).any(), "outside the target"
+
+
+
+# --- put right by what both pictures agree on -----------------------------------------------------------------------
+
+
+def agreement() -> tuple[Warp, np.ndarray, np.ndarray, np.ndarray]:
+    """A warp, what its depth order hides, what really is hidden, and confidence: none where it is, full elsewhere."""
+    warp, hidden = SIDEWAYS.truth()
+    told = np.roll(hidden, 1, axis=1) & warp.inside(TARGET)
+    return warp, told, hidden, np.where(hidden, np.float32(0), np.float32(1))
+
+
+def test_rims_follow_what_both_pictures_agree_on() -> None:
+    warp, told, hidden, sure = agreement()
+    everywhere = np.ones(SHAPE, bool)
+    assert (told != hidden).sum() > 50
+    right = by_agreement(told, replace(warp, lazy_confidence=sure), TARGET, everywhere)
+    assert np.array_equal(right, hidden)
+    assert np.array_equal(told, agreement()[1]), "what was given stays as it is"
+
+
+def test_without_dense_refinement_the_depth_order_has_the_last_word() -> None:
+    warp, told, _, _ = agreement()
+    assert np.array_equal(by_agreement(told, warp, TARGET, np.ones(SHAPE, bool)), told)
+
+
+def test_nothing_lies_beside_a_speck() -> None:
+    """Noise on a bare wall turns a few pixels over: they stay what they are."""
+    warp, _, _, _ = agreement()
+    speck = np.zeros(SHAPE, bool)
+    speck[SHAPE[0] // 2, SHAPE[1] // 2 : SHAPE[1] // 2 + 3] = True
+    unsure, everywhere = replace(warp, lazy_confidence=np.zeros(SHAPE, np.float32)), np.ones(SHAPE, bool)
+    assert warp.inside(TARGET)[speck].all()
+    assert np.array_equal(by_agreement(speck, unsure, TARGET, everywhere), speck)
+
+
+def test_doubt_alone_hides_nothing() -> None:
+    """A bare wall is agreed on nowhere: it is hidden only close by what the depth order hides, and where the reference
+    shows it."""
+    warp, told, hidden, _ = agreement()
+    unsure, everywhere = replace(warp, lazy_confidence=np.zeros(SHAPE, np.float32)), np.ones(SHAPE, bool)
+    out = by_agreement(told, unsure, TARGET, everywhere)
+    reach = round(BESIDE * max(TARGET))
+    near = cv2.dilate(told.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0
+    assert (out & ~told).any() and not (out & ~near).any() and not (out & ~warp.inside(TARGET)).any()
+    assert np.array_equal(by_agreement(told, unsure, TARGET, ~everywhere), told), "beyond the reference: nothing"
+    nothing = np.zeros(SHAPE, bool)
+    assert not by_agreement(nothing, unsure, TARGET, everywhere).any()

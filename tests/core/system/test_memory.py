@@ -1,0 +1,50 @@
+"""Freed memory: the next array takes it, whatever its thread, and nothing happens where glibc is not there."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from edf_stitch.core.system import memory
+
+FREE_AND_ASK_AGAIN = """
+import threading
+import numpy as np
+from edf_stitch.core.system.memory import use_again
+def held():
+    return int(next(l.split()[1] for l in open("/proc/self/status") if l.startswith("VmRSS"))) // 1024
+use_again()
+empty = held()
+arrays = [np.ones(4 << 20, np.uint8) for _ in range(50)]  # 200 MB
+full = held()
+del arrays
+kept = held()
+def ask_again():
+    global again
+    arrays = [np.ones(3 << 20, np.uint8) for _ in range(60)]
+    again = held()
+thread = threading.Thread(target=ask_again)
+thread.start()
+thread.join()
+print(full - empty, kept - empty, again - empty)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists() or sys.platform != "linux", reason="asks Linux")
+def test_freed_memory_is_kept_for_the_next_array_of_any_thread() -> None:
+    done = subprocess.run([sys.executable, "-c", FREE_AND_ASK_AGAIN], capture_output=True, text=True, check=True)
+    full, kept, again = map(int, done.stdout.split())
+    assert full > 190
+    assert kept > 150, "not given back"
+    assert again < full + 20, "used again"
+
+
+def test_nothing_happens_where_there_is_no_glibc(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_library(_: object) -> None:
+        raise AssertionError("asked for a C library")
+
+    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(memory.ctypes, "CDLL", no_library)
+    memory.use_again()

@@ -1,0 +1,28 @@
+"""Text that users write, and what is no text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from edf_stitch.core.system.errors import BadRequest, UnreadableImage
+from edf_stitch.core.system.text_files import read_text
+
+
+@pytest.mark.parametrize("written", ["a,b\nä\n".encode(), b"\xef\xbb\xbf" + "a,b\nä\n".encode()])
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path, written: bytes) -> None:
+    (tmp_path / "list.csv").write_bytes(written)
+    assert read_text(tmp_path / "list.csv", "the list", "") == "a,b\nä\n"
+
+
+@pytest.mark.parametrize("written", [b"\xff\xfea\x00", b"a\x00b", b"caf\xe9"])
+def test_what_is_no_text_is_refused_with_what_is_needed(tmp_path: Path, written: bytes) -> None:
+    (tmp_path / "list.csv").write_bytes(written)
+    with pytest.raises(BadRequest, match=r"list\.csv: not a text in UTF-8; the list is a CSV file: two columns"):
+        read_text(tmp_path / "list.csv", "the list", "two columns")
+
+
+def test_what_cannot_be_read_is_another_matter(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableImage, match="the list cannot be read") as refused:
+        read_text(tmp_path / "none.csv", "the list", "")
+    assert refused.value.exit_code == 4

@@ -1,0 +1,154 @@
+"""How core/ is laid out, in figures: `python tests/house.py` prints them, `test_house.py` holds them.
+
+Imports inside functions and under TYPE_CHECKING do not count: they put no module on top of another.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CORE = ROOT / "core"
+
+# Which rooms each may import, itself left out. Rooms stand in the order of the data.
+BELOW_POSE = ("system", "raster", "pictures", "cameras")
+BELOW_MEASURE = (*BELOW_POSE, "pose", "field", "panorama", "dense", "compose")
+TOP = ("choices", "options", "fields", "alignment", "pipeline")
+MAY_IMPORT = {
+    "system": (),
+    "raster": ("system",),
+    "pictures": ("system", "raster"),
+    "cameras": ("system", "raster", "pictures"),
+    "pose": BELOW_POSE,
+    "field": ("system", "raster", "cameras"),
+    "rivals": ("system", "raster", "cameras", "pose", "field"),
+    "panorama": (*BELOW_POSE, "field", "choices"),
+    "dense": (*BELOW_POSE, "field", "panorama"),
+    "compose": (*BELOW_POSE, "panorama", "choices", "options"),
+    "measure": BELOW_MEASURE,
+    "output": (*BELOW_MEASURE, "measure", "pipeline"),
+    "batch": (*BELOW_MEASURE, "measure", "output", *TOP),
+    "compare": (*BELOW_MEASURE, "measure", "output", *TOP),
+    "commands": (*BELOW_MEASURE, "measure", "rivals", "output", "batch", "compare", *TOP),
+    "choices": (),
+    "options": ("system", "cameras", "choices"),
+    "fields": ("cameras", "field", "rivals"),
+    "alignment": (*BELOW_MEASURE, "options", "fields"),
+    "pipeline": (*BELOW_MEASURE, "measure", "options", "alignment"),
+}
+# Names of the first layout that only its builders knew (modules, classes, functions), and what they are called now.
+RENAMED = {
+    "light": "lazy", "Light": "LazyImage", "tone": "log_encoding", "relief": "refined_depth", "Relief": "RefinedDepth",
+    "Sureness": "Confidence", "Shown": "CoverageSamples", "line_map": "epipolar_lines", "Lines": "EpipolarLines",
+    "Ways": "ArcLengths", "line_search": "matching", "moved": "moving_things", "seen": "inspection",
+    "around": "wraparound", "Rolled": "WrappedImage", "uprights": "upright_edges", "lay": "fit_and_warp",
+    "register": "estimate_geometry", "slid": "transfer", "sends": "predict", "through": "project_rows",
+    "beyond_infinity": "cheirality_residual", "steps": "progress", "tied": "strengthen", "broken": "cut_edges",
+    "told": "trust", "raised": "build_refinement", "held": "keep", "third": "w_rate",
+}  # fmt: skip
+
+Graph = dict[str, set[str]]
+
+
+def modules(core: Path = CORE) -> dict[str, Path]:
+    """Every module of core by its name: `room/module`, or `module` directly in core."""
+    paths = (path for path in core.rglob("*.py") if path.name != "__init__.py")
+    return {path.relative_to(core).with_suffix("").as_posix(): path for path in sorted(paths)}
+
+
+def room_of(module: str) -> str:
+    """The folder of a module, or the module itself where it lies directly in core."""
+    return module.partition("/")[0]
+
+
+def imports(core: Path = CORE) -> Graph:
+    """Which modules of core each module imports when it is loaded."""
+    known = modules(core)
+    return {name: set(_imported(name, ast.parse(path.read_text("utf-8")), known)) for name, path in known.items()}
+
+
+def by_room(graph: Graph) -> Graph:
+    """The same between rooms."""
+    rooms: Graph = {room_of(name): set() for name in graph}
+    for name, targets in graph.items():
+        rooms[room_of(name)] |= {room_of(target) for target in targets} - {room_of(name)}
+    return rooms
+
+
+def _imported(name: str, tree: ast.Module, known: Iterable[str]) -> Iterable[str]:
+    late = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) or _is_type_checking(node)]
+    skipped = {id(inner) for node in late for inner in ast.walk(node)}
+    folder = name.split("/")[:-1]
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.ImportFrom) or id(node) in skipped or not 1 <= node.level <= len(folder) + 1:
+            continue
+        base = folder[: len(folder) + 1 - node.level] + (node.module.split(".") if node.module else [])
+        for target in ["/".join(base)] + ["/".join([*base, alias.name]) for alias in node.names]:
+            if target in known:
+                yield target
+
+
+def _is_type_checking(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
+    """The circles of a graph that a walk in depth meets; none where it has none."""
+    found: list[list[str]] = []
+    done: set[str] = set()
+
+    def walk(node: str, way: list[str]) -> None:
+        if node in way:
+            found.append([*way[way.index(node) :], node])
+        elif node not in done:
+            for target in sorted(graph.get(node, ())):
+                walk(target, [*way, node])
+            done.add(node)
+
+    for node in sorted(graph):
+        walk(node, [])
+    return found
+
+
+def floors(graph: Mapping[str, set[str]]) -> int:
+    """How many nodes the longest chain of imports has; the graph has no circles."""
+    heights: dict[str, int] = {}
+
+    def height(node: str) -> int:
+        if node not in heights:
+            heights[node] = 1 + max((height(target) for target in graph.get(node, ())), default=0)
+        return heights[node]
+
+    return max(height(node) for node in graph)
+
+
+def old_names(core: Path = CORE) -> list[str]:
+    """Modules, classes and functions that still bear a name of the first layout."""
+    found = [name for name in modules(core) if name.rpartition("/")[2] in RENAMED]
+    for name, path in modules(core).items():
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name.strip("_") in RENAMED:
+                found.append(f"{name}: {node.name}")
+    return found
+
+
+def main() -> None:
+    """Prints the figures of the layout."""
+    graph = imports()
+    rooms = by_room(graph)
+    folders = [room for room in rooms if (CORE / room).is_dir()]
+    print(f"modules directly in core: {len(rooms) - len(folders)}")
+    print(f"folders: {len(folders)}")
+    for what, of in (("folders", rooms), ("files", graph)):
+        loops = circles(of)
+        print(f"circles between {what}: {len(loops)}", *(" -> ".join(loop) for loop in loops), sep="\n  ")
+        if not loops:
+            print(f"longest chain of imports between {what}: {floors(of)}")
+    names = old_names()
+    print(f"names of the first layout: {len(names)}", *names, sep="\n  ")
+
+
+if __name__ == "__main__":
+    main()
