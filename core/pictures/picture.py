@@ -210,9 +210,14 @@ def resized(picture: Picture, scale: float) -> Picture:
 
     if picture.alpha is None:
         return replace(picture, light=shrink(picture.pixels), view=shrink(picture.view))
-    alpha = shrink(picture.alpha)
-    pixels = shrink(picture.pixels * picture.alpha[..., None]) / np.maximum(alpha, 1e-6)[..., None]
-    return replace(picture, light=pixels, alpha=alpha, view=shrink(picture.view))
+    weight, alpha = picture.alpha[..., None], shrink(picture.alpha)
+
+    def weighed(array: np.ndarray) -> np.ndarray:
+        """What lies under transparent pixels has no say in what is seen beside them."""
+        return shrink(array * weight) / np.maximum(alpha, 1e-6)[..., None]
+
+    view = np.clip(np.rint(weighed(picture.view)), 0, 255).astype(np.uint8)
+    return replace(picture, light=weighed(picture.pixels), alpha=alpha, view=view)
 
 
 def in_same_colour_space(a: Picture, b: Picture) -> tuple[Picture, Picture]:

@@ -133,6 +133,16 @@ def test_alpha_stays_straight_and_what_is_transparent_lends_no_colour() -> None:
     assert not small.pixels[:, 3:].any()
 
 
+def test_the_view_of_a_smaller_picture_shows_nothing_of_what_is_transparent() -> None:
+    """Features and metrics look at the view: what lies under transparent pixels must not be seen beside them."""
+    array = np.full((8, 12, 4), 255, np.uint8)
+    array[..., :3] = (40, 90, 160)
+    array[:, 5:, :3], array[:, 5:, 3] = (255, 0, 255), 0
+    small = resized(picture_from_array(array), 0.5)
+    assert small.alpha is not None and small.alpha[0, 2] == pytest.approx(0.5)
+    assert small.view.dtype == np.uint8 and (small.view[:, :3] == (40, 90, 160)).all()
+
+
 # --- frames pooled --------------------------------------------------------------------------------------------------
 
 
