@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,21 @@ PRINCIPAL_SIGMA = 0.01
 EXIF_SIGMA, CROPPED_SIGMA, ASSUMED_SIGMA = 0.05, 0.2, 0.4
 
 
+class Knowledge(StrEnum):
+    """How a focal length is known."""
+
+    GIVEN = "given"  # by the user, a camera file or Blender: exact
+    EXIF = "exif"  # by the picture's metadata: to some per cent
+    ASSUMED = "assumed"  # by nobody: a usual one
+
+
 @dataclass(frozen=True)
 class Camera:
     """One picture's camera as known before matching.
 
     K (3, 3) px with integer pixel centres; size (W, H) px; source in words; log_sigma: standard deviation of log f
     (0: fixed); distortion (5,) OpenCV's k1, k2, p1, p2, k3; pose (R, t) world to camera, where given; principal_sigma:
-    standard deviation of the principal point in units of the longer side (0: fixed).
+    standard deviation of the principal point in units of the longer side (0: fixed); knowledge: how f is known.
     """
 
     K: NDArray[np.float64]
@@ -29,6 +38,7 @@ class Camera:
     distortion: NDArray[np.float64] = field(default_factory=lambda: np.zeros(5))
     pose: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     principal_sigma: float = 0.0
+    knowledge: Knowledge = Knowledge.GIVEN
 
     @property
     def focal(self) -> float:
@@ -43,7 +53,7 @@ class Camera:
     @property
     def assumed(self) -> bool:
         """Whether nothing was known of the focal length."""
-        return self.log_sigma == ASSUMED_SIGMA
+        return self.knowledge == Knowledge.ASSUMED
 
     def scaled(self, factor: float) -> NDArray[np.float64]:
         """K with its focal length times `factor`."""

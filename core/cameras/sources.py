@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..system.errors import BadRequest, UnreadableImage
-from .camera import ASSUMED_SIGMA, CROPPED_SIGMA, EXIF_SIGMA, PRINCIPAL_SIGMA, Camera
+from .camera import ASSUMED_SIGMA, CROPPED_SIGMA, EXIF_SIGMA, PRINCIPAL_SIGMA, Camera, Knowledge
 from .sensors import sensor_diagonal
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]
         found.append((exif.focal_mm * exif.focal_plane_x_per_mm * shrink, "EXIF focal length and sensor resolution"))
     found = [(f, source) for f, source in found if 0.2 * max(size) < f < 50 * max(size)]
     if not found:
-        return _camera(0.9 * max(size), size, "assumed (0.9 × the longer side)", ASSUMED_SIGMA)
+        return _camera(0.9 * max(size), size, "assumed (0.9 × the longer side)", ASSUMED_SIGMA, Knowledge.ASSUMED)
     focal, source = found[0]
     for other, other_source in found[1:]:
         if abs(np.log(other / focal)) > 0.15:
@@ -129,16 +129,18 @@ def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]
                 "now): its EXIF focal "
                 "length is only a hint; give the focal length if you know it"
             )
-    return _camera(focal, size, source, sigma)
+    return _camera(focal, size, source, sigma, Knowledge.EXIF)
 
 
 def _from_35mm(focal35: float, size: tuple[int, int]) -> float:
     return focal35 * float(np.hypot(*size)) / FULL_FRAME_DIAGONAL
 
 
-def _camera(focal: float, size: tuple[int, int], source: str, log_sigma: float) -> Camera:
+def _camera(
+    focal: float, size: tuple[int, int], source: str, log_sigma: float, knowledge: Knowledge = Knowledge.GIVEN
+) -> Camera:
     K = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1.0]])
-    return Camera(K, size, source, log_sigma, principal_sigma=PRINCIPAL_SIGMA)
+    return Camera(K, size, source, log_sigma, principal_sigma=PRINCIPAL_SIGMA, knowledge=knowledge)
 
 
 def _with_principal_point(camera: Camera, principal: tuple[float, ...]) -> Camera:

@@ -144,6 +144,18 @@ def _beyond(pose: Pose, x: Array, y: Array) -> Array:
     return np.minimum(along, 0.0)
 
 
+def shared_focal_sigma(camera: Camera, camera_prime: Camera) -> float:
+    """Standard deviation of the log of the factor that both focal lengths share, by what is known of each.
+
+    Each camera counts by its precision. Where both are known in the same way they are one piece of knowledge, told
+    twice (one lens, one maker's rounding): the sharper one counts alone.
+    """
+    first, second = camera.log_sigma, camera_prime.log_sigma
+    if camera.knowledge == camera_prime.knowledge or not first * second:
+        return min(first, second)
+    return 1 / math.hypot(1 / first, 1 / second)
+
+
 class _Problem:
     """The least-squares problem around a pose: unknowns [log f,] [log f',] [principal point (2) in units of
     its prior,] rotation (3), direction of t (2)."""
@@ -154,13 +166,15 @@ class _Problem:
         self.sigma_beyond = BEYOND_PX * matches.scale
         self.focal_free = not (camera.fixed or camera_prime.fixed)
         self.zoom = zoom and self.focal_free
+        self.assumed = camera.assumed and camera_prime.assumed
+        self.focal_sigma = camera.log_sigma if self.zoom else shared_focal_sigma(camera, camera_prime)
         # one sensor behind both pictures: where they differ in size, who knows
         believed_off = min(camera.principal_sigma, camera_prime.principal_sigma)
         self.principal_free = believed_off > 0 and camera.size == camera_prime.size
         self.principal_sigma = believed_off * max(camera.size)
         self.size = 5 + self.focal_free + self.zoom + 2 * self.principal_free
         # against the prior, residuals count as if none were smaller than what a lens leaves in them
-        believed = max(sigma, (SYSTEMATIC_GUESS_PX if camera.assumed else SYSTEMATIC_PX) * matches.scale)
+        believed = max(sigma, (SYSTEMATIC_GUESS_PX if self.assumed else SYSTEMATIC_PX) * matches.scale)
         tempered = min(1.0, EFFECTIVE_MATCHES / max(1, len(matches))) * (sigma / believed) ** 2
         self.weight = tempered * matches.weights / max(float(matches.weights.mean()), 1e-300)
         # (3, N): long rows are what NumPy is quick with
@@ -193,11 +207,11 @@ class _Problem:
         A guess is no measurement: far from it, what is left of the pull is that of Student's tails (3 degrees of
         freedom), so that matches that know better are not drawn back.
         """
-        z = off / self.camera.log_sigma
-        if not self.camera.assumed or z == 0:
-            return z, 1 / self.camera.log_sigma
+        z = off / self.focal_sigma
+        if not self.assumed or z == 0:
+            return z, 1 / self.focal_sigma
         value = np.sign(z) * np.sqrt(TAILS * np.log1p(z * z / TAILS))
-        return float(value), float(z / (1 + z * z / TAILS) / value / self.camera.log_sigma)
+        return float(value), float(z / (1 + z * z / TAILS) / value / self.focal_sigma)
 
     def priors(self, pose: Pose) -> list[tuple[float, Array]]:
         """Residuals of the prior with their derivatives by the unknowns; the second focal's ratio to the first is kept
@@ -214,6 +228,10 @@ class _Problem:
             d_ratio = np.zeros(size)
             d_ratio[:2] = (-1 / 0.3, 1 / 0.3)
             out.append((ratio / 0.3, d_ratio))
+            if self.camera.knowledge != self.camera_prime.knowledge:
+                d_second = np.zeros(size)
+                d_second[1] = 1 / self.camera_prime.log_sigma
+                out.append((np.log(pose.K_prime[0, 0] / self.camera_prime.focal) * d_second[1], d_second))
         if self.principal_free:
             moved = (pose.K - self.camera.K)[:2, 2] / self.principal_sigma
             out += [(float(moved[i]), np.eye(size)[size - 7 + i]) for i in (0, 1)]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera
+from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import homogeneous, infinite_homography, project
 from edf_stitch.core.pose.focal import KnownFocal, focal_warnings, known_focal
@@ -26,7 +26,8 @@ def intrinsics(focal: float) -> np.ndarray:
 
 
 def camera(focal: float = FOCAL, log_sigma: float = 0.0, source: str = "test") -> Camera:
-    return Camera(intrinsics(focal), SIZE, source, log_sigma)
+    knowledge = Knowledge.ASSUMED if log_sigma == ASSUMED_SIGMA else Knowledge.EXIF
+    return Camera(intrinsics(focal), SIZE, source, log_sigma, knowledge=knowledge)
 
 
 def assumed() -> Camera:

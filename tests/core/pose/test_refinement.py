@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, PRINCIPAL_SIGMA, Camera
+from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, PRINCIPAL_SIGMA, Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import (
     homogeneous,
@@ -28,6 +28,7 @@ from edf_stitch.core.pose.refinement import (
     cheirality_residual,
     focal_deviations,
     refine_pose,
+    shared_focal_sigma,
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -47,7 +48,8 @@ def camera(focal: float = FOCAL, log_sigma: float = 0.0, principal_sigma: float 
     """Its principal point is as unknown as its focal length, if not said otherwise."""
     if principal_sigma is None:
         principal_sigma = PRINCIPAL_SIGMA if log_sigma == ASSUMED_SIGMA else 0.0
-    return Camera(intrinsics(focal), SIZE, "test", log_sigma, principal_sigma=principal_sigma)
+    knowledge = Knowledge.ASSUMED if log_sigma == ASSUMED_SIGMA else Knowledge.EXIF
+    return Camera(intrinsics(focal), SIZE, "test", log_sigma, principal_sigma=principal_sigma, knowledge=knowledge)
 
 
 def scene(
@@ -510,3 +512,21 @@ def test_the_focal_deviation_is_what_repeating_the_measurement_scatters(log_sigm
         claims.append(focal_deviations(noisy, found, cam, cam, noise, False)[0])
     assert 0.75 < np.median(claims) / np.std(logs) < 1.5
     assert abs(np.mean(logs)) < 3 * np.std(logs) / np.sqrt(60) + 0.1 * np.std(logs)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_each_cameras_own_prior_counts_by_its_precision(which: int) -> None:
+    """Axes that are parallel leave the focal length to what is known; it is known well of one camera only."""
+    matches, true = scene(noise=0.3, R=np.eye(3), t=SIDEWAYS)
+    start = 1.1 * FOCAL
+    cameras = [camera(FOCAL, ASSUMED_SIGMA, 0.0), camera(FOCAL, ASSUMED_SIGMA, 0.0)]
+    cameras[which] = camera(FOCAL, 0.002)
+    assert shared_focal_sigma(*cameras) < 0.002
+    K = intrinsics(start)
+    found, _ = refine_pose(matches, Pose(K, K, true.R, true.t), *cameras, sigma=0.3)
+    assert abs(found.K[0, 0] / FOCAL - 1) < 0.004
+
+
+def test_what_is_known_in_one_way_of_both_cameras_counts_once() -> None:
+    assert shared_focal_sigma(camera(log_sigma=EXIF_SIGMA), camera(log_sigma=EXIF_SIGMA)) == EXIF_SIGMA
+    assert shared_focal_sigma(camera(log_sigma=0.2), camera(log_sigma=EXIF_SIGMA)) == EXIF_SIGMA

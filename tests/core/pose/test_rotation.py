@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera
+from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import (
     homogeneous,
@@ -26,7 +26,8 @@ def intrinsics(focal: float) -> np.ndarray:
 
 
 def camera(focal: float = FOCAL, log_sigma: float = 0.0) -> Camera:
-    return Camera(intrinsics(focal), SIZE, "test", log_sigma)
+    knowledge = Knowledge.ASSUMED if log_sigma == ASSUMED_SIGMA else Knowledge.EXIF
+    return Camera(intrinsics(focal), SIZE, "test", log_sigma, knowledge=knowledge)
 
 
 def scene(

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from multiprocessing import Pool
 
 import numpy as np
-from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.pose.estimation import estimate
@@ -330,6 +330,7 @@ def _cameras(stage: _Stage, calibration: str, zoom: bool, random: np.random.Gene
     EXIF is off by 3 %, for both pictures alike since it is one lens; a zoom, whose EXIF is rounded, by 1 % more.
     """
     off, rounding = random.normal(0, (0.03, 0.01 if zoom else 0.0))
+    knowledge = {GIVEN: Knowledge.GIVEN, EXIF: Knowledge.EXIF}.get(calibration, Knowledge.ASSUMED)
     if calibration == GIVEN:
         believed, sigma = (stage.K, stage.K_prime), 0.0
     elif calibration == EXIF:
@@ -339,8 +340,8 @@ def _cameras(stage: _Stage, calibration: str, zoom: bool, random: np.random.Gene
         focals = (0.9 * max(stage.size), 0.9 * max(stage.size_prime))
         believed, sigma = (_intrinsics(focals[0], stage.size), _intrinsics(focals[1], stage.size_prime)), 0.4
     return (
-        Camera(believed[0], stage.size, calibration, sigma),
-        Camera(believed[1], stage.size_prime, calibration, sigma),
+        Camera(believed[0], stage.size, calibration, sigma, knowledge=knowledge),
+        Camera(believed[1], stage.size_prime, calibration, sigma, knowledge=knowledge),
     )
 
 
