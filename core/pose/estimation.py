@@ -35,7 +35,7 @@ from .fundamental import (
     shows_parallax,
     transfer_error,
 )
-from .refinement import MIN_PARALLAX, Pose, pose_of_fundamental, refine_pose
+from .refinement import MIN_PARALLAX, Pose, pose_of_fundamental, refine_pose, shared_focal_sigma
 from .rotation import fit_rotation
 from .zoom import with_two_focals
 
@@ -239,7 +239,7 @@ def _best_starts(
     All are compared by one robust cost with a wide scale over all matches: the landscape has several valleys.
     """
     factors = [1.0]
-    if not (camera.fixed or camera_prime.fixed) and camera.log_sigma > 0.1:
+    if not (camera.fixed or camera_prime.fixed) and shared_focal_sigma(camera, camera_prime) > 0.1:
         factors += [rung * max(camera.size) / camera.focal for rung in FOCAL_LADDER]
     few = matches.thinned(FIRST_LOOK)
     starts: list[Pose] = []
@@ -337,6 +337,13 @@ def _from_known_cameras(
             f"the given cameras explain only {int(inliers.sum())} of {len(matches)} matches: check that K, R and "
             "t belong to these pictures, in this order, with R and t taking world points into the camera "
             "(x ~ K (R X + t))"
+        )
+    front = in_front(camera.K, camera_prime.K, R, relative.t, matches.x[inliers], matches.y[inliers], MIN_PARALLAX)
+    if front.mean() < 0.5:
+        raise DegenerateGeometry(
+            f"by the given cameras only {front.mean():.0%} of {len(front)} matching points lie in front of both: R "
+            "and t must take world points into the camera (x ~ K (R X + t), z ahead); check the sign of t and whether R "
+            "is to be transposed"
         )
     sigma = float(max(np.median(residual[inliers]) / 0.6745, 0.1 * matches.scale))
     why = f"cameras given; they explain {int(inliers.sum())} of {len(matches)} matches"

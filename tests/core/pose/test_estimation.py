@@ -8,7 +8,7 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera
+from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera, Knowledge
 from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import (
@@ -75,11 +75,11 @@ def known(focal: float = FOCAL) -> Camera:
 
 
 def from_exif(focal: float = FOCAL) -> Camera:
-    return Camera(intrinsics(focal), SIZE, "EXIF", EXIF_SIGMA)
+    return Camera(intrinsics(focal), SIZE, "EXIF", EXIF_SIGMA, knowledge=Knowledge.EXIF)
 
 
 def unknown() -> Camera:
-    return Camera(intrinsics(0.9 * SIZE[0]), SIZE, "assumed", ASSUMED_SIGMA)
+    return Camera(intrinsics(0.9 * SIZE[0]), SIZE, "assumed", ASSUMED_SIGMA, knowledge=Knowledge.ASSUMED)
 
 
 @cache
@@ -504,6 +504,17 @@ def test_given_poses_that_do_not_fit_are_refused() -> None:
         with pytest.raises(DegenerateGeometry, match=r"explain only \d+ of 100") as caught:
             pytest.fail(f"{name}: {estimate(truth.matches, *cameras).why}")
         assert "R X + t" in str(caught.value)
+
+
+def test_given_poses_that_have_the_scene_behind_them_are_refused() -> None:
+    """The epipolar lines are the same, so the matches fit; but nothing lies in front of both cameras."""
+    truth = scene("to the side, turned", 6, 100)
+    first, second = placed(truth, np.array([3.0, 1, -2]), 0.6)
+    assert first.pose is not None and second.pose is not None
+    (R, t), (R_prime, t_prime) = first.pose, second.pose
+    backwards = replace(second, pose=(R_prime, 2 * R_prime @ R.T @ t - t_prime))
+    with pytest.raises(DegenerateGeometry, match=r"only 0% of \d+ matching points lie in front of both.*sign of t"):
+        estimate(truth.matches, first, backwards)
 
 
 # --- repeatable ----------------------------------------------------------------------------------------------------
