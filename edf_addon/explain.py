@@ -66,8 +66,10 @@ def lines(text: str, width: float, character: float = 6.6) -> list[str]:
 
 
 def sentence(text: str) -> str:
-    """As a sentence: the engine's messages begin small, as they stand behind a colon on the command line."""
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+    """As a sentence: the engine's messages begin small, as they stand behind a colon on the command line. Nothing stays
+    nothing."""
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if not text or text.endswith((".", "!", "?")) else ".")
 
 
 def _dense(told: dict[str, Any]) -> str:

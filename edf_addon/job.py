@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from . import command
+from .explain import sentence
 
 # Seconds that a worker gets to end by itself when asked to; nothing is lost when it is killed.
 GRACE = 2.0
@@ -152,12 +153,6 @@ def new_folder(parent: str | None = None) -> Path:
 def remove(folder: Path) -> None:
     """Take a job's folder away with all that is in it."""
     shutil.rmtree(folder, ignore_errors=True)
-
-
-def sentence(words: str) -> str:
-    """With a capital and a full stop, as Blender's users read it."""
-    words = words.strip()
-    return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) else ".")
 
 
 def _crash(status: int, tail: str) -> str:

@@ -72,6 +72,6 @@ def test_long_texts_are_broken_and_nothing_is_lost():
     assert explain.lines("", 200) == [""]
 
 
-@pytest.mark.parametrize(("said", "shown"), [("it ended", "It ended."), ("Why?", "Why?"), ("so.", "So."), ("", ".")])
+@pytest.mark.parametrize(("said", "shown"), [("it ended", "It ended."), ("Why?", "Why?"), ("so.", "So."), ("", "")])
 def test_a_message_becomes_a_sentence(said, shown):
     assert explain.sentence(said) == shown
