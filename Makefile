@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest
 export OPENBLAS_NUM_THREADS := 1
 export BLENDER_RUN
 
-.PHONY: setup demo test test-oldest slow soak validate end-to-end lint bench extension clean
+.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint bench extension clean
 
 setup: $(READY)
 
@@ -45,6 +45,19 @@ $(OLDEST)/.ready: pyproject.toml .ci/constraints.txt
 
 test-oldest: $(OLDEST)/.ready
 	$(OLDEST)/bin/python -m pytest -n $(WORKERS) tests/edf_addon tests/core/commands/test_worker.py tests/core/output/test_inspection.py
+
+# A fast part of the tests with the newest version of every dependency, as a plain `pip install` brings it.
+NEWEST := .venv-newest
+$(NEWEST)/.ready: pyproject.toml
+	rm -rf $(NEWEST)
+	$(PYTHON) -m venv $(NEWEST)
+	$(NEWEST)/bin/python -m pip install --quiet --upgrade --editable . pytest pytest-xdist hypothesis
+	touch $@
+
+test-newest: $(NEWEST)/.ready
+	$(NEWEST)/bin/python -m pytest -n $(WORKERS) -m "not slow and not blender" tests/core/pictures/test_picture.py \
+		tests/core/test_refusals.py tests/core/test_pipeline.py tests/core/pose/test_features.py tests/core/dense \
+		tests/core/compose tests/core/commands/test_worker.py
 
 # pytest exits 5 where no test is marked so.
 slow: setup
@@ -78,4 +91,4 @@ extension: setup
 		--blender "$$BLENDER_RUN" --output-dir dist
 
 clean:
-	rm -rf .venv $(OLDEST) build dist wheels demo_output validation_quick validation_full *.egg-info
+	rm -rf .venv $(OLDEST) $(NEWEST) build dist wheels demo_output validation_quick validation_full *.egg-info

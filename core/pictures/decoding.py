@@ -60,12 +60,14 @@ def check_size(width: int, height: int, stored: int, pixels_per_byte: int = PHOT
 @contextmanager
 def quiet_opencv() -> Iterator[None]:
     """OpenCV reports damaged files on stderr by itself; the user gets our message instead."""
-    level = cv2.getLogLevel()
-    cv2.setLogLevel(0)
+    # from 4.13 on these two stand in a module of their own
+    log = cv2 if hasattr(cv2, "getLogLevel") else cv2.utils.logging
+    level = log.getLogLevel()
+    log.setLogLevel(0)
     try:
         yield
     finally:
-        cv2.setLogLevel(level)
+        log.setLogLevel(level)
 
 
 def decode_file(data: bytes, structure: Structure) -> tuple[np.ndarray, list[str]]:

@@ -8,10 +8,12 @@ import subprocess
 import sys
 import zlib
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core.pictures import decoding
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.pictures.picture import Picture, load_picture
@@ -134,13 +136,26 @@ def test_bombs_are_refused_by_their_header(tmp_path: Path, suffix: str, width: i
 
 
 def test_names_outside_ascii_and_the_level_of_opencv(tmp_path: Path) -> None:
-    before = cv2.getLogLevel()
-    cv2.setLogLevel(2)
+    log = cv2 if hasattr(cv2, "getLogLevel") else cv2.utils.logging
+    before = log.getLogLevel()
+    log.setLogLevel(2)
     path = tmp_path / "Übung 写真.png"
     path.write_bytes(encoded(PICTURE, ".png"))
     assert load_picture(str(path)).name == "Übung 写真.png"
-    assert cv2.getLogLevel() == 2
-    cv2.setLogLevel(before)
+    assert log.getLogLevel() == 2
+    log.setLogLevel(before)
+
+
+@pytest.mark.parametrize("newer", [False, True])
+def test_opencv_is_quiet_by_either_spelling(monkeypatch: pytest.MonkeyPatch, newer: bool) -> None:
+    """`cv2.getLogLevel` moved to `cv2.utils.logging` with OpenCV 4.13."""
+    level = [3]
+    spelt = SimpleNamespace(getLogLevel=lambda: level[0], setLogLevel=lambda value: level.__setitem__(0, value))
+    whole = SimpleNamespace(utils=SimpleNamespace(logging=spelt)) if newer else spelt
+    monkeypatch.setattr(decoding, "cv2", whole)
+    with decoding.quiet_opencv():
+        assert level == [0]
+    assert level == [3]
 
 
 def mutated(seed: int, length: int, changes: list[tuple[int, int]]) -> tuple[bytes, str]:
