@@ -169,7 +169,8 @@ def compose(
     painted = None if frame.painted is None else _on_canvas(frame.painted, whole.canvas)
     floats = (first.bits == 32, second.bits == 32)
     panorama, exposed, found = composed(
-        base, layer, whole, alignment.two_view, size_of(second), options, floats, painted, steps, decided, keep
+        base, layer, whole, alignment.two_view, size_of(second), options, floats, painted, steps, decided, keep,
+        alignment.cameras[0],
     )
     seen = appearance(panorama, base, exposed, found.from_target, floats) if options.measure else {}
     place = reference_box(whole.canvas, alignment.cameras[0])

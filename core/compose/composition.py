@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.camera import Camera
 from ..cameras.two_view import TwoView
 from ..options import StitchOptions
 from ..panorama.folding import folds, turned_over, turning
@@ -57,20 +58,20 @@ class Decided:
 def composed(
     reference: Layer, target: Layer, warp: Warp, two_view: TwoView, target_size: tuple[int, int],
     options: StitchOptions, floats: tuple[bool, bool], painted: NDArray[np.int8] | None, steps: ReportProgress,
-    decided: Decided | None = None, keep: bool = False,
+    decided: Decided | None = None, keep: bool = False, camera: Camera | None = None,
 ) -> tuple[Layer, Layer, Decided]:
     """The panorama, the target's layer as it was exposed for it, and what was decided.
 
     What neither picture shows is transparent, and so is what only a target that cannot see it would show, unless it is
     to be inpainted. floats: whether reference and target come from float pictures; painted (H, W): see
     `masks.read_painted`; decided: from other frames of the same two cameras, kept to; keep: what
-    the seam was cut by, for `pooled_decision`.
+    the seam was cut by, for `pooled_decision`; camera: the reference's, if its lens matters.
     """
     steps("occlusion", 0.0)
     if decided:
         hidden, surely, folded = decided.hidden, decided.surely, decided.folds
     else:
-        surely = occluded(warp, two_view, target_size)
+        surely = occluded(warp, two_view, target_size, camera)
         hidden = by_agreement(surely, warp, target_size, reference.alpha > 0)
         surely &= hidden
         turns = turning(warp, target_size)

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.lens import distort
 from ..cameras.projective import homogeneous
 from ..cameras.two_view import TwoView
 from ..measure.metrics import look_up
@@ -103,9 +104,13 @@ def displacement_px(result: StitchResult) -> NDArray[np.float32]:
     warp, view = result.warp, result.two_view
     if not view.e_prime.any():
         return np.zeros(warp.map_x.shape, np.float32)
-    a, b, c = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys)
+    reference, target = result.cameras
+    a, b, c = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, reference)
     with np.errstate(divide="ignore", invalid="ignore"):
-        far = np.hypot(warp.map_x - a / c, warp.map_y - b / c)
+        x, y = a / c, b / c
+        if target.distortion.any():
+            x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), target), -1, 0)
+        far = np.hypot(warp.map_x - x, warp.map_y - y)
     return np.where(c > 0, far / scales(result)[1][0, 0], np.nan).astype(np.float32)
 
 

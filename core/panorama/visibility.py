@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.camera import Camera
 from ..cameras.two_view import TwoView
 from ..raster.arrays import bounds, with_margin, without_specks
 from ..system.threads import in_order
@@ -30,15 +31,17 @@ STRIP = 2_000_000
 AGREED, ALONE, BESIDE = 0.5, 0.3, 1 / 200
 
 
-def occluded(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> NDArray[np.bool_]:
+def occluded(
+    warp: Warp, two_view: TwoView, target_size: tuple[int, int], camera: Camera | None = None
+) -> NDArray[np.bool_]:
     """Where (H, W) the map falls on a target pixel that a nearer canvas point owns: what is seen there is not this.
 
-    target_size: (W, H) px. d ≤ 0 is infinitely far; where there is no depth (d NaN, no baseline), nothing hides
-    anything. A surface does not hide itself, however obliquely it is seen and however much the map magnifies. Linear in
-    the pixels.
+    target_size: (W, H) px; camera: the reference's, if its lens matters. d ≤ 0 is infinitely far; where there is no
+    depth (d NaN, no baseline), nothing hides anything. A surface does not hide itself, however obliquely it is seen and
+    however much the map magnifies. Linear in the pixels.
     """
     hidden = np.zeros(warp.map_x.shape, bool)
-    contested = _contested(warp, two_view, target_size)
+    contested = _contested(warp, two_view, target_size, camera)
     if not (contested.near > 0).any():
         return hidden
     points, near = contested.points, contested.near
@@ -104,7 +107,7 @@ class Contested:
         return row, rows * columns
 
 
-def _contested(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> Contested:
+def _contested(warp: Warp, two_view: TwoView, target_size: tuple[int, int], camera: Camera | None) -> Contested:
     """The points among which something may be hidden.
 
     Along an epipolar line the map is a function of one variable, and continuous between pixels. Where it takes a value
@@ -126,7 +129,7 @@ def _contested(warp: Warp, two_view: TwoView, target_size: tuple[int, int]) -> C
         near = np.empty(0, np.float32)
         if there.size:
             with np.errstate(invalid="ignore", divide="ignore"):
-                near = inverse_depth_in_target(strip, two_view).ravel()[inside[there]]
+                near = inverse_depth_in_target(strip, two_view, camera).ravel()[inside[there]]
             known = np.isfinite(near)
             there, near = (there, near) if known.all() else (there[known], near[known])
         points = inside[there] + top * width
@@ -188,9 +191,10 @@ def _mirrored(warp: Warp) -> bool:
     return bool((turn < 0).sum() > (turn > 0).sum())
 
 
-def inverse_depth_in_target(warp: Warp, two_view: TwoView) -> NDArray[np.float32]:
-    """baseline / depth in front of the target camera (H, W): d / x'₃, 0 at infinity and beyond; NaN without depth."""
-    (infinite,) = warp.canvas.project_rows(two_view.H_inf[2:], warp.canvas.xs, warp.canvas.ys)
+def inverse_depth_in_target(warp: Warp, two_view: TwoView, camera: Camera | None = None) -> NDArray[np.float32]:
+    """baseline / depth in front of the target camera (H, W): d / x'₃, 0 at infinity and beyond; NaN without depth.
+    camera: the reference's, if its lens matters."""
+    (infinite,) = warp.canvas.project_rows(two_view.H_inf[2:], warp.canvas.xs, warp.canvas.ys, camera)
     d = warp.inverse_depth
     w = d * np.float32(two_view.e_prime[2]) + infinite.astype(np.float32)
     return np.maximum(d, np.float32(0)) / w

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.projective import homogeneous, project
 from edf_stitch.core.output import inspection
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
@@ -66,6 +67,18 @@ def test_the_slide_is_what_depth_does(half: StitchResult):
     assert abs(far[y, x] - 2 * np.linalg.norm(ideal)) < 2 * slack
     flat = replace(half, two_view=replace(half.two_view, e_prime=np.zeros(3)))
     assert not inspection.displacement_px(flat).any()
+
+
+def test_the_slide_is_measured_through_the_lenses(half: StitchResult):
+    """A point at infinity is seen where both lenses bend it to: a map of such points slides nowhere."""
+    cameras = tuple(replace(camera, distortion=np.array([k1, 0, 0, 0, 0])) for camera, k1 in
+                    zip(half.cameras, (-0.12, 0.08), strict=True))  # fmt: skip
+    canvas = half.warp.canvas
+    raw = np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1)
+    q = homogeneous(undistort(raw, cameras[0])) @ half.two_view.H_inf.T
+    far = distort(q[..., :2] / q[..., 2:], cameras[1])
+    warp = replace(half.warp, map_x=far[..., 0].astype(np.float32), map_y=far[..., 1].astype(np.float32))
+    assert inspection.displacement_px(replace(half, cameras=cameras, warp=warp)).max() < 1e-3
 
 
 def test_the_heat_map_ends_where_the_target_does(half: StitchResult):

@@ -122,7 +122,7 @@ def test_what_an_outline_encloses_lies_within_its_extent(kind: str, rotation: np
 
     def shows(ray: np.ndarray) -> bool:
         p = K @ ray
-        return bool(p[2] > 0 and 0 <= p[0] / p[2] <= 639 and 0 <= p[1] / p[2] <= 479)
+        return bool(p[2] > 0 and 0 <= p[0] <= 639 * p[2] and 0 <= p[1] <= 479 * p[2])
 
     outline = homogeneous(around * (639, 479)) @ np.linalg.inv(K).T
     left, top, right, bottom = extent(projection, outline, shows)
@@ -148,7 +148,7 @@ def test_a_pole_just_inside_takes_the_whole_width(sign: float) -> None:
 
     def shows(ray: np.ndarray) -> bool:
         p = K @ ray
-        return bool(p[2] > 0 and 0 <= p[0] / p[2] <= 639 and 0 <= p[1] / p[2] <= 479)
+        return bool(p[2] > 0 and 0 <= p[0] <= 639 * p[2] and 0 <= p[1] <= 479 * p[2])
 
     outline = homogeneous(around * (639, 479)) @ np.linalg.inv(K).T
     left, top, right, bottom = extent(projection, outline, shows)

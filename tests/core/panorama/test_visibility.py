@@ -9,10 +9,12 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.lens import undistort
 from edf_stitch.core.cameras.projective import homogeneous, infinite_homography
 from edf_stitch.core.panorama import visibility
 from edf_stitch.core.panorama.canvas import Canvas
-from edf_stitch.core.panorama.folding import turned_over, turning  # fmt: skip
+from edf_stitch.core.panorama.folding import turned_over, turning
 from edf_stitch.core.panorama.visibility import BESIDE, by_agreement, inverse_depth_in_target, occluded
 from edf_stitch.core.panorama.warp import Warp
 from hypothesis import given, settings
@@ -109,6 +111,16 @@ def test_the_nearest_to_the_target_owns_the_pixel_not_the_nearest_to_the_referen
     world = homogeneous(points()) @ np.linalg.inv(K).T / warp.inverse_depth[..., None]
     there = (world @ SIDEWAYS.R.T + SIDEWAYS.t)[..., 2]
     assert np.allclose(near, 1 / there, rtol=1e-4)
+
+
+def test_depth_in_front_of_the_target_is_that_of_the_undistorted_point() -> None:
+    warp, _ = SIDEWAYS.truth()
+    lens = Camera(K, (TARGET[0], TARGET[1]), "test", 0.0, np.array([-0.2, 0, 0, 0, 0]))
+    near = inverse_depth_in_target(warp, SIDEWAYS.view, lens)
+    world = homogeneous(undistort(points(), lens)) @ np.linalg.inv(K).T / warp.inverse_depth[..., None]
+    there = (world @ SIDEWAYS.R.T + SIDEWAYS.t)[..., 2]
+    assert np.allclose(near, 1 / there, rtol=1e-4)
+    assert np.abs(near / inverse_depth_in_target(warp, SIDEWAYS.view) - 1).max() > 1e-3, "the lens matters here"
 
 
 @settings(max_examples=20)
