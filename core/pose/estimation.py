@@ -138,7 +138,8 @@ def _same_viewpoint(
     on = matches.subset(homography.inliers)
     rotation = fit_rotation(on, homography.H, camera, camera_prime, homography.sigma)
     error = transfer_error(rotation.H_inf, matches)
-    typical, found = (float(np.percentile(e[homography.inliers], 80)) for e in (homography.error, error))
+    with np.errstate(invalid="ignore"):  # infinitely far off where a point comes to lie behind the camera
+        typical, found = (float(np.percentile(e[homography.inliers], 80)) for e in (homography.error, error))
     allowed = max(ROTATION_FACTOR * typical, ROTATION_PX * matches.scale)
     if found > allowed:
         return None
