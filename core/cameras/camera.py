@@ -59,6 +59,10 @@ class Camera:
         """K with its focal length times `factor`."""
         return zoomed(self.K, factor)
 
+    def with_focal_held(self) -> Camera:
+        """The camera with its focal length taken as given, however it is known."""
+        return replace(self, log_sigma=0.0, knowledge=Knowledge.GIVEN)
+
     def resized(self, size: tuple[int, int]) -> Camera:
         """The camera of its picture resized to (W, H) px."""
         factor = np.array(size) / np.array(self.size)

@@ -83,7 +83,7 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
             return _plane_without_pose(matches, homography, camera, camera_prime)
     # on a plane, the calibration and the plane trade freely: what is known of it stays
     first, second = (
-        c if parallax else replace(c, log_sigma=0.0, principal_sigma=0.0) for c in (camera, camera_prime)
+        c if parallax else replace(c.with_focal_held(), principal_sigma=0.0) for c in (camera, camera_prime)
     )
     pose, inliers, sigma, zoom = _fit_pose(matches, candidates, homography, first, second, seed)
     if not parallax and inliers.sum() < PLANE_KEPT * homography.inliers.sum():

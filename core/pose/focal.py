@@ -69,9 +69,8 @@ def _spread(
     back = there @ np.linalg.inv(infinite_homography(pose.K, pose.K_prime, pose.R)).T
     moved = []
     for factor in (math.exp(-change), math.exp(change)):
-        first, second = (replace(c, K=zoomed(K, factor), log_sigma=0.0) for c, K in (
-            (camera, pose.K), (camera_prime, pose.K_prime)
-        ))  # fmt: skip
+        held = (camera, pose.K), (camera_prime, pose.K_prime)
+        first, second = (replace(c.with_focal_held(), K=zoomed(K, factor)) for c, K in held)
         other, _ = refine_pose(matches, Pose(first.K, second.K, pose.R, pose.t), first, second, sigma)
         away = project(back @ infinite_homography(other.K, other.K_prime, other.R).T) - there[:, :2]
         moved.append(float(np.median(np.linalg.norm(away, axis=1))))

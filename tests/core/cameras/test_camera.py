@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, CROPPED_SIGMA, EXIF_SIGMA, Camera
+from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, CROPPED_SIGMA, EXIF_SIGMA, Camera, Knowledge
 from edf_stitch.core.cameras.projective import rotation_angle, rotation_from_vector
 from edf_stitch.core.cameras.sources import CameraRequest, cameras_for, read_camera_file
 from edf_stitch.core.pictures.metadata import Exif
@@ -384,3 +384,9 @@ def test_a_resized_picture_is_seen_by_the_resized_camera(size: tuple[int, int]) 
     assert other.size == size and np.array_equal(other.distortion, camera.distortion) and other.distortion.any()
     assert (other.source, other.log_sigma) == (camera.source, camera.log_sigma) and other.pose is camera.pose
     assert camera.resized(camera.size).K.tolist() == camera.K.tolist()
+
+
+def test_a_focal_length_that_is_held_counts_as_given() -> None:
+    guess = Camera(np.diag([900.0, 900.0, 1.0]), (1000, 800), "assumed", ASSUMED_SIGMA, knowledge=Knowledge.ASSUMED)
+    held = guess.with_focal_held()
+    assert guess.assumed and not guess.fixed and held.fixed and not held.assumed and held.focal == guess.focal
