@@ -76,7 +76,9 @@ def cameras_for(
         if first.assumed != second.assumed:  # one lens took both pictures more often than not
             known, unknown = (second, first) if first.assumed else (first, second)
             guess = known.focal * max(unknown.size) / max(known.size)
-            borrowed = _camera(guess, unknown.size, f"the other picture ({known.source})", CROPPED_SIGMA)
+            # the same knowledge as the other picture's, so that the focal prior does not count it twice
+            source = f"the other picture ({known.source})"
+            borrowed = _camera(guess, unknown.size, source, CROPPED_SIGMA, known.knowledge)
             first, second = (borrowed, second) if first.assumed else (first, borrowed)
     if request.principal:
         values = (*request.principal, *request.principal)[:4]

@@ -222,6 +222,7 @@ def test_an_unknown_picture_borrows_the_focal_length_of_the_other(known_first: b
     assert knows.focal == pytest.approx(28 * DIAGONAL / FULL_FRAME) and knows.log_sigma == EXIF_SIGMA
     assert borrows.focal == pytest.approx(knows.focal / 2)  # the same lens, half the pixels
     assert borrows.log_sigma == CROPPED_SIGMA and not borrows.assumed
+    assert borrows.knowledge == knows.knowledge == Knowledge.EXIF  # one piece of knowledge: it must not count twice
     assert "other picture" in borrows.source and "35 mm" in borrows.source
     assert borrows.size == (2000, 1500) and borrows.K[:2, 2].tolist() == [999.5, 749.5]
 
