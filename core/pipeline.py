@@ -42,7 +42,7 @@ class StitchResult:
     panorama: what is shown on `canvas`, its light worked out where it is asked for (see `lazy`), as arrays `pixels`
     (H, W, C) float32 scene-linear and alpha (H, W), straight; the two layers, the warp, occluded
     (H, W) bool (what the target cannot see though the map falls inside it) and from_target (H, W) bool (which side of
-    the seam a pixel lies on, None without a seam) on `canvas`, which is the same, but of a whole sphere the part
+    the seam a pixel lies on, None without a seam) on `warp.canvas`, which is the same, but of a whole sphere the part
     that the pictures cover (see `spread`); what was decided on the whole canvas; the geometry, the field, the matches
     (all, before inlier choice), the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage. Scale and
     crop are done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes` (W, H): of

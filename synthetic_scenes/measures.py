@@ -124,7 +124,7 @@ def composition(result: StitchResult, truth: Truth) -> dict[str, float]:
     composed_psnr_db, composed_ssim: of the whole picture against the true panorama; over_average_db, over_average_ssim:
     by how much that is better than the average's, over the same pixels; overlap_over_average_db: the same in what both
     layers show alone, for beyond it the two pictures do not differ; source_fidelity_mean, source_fidelity_p5,
-    seam_visibility (NaN without a seam): see `appearance`.
+    seam_visibility (NaN without a seam): see `metrics.appearance`.
     """
     floats = (result.reference.bits == 32, result.target.bits == 32)
     reference = result.reference_layer

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 # Where the axis meets the sensor is not its middle: about so far off, in units of the longer side.
 PRINCIPAL_SIGMA = 0.01
-# Beliefs, as standard deviations of log f. Phone makers round and measure before distortion correction: 2-7 % off seen.
-EXIF_SIGMA, CROPPED_SIGMA, ASSUMED_SIGMA = 0.05, 0.2, 0.4
 
 
 class Knowledge(StrEnum):

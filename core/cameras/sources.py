@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..system.errors import BadRequest, UnreadableImage
-from .camera import ASSUMED_SIGMA, CROPPED_SIGMA, EXIF_SIGMA, PRINCIPAL_SIGMA, Camera, Knowledge
+from .camera import PRINCIPAL_SIGMA, Camera, Knowledge
 from .sensors import sensor_diagonal
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Diagonal of the 36 × 24 mm frame that "35 mm equivalent" refers to.
 FULL_FRAME_DIAGONAL = float(np.hypot(36.0, 24.0))
+# Beliefs, as standard deviations of log f. Phone makers round and measure before distortion correction: 2-7 % off seen.
+EXIF_SIGMA, CROPPED_SIGMA, ASSUMED_SIGMA = 0.05, 0.2, 0.4
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class Decided:
     is not kept); exposure: the target's; from_target (H, W): which side of the seam a pixel lies on, None without a
     seam; known, cost, price, box: what the seam was cut by (see `find_seam`), None if it was not or they are not
     kept; roll: by how many columns those four are rolled (see `wraparound`); holes: pixels that the target cannot see
-    and the reference does not show: transparent or filled, but in an average; folds: `folds` away from what
+    and the reference does not show: transparent or filled, but in an average; folds: `folding.folds` away from what
     is hidden behind something near.
     """
 

@@ -127,7 +127,7 @@ def target_price(
     """What each pixel of the overlap's box (h, w) costs if it comes from the target; less than nothing: if it does not.
 
     hidden (H, W): what the target cannot see costs by how different it looks, and so does what moved if it is not seen
-    at its own time, times (h, w): see `moved.times`.
+    at its own time, times (h, w): see `moving_things.times`.
     """
     misplaced = hidden[overlap.box].astype(np.int8)
     if times is not None:

@@ -40,7 +40,7 @@ def make_report(
     """The report of a stitch that shows `canvas`, and warnings in plain words drawn from it.
 
     decided: about its composition (hole_px: pixels that neither picture sees, beyond the reference and behind something
-    near; inpainted_px: how many of them were filled); appearance: of the panorama (see `appearance`).
+    near; inpainted_px: how many of them were filled); appearance: of the panorama (see `metrics.appearance`).
     No seconds, no dates: the same input gives the same report.
     """
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..cameras.lens import distort
 from ..cameras.projective import homogeneous
 from ..cameras.two_view import TwoView
+from ..field.transfer import transfer
 from ..measure.metrics import look_up
 from ..pipeline import StitchResult
 from ..raster.arrays import Array
@@ -105,13 +106,10 @@ def displacement_px(result: StitchResult) -> NDArray[np.float32]:
     if not view.e_prime.any():
         return np.zeros(warp.map_x.shape, np.float32)
     reference, target = result.cameras
-    a, b, c = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, reference)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x, y = a / c, b / c
-        if target.distortion.any():
-            x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), target), -1, 0)
-        far = np.hypot(warp.map_x - x, warp.map_y - y)
-    return np.where(c > 0, far / scales(result)[1][0, 0], np.nan).astype(np.float32)
+    infinite = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, reference)
+    far = distort(np.stack(transfer(view, infinite, np.zeros(1)), axis=-1), target)
+    moved = np.hypot(warp.map_x - far[..., 0], warp.map_y - far[..., 1])
+    return (moved / scales(result)[1][0, 0]).astype(np.float32)
 
 
 def heat_map(result: StitchResult) -> tuple[NDArray[np.uint8], tuple[float, float]]:

@@ -12,6 +12,8 @@ from .warp import Warp
 
 # What is occluded is known to 3 px.
 RIM = np.ones((7, 7), np.uint8)
+# In place of -1, 0 or 1: see `turning`.
+NO_TURN = 2
 
 
 def folds(turns: NDArray[np.int8], hidden: NDArray[np.bool_] | None = None) -> float:
@@ -28,10 +30,6 @@ def folds(turns: NDArray[np.int8], hidden: NDArray[np.bool_] | None = None) -> f
     # the median's own way is the right one: what most pixels do, or nearly
     usual = back if 2 * back >= total else on if 2 * on >= total else flat
     return (total - usual) / total if total else 0.0
-
-
-# In place of -1, 0 or 1: see `turning`.
-NO_TURN = 2
 
 
 def turning(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.int8]:

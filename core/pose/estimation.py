@@ -342,9 +342,9 @@ def _from_known_cameras(
     front = in_front(camera.K, camera_prime.K, R, relative.t, matches.x[inliers], matches.y[inliers], MIN_PARALLAX)
     if front.mean() < 0.5:
         raise DegenerateGeometry(
-            f"by the given cameras only {front.mean():.0%} of {len(front)} matching points lie in front of both: R "
-            "and t must take world points into the camera (x ~ K (R X + t), z ahead); check the sign of t and whether "
-            "R is to be transposed"
+            f"by the given cameras only {front.mean():.0%} of {len(front)} matching points lie in front of both, "
+            "at least half needed: R and t must take world points into the camera (x ~ K (R X + t), z ahead); check "
+            "the sign of t and whether R is to be transposed"
         )
     sigma = float(max(np.median(residual[inliers]) / 0.6745, 0.1 * matches.scale))
     why = f"cameras given; they explain {int(inliers.sum())} of {len(matches)} matches"

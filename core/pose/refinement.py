@@ -168,7 +168,7 @@ class _Problem:
         self.zoom = zoom and self.focal_free
         self.assumed = camera.assumed and camera_prime.assumed
         self.focal_sigma = camera.log_sigma if self.zoom else shared_focal_sigma(camera, camera_prime)
-        # one sensor behind both pictures: where they differ in size, who knows
+        # share the principal point only where both pictures have the same size
         believed_off = min(camera.principal_sigma, camera_prime.principal_sigma)
         self.principal_free = believed_off > 0 and camera.size == camera_prime.size
         self.principal_sigma = believed_off * max(camera.size)

@@ -9,8 +9,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
+Plane = NDArray[np.float32]
+# Rows and columns, with bounds that lie in the picture.
+Part: TypeAlias = tuple[slice, slice]
+# Pixels that are worked out at a time.
+STRIP = 1_000_000
 # left, top, width, height in px
 Box = tuple[int, int, int, int]
+# Narrower than this, px, is a speck.
+SPECK = 7
 
 
 def common(box: Box, other: Box) -> Box:
@@ -18,13 +26,6 @@ def common(box: Box, other: Box) -> Box:
     left, top = max(box[0], other[0]), max(box[1], other[1])
     right, bottom = min(box[0] + box[2], other[0] + other[2]), min(box[1] + box[3], other[1] + other[3])
     return left, top, right - left, bottom - top
-
-
-Array = NDArray[np.float64]
-# Pixels that are worked out at a time.
-STRIP = 1_000_000
-# Rows and columns, with bounds that lie in the picture.
-Part: TypeAlias = tuple[slice, slice]
 
 
 def strips(shape: tuple[int, ...]) -> Iterator[slice]:
@@ -90,11 +91,6 @@ def in_any_channel(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Where (H, W) something holds in any channel (H, W, C); NumPy's own `any` takes several times as long over so few.
     """
     return np.logical_or.reduce([holds[..., k] for k in range(holds.shape[2])])
-
-
-Plane = NDArray[np.float32]
-# Narrower than this is a speck.
-SPECK = 7
 
 
 def without_specks(hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:

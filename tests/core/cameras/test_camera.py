@@ -8,9 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, CROPPED_SIGMA, EXIF_SIGMA, Camera, Knowledge
+from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.projective import rotation_angle, rotation_from_vector
-from edf_stitch.core.cameras.sources import CameraRequest, cameras_for, read_camera_file
+from edf_stitch.core.cameras.sources import (
+    ASSUMED_SIGMA,
+    CROPPED_SIGMA,
+    EXIF_SIGMA,
+    CameraRequest,
+    cameras_for,
+    read_camera_file,
+)
 from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.system.errors import BadRequest, UnreadableImage
 from hypothesis import given, settings

@@ -8,7 +8,7 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera, Knowledge
+from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import (
@@ -20,6 +20,7 @@ from edf_stitch.core.cameras.projective import (
     rotation_from_vector,
     sampson_residuals,
 )
+from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.pose.estimation import MIN_MATCHES, estimate
 from edf_stitch.core.system.errors import DegenerateGeometry, NoOverlap, TooFewMatches

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera, Knowledge
+from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import homogeneous, infinite_homography, project
+from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
 from edf_stitch.core.pose.focal import KnownFocal, focal_warnings, known_focal
 from edf_stitch.core.pose.refinement import Pose, focal_deviations, refine_pose
 

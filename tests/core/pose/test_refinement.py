@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, PRINCIPAL_SIGMA, Camera, Knowledge
+from edf_stitch.core.cameras.camera import PRINCIPAL_SIGMA, Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import (
     homogeneous,
@@ -18,6 +18,7 @@ from edf_stitch.core.cameras.projective import (
     rotation_from_vector,
     sampson_residuals,
 )
+from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
 from edf_stitch.core.pose.refinement import (
     BEYOND_PX,
     EFFECTIVE_MATCHES,

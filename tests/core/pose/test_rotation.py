@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import ASSUMED_SIGMA, EXIF_SIGMA, Camera, Knowledge
+from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import (
     homogeneous,
@@ -13,6 +13,7 @@ from edf_stitch.core.cameras.projective import (
     rotation_angle,
     rotation_from_vector,
 )
+from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
 from edf_stitch.core.pose.fundamental import fit_homography
 from edf_stitch.core.pose.rotation import Rotation, fit_rotation
 
