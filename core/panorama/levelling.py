@@ -76,7 +76,8 @@ def gravity_by_edges(R: Array, normals: Array, lengths: Array) -> Array:
     cameras were held and by the upright edges that they saw.
 
     normals (N, 3), in the reference's frame, and lengths (N,): see `upright_edges.edges`. All uprights meet in one
-    point of the picture, which is where down is: that tells pitch, too, where there are some to the left and to the right.
+    point of the picture, which is where down is: that tells pitch, too, where there are some to the left and to the
+    right.
     """
     held = gravity(R)
     if not len(normals):
