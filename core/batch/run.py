@@ -212,7 +212,7 @@ def _worst(codes: Iterable[int]) -> int:
 
 def _pair(job: Job, meter: _Meter) -> Outcome:
     for unit in job.todo:
-        unit.write(stitch(*unit.pictures, unit.options, meter.piece(1.0), meter.cancelled))
+        unit.write(stitch(unit.pictures, unit.options, meter.piece(1.0), meter.cancelled))
     return _with_report(job, Outcome(job.item.name, "done" if job.todo else "skipped"))
 
 
@@ -236,8 +236,8 @@ class _Locked:
     settled."""
 
     alignment: Alignment
-    decided: Decided
-    sizes: tuple[tuple[int, int], tuple[int, int]]
+    decided: tuple[Decided, ...]
+    sizes: tuple[tuple[int, int], ...]
     options: StitchOptions
 
 
@@ -278,22 +278,22 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
 def _lock(job: Job, meter: _Meter) -> _Locked:
     """What the frames of a clip share; also writes its report, where that is due, from the first frame it was taken
     from."""
-    item, options, steps = job.item, job.options, meter.stopwatch(ALIGNMENT_WEIGHT)
-    used = _readable(item, options, steps)
+    item, options, progress = job.item, job.options, meter.stopwatch(ALIGNMENT_WEIGHT)
+    used = _readable(item, options, progress)
     shown = next(iter(used))
     sizes = used[shown].full_sizes
-    alignment = align(list(used.values()), options, steps)
+    alignment = align(list(used.values()), options, progress)
     quick = replace(options, crop="full", measure=False)
     decided = pooled_decision([
         compose(
-            read_frame(*item.pair(number), options), alignment, quick, meter.stopwatch(FRAME_WEIGHT), keep=True
+            read_frame(item.pair(number), options), alignment, quick, meter.stopwatch(FRAME_WEIGHT), keep=True
         ).decided
         for number in used
     ])
     reports = [unit for unit in job.todo if unit.frame is None]
     crop = options.crop
     if reports or crop == "inscribed":
-        frame = read_frame(*item.pair(shown), options)
+        frame = read_frame(item.pair(shown), options)
         result = compose(frame, alignment, options, meter.stopwatch(FRAME_WEIGHT), decided)
         if crop == "inscribed":  # what one frame shows decides for all: the frames of a clip have one size
             whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
@@ -304,14 +304,14 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
     return _Locked(alignment, decided, sizes, replace(options, crop=crop, measure=False))
 
 
-def _readable(item: BatchItem, options: StitchOptions, steps: Stopwatch) -> dict[int, Frame]:
+def _readable(item: BatchItem, options: StitchOptions, progress: Stopwatch) -> dict[int, Frame]:
     """The frames that a clip is aligned on, as far as they can be read and have the size of the first of them."""
     used: dict[int, Frame] = {}
     troubles: list[StitchError] = []
     for at, number in enumerate(item.aligned_on):
-        steps("read", at / len(item.aligned_on))
+        progress("read", at / len(item.aligned_on))
         try:
-            frame = _without_light(read_frame(*item.pair(number), options))
+            frame = _without_light(read_frame(item.pair(number), options))
         except StitchError as trouble:  # told again when it is the frame's turn
             troubles.append(trouble)
             continue
@@ -329,17 +329,17 @@ def _without_light(frame: Frame) -> Frame:
     def bare(picture: Picture) -> Picture:
         return replace(picture, light=np.broadcast_to(np.float32(np.nan), picture.light.shape))
 
-    return replace(frame, reference=bare(frame.reference), target=bare(frame.target))
+    return replace(frame, pictures=tuple(bare(picture) for picture in frame.pictures))
 
 
-def _frame(unit: Unit, locked: _Locked, steps: Stopwatch) -> tuple[tuple[int, int], list[str]]:
+def _frame(unit: Unit, locked: _Locked, progress: Stopwatch) -> tuple[tuple[int, int], list[str]]:
     """Stitches one frame; returns the panorama's (W, H) and warnings."""
-    steps("read")
-    frame = read_frame(*unit.pictures, locked.options)
+    progress("read")
+    frame = read_frame(unit.pictures, locked.options)
     if frame.full_sizes != locked.sizes:
         found, needed = (" and ".join(f"{w}×{h}" for w, h in sizes) for sizes in (frame.full_sizes, locked.sizes))
         raise BadRequest(f"the pictures have {found} pixels, the clip {needed}: one alignment is for one camera each")
-    result: StitchResult = compose(frame, locked.alignment, locked.options, steps, locked.decided)
+    result: StitchResult = compose(frame, locked.alignment, locked.options, progress, locked.decided)
     height, width = result.panorama.alpha.shape
     return (width, height), unit.write(result)
 

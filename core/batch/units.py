@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..options import StitchOptions
-from ..output.outputs import INPAINTED, MASKS, SEAM, OutputRequest, add_report, json_bytes, warp_bytes, write
+from ..output.outputs import OutputRequest, add_report, json_bytes, layer_files, warp_bytes, write
 from ..pictures.encoding import output_bits
 from ..pipeline import StitchResult
 from ..system.errors import BadRequest, UnreadableImage, UnwritableOutput
@@ -92,9 +92,11 @@ class Unit:
         """All that will be there, apart from what float pictures add."""
         out = [self.panorama] if self.panorama else []
         if self._layers:
-            out += [self._layers / f"{name}.png" for name in ("reference", "target", *MASKS)]
-            out += [self._layers / f"{SEAM}.png"] if self.options.has_seam else []
-            out += [self._layers / f"{INPAINTED}.png"] if self.options.holes == "inpaint" else []
+            names = layer_files(
+                [path.name for path in self.pictures], seam=self.options.has_seam,
+                inpainted=self.options.holes == "inpaint",
+            )  # fmt: skip
+            out += [self._layers / name for name in names]
         if self.report:
             out += [self.report, self._named(".matches.csv"), self._named(".timing.json")]
             out += [self._named(".warp.npz")] if self.request.warp else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,32 +61,43 @@ class CameraRequest:
             raise BadRequest("--principal takes X,Y for both pictures or X,Y,X2,Y2")
 
 
+def role(number: int) -> str:
+    """What messages and camera files call a picture."""
+    return "reference" if number == 0 else "target"
+
+
 def cameras_for(
-    request: CameraRequest,
-    names: tuple[str, str],
-    sizes: tuple[tuple[int, int], tuple[int, int]],
-    exifs: tuple[Exif, Exif],
-) -> tuple[tuple[Camera, Camera], list[str]]:
-    """Both pictures' cameras by DESIGN 4's order, and warnings about what contradicts itself.
+    request: CameraRequest, names: Sequence[str], sizes: Sequence[tuple[int, int]], exifs: Sequence[Exif]
+) -> tuple[list[Camera], list[str]]:
+    """The pictures' cameras by the best that is known of each (docs/method.md), and warnings about what contradicts
+    itself.
 
     names: as a camera file would call the pictures; sizes: (W, H) px after orientation was applied. Raises BadRequest.
     """
     warnings: list[str] = []
     if request.cameras is not None:
-        first, second = read_camera_file(request.cameras, names, sizes)
+        cameras = read_camera_file(request.cameras, names, sizes)
     else:
-        first, second = (_one_camera(request, i, sizes[i], exifs[i], warnings) for i in (0, 1))
-        if first.assumed != second.assumed:  # one lens took both pictures more often than not
-            known, unknown = (second, first) if first.assumed else (first, second)
-            guess = known.focal * max(unknown.size) / max(known.size)
-            # the same knowledge as the other picture's, so that the focal prior does not count it twice
-            source = f"the other picture ({known.source})"
-            borrowed = _camera(guess, unknown.size, source, CROPPED_SIGMA, known.knowledge)
-            first, second = (borrowed, second) if first.assumed else (first, borrowed)
+        cameras = [
+            _one_camera(request, number, size, exif, warnings)
+            for number, (size, exif) in enumerate(zip(sizes, exifs, strict=True))
+        ]
+        known = [camera for camera in cameras if not camera.assumed]
+        if known:  # one lens took all pictures more often than not
+            cameras = [_like(known[0], camera) if camera.assumed else camera for camera in cameras]
     if request.principal:
-        values = (*request.principal, *request.principal)[:4]
-        first, second = (_with_principal_point(c, values[2 * i : 2 * i + 2]) for i, c in enumerate((first, second)))
-    return (first, second), warnings
+        values = [request.principal[i : i + 2] for i in range(0, len(request.principal), 2)]
+        cameras = [
+            _with_principal_point(camera, values[min(number, len(values) - 1)]) for number, camera in enumerate(cameras)
+        ]
+    return cameras, warnings
+
+
+def _like(known: Camera, unknown: Camera) -> Camera:
+    """An unknown camera with the lens of a known one."""
+    guess = known.focal * max(unknown.size) / max(known.size)
+    # the same knowledge as the other picture's, so that the focal prior does not count it twice
+    return _camera(guess, unknown.size, f"the other picture ({known.source})", CROPPED_SIGMA, known.knowledge)
 
 
 def _one_camera(request: CameraRequest, index: int, size: tuple[int, int], exif: Exif, warnings: list[str]) -> Camera:
@@ -99,7 +111,7 @@ def _one_camera(request: CameraRequest, index: int, size: tuple[int, int], exif:
         return _camera(pick(request.focal_mm) / pick(request.sensor_mm) * max(size), size, "given in mm", 0.0)
     if request.focal35:
         return _camera(_from_35mm(pick(request.focal35), size), size, "given as 35 mm equivalent", 0.0)
-    return _from_exif(exif, size, ("reference", "target")[index], warnings)
+    return _from_exif(exif, size, role(index), warnings)
 
 
 def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]) -> Camera:
@@ -154,9 +166,9 @@ def _with_principal_point(camera: Camera, principal: tuple[float, ...]) -> Camer
 
 
 def read_camera_file(
-    source: str | Path | dict[str, Any], names: tuple[str, str], sizes: tuple[tuple[int, int], tuple[int, int]]
-) -> tuple[Camera, Camera]:
-    """Cameras of the two pictures from a JSON file or its content.
+    source: str | Path | dict[str, Any], names: Sequence[str], sizes: Sequence[tuple[int, int]]
+) -> list[Camera]:
+    """Cameras of the pictures from a JSON file or its content.
 
     Layout: {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "R": 3×3?, "t": [3]?}}} with NAME the
     picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes, integer pixel centres. Raises
@@ -173,16 +185,17 @@ def read_camera_file(
     if not isinstance(table, dict):
         raise BadRequest('a camera file holds {"cameras": {"NAME": {"K": [[…]], "R": [[…]], "t": […]}}}')
     out = []
-    for name, role, size in zip(names, ("reference", "target"), sizes, strict=True):
-        entry = table.get(name, table.get(role))
+    for number, (name, size) in enumerate(zip(names, sizes, strict=True)):
+        entry = table.get(name, table.get(role(number)))
         if not isinstance(entry, dict):
             raise BadRequest(
-                f"the camera file has no camera named {name!r} or {role!r}; it has: {', '.join(map(str, table))}"
+                f"the camera file has no camera named {name!r} or {role(number)!r}; it has: "
+                f"{', '.join(map(str, table))}"
             )
         out.append(_camera_from_entry(entry, name, size))
-    if (out[0].pose is None) != (out[1].pose is None):
+    if len({camera.pose is None for camera in out}) > 1:
         raise BadRequest("the camera file gives R and t for one picture only: give both or neither")
-    return out[0], out[1]
+    return out
 
 
 def _camera_from_entry(entry: dict[str, Any], name: str, size: tuple[int, int]) -> Camera:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..alignment import Geometry
+from ..cameras.edge import Edge
 from ..measure.held_out import held_out
 from ..measure.metrics import canvas_quality, coverage_samples, off_line_mean, overlap_quality
 from ..measure.projectivity import projectivity
@@ -37,23 +37,21 @@ SHARES = ("folds", "occluded")
 RIM = np.ones((7, 7), np.uint8)
 
 
-def figures_of(result: StitchResult, registration: Geometry, independent: Array, seed: int) -> dict[str, float]:
+def figures_of(result: StitchResult, edge: Edge, independent: Array, seed: int) -> dict[str, float]:
     """The figures of a field's stitch (on the whole flat canvas); NaN where one has no meaning.
 
-    Projectivity and distances from lines are by the pair's own F and by `independent`, whatever the field knows of
+    Projectivity and distances from lines are by the edge's own F and by `independent`, whatever the field knows of
     them, so that all fields are measured alike; folds are counted outside what is occluded and its rim.
     """
-    warp, size = result.warp, result.cameras[1].size
-    shown = coverage_samples(warp, result.cameras)
-    F = registration.two_view.F
-    inliers = registration.ideal.subset(registration.two_view.inliers)
-    unseen = held_out(result.field, inliers, shown, seed)
+    warp = result.warp
+    shown = coverage_samples(warp, result.cameras, edge.j)
+    F = edge.two_view.F
+    unseen = held_out(result.field, edge.inliers, shown, seed)
     measured = result.report["measured"]
-    inside = (result.reference_layer.alpha > 0) & warp.inside(size)
-    hidden = result.occluded & inside
+    inside = (result.layers[edge.i].alpha > 0) & warp.maps[edge.j].inside()
+    hidden = result.occluded[edge.j] & inside
     return {
-        **overlap_quality(result.reference, result.target, warp),
-        **canvas_quality(result.reference, result.target, warp),
+        **overlap_quality(result.pictures, warp, edge.j), **canvas_quality(result.pictures, warp, edge.j),
         "projectivity_px": projectivity(F, shown), "projectivity_independent_px": projectivity(independent, shown),
         "off_line_mean_px": off_line_mean(F, shown),
         "held_out_rms_px": unseen.rms_px, "held_out_towards_rms_px": unseen.towards_rms_px,

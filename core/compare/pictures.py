@@ -21,7 +21,7 @@ STRONGER = 4
 def field_pictures(result: StitchResult) -> dict[str, bytes]:
     """JPEG files by kind: panorama; average (of reference and warped target in the overlap: what is off shows twice);
     difference (× STRONGER); warped, and reference the same way: the two that blink."""
-    view, fetched, inside = overlap_views(result.reference, result.target, result.warp)
+    view, fetched, inside = overlap_views(result.pictures, result.warp)
     view, fetched = _rgb(view), _rgb(fetched)
     box = _bounds(inside)
     here, there, both = view[box], fetched[box], inside[box][..., None]

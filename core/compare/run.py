@@ -83,8 +83,8 @@ def check_options(options: StitchOptions, pairs: Sequence[PairFiles]) -> None:
         raise BadRequest("a comparison looks at flat panoramas, where all fields exist: leave --projection out")
     if len(pairs) > 1:
         for name, value in (
-            ("--matches", options.matches), ("--ignore-ref", options.ignore_reference),
-            ("--ignore-target", options.ignore_target),
+            ("--matches", options.matches), ("--ignore-ref", options.ignored(0)),
+            ("--ignore-target", options.ignored(1)),
         ):  # fmt: skip
             if value is not None:
                 raise BadRequest(f"{name} belongs to one pair, and {len(pairs)} are named")
@@ -107,8 +107,8 @@ def run_comparison(
         files.check_folder(request.folder, FILES)
         outcomes = []
         for number, pair in enumerate(request.pairs):
-            steps = _Steps(show, cancelled, number, len(request.pairs), len(request.fields))
-            outcomes.append(_outcome(pair, request.fields, options, truths, steps))
+            progress = _Steps(show, cancelled, number, len(request.pairs), len(request.fields))
+            outcomes.append(_outcome(pair, request.fields, options, truths, progress))
             if tell is not None:
                 tell(_in_words(outcomes[-1].entry, number + 1, len(request.pairs)))
         summary = {
@@ -155,7 +155,7 @@ class _Steps:
 
 
 def _outcome(
-    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, steps: _Steps
+    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Steps
 ) -> PairOutcome:
     """Does what there is to do for a pair. Raises Cancelled only: whatever goes wrong with it stops no other."""
     entry: dict[str, Any] = {
@@ -165,7 +165,7 @@ def _outcome(
     try:
         if pair.trouble:
             raise BadRequest(pair.trouble)
-        return _compared(pair, fields, options, truths, steps, entry)
+        return _compared(pair, fields, options, truths, progress, entry)
     except Cancelled:
         raise
     except (StitchError, MemoryError) as error:
@@ -175,7 +175,7 @@ def _outcome(
 
 
 def _compared(
-    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, steps: _Steps,
+    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Steps,
     entry: dict[str, Any],
 ) -> PairOutcome:  # fmt: skip
     truth = truths(pair.folder) if truths is not None and pair.folder is not None else None
@@ -183,24 +183,25 @@ def _compared(
     options = replace(options, measure=False, cache=None)
     if truth is not None:
         options = replace(options, camera=truth.camera)
-    watch, start = steps.begin("registration"), time.process_time()
+    watch, start = progress.begin("registration"), time.process_time()
     watch("read")
-    frame = read_frame(pair.reference, pair.target, options)
-    registration = estimate_geometry([frame], options, watch)
+    frame = read_frame((pair.reference, pair.target), options)
+    geometry = estimate_geometry([frame], options, watch)
+    edge = geometry.edges[0]
     seconds = {"registration": time.process_time() - start}
-    independent = independent_fundamental(registration.ideal, options.seed)
+    independent = independent_fundamental(edge.ideal, options.seed)
     outcome = PairOutcome(entry, seconds=seconds)
     results: dict[str, StitchResult] = {}
     for name in fields:
         try:
-            results[name] = _stitched(name, frame, registration, options, steps.begin(name), seconds)
+            results[name] = _stitched(name, frame, geometry, options, progress.begin(name), seconds)
         except Cancelled:
             raise
         except StitchError as error:
             entry["fields"][name] = {"status": "failed", "message": str(error), "figures": {}, "pictures": {}}
             outcome.exit_code = error.exit_code
             continue
-        figures = figures_of(results[name], registration, independent, options.seed)
+        figures = figures_of(results[name], edge, independent, options.seed)
         made = field_pictures(results[name])
         outcome.pictures |= {f"{pair.name}/{name}-{kind}.jpg": data for kind, data in made.items()}
         entry["fields"][name] = {
@@ -213,12 +214,12 @@ def _compared(
         for name, figures in truth.figures(results).items():
             entry["fields"][name]["figures"] |= figures
     done = [one for one in entry["fields"].values() if one["status"] == "done"]
-    view = registration.two_view
+    view = edge.two_view
     entry |= {
         "status": "done" if done else "failed",
         "message": "" if done else next(one["message"] for one in entry["fields"].values()),
-        "size": list(registration.cameras[0].size), "target_size": list(registration.cameras[1].size),
-        "model": view.model, "why": view.why, "matches": len(registration.matches), "inliers": int(view.inliers.sum()),
+        "size": list(geometry.cameras[edge.i].size), "target_size": list(geometry.cameras[edge.j].size),
+        "model": view.model, "why": view.why, "matches": len(edge.matches), "inliers": int(view.inliers.sum()),
         "focal_source": view.focal_source, "rendered": truth is not None,
     }  # fmt: skip
     outcome.exit_code = 0 if done else outcome.exit_code
@@ -226,11 +227,11 @@ def _compared(
 
 
 def _stitched(
-    name: str, frame: Frame, registration: Geometry, options: StitchOptions, watch: Stopwatch,
+    name: str, frame: Frame, geometry: Geometry, options: StitchOptions, watch: Stopwatch,
     seconds: dict[str, float],
 ) -> StitchResult:  # fmt: skip
     chosen, start = replace(options, field=name), time.process_time()
-    alignment = fit_and_warp(registration, [frame], chosen, watch)
+    alignment = fit_and_warp(geometry, [frame], chosen, watch)
     laid = time.process_time()
     result = compose(frame, alignment, chosen, watch)
     seconds |= {f"{name}: alignment": laid - start, f"{name}: composition": time.process_time() - laid}

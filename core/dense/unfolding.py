@@ -6,18 +6,15 @@ over, noise does it: there the moves are smoothed until it no longer does.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.two_view import TwoView
-from ..panorama.canvas import Canvas
-from ..panorama.folding import jacobian
-from ..panorama.visibility import occluded
-from ..panorama.warp import Warp
+from ..field.folding import jacobian
+from ..field.visibility import nearness_of, occluded
 from ..raster.arrays import Plane, beside
+from ..raster.picture_map import PictureMap
 from ..system.threads import each
 from .epipolar_lines import EpipolarLines
 
@@ -137,8 +134,10 @@ def _hidden(
     rows, columns = lines.shape
     left, top, width, height = lines.box
     sx, sy = width / columns, height / rows
-    # nodes as the pixels of a canvas of their own
-    to_reference = np.array([[sx, 0, left + (sx - 1) / 2], [0, sy, top + (sy - 1) / 2], [0, 0, 1]])
-    depth = lines.inverse_depth + along * lines.depth_per_px
-    warp = Warp(Canvas(columns, rows, (0, 0)), x, y, depth.astype(np.float32))
-    return occluded(warp, replace(two_view, H_inf=two_view.H_inf @ to_reference), target_size)
+    # x'₃ of H_inf p + d e' at the nodes
+    row = two_view.H_inf[2] @ np.array([[sx, 0, left + (sx - 1) / 2], [0, sy, top + (sy - 1) / 2], [0, 0, 1]])
+    infinite = (row[0] * np.arange(columns))[None, :] + (row[1] * np.arange(rows)[:, None] + row[2])
+    depth = (lines.inverse_depth + along * lines.depth_per_px).astype(np.float32)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        nearness = nearness_of(depth, depth * np.float32(two_view.e_prime[2]) + infinite.astype(np.float32))
+    return occluded(PictureMap(x, y, target_size), nearness)

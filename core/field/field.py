@@ -17,13 +17,15 @@ from ..raster.grid import Grid
 @dataclass(frozen=True)
 class FieldValues:
     """A field at nodes: inverse_depth (rows, columns), NaN where it knows none (e' is 0 then), and shift (rows,
-    columns, 2) in target px that comes on top of π(H_inf p + d e'), None where the field keeps to its lines; far (3,):
-    the plane that inverse_depth ends in beyond the fade, None for a field that means nothing off the reference's plane.
+    columns, 2), px of picture number `picture` that come on top of π(H_inf p + d e') there, None where the field keeps
+    to its lines; far (3,): the plane that inverse_depth ends in beyond the fade, None for a field that means nothing
+    off the reference's plane.
     """
 
     inverse_depth: Array
     shift: Array | None = None
     far: Array | None = None
+    picture: int = 1
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ class RefinedDepth:
     """Nodes over a part of the reference: the first (column, row) lies at raw px `start` (x, y), `step` (x, y) px lie
     from each to the next.
 
-    inverse_depth (h, w) to be added to the field's, shift (h, w, 2) px to be added in the target, confidence (h, w)
-    0..1 in it; all 0 at the rim, float32.
+    inverse_depth (h, w) to be added to the field's, shift (h, w, 2) px to be added in picture number `picture`,
+    confidence (h, w) 0..1 in it; all 0 at the rim, float32.
     """
 
     start: tuple[float, float]
@@ -26,6 +26,7 @@ class RefinedDepth:
     inverse_depth: Plane
     shift: Plane
     confidence: Plane
+    picture: int = 1
 
     def at(self, x: NDArray, y: NDArray) -> tuple[Plane, Plane, Plane]:
         """inverse_depth (…), shift (…, 2) and confidence (…) at reference px (rows, columns); exact on nodes, linear

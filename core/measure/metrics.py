@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -21,6 +21,7 @@ from ..raster.arrays import Array, Part, beside, bounds, strips
 from ..raster.colour import encode
 from ..raster.lazy import AnyImage
 from ..raster.log_encoding import log_encode
+from ..raster.picture_map import falls_inside
 from ..raster.sampling import fetch
 from ..system.threads import each, in_order
 
@@ -67,30 +68,34 @@ def _gray(picture: NDArray) -> NDArray:
 
 
 def overlap_views(
-    reference: Picture, target: Picture, warp: Warp
+    pictures: Sequence[Picture], warp: Warp, number: int = 1
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.bool_]]:
-    """The 8-bit views (H, W, C) of the reference and, on its pixels, of the warped target; and where (H, W) both show
-    something whole; by a flat warp."""
+    """The 8-bit views (H, W, C) of the reference and, on its pixels, of warped picture `number`; and where (H, W) both
+    show something whole; by a flat warp."""
+    reference, picture = pictures[0], pictures[number]
     height, width = reference.view.shape[:2]
     x, y = warp.canvas.offset
     box = (slice(y, y + height), slice(x, x + width))
-    inside = warp.inside((target.view.shape[1], target.view.shape[0]))[box]
+    picture_map = warp.maps[number].arrays()
+    map_x, map_y = picture_map.x[box], picture_map.y[box]
+    inside = falls_inside(map_x, map_y, (picture.view.shape[1], picture.view.shape[0]))
     if reference.alpha is not None:
         inside = inside & (reference.alpha > 0)
-    if target.alpha is not None:
+    if picture.alpha is not None:
         # whole, where the colours are fetched from: what is hidden has no colour to compare
-        alpha = fetch(target.alpha[..., None], warp.map_x[box], warp.map_y[box], cv2.INTER_LINEAR)
+        alpha = fetch(picture.alpha[..., None], map_x, map_y, cv2.INTER_LINEAR)
         inside = inside & (alpha[..., 0] > 1 - 1 / 255)
-    map_x, map_y = (np.where(inside, m[box], -1).astype(np.float32) for m in (warp.map_x, warp.map_y))
-    return reference.view, fetch(target.view, map_x, map_y, cv2.INTER_LINEAR), inside
+    map_x, map_y = (np.where(inside, values, -1).astype(np.float32) for values in (map_x, map_y))
+    return reference.view, fetch(picture.view, map_x, map_y, cv2.INTER_LINEAR), inside
 
 
-def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
-    """PSNR (dB), SSIM and size of the overlap, between the 8-bit views of the reference and of the warped target.
+def overlap_quality(pictures: Sequence[Picture], warp: Warp, number: int = 1) -> dict[str, float]:
+    """PSNR (dB), SSIM and size of the overlap, between the 8-bit views of the reference and of warped picture
+    `number`.
 
     Exposure differences are in it; it is what a reader of the literature calls alignment quality on the overlap.
     """
-    view, fetched, inside = overlap_views(reference, target, warp)
+    view, fetched, inside = overlap_views(pictures, warp, number)
     if not inside.any():
         return {"overlap_px": 0, "overlap_psnr_db": float("nan"), "overlap_ssim": float("nan")}
     return {
@@ -100,12 +105,12 @@ def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str
     }
 
 
-def canvas_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
+def canvas_quality(pictures: Sequence[Picture], warp: Warp, number: int = 1) -> dict[str, float]:
     """The same as published tables have it: both pictures black outside the overlap, averaged over the whole canvas.
 
     For comparison with them only: black counts as perfect, so a larger canvas looks better.
     """
-    view, fetched, inside = overlap_views(reference, target, warp)
+    view, fetched, inside = overlap_views(pictures, warp, number)
     if not inside.any():
         return {"canvas_psnr_db": float("nan"), "canvas_ssim": float("nan")}
     share = float(inside.sum()) / (warp.canvas.width * warp.canvas.height)
@@ -121,32 +126,34 @@ def canvas_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str,
 
 
 def appearance(
-    panorama: Layer, reference: Layer, target: Layer, from_target: NDArray[np.bool_] | None, floats: tuple[bool, bool]
+    panorama: Layer, layers: Sequence[Layer], labels: NDArray[np.int16] | None, floats: bool
 ) -> dict[str, float]:
-    """How much of a panorama's overlap looks as one of its pictures does, and how much its seam shows.
+    """How much of a panorama's overlaps looks as one of its pictures does, and how much its seams show.
 
-    source_fidelity_mean, source_fidelity_p5: for every pixel of the overlap the better of the structural similarities
-    (gray, 7×7) to the reference and to the target, which is exposed as it is in the panorama: mean and 5th percentile;
-    a ghost looks like neither. seam_visibility: by how many levels (of 255) the step from pixel to pixel across the
-    seam differs from the same step in the picture that is nearer to it, mean over the seam. NaN where there is none.
+    source_fidelity_mean, source_fidelity_p5: for every pixel that several layers show, exposed as they are in the
+    panorama, the best of the structural similarities (gray, 7×7) to them: mean and 5th percentile; a ghost looks like
+    none. seam_visibility: by how many levels (of 255) the step from pixel to pixel across a seam differs from the same
+    step in the picture that is nearest to it, mean over the seams. NaN where there is none. labels (H, W): which layer
+    a pixel comes from; floats: whether there are float pictures.
     """
-    box = bounds((reference.alpha > 0) & (target.alpha > 0))
+    several = np.sum([layer.alpha > 0 for layer in layers], axis=0, dtype=np.int16) > 1
+    box = bounds(several)
     if box is None:
         return {"source_fidelity_mean": math.nan, "source_fidelity_p5": math.nan, "seam_visibility": math.nan}
     # what else is there may be missing for want of room in 8 bit: light beyond white is looked at as tones
-    levels = [_levels(part.light, box, any(floats)) for part in (panorama, reference, target)]
-    both = ((reference.alpha > 0) & (target.alpha > 0))[box]
+    levels = [_levels(part.light, box, floats) for part in (panorama, *layers)]
+    several = several[box]
 
     def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
         return cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
 
-    def better(rows: slice) -> NDArray[np.float32]:
-        near, here = beside(rows, 3, len(both))
-        whole, first, second = (_gray(part[near].astype(np.float32)) for part in levels)
-        return np.maximum(*(_similarity(whole, part, smooth)[here][both[rows]] for part in (first, second)))
+    def best(rows: slice) -> NDArray[np.float32]:
+        near, here = beside(rows, 3, len(several))
+        whole, *others = (_gray(part[near].astype(np.float32)) for part in levels)
+        return np.max([_similarity(whole, part, smooth)[here][several[rows]] for part in others], axis=0)
 
-    fidelity = np.concatenate(list(in_order(better, strips(both.shape))))
-    seam = math.nan if from_target is None else _seam_visibility(levels, from_target[box], both)
+    fidelity = np.concatenate(list(in_order(best, strips(several.shape))))
+    seam = math.nan if labels is None else _seam_visibility(levels, labels[box], several)
     return {
         "source_fidelity_mean": float(fidelity.mean(dtype=np.float64)),
         "source_fidelity_p5": float(np.percentile(fidelity, 5)), "seam_visibility": seam,
@@ -177,20 +184,21 @@ def _similarity(
 
 
 def _seam_visibility(
-    levels: list[NDArray], from_target: NDArray[np.bool_], both: NDArray[np.bool_]
+    levels: list[NDArray], labels: NDArray[np.int16], several: NDArray[np.bool_]
 ) -> float:
     beyond = []
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        across = (from_target[here] != from_target[there]) & both[here] & both[there]
+        across = (labels[here] != labels[there]) & several[here] & several[there]
         steps = [part[here][across].astype(np.float32) - part[there][across] for part in levels]
-        beyond.append(np.minimum(*(np.abs(steps[0] - step).mean(axis=1) for step in steps[1:])))
+        beyond.append(np.min([np.abs(steps[0] - step).mean(axis=1) for step in steps[1:]], axis=0))
     every = np.concatenate(beyond)
     return float(every.mean(dtype=np.float64)) if every.size else math.nan
 
 
-def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
-    """The map (N, 2) at raw points (N, 2) of the reference, bilinear between canvas pixels; NaN outside.
-    camera: the reference's, if its lens matters."""
+def look_up(warp: Warp, x: Array, camera: Camera | None = None, number: int = 1) -> Array:
+    """The map (N, 2) of picture `number` at raw points (N, 2) of the reference, bilinear between canvas pixels; NaN
+    outside. camera: the reference's, if its lens matters."""
+    picture_map = warp.maps[number].arrays()
     at = warp.canvas.of_reference(x, camera)
     limit = np.array([warp.canvas.width, warp.canvas.height]) - 1
     outside = ((at < 0) | (at > limit)).any(axis=1)
@@ -198,7 +206,7 @@ def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
     (u, v), (column, row) = (at - corner).T, corner.T
     next_column, next_row = np.minimum(column + 1, limit[0]), np.minimum(row + 1, limit[1])
     out = []
-    for values in (warp.map_x, warp.map_y):
+    for values in (picture_map.x, picture_map.y):
         upper = values[row, column] * (1 - u) + values[row, next_column] * u
         lower = values[next_row, column] * (1 - u) + values[next_row, next_column] * u
         out.append(np.where(outside, np.nan, upper * (1 - v) + lower * v))
@@ -207,7 +215,8 @@ def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
 
 @dataclass(frozen=True)
 class CoverageSamples:
-    """Canvas pixels that show the target, evenly spread, and where they show it, in ideal (undistorted) px of both.
+    """Canvas pixels that show a further picture, evenly spread, and where they show it, in ideal (undistorted) px of
+    both.
 
     points (N, 2) of the reference's plane; target (N, 2); overlap (N,): which of them lie in the reference.
     """
@@ -217,26 +226,31 @@ class CoverageSamples:
     overlap: NDArray[np.bool_]
 
 
-def coverage_samples(warp: Warp, cameras: tuple[Camera, Camera], samples: int = SAMPLES) -> CoverageSamples:
-    """What a warp shows of the target at about `samples` pixels of the whole canvas, on an even grid.
+def coverage_samples(
+    warp: Warp, cameras: Sequence[Camera], number: int = 1, samples: int = SAMPLES
+) -> CoverageSamples:
+    """What a warp shows of picture `number` at about `samples` pixels of the whole canvas, on an even grid.
 
     Of a round panorama no more than a flat one would show: beyond, pixels of the reference's plane mean nothing.
     """
     canvas = warp.canvas
     step = max(1, int(np.sqrt(canvas.width * canvas.height / samples)))
     nodes = np.s_[step // 2 :: step, step // 2 :: step]
-    shows = warp.inside(cameras[1].size)[nodes]
-    raw = np.stack([warp.map_x[nodes][shows], warp.map_y[nodes][shows]], axis=-1).astype(np.float64)
+    picture_map = warp.maps[number].arrays()
+    x, y = picture_map.x[nodes], picture_map.y[nodes]
+    reference, camera = cameras[0], cameras[number]
+    shows = falls_inside(x, y, camera.size)
+    raw = np.stack([x[shows], y[shows]], axis=-1).astype(np.float64)
     if canvas.projection is None:
         points = np.argwhere(shows)[:, ::-1] * float(step) + step // 2 - np.array(canvas.offset)
     else:
-        points = canvas.on_reference(canvas.xs[nodes[1]], canvas.ys[nodes[0]], cameras[0])[0][shows]
-        far = MAX_REACH * max(*cameras[0].size, *cameras[1].size)
+        points = canvas.on_reference(canvas.xs[nodes[1]], canvas.ys[nodes[0]], reference)[0][shows]
+        far = MAX_REACH * max(*reference.size, *camera.size)
         with np.errstate(invalid="ignore"):
-            flat = ((points >= -far) & (points <= np.array(cameras[0].size) + far)).all(axis=1)
+            flat = ((points >= -far) & (points <= np.array(reference.size) + far)).all(axis=1)
         points, raw = points[flat], raw[flat]
-    overlap = (points >= 0).all(axis=1) & (points <= np.array(cameras[0].size) - 1).all(axis=1)
-    return CoverageSamples(undistort(points, cameras[0]), undistort(raw, cameras[1]), overlap)
+    overlap = (points >= 0).all(axis=1) & (points <= np.array(reference.size) - 1).all(axis=1)
+    return CoverageSamples(undistort(points, reference), undistort(raw, camera), overlap)
 
 
 def off_line_mean(F: Array, shown: CoverageSamples) -> float:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cameras.lens import undistort
 from ..field.slack import SlackField
 from ..panorama.canvas import Canvas
 from ..panorama.levelling import angles_of
@@ -34,18 +33,20 @@ HOLES = 1e-4
 
 
 def make_report(
-    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment, canvas: Canvas, decided: Decided,
-    appearance: dict[str, float],
+    options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment, canvas: Canvas,
+    decided: Sequence[Decided], appearance: dict[str, float],
 ) -> tuple[dict[str, Any], list[str]]:
     """The report of a stitch that shows `canvas`, and warnings in plain words drawn from it.
 
-    decided: about its composition (hole_px: pixels that neither picture sees, beyond the reference and behind something
-    near; inpainted_px: how many of them were filled); appearance: of the panorama (see `metrics.appearance`).
+    decided: about the composition of each picture (hole_px: pixels that no picture sees, beyond the reference and
+    behind something near; inpainted_px: how many of them were filled); appearance: of the panorama (see
+    `metrics.appearance`).
     No seconds, no dates: the same input gives the same report.
     """
-    cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
-    field = alignment.field
-    measured = _measured(options, pictures, alignment) | {"folds": decided.folds} | appearance
+    cameras, edge, field = alignment.cameras, alignment.edges[0], alignment.field
+    matches, two_view, further = edge.matches, edge.two_view, decided[edge.j]
+    holes = sum(one.holes for one in decided)
+    measured = _measured(options, pictures, alignment) | {"folds": max(one.folds for one in decided)} | appearance
     report = {
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
@@ -76,35 +77,35 @@ def make_report(
             "projection": _projection_entry(canvas, two_view),
         },
         "composition": {
-            "exposure_gain": decided.exposure.gain, "exposure_spread": decided.exposure.spread,
-            "exposure_blocks": decided.exposure.blocks, "occluded_px": int(decided.hidden.sum()),
-            "hole_px": decided.holes, "inpainted_px": decided.holes if options.holes == "inpaint" else 0,
+            "exposure_gain": further.exposure.gain, "exposure_spread": further.exposure.spread,
+            "exposure_blocks": further.exposure.blocks, "occluded_px": int(further.hidden.sum()),
+            "hole_px": holes, "inpainted_px": holes if options.holes == "inpaint" else 0,
         },
         "measured": measured,
     }  # fmt: skip
     warnings = _warnings(alignment, measured["folds"])
-    if decided.holes > HOLES * alignment.warp.map_x.size:
+    if holes > HOLES * further.hidden.size:
         shown = (
             "filled smoothly from around there" if options.holes == "inpaint" else
             "transparent there (black in a JPEG); --holes inpaint fills them"
         )  # fmt: skip
         warnings.append(
-            f"{decided.holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
+            f"{holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
             f"{shown}; --crop reference shows none of them"
         )
     return plain(report), warnings
 
 
 def _measured(
-    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment
+    options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment
 ) -> dict[str, float]:
     """The figures of an alignment; those that cost time only where options.measure asks for them. NaN: undefined."""
-    cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
-    field, warp = alignment.field, alignment.warp
-    inliers = matches.subset(two_view.inliers)
-    error = np.linalg.norm(look_up(warp, inliers.x, cameras[0]) - inliers.y, axis=1)
+    cameras, edge = alignment.cameras, alignment.edges[0]
+    field, warp, two_view = alignment.field, alignment.warp, edge.two_view
+    inliers = edge.matches.subset(two_view.inliers)
+    error = np.linalg.norm(look_up(warp, inliers.x, cameras[0], edge.j) - inliers.y, axis=1)
     error = error[np.isfinite(error)]
-    shown = coverage_samples(warp, cameras)
+    shown = coverage_samples(warp, cameras, edge.j)
     measured = {
         "alignment_median_px": _median(error),
         "alignment_p95_px": float(np.percentile(error, 95)) if error.size else math.nan,
@@ -113,16 +114,15 @@ def _measured(
     }
     if not options.measure:
         return measured
-    ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
     # where the pair has no F of its own, none that matches give means anything
-    independent = independent_fundamental(ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
-    unseen = held_out(field, ideal.subset(two_view.inliers), shown, options.seed)
+    independent = independent_fundamental(edge.ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
+    unseen = held_out(field, edge.inliers, shown, options.seed)
     # pixels are compared in the reference's own frame, where only one of the two pictures is resampled
     framed = warp
     if warp.canvas.projection is not None:
         relief = None if alignment.dense is None else alignment.dense.relief
-        framed = build_map(field, two_view, Canvas(*cameras[0].size, (0, 0)), *cameras, relief)
-    return measured | overlap_quality(*pictures, framed) | {
+        framed = build_map(field, alignment.views, Canvas(*cameras[0].size, (0, 0)), relief)
+    return measured | overlap_quality(pictures, framed, edge.j) | {
         "projectivity_own_px": projectivity(two_view.F, shown),
         "projectivity_independent_px": projectivity(independent, shown),
         "projectivity_points": int((~shown.overlap).sum()),
@@ -133,7 +133,7 @@ def _measured(
 
 
 def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
-    two_view, field, warp = alignment.two_view, alignment.field, alignment.warp
+    two_view, field, warp = alignment.edges[0].two_view, alignment.field, alignment.warp
     out = []
     if field.fit.negative_share > NEGATIVE_SHARE:
         out.append(

@@ -6,6 +6,7 @@ here, once on the way in and once on the way out, so that no other room has to k
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -106,7 +107,8 @@ def picture_from_array(array: np.ndarray, name: str = "array") -> Picture:
     if array.ndim not in (2, 3) or array.size == 0 or (array.ndim == 3 and array.shape[2] > 4):
         raise BadRequest(f"{name}: an array of the shape {array.shape}; height × width (× 1 to 4 channels) is needed")
     raw = array[..., None] if array.ndim == 2 else array
-    raw = np.array(raw, dtype=np.float32 if dtype == np.float64 else dtype, order="C")
+    with np.errstate(over="ignore"):  # what float32 cannot hold is infinite, which is told further on
+        raw = np.array(raw, dtype=np.float32 if dtype == np.float64 else dtype, order="C")
     try:
         return _picture(raw, False, Exif(), None, name, [])
     except UnreadableImage as error:
@@ -220,24 +222,24 @@ def resized(picture: Picture, scale: float) -> Picture:
     return replace(picture, light=weighed(picture.pixels), alpha=alpha, view=view)
 
 
-def in_same_colour_space(a: Picture, b: Picture) -> tuple[Picture, Picture]:
-    """Both pictures with the same primaries, the same number of channels and, for two float pictures, comparable views.
+def in_same_colour_space(pictures: Sequence[Picture]) -> tuple[Picture, ...]:
+    """The pictures with the same primaries, the same number of channels and, if all are float, comparable views.
 
     Equal profiles are kept (light stays in their primaries); otherwise each picture with a profile is converted to
     linear sRGB and loses it. A profile that is not understood counts as sRGB then, with a warning. Gray beside colour
     gets three channels. Returns new pictures; the given ones stay as they are.
     """
-    if a.icc != b.icc:
-        a, b = _to_srgb(a), _to_srgb(b)
-    if a.light.shape[2] != b.light.shape[2]:
-        a, b = _three_channels(a), _three_channels(b)
-    if a.bits == b.bits == 32:
-        ours, theirs = _exposure(a.pixels, a.alpha), _exposure(b.pixels, b.alpha)
-        # One factor keeps the same thing equally bright in both; over two stops apart, seeing anything comes first.
-        if 0.25 <= ours / theirs <= 4.0:
-            shared = float(np.sqrt(ours * theirs))
-            a, b = (replace(one, view=_float_view(one.pixels, shared)) for one in (a, b))
-    return a, b
+    if len({picture.icc for picture in pictures}) > 1:
+        pictures = [_to_srgb(picture) for picture in pictures]
+    if len({picture.light.shape[2] for picture in pictures}) > 1:
+        pictures = [_three_channels(picture) for picture in pictures]
+    if all(picture.bits == 32 for picture in pictures):
+        exposures = [_exposure(picture.pixels, picture.alpha) for picture in pictures]
+        # One factor keeps the same thing equally bright in all; over two stops apart, seeing anything comes first.
+        if max(exposures) <= 4.0 * min(exposures):
+            shared = float(np.prod(exposures) ** (1 / len(exposures)))
+            pictures = [replace(picture, view=_float_view(picture.pixels, shared)) for picture in pictures]
+    return tuple(pictures)
 
 
 def _to_srgb(picture: Picture) -> Picture:

@@ -49,6 +49,15 @@ def bounds(mask: NDArray[np.bool_]) -> Part | None:
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
+def box_of(mask: NDArray[np.bool_]) -> Box:
+    """The smallest box that holds all of a mask (H, W), which is not empty."""
+    part = bounds(mask)
+    if part is None:
+        raise ValueError("a mask that holds nothing has no box")
+    rows, columns = part
+    return columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start
+
+
 def within(part: Part, shape: tuple[int, ...]) -> Part:
     """The same rows and columns of a picture (H, W, …), none beyond its edges."""
     rows, columns = (slice(*one.indices(side)[:2]) for one, side in zip(part, shape, strict=False))

@@ -12,6 +12,7 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.choices import FIELDS
 from edf_stitch.core.field.field import Field
 from edf_stitch.core.field.strict import MIN_CENTRES
@@ -198,7 +199,7 @@ def test_a_field_sends_points_where_its_map_does(name: str, view: TwoView, camer
     matches = matches_of(view, curved, 300, noise=0.3)
     field = fitted(name, view, matches)
     points = matches.x[(np.abs(matches.x - (250, 150)) < (100, 100)).all(axis=1)]
-    shown = look_up(build_warp(field, field.two_view, camera, camera), points)
+    shown = look_up(build_warp(field, views_of(field.two_view, (camera, camera))), points)
     assert len(points) > 50 and np.abs(field.predict(points) - shown).max() < 0.05
 
 
