@@ -33,6 +33,7 @@ from .pictures.picture import Picture, resized
 from .pose import features
 from .pose.estimation import MIN_MATCHES, estimate
 from .pose.match_files import read_matches
+from .raster.resizing import resized_points
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, TooFewMatches
 from .system.threads import in_order
@@ -229,7 +230,7 @@ def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, Camer
     sizes = frame.full_sizes
     matches = read_matches(source, *sizes)
     x, y = (
-        (points + 0.5) * (np.array(camera.size) / np.array(size)) - 0.5
+        resized_points(points, size, camera.size)
         for points, camera, size in zip((matches.x, matches.y), cameras, sizes, strict=True)
     )
     seen = _shown(frame.reference, x) & _shown(frame.target, y)

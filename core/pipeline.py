@@ -27,6 +27,7 @@ from .panorama.warp import Warp, reference_box
 from .pictures.masks import painted_over
 from .pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
 from .raster.arrays import Box, common, cut
+from .raster.resizing import resized_points
 from .system.errors import NoOverlap
 from .system.progress import Progress
 from .system.threads import in_order
@@ -83,7 +84,7 @@ class StitchResult:
         """The matches that the field stands on, in px of the full pictures: given back, they make the same field."""
         used = self.matches.subset(np.flatnonzero(self.two_view.inliers)[self.field.fit.inliers_used])
         x, y = (
-            (points + 0.5) * (np.array(full) / np.array(camera.size)) - 0.5
+            resized_points(points, camera.size, full)
             for points, full, camera in zip((used.x, used.y), self.full_sizes, self.cameras, strict=True)
         )
         return Matches(x, y, used.scale, used.weights)

@@ -8,6 +8,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from ..raster.resizing import size_change
+
 # Where the axis meets the sensor is not its middle: about so far off, in units of the longer side.
 PRINCIPAL_SIGMA = 0.01
 
@@ -63,10 +65,10 @@ class Camera:
 
     def resized(self, size: tuple[int, int]) -> Camera:
         """The camera of its picture resized to (W, H) px."""
-        factor = np.array(size) / np.array(self.size)
+        factor, shift = size_change(self.size, size)
         K = self.K.copy()
         K[:2] *= factor[:, None]
-        K[:2, 2] += (factor - 1) / 2  # pixel centres are integers: the corner lies at −½
+        K[:2, 2] += shift
         return replace(self, K=K, size=size)
 
 

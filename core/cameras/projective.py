@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from ..raster.arrays import Array
 
+# The third homogeneous coordinate of a point in front of its camera, relative to the larger of the other two.
+LEAST_AHEAD = 1e-6
+
 
 def homogeneous(points: NDArray) -> Array:
     """(…, 2) points as (…, 3) with a one behind."""
@@ -22,6 +25,14 @@ def homogeneous(points: NDArray) -> Array:
 def project(rays: Array) -> Array:
     """π(a, b, c) = (a/c, b/c) of (…, 3) vectors; the caller looks after c > 0."""
     return rays[..., :2] / rays[..., 2:]
+
+
+def ahead_of_camera(a: NDArray, b: NDArray, c: NDArray) -> NDArray[np.bool_]:
+    """Which homogeneous pixels (a, b, c), c's sign kept, lie in front of their camera; False for NaN.
+
+    What is less than LEAST_AHEAD in front, relative to its own length, would be shown outside any picture.
+    """
+    return c > LEAST_AHEAD * np.maximum(np.abs(a), np.abs(b))
 
 
 def normalisation(points: Array) -> Array:

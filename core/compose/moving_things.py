@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
 from ..panorama.warp import Warp
-from ..raster.distance import distance_inside
+from ..raster.distance import distance_inside, distance_to_border
 from .overlap import Overlap
 
 # It is looked for at so many px across the overlap at most: whatever is narrower than THIN of them is none.
@@ -87,8 +87,7 @@ def _moving(
         return False
     left_over = targets - places @ np.linalg.lstsq(places, targets, rcond=None)[0]
     parallax = np.hypot(*np.ptp(left_over, axis=0)) / step
-    inner = np.pad(thing, 1).astype(np.uint8)
-    across = 2 * float(cv2.distanceTransform(inner, cv2.DIST_L2, cv2.DIST_MASK_5).max())
+    across = 2 * float(distance_to_border(thing).max())
     return across > WIDER * parallax
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..cameras.projective import homogeneous, project
+from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..cameras.two_view import TwoView
 from ..raster.arrays import Array
 
@@ -21,8 +21,7 @@ def transfer(two_view: TwoView, infinite: list[Array], inverse_depth: Array) -> 
     e = two_view.e_prime
     depth = inverse_depth if e.any() else 0.0  # without a baseline depth, known or not (NaN), moves nothing
     a, b, c = (part + depth * e[k] for k, part in enumerate(infinite))
-    # relative to the ray's own length: less than this in front is behind for any picture
-    c = np.where(c <= 1e-6 * np.maximum(np.abs(a), np.abs(b)), np.nan, c)
+    c = np.where(ahead_of_camera(a, b, c), c, np.nan)
     return a / c, b / c
 
 

@@ -20,6 +20,7 @@ from ..measure.metrics import look_up
 from ..pipeline import StitchResult
 from ..raster.arrays import Array
 from ..raster.colour import encode
+from ..raster.resizing import size_change
 
 # Pixels along the longer side of the pictures that lie over the panorama, and nodes along that of the depth grid.
 LONGEST_SIDE = 1600
@@ -31,9 +32,9 @@ def scales(result: StitchResult) -> tuple[Array, Array]:
     """Matrices S, S' (3, 3) that bring px of the full pictures to px of those that were worked on."""
     out = []
     for full, camera in zip(result.full_sizes, result.cameras, strict=True):
-        factor = np.array(camera.size) / np.array(full)
+        factor, shift = size_change(full, camera.size)
         S = np.diag([*factor, 1.0])
-        S[:2, 2] = (factor - 1) / 2  # pixel centres are integers: the corner lies at −½
+        S[:2, 2] = shift
         out.append(S)
     return out[0], out[1]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
 from ..cameras.lens import distort, undistort
-from ..cameras.projective import homogeneous, project
+from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..cameras.two_view import TwoView
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
@@ -255,7 +255,7 @@ def _outline(field: Field, two_view: TwoView, camera_prime: Camera) -> Array:
 def _in_plane(points: Array) -> Array:
     """Reference pixels (N, 2) of canvas points (N, 3), NaN behind the reference camera."""
     points = points.copy()
-    points[points[:, 2] <= 1e-6 * np.abs(points[:, :2]).max(axis=1)] = np.nan
+    points[~ahead_of_camera(*points.T)] = np.nan
     return project(points)
 
 

@@ -19,6 +19,7 @@ from ..cameras.matches import Matches
 from ..cameras.projective import in_front, infinite_homography, inverse_intrinsics, sampson_residuals
 from ..cameras.two_view import TwoView
 from ..raster.arrays import Array
+from ..raster.robust import sigma_of
 from ..system.errors import DegenerateGeometry, NoOverlap, TooFewMatches
 from .focal import focal_warnings, held_focal, known_focal
 from .fundamental import (
@@ -291,8 +292,7 @@ def _refine_with_inliers(
         inliers, previous = new, sigma
         pose, _ = refine_pose(matches.subset(inliers).thinned(IN_EARNEST), pose, camera, camera_prime, sigma, zoom=zoom)
         residual = np.abs(sampson_residuals(pose.F, matches.x[inliers], matches.y[inliers]))
-        # σ from the median absolute residual of a normal distribution
-        sigma = float(np.clip(np.median(residual) / 0.6745, LEAST_PX * matches.scale, RANSAC_PX * matches.scale))
+        sigma = float(np.clip(sigma_of(residual), LEAST_PX * matches.scale, RANSAC_PX * matches.scale))
         if settled and abs(sigma / previous - 1) < 0.05:
             break
     return pose, inliers, sigma
@@ -346,7 +346,7 @@ def _from_known_cameras(
             "at least half needed: R and t must take world points into the camera (x ~ K (R X + t), z ahead); check "
             "the sign of t and whether R is to be transposed"
         )
-    sigma = float(max(np.median(residual[inliers]) / 0.6745, 0.1 * matches.scale))
+    sigma = float(max(sigma_of(residual[inliers]), 0.1 * matches.scale))
     why = f"cameras given; they explain {int(inliers.sum())} of {len(matches)} matches"
     return TwoView(
         K=relative.K, K_prime=relative.K_prime, R=R, t=relative.t, F=relative.F,

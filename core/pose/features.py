@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import sgemm
 
 from ..cameras.matches import Matches
+from ..raster.resizing import resized_points, size_change
 from ..system.threads import in_order
 
 # Above this a picture is shrunk for features only: SIFT's cost and memory grow with pixels, its useful points hardly
@@ -72,11 +73,11 @@ def detect(
     floor = min(STRONG / OCTAVE_LAYERS, np.partition(strength, -ENOUGH)[-ENOUGH]) if len(strength) > ENOUGH else 0.0
     strong = np.flatnonzero(strength >= floor)
     chosen = strong[spread_evenly(points[strong], strength[strong], gray.shape, budget)]
-    factor = np.array([width / small[0], height / small[1]])
     # a descriptor costs more than a point: only those that are kept get one, though that needs the pyramid once more
     _, descriptors = sift.compute(gray, [keypoints[i] for i in chosen])
     descriptors = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-12))
-    return Features((points[chosen] + 0.5) * factor - 0.5, descriptors, float(factor.mean()))
+    scale = float(np.mean(size_change(small, (width, height))[0]))
+    return Features(resized_points(points[chosen], small, (width, height)), descriptors, scale)
 
 
 def _shown(alpha: NDArray[np.float32] | None, size: tuple[int, int]) -> NDArray[np.uint8] | None:

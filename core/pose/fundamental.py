@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..cameras.matches import Matches
 from ..cameras.projective import homogeneous, project, sampson_residuals
 from ..raster.arrays import Array
+from ..raster.robust import sigma_of, sigma_of_lengths
 from ..system.errors import DegenerateGeometry, NoOverlap
 
 # A chance F gathers its 7 points and whatever lies within the threshold of its lines; this many is beyond chance.
@@ -69,8 +70,7 @@ def explained_by(F: Array, matches: Matches) -> tuple[NDArray[np.bool_], float]:
     """Which matches (N,) lie on the lines of F, and the noise of a Sampson distance among them in px."""
     residual = np.abs(sampson_residuals(F, matches.x, matches.y))
     on = residual < RANSAC_PX * matches.scale
-    # σ from the median absolute residual of a normal distribution
-    sigma = float(np.median(residual[on])) / 0.6745 if on.any() else 0.0
+    sigma = sigma_of(residual[on]) if on.any() else 0.0
     return on, max(sigma, LEAST_PX * matches.scale)
 
 
@@ -123,8 +123,8 @@ def fit_homography(matches: Matches, seed: int) -> Homography:
     # the sign that has the inliers in front
     H = H * np.sign(np.median(homogeneous(matches.x[inliers]) @ H[2])) / np.linalg.norm(H)
     error = transfer_error(H, matches)
-    # the median length of a normal vector of two components is 1.1774 σ; both pictures contribute
-    sigma = max(float(np.median(error[inliers])) / 1.1774 / math.sqrt(2), LEAST_PX * matches.scale)
+    # the noise of both pictures
+    sigma = max(sigma_of_lengths(error[inliers]) / math.sqrt(2), LEAST_PX * matches.scale)
     return Homography(H, error, inliers, sigma)
 
 
