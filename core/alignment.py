@@ -31,8 +31,9 @@ from .panorama.warp import Warp, build_warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
 from .pose import features
-from .pose.estimation import MIN_MATCHES, estimate
+from .pose.estimation import estimate
 from .pose.match_files import read_matches
+from .pose.options import ESTIMATION
 from .raster.resizing import resized_points
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, TooFewMatches
@@ -198,7 +199,7 @@ def _projection(
 
 def _found_in(frames: Sequence[Frame], steps: ReportProgress, quick: bool) -> Matches:
     found = []
-    most = (features.PREVIEW_BUDGET, features.PREVIEW_PIXELS) if quick else ()
+    most = (features.FEATURES.preview_budget, features.FEATURES.preview_pixels) if quick else ()
     for i, frame in enumerate(frames):
         seen = []
         for keypoints in in_order(lambda p: features.detect(p.view, p.alpha, *most), (frame.reference, frame.target)):
@@ -206,7 +207,7 @@ def _found_in(frames: Sequence[Frame], steps: ReportProgress, quick: bool) -> Ma
             steps("features", (i + 0.45 * len(seen)) / len(frames))
         first, second = seen
         found.append(features.match(first, second))
-        if len(frames) == 1 and len(found[0]) < MIN_MATCHES:
+        if len(frames) == 1 and len(found[0]) < ESTIMATION.min_matches:
             _refuse_scarce(len(found[0]), frame, len(first.points), len(second.points))
     x, y = np.concatenate([m.x for m in found]), np.concatenate([m.y for m in found])
     return Matches(x, y, max(m.scale for m in found))
@@ -219,9 +220,9 @@ def _refuse_scarce(matches: int, frame: Frame, *details: int) -> None:
         if count < SCARCE:
             width, height = size_of(picture)
             raise TooFewMatches(
-                f"only {matches} matching points found, at least {MIN_MATCHES} needed: the {name} ({width}×{height} "
-                f"pixels) shows only {count} points of detail; choose a larger or sharper picture of something with "
-                "texture, or give matches by hand (--matches)"
+                f"only {matches} matching points found, at least {ESTIMATION.min_matches} needed: the {name} "
+                f"({width}×{height} pixels) shows only {count} points of detail; choose a larger or sharper picture of "
+                "something with texture, or give matches by hand (--matches)"
             )
 
 

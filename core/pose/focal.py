@@ -10,11 +10,8 @@ import numpy as np
 from ..cameras.camera import Camera, zoomed
 from ..cameras.matches import Matches
 from ..cameras.projective import homogeneous, infinite_homography, project
+from .options import FOCAL
 from .refinement import Pose, focal_deviations, refine_pose
-
-# Matches alone leave more than this (log f) open: they do not determine it.
-UNDETERMINED = 0.1
-SPREAD_MATCHES = 200
 
 
 @dataclass(frozen=True)
@@ -35,8 +32,8 @@ def known_focal(
     if camera.fixed or camera_prime.fixed:
         return KnownFocal(camera.source, 0.0, 0.0)
     with_prior, alone = focal_deviations(matches, pose, camera, camera_prime, sigma, zoom)
-    spread = _spread(matches.thinned(SPREAD_MATCHES), pose, camera, camera_prime, sigma, 2 * with_prior)
-    if alone <= UNDETERMINED:
+    spread = _spread(matches.thinned(FOCAL.spread_matches), pose, camera, camera_prime, sigma, 2 * with_prior)
+    if alone <= FOCAL.undetermined:
         source = f"the matches, from {camera.source}" if camera.assumed else camera.source
         return KnownFocal(source, with_prior, spread)
     if not camera.assumed:
@@ -54,7 +51,7 @@ def known_focal(
 def held_focal(matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, sigma: float) -> KnownFocal:
     """How sure a focal length is that the matches had no say in: as sure as what is known of the camera."""
     deviation = max(camera.log_sigma, camera_prime.log_sigma)
-    few = matches.thinned(SPREAD_MATCHES)
+    few = matches.thinned(FOCAL.spread_matches)
     spread = _spread(few, pose, camera, camera_prime, sigma, 2 * deviation) if deviation else 0.0
     return KnownFocal(camera.source, deviation, spread)
 
@@ -82,7 +79,7 @@ def focal_warnings(pose: Pose, camera: Camera, camera_prime: Camera) -> list[str
     out = []
     for name, K, cam in (("reference", pose.K, camera), ("target", pose.K_prime, camera_prime)):
         moved = K[0, 0] / cam.focal - 1
-        if not cam.assumed and not cam.fixed and abs(moved) > 2 * cam.log_sigma:
+        if not cam.assumed and not cam.fixed and abs(moved) > FOCAL.contradiction_sigmas * cam.log_sigma:
             out.append(
                 f"the matches contradict the {name}'s focal length: {cam.focal:.0f} px from {cam.source}, "
                 f"{K[0, 0]:.0f} px ({moved:+.0%}) from the matches; was the picture cropped? "

@@ -26,18 +26,8 @@ from ..cameras.projective import (
     skew,
 )
 from ..raster.arrays import Array
+from .options import REFINEMENT
 
-# Errors of neighbouring matches go together (lens distortion, rolling shutter): more than this many are not more
-# evidence against a prior, however many there are.
-EFFECTIVE_MATCHES = 300
-# What a lens leaves in residuals (px), where they speak against a known focal length, and against a mere guess.
-SYSTEMATIC_PX, SYSTEMATIC_GUESS_PX = 0.5, 0.15
-# Where infinity is seen depends on the whole calibration: distortion moves it by this much.
-BEYOND_PX = 2.0
-TAILS = 3.0
-# Parallax below this angle (radians) is rounding and keypoint noise: such a point may lie behind by accident.
-MIN_PARALLAX = 2e-3
-NEGLIGIBLE = 1e-3
 # [e_i]ₓ of the three axes: where a small rotation takes a vector.
 _TURNS = np.array([skew(axis) for axis in np.eye(3)])
 
@@ -56,13 +46,16 @@ class Pose:
         """The fundamental matrix of the pose, x'ᵀ F x = 0."""
         return fundamental_from_pose(self.K, self.K_prime, self.R, self.t)
 
+    def in_front(self, matches: Matches) -> NDArray[np.bool_]:
+        """Which matches (N,) triangulate in front of both cameras, or have too little parallax to say."""
+        return in_front(self.K, self.K_prime, self.R, self.t, matches.x, matches.y, REFINEMENT.min_parallax)
+
 
 def pose_of_fundamental(matches: Matches, F: Array, K: Array, K_prime: Array, threshold: float) -> Pose:
     """The pose of F that has most of the matches within `threshold` px of their lines in front of both cameras."""
     near = matches.subset(np.abs(sampson_residuals(F, matches.x, matches.y)) < threshold)
     poses = poses_from_fundamental(F, K, K_prime)
-    front = [in_front(K, K_prime, R, t, near.x, near.y, MIN_PARALLAX).sum() for R, t in poses]
-    return Pose(K, K_prime, *poses[int(np.argmax(front))])
+    return max((Pose(K, K_prime, R, t) for R, t in poses), key=lambda pose: pose.in_front(near).sum())
 
 
 def refine_pose(
@@ -163,7 +156,7 @@ class _Problem:
     def __init__(self, matches: Matches, camera: Camera, camera_prime: Camera, sigma: float, zoom: bool) -> None:
         self.matches, self.camera, self.camera_prime = matches, camera, camera_prime
         self.sigma = sigma
-        self.sigma_beyond = BEYOND_PX * matches.scale
+        self.sigma_beyond = REFINEMENT.cheirality_sigma_px * matches.scale
         self.focal_free = not (camera.fixed or camera_prime.fixed)
         self.zoom = zoom and self.focal_free
         self.assumed = camera.assumed and camera_prime.assumed
@@ -174,8 +167,9 @@ class _Problem:
         self.principal_sigma = believed_off * max(camera.size)
         self.size = 5 + self.focal_free + self.zoom + 2 * self.principal_free
         # against the prior, residuals count as if none were smaller than what a lens leaves in them
-        believed = max(sigma, (SYSTEMATIC_GUESS_PX if self.assumed else SYSTEMATIC_PX) * matches.scale)
-        tempered = min(1.0, EFFECTIVE_MATCHES / max(1, len(matches))) * (sigma / believed) ** 2
+        systematic_px = REFINEMENT.systematic_guess_px if self.assumed else REFINEMENT.systematic_px
+        believed = max(sigma, systematic_px * matches.scale)
+        tempered = min(1.0, REFINEMENT.effective_matches / max(1, len(matches))) * (sigma / believed) ** 2
         self.weight = tempered * matches.weights / max(float(matches.weights.mean()), 1e-300)
         # (3, N): long rows are what NumPy is quick with
         self.x, self.y = (np.ascontiguousarray(homogeneous(points).T) for points in (matches.x, matches.y))
@@ -184,9 +178,10 @@ class _Problem:
         """The pose after a step in the unknowns."""
         K, K_prime = pose.K, pose.K_prime
         if self.focal_free:
-            K = zoomed(K, np.exp(np.clip(step[0], -0.3, 0.3)))
+            most = REFINEMENT.max_focal_step
+            K = zoomed(K, np.exp(np.clip(step[0], -most, most)))
             factor = step[1] if self.zoom else step[0]
-            K_prime = zoomed(K_prime, np.exp(np.clip(factor, -0.3, 0.3)))
+            K_prime = zoomed(K_prime, np.exp(np.clip(factor, -most, most)))
         if self.principal_free:
             aside = np.zeros((3, 3))
             aside[:2, 2] = self.principal_sigma * step[-7:-5]
@@ -210,8 +205,9 @@ class _Problem:
         z = off / self.focal_sigma
         if not self.assumed or z == 0:
             return z, 1 / self.focal_sigma
-        value = np.sign(z) * np.sqrt(TAILS * np.log1p(z * z / TAILS))
-        return float(value), float(z / (1 + z * z / TAILS) / value / self.focal_sigma)
+        freedom = REFINEMENT.prior_freedom
+        value = np.sign(z) * np.sqrt(freedom * np.log1p(z * z / freedom))
+        return float(value), float(z / (1 + z * z / freedom) / value / self.focal_sigma)
 
     def priors(self, pose: Pose) -> list[tuple[float, Array]]:
         """Residuals of the prior with their derivatives by the unknowns; the second focal's ratio to the first is kept
@@ -226,8 +222,8 @@ class _Problem:
         if self.zoom:
             ratio = np.log(pose.K_prime[0, 0] / self.camera_prime.focal) - off
             d_ratio = np.zeros(size)
-            d_ratio[:2] = (-1 / 0.3, 1 / 0.3)
-            out.append((ratio / 0.3, d_ratio))
+            d_ratio[:2] = (-1 / REFINEMENT.zoom_sigma, 1 / REFINEMENT.zoom_sigma)
+            out.append((ratio / REFINEMENT.zoom_sigma, d_ratio))
             if self.camera.knowledge != self.camera_prime.knowledge:
                 d_second = np.zeros(size)
                 d_second[1] = 1 / self.camera_prime.log_sigma
@@ -247,7 +243,8 @@ class _Problem:
         far = (beyond / self.sigma_beyond) ** 2
         loss = self.weight / (1 + (residual / self.sigma) ** 2 + far)
         _add(normal, gradient, residual, by_unknowns.T @ by_F, loss / self.sigma**2)
-        wrong = far * loss > NEGLIGIBLE * self.weight  # not those that are far off their lines anyway
+        # those far off their lines are left out: they have no say anyway
+        wrong = far * loss > REFINEMENT.negligible_cheirality * self.weight
         if wrong.any():
             derivative = self._beyond_derivative(pose, wrong)
             _add(normal, gradient, beyond[wrong], derivative, loss[wrong] / self.sigma_beyond**2)
