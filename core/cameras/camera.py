@@ -10,9 +10,6 @@ from numpy.typing import NDArray
 
 from ..raster.resizing import size_change
 
-# Where the axis meets the sensor is not its middle: about so far off, in units of the longer side.
-PRINCIPAL_SIGMA = 0.01
-
 
 class Knowledge(StrEnum):
     """How a focal length is known."""

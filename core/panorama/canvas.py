@@ -16,7 +16,8 @@ from ..cameras.camera import Camera
 from ..cameras.lens import distort, undistort
 from ..cameras.projective import ahead_of_camera, homogeneous, inverse_intrinsics
 from ..raster.arrays import Array, Box
-from ..raster.grid import NODES, Grid
+from ..raster.grid import Grid
+from ..raster.options import GRID
 from ..system.errors import OutputTooLarge
 from .projection import Projection, extent
 
@@ -106,7 +107,8 @@ def bounding_canvas(
     max_stretch = np.inf if projection is not None and projection.sphere else MAX_STRETCH
     cropped = False
     for _ in range(2):  # the second pass looks closer at what the first found
-        grid = Grid.over(int(left), int(top), max(1, int(right - left)), max(1, int(bottom - top)), nodes=NODES // 10)
+        width, height = max(1, int(right - left)), max(1, int(bottom - top))
+        grid = Grid.over(int(left), int(top), width, height, nodes=GRID.nodes // 10)
         target = target_at(grid)
         seen = _inside(target, target_size)
         stretched = seen & (_area_ratio(target, grid.step) < 1 / max_stretch**2)

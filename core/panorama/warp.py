@@ -19,8 +19,9 @@ from ..cameras.two_view import TwoView
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
 from ..raster.arrays import Array, Box, Part, cut, cut_in_place, strips, within
-from ..raster.grid import NODES, Grid
+from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, LazyImage, Placed, whole
+from ..raster.options import GRID
 from ..system.errors import BadRequest, NoOverlap
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
@@ -225,7 +226,7 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     margin = int(np.ceil(min(field.fit.fade_px, MAX_FADE * max(camera.size))))
     across, down = width + 2 * margin, height + 2 * margin
     share = min(4.0, max(1.0, across * down / (2 * width * height)))
-    flat = Grid.over(-margin, -margin, across, down, int(share * NODES))
+    flat = Grid.over(-margin, -margin, across, down, int(share * GRID.nodes))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)
     if values.far is None:

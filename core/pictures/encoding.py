@@ -18,7 +18,8 @@ from ..system.threads import in_order
 from .decoding import quiet_opencv
 from .exr import write_exr
 from .metadata import Exif, embed
-from .picture import _curves
+from .options import WRITING
+from .picture import curves_for
 from .png import encode_png
 
 # suffix: container, bits it can hold
@@ -27,7 +28,6 @@ _WRITABLE = {
     ".exr": ("exr", 32),
 }
 _JPEG_LONGEST_SIDE = 65500  # libjpeg's limit
-_JPEG_QUALITY = 95
 
 
 def output_bits(bits: Iterable[int], suffix: str) -> int:
@@ -72,7 +72,7 @@ def encode_picture(
     channels = 3 if alpha is not None and kind != "jpeg" else pixels.shape[2]
     if icc is not None and icc_channels(icc) != channels:
         icc = None
-    levels = _Levels(pixels, alpha, depth, _curves(icc, channels), kind == "jpeg")
+    levels = _Levels(pixels, alpha, depth, curves_for(icc, channels), kind == "jpeg")
     if kind == "png":
         encoded, brighter = levels.as_png()
     else:
@@ -87,7 +87,7 @@ def encode_picture(
 
 def _by_opencv(coded: np.ndarray, suffix: str) -> bytes:
     """The file of levels (H, W, C) in B, G, R, A order."""
-    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if _WRITABLE[suffix.lower()][0] == "jpeg" else []
+    options = [cv2.IMWRITE_JPEG_QUALITY, WRITING.jpeg_quality] if _WRITABLE[suffix.lower()][0] == "jpeg" else []
     try:
         with quiet_opencv():
             done, encoded = cv2.imencode(suffix.lower(), coded, options)

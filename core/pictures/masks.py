@@ -14,15 +14,8 @@ from numpy.typing import NDArray
 
 from ..raster.lazy import extent
 from ..system.errors import BadRequest
-from .decoding import DRAWING
+from .options import MASKS, READING
 from .picture import Picture, load_picture, picture_from_array
-
-# Less than this of a picture left is a mask that means something else.
-LEAST_LEFT = 0.01
-# Share of white up to which paint is black, and from the other end white.
-PAINTED = 0.25
-# Share of white by which a colour may differ and still be one: rounding, and compression that is not lossless.
-ONE_COLOUR = 8 / 255
 
 
 def read_mask(source: str | Path | np.ndarray, size: tuple[int, int], name: str) -> NDArray[np.bool_]:
@@ -39,10 +32,10 @@ def read_mask(source: str | Path | np.ndarray, size: tuple[int, int], name: str)
     _refuse_labels(picture, label)
     mask = _stretched(_white(picture), size, label)
     left = 1 - float(mask.mean())
-    if left < LEAST_LEFT:
+    if left < MASKS.least_left:
         raise BadRequest(
-            f"{label} leaves {left:.1%} of the picture, at least {LEAST_LEFT:.0%} is needed: white is ignored, black "
-            "is kept; invert the mask if it was painted the other way round"
+            f"{label} leaves {left:.1%} of the picture, at least {MASKS.least_left:.0%} is needed: white is ignored, "
+            "black is kept; invert the mask if it was painted the other way round"
         )
     return mask
 
@@ -56,7 +49,7 @@ def read_painted(source: str | Path | np.ndarray) -> NDArray[np.int8]:
     picture = _picture(source, "the mask of the seam")
     values = _gray(picture)
     painted = np.zeros(values.shape, np.int8)
-    painted[values < PAINTED], painted[values > 1 - PAINTED] = -1, 1
+    painted[values < MASKS.painted], painted[values > 1 - MASKS.painted] = -1, 1
     if picture.alpha is not None:
         painted[picture.alpha <= 0.5] = 0
     return painted
@@ -77,7 +70,7 @@ def without(picture: Picture, mask: NDArray[np.bool_]) -> Picture:
 
 def _picture(source: str | Path | np.ndarray, label: str) -> Picture:
     if not isinstance(source, np.ndarray):
-        return load_picture(source, DRAWING)
+        return load_picture(source, READING.drawing_pixels_per_byte)
     return picture_from_array(source.astype(np.uint8) * 255 if source.dtype == bool else source, label)
 
 
@@ -93,7 +86,7 @@ def _white(picture: Picture) -> NDArray[np.bool_]:
     if picture.alpha is None:
         return gray > 0.5
     shown = _values(picture)[picture.alpha > 0.5]
-    one_colour = not len(shown) or np.ptp(shown, axis=0).max() <= ONE_COLOUR
+    one_colour = not len(shown) or np.ptp(shown, axis=0).max() <= MASKS.one_colour
     return (picture.alpha if one_colour else gray * picture.alpha) > 0.5
 
 

@@ -16,11 +16,11 @@ from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from ..raster.lazy import AnyImage, Coded, whole
 from ..system.errors import BadRequest, UnreadableImage
 from .containers import foreign_kind, read_structure
-from .decoding import PHOTOGRAPH, check_size, decode_exr, decode_file, read_file, turn
+from .decoding import check_size, decode_exr, decode_file, read_file, turn
 from .metadata import Exif, read_exif
+from .options import READING
 
 _READABLE = "PNG, JPEG, TIFF, EXR, WebP or BMP"
-_MOST_NOT_FINITE = 0.5
 _ADVICE = {
     "camera RAW": "develop it in a RAW converter and export a 16-bit TIFF",
     "HEIC/HEIF": "export it as JPEG or TIFF", "AVIF": "export it as PNG or JPEG",
@@ -54,7 +54,7 @@ class Picture:
         return whole(self.light)
 
 
-def load_picture(path: str | Path, pixels_per_byte: int = PHOTOGRAPH) -> Picture:
+def load_picture(path: str | Path, pixels_per_byte: int = READING.photograph_pixels_per_byte) -> Picture:
     """Reads a PNG, JPEG, TIFF, EXR, WebP or BMP file.
 
     8, 16 or 32 bits (float), gray or colour, with or without alpha. pixels_per_byte: see `check_size`. Raises
@@ -134,13 +134,13 @@ def _picture(
         icc = None
     if raw.dtype == np.float32:
         light, alpha, share = _finite(colour, alpha)
-        if share > _MOST_NOT_FINITE:
+        if share > READING.max_not_finite:
             raise UnreadableImage(f"{share:.0%} of the pixels are not finite numbers; render or export it again")
         if share > 0:
             warnings = [*warnings, f"{share:.2%} of the pixels are not finite numbers; they are taken as transparent"]
         view = _float_view(light, _exposure(light, alpha))
     else:
-        light = Coded(colour, _curves(icc, channels))
+        light = Coded(colour, curves_for(icc, channels))
         # 65535 / 255 = 257; OpenCV rounds
         view = colour if raw.dtype == np.uint8 else cv2.convertScaleAbs(colour, alpha=1 / 257).reshape(colour.shape)
     if alpha is not None and (alpha >= 1.0).all():
@@ -188,7 +188,7 @@ def _float_view(pixels: np.ndarray, exposure: float) -> np.ndarray:
         return encode(pixels * np.float32(exposure), 8)
 
 
-def _curves(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
+def curves_for(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
     """The curves for pixels of so many channels; sRGB where the profile is missing or not understood."""
     profile = parse_icc(icc) if icc is not None else None
     if profile is None:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ..raster.arrays import strips
 from ..system.threads import in_order
+from .options import WRITING
 
-LEVEL = 1
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 # Colour types by channels: gray, RGB, RGBA.
 _KINDS = {1: 0, 3: 2, 4: 6}
@@ -39,7 +39,7 @@ def encode_png(shape: tuple[int, int, int], bits: int, levels_of: Callable[[slic
 
     def packed(rows: slice) -> tuple[bytes, int, int]:
         lines = _filtered(levels_of(rows)).data
-        packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS, zlib.DEF_MEM_LEVEL, zlib.Z_RLE)
+        packer = zlib.compressobj(WRITING.png_level, zlib.DEFLATED, -zlib.MAX_WBITS, zlib.DEF_MEM_LEVEL, zlib.Z_RLE)
         body = packer.compress(lines) + packer.flush(zlib.Z_FINISH if rows.stop == height else zlib.Z_FULL_FLUSH)
         return (_ZLIB if rows.start == 0 else b"") + body, zlib.adler32(lines), lines.nbytes
 

@@ -9,16 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .options import MASKS, PARTS
+
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
 # Rows and columns, with bounds that lie in the picture.
 Part: TypeAlias = tuple[slice, slice]
-# Pixels that are worked out at a time.
-STRIP = 1_000_000
 # left, top, width, height in px
 Box = tuple[int, int, int, int]
-# Narrower than this, px, is a speck.
-SPECK = 7
 
 
 def common(box: Box, other: Box) -> Box:
@@ -30,7 +28,7 @@ def common(box: Box, other: Box) -> Box:
 
 def strips(shape: tuple[int, ...]) -> Iterator[slice]:
     """The rows of a picture (H, W, …), some at a time."""
-    rows = max(1, STRIP // max(1, shape[1]))
+    rows = max(1, PARTS.strip_pixels // max(1, shape[1]))
     for top in range(0, shape[0], rows):
         yield slice(top, min(shape[0], top + rows))
 
@@ -95,7 +93,7 @@ def in_any_channel(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def without_specks(hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Of what the target cannot see (H, W) that which is more than a speck."""
-    return cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8)) > 0
+    return cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, np.ones((MASKS.speck_side,) * 2, np.uint8)) > 0
 
 
 def cut(array: NDArray, box: Box, beyond: float = 0.0) -> NDArray:

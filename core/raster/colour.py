@@ -10,6 +10,8 @@ from typing import Any
 import cv2
 import numpy as np
 
+from .options import PARTS
+
 # Primaries of sRGB (IEC 61966-2-1), adapted to D50 by the Bradford matrix, as columns of XYZ: the connection space of
 # ICC profiles is D50. Values: B. Lindbloom, "RGB/XYZ Matrices", sRGB, reference white D50.
 _SRGB_TO_XYZ_D50 = np.array([
@@ -18,7 +20,6 @@ _SRGB_TO_XYZ_D50 = np.array([
     [0.0139322, 0.0971045, 0.7141733],
 ])
 _LEVELS = 65536
-_BLOCK = 1 << 20  # values encoded at a time: the index arrays stay small beside a 400 megapixel picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,16 +94,17 @@ def _parts(curves: tuple[Curve, ...]) -> list[tuple[Any, Curve]]:
 def _encode(light: np.ndarray, bits: int, curve: Curve) -> np.ndarray:
     flat = light.reshape(-1)
     levels = np.empty(flat.size, np.uint8 if bits == 8 else np.uint16)
-    for start in range(0, flat.size, _BLOCK):
-        block = flat[start : start + _BLOCK]
+    for start in range(0, flat.size, PARTS.values_at_once):
+        part = slice(start, start + PARTS.values_at_once)
+        block = flat[part]
         # fmax and fmin take the number when the other is NaN
         place = np.sqrt(np.fmin(np.fmax(block, np.float32(0)), np.float32(1))) * np.float32(_LEVELS - 1)
         if bits == 8:
-            levels[start : start + _BLOCK] = curve.bytes_by_root[(place + np.float32(0.5)).astype(np.intp)]
+            levels[part] = curve.bytes_by_root[(place + np.float32(0.5)).astype(np.intp)]
         else:
             below = np.minimum(place.astype(np.intp), _LEVELS - 2)
             low, high = curve.levels_by_root[below], curve.levels_by_root[below + 1]
-            levels[start : start + _BLOCK] = low + (high - low) * (place - below.astype(np.float32)) + np.float32(0.5)
+            levels[part] = low + (high - low) * (place - below.astype(np.float32)) + np.float32(0.5)
     return levels.reshape(light.shape)
 
 

@@ -9,12 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array
-
-# Fields are smooth: about this many nodes carry them at any picture size.
-NODES = 20_000
-MIN_STEP = 4
-# Cells of one axis whose pixels are interpolated at once.
-CELLS = 8
+from .options import GRID
 
 
 @dataclass(frozen=True)
@@ -31,10 +26,10 @@ class Grid:
     rows: int
 
     @staticmethod
-    def over(left: int, top: int, width: int, height: int, nodes: int = NODES) -> Grid:
+    def over(left: int, top: int, width: int, height: int, nodes: int = GRID.nodes) -> Grid:
         """The grid that covers a rectangle of pixels of the reference's plane with two cells of margin (bicubic needs
         them)."""
-        step = max(MIN_STEP, int(np.sqrt(width * height / nodes)))
+        step = max(GRID.least_step, int(np.sqrt(width * height / nodes)))
         columns, rows = -(-width // step) + 4, -(-height // step) + 4
         return Grid((left - 2 * step, top - 2 * step), step, columns, rows)
 
@@ -89,7 +84,7 @@ class Grid:
 def _across(start: int, step: int, nodes: int, pixels: range) -> list[tuple[slice, slice, NDArray[np.float32]]]:
     """Some pixels of one axis after the other, the nodes that count for them, and their weights (n, pixels): so that
     what is not near is not multiplied."""
-    some = max(1, CELLS * step // pixels.step)
+    some = max(1, GRID.cells_at_once * step // pixels.step)
     out = []
     for first in range(0, len(pixels), some):
         part = slice(first, first + some)

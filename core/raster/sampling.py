@@ -9,10 +9,7 @@ from numpy.typing import NDArray
 from ..system.threads import each
 from .arrays import copied_where
 from .lazy import LazyImage
-
-# cv2.remap wants every side below 32767; tiles also keep its working memory small.
-TILE = 1024
-REMAP_LIMIT = 32000
+from .options import PARTS
 
 
 def fetch(
@@ -22,10 +19,11 @@ def fetch(
     """Samples (H, W, C) of a source (h, w, C) at map positions, in tiles, of the source's type; 0 where the map leaves
     the picture."""
     out = np.zeros((*map_x.shape, source.shape[2]), source.dtype)
-    tops, lefts = (range(0, side, TILE) for side in map_x.shape)
+    step = PARTS.tile_side
+    tops, lefts = (range(0, side, step) for side in map_x.shape)
     each(
         lambda tile: _fetch_tile(source, map_x[tile], map_y[tile], out[tile], interpolation),
-        [(slice(top, top + TILE), slice(left, left + TILE)) for top in tops for left in lefts],
+        [(slice(top, top + step), slice(left, left + step)) for top in tops for left in lefts],
     )
     return out
 
@@ -40,7 +38,8 @@ def _fetch_tile(
         return
     x0, x1 = max(0, int(x[inside].min()) - 2), min(width, int(x[inside].max()) + 4)
     y0, y1 = max(0, int(y[inside].min()) - 2), min(height, int(y[inside].max()) + 4)
-    if max(x1 - x0, y1 - y0) > REMAP_LIMIT and max(out.shape[:2]) > 1:  # a tile that shrinks a huge picture: quarter it
+    # a tile that shrinks a huge picture is quartered
+    if max(x1 - x0, y1 - y0) > PARTS.max_remap_side and max(out.shape[:2]) > 1:
         half = (max(1, out.shape[0] // 2), max(1, out.shape[1] // 2))
         for rows in (slice(None, half[0]), slice(half[0], None)):
             for columns in (slice(None, half[1]), slice(half[1], None)):

@@ -26,9 +26,9 @@ import numpy as np
 import poselib
 import scipy
 
+from .options import SYSTEM
+
 Kept = TypeVar("Kept")
-# Bytes of all entries together; the least recently used go first. Larger ones than a quarter are not kept at all.
-LIMIT = 2 << 30
 # The package of the whole engine, whichever name it is installed under.
 _PACKAGE = __name__.rpartition(".system")[0]
 _PLAN = "plan.json"
@@ -53,7 +53,7 @@ class Cache:
     at once, since entries appear whole and never change.
     """
 
-    def __init__(self, folder: Path | None, limit: int = LIMIT) -> None:
+    def __init__(self, folder: Path | None, limit: int = SYSTEM.cache_bytes) -> None:
         self._folder, self._limit = folder, limit
 
     def remember(self, what: str, decided_by: tuple[Any, ...], make: Callable[[], Kept]) -> Kept:
@@ -80,7 +80,7 @@ class Cache:
         arrays: list[np.ndarray] = []
         plan = _plan(value, arrays)
         size = sum(array.nbytes + 300 for array in arrays) + 1000
-        if size > self._limit // 4:
+        if size > self._limit // SYSTEM.cache_entry_part:
             return
         temporary = path.with_name(f".{secrets.token_hex(8)}.tmp")
         try:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import ctypes
 import sys
 
+from .options import SYSTEM
+
 # mallopt's names (malloc.h) for from where on an array has pages of its own, how much may stay free on top, and the
 # number of heaps.
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
-_LARGE = 1 << 30
 
 
 def use_again() -> None:
@@ -21,5 +22,6 @@ def use_again() -> None:
         return
     libc = ctypes.CDLL(None)
     if hasattr(libc, "mallopt"):
-        for name, value in ((_MMAP_THRESHOLD, _LARGE), (_TRIM_THRESHOLD, _LARGE), (_ARENA_MAX, 1)):
+        large = SYSTEM.large_bytes
+        for name, value in ((_MMAP_THRESHOLD, large), (_TRIM_THRESHOLD, large), (_ARENA_MAX, 1)):
             libc.mallopt(name, value)

@@ -14,8 +14,8 @@ from typing import TypeVar
 
 import cv2
 
-# More would be waiting for memory, and each holds a part of it.
-MOST = 8
+from .options import SYSTEM
+
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 _here = threading.local()
@@ -23,7 +23,7 @@ _here = threading.local()
 
 def count() -> int:
     """How many threads work at once; one within the work of another, which has its share already."""
-    return 1 if getattr(_here, "working", False) else max(1, min(MOST, cv2.getNumThreads()))
+    return 1 if getattr(_here, "working", False) else max(1, min(SYSTEM.max_threads, cv2.getNumThreads()))
 
 
 def in_order(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[Result]:

@@ -11,6 +11,7 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import (
     fundamental_from_pose,
     homogeneous,
@@ -20,13 +21,14 @@ from edf_stitch.core.cameras.projective import (
     rotation_from_vector,
     sampson_residuals,
 )
-from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.pose.estimation import estimate
 from edf_stitch.core.pose.options import ESTIMATION
 from edf_stitch.core.system.errors import DegenerateGeometry, NoOverlap, TooFewMatches
 
 from ..point_scenes import FOCAL, SIZE, spoiled, turned_by, unit
+
+ASSUMED_SIGMA, EXIF_SIGMA = INTRINSICS.assumed_sigma, INTRINSICS.exif_sigma
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import PRINCIPAL_SIGMA, Camera, Knowledge
+from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import (
     homogeneous,
     in_front,
@@ -18,7 +19,6 @@ from edf_stitch.core.cameras.projective import (
     rotation_from_vector,
     sampson_residuals,
 )
-from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
 from edf_stitch.core.pose.options import REFINEMENT
 from edf_stitch.core.pose.refinement import (
     Pose,
@@ -31,6 +31,7 @@ from edf_stitch.core.pose.refinement import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+ASSUMED_SIGMA, EXIF_SIGMA, PRINCIPAL_SIGMA = INTRINSICS.assumed_sigma, INTRINSICS.exif_sigma, INTRINSICS.principal_sigma
 FREEDOM, EFFECTIVE_MATCHES = REFINEMENT.prior_freedom, REFINEMENT.effective_matches
 SIZE = (1200, 900)
 FOCAL = 1000.0
