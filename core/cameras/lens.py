@@ -72,7 +72,8 @@ def _distorted(ideal: Array, distortion: Array, limit: float) -> Array:
     radial = k1 * r2 + k2 * r2**2 + k3 * r2**3
     dx = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
     dy = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return ideal + np.concatenate([dx, dy], axis=-1) / inward
+    raw: Array = ideal + np.concatenate([dx, dy], axis=-1) / inward
+    return raw
 
 
 def _normalised(points: Array, camera: Camera) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ class Matches:
         """How much each match counts (N,); ones where nothing was said."""
         return np.ones(len(self.x)) if self.weight is None else self.weight
 
-    def subset(self, keep: NDArray) -> Matches:
+    def subset(self, keep: NDArray[Any]) -> Matches:
         """The matches that a mask or index array selects."""
         weight = None if self.weight is None else self.weight[keep]
         return replace(self, x=self.x[keep], y=self.y[keep], weight=weight)

@@ -7,6 +7,8 @@ Multiple View Geometry, 2nd ed., chapters 9 (F, epipoles, pose from E), 11.4 (Sa
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +18,7 @@ from ..raster.arrays import Array
 LEAST_AHEAD = 1e-6
 
 
-def homogeneous(points: NDArray) -> Array:
+def homogeneous(points: NDArray[Any]) -> Array:
     """(…, 2) points as (…, 3) with a one behind."""
     points = np.asarray(points, np.float64)
     return np.concatenate([points, np.ones((*points.shape[:-1], 1))], axis=-1)
@@ -27,12 +29,13 @@ def project(rays: Array) -> Array:
     return rays[..., :2] / rays[..., 2:]
 
 
-def ahead_of_camera(a: NDArray, b: NDArray, c: NDArray) -> NDArray[np.bool_]:
+def ahead_of_camera(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> NDArray[np.bool_]:
     """Which homogeneous pixels (a, b, c), c's sign kept, lie in front of their camera; False for NaN.
 
     What is less than LEAST_AHEAD in front, relative to its own length, would be shown outside any picture.
     """
-    return c > LEAST_AHEAD * np.maximum(np.abs(a), np.abs(b))
+    ahead: NDArray[np.bool_] = c > LEAST_AHEAD * np.maximum(np.abs(a), np.abs(b))
+    return ahead
 
 
 def normalisation(points: Array) -> Array:
@@ -53,7 +56,8 @@ def rotation_from_vector(omega: Array) -> Array:
     if angle < 1e-12:
         return np.eye(3) + skew(omega)
     axis = skew(omega / angle)
-    return np.eye(3) + np.sin(angle) * axis + (1 - np.cos(angle)) * axis @ axis
+    R: Array = np.eye(3) + np.sin(angle) * axis + (1 - np.cos(angle)) * axis @ axis
+    return R
 
 
 def rotation_angle(R1: Array, R2: Array) -> float:
@@ -82,16 +86,18 @@ def sampson_residuals(F: Array, x: Array, y: Array) -> Array:
     """Signed first-order distance in px of matches x ↔ y (N, 2) from satisfying yᵀ F x = 0 (H&Z eq. 11.9, rooted)."""
     line_y, line_x, algebraic = _lines(F, x, y)
     gradient = line_y[:, 0] ** 2 + line_y[:, 1] ** 2 + line_x[:, 0] ** 2 + line_x[:, 1] ** 2
-    return algebraic / np.sqrt(np.maximum(gradient, 1e-300))
+    residuals: Array = algebraic / np.sqrt(np.maximum(gradient, 1e-300))
+    return residuals
 
 
-def distance_to_line(F: Array, x: NDArray, y: NDArray) -> Array:
+def distance_to_line(F: Array, x: NDArray[Any], y: NDArray[Any]) -> Array:
     """Distance in px of each target point y from the epipolar line F x of its reference point x."""
     line_y, _, algebraic = _lines(F, x, y)
-    return np.abs(algebraic) / np.maximum(np.hypot(line_y[:, 0], line_y[:, 1]), 1e-300)
+    distances: Array = np.abs(algebraic) / np.maximum(np.hypot(line_y[:, 0], line_y[:, 1]), 1e-300)
+    return distances
 
 
-def _lines(F: Array, x: NDArray, y: NDArray) -> tuple[Array, Array, Array]:
+def _lines(F: Array, x: NDArray[Any], y: NDArray[Any]) -> tuple[Array, Array, Array]:
     a, b = homogeneous(x), homogeneous(y)
     line_y, line_x = a @ F.T, b @ F
     return line_y, line_x, np.sum(b * line_y, axis=1)
@@ -125,4 +131,5 @@ def in_front(K: Array, K_prime: Array, R: Array, t: Array, x: Array, y: Array, s
     depth = cosine * along_prime - along
     depth_prime = along_prime - cosine * along
     far = (1 - cosine**2 < slack**2) & (cosine > 0)
-    return far | ((depth > 0) & (depth_prime > 0))
+    front: NDArray[np.bool_] = far | ((depth > 0) & (depth_prime > 0))
+    return front

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..system.errors import StitchError, UnreadableImage
 from .containers import Structure, neutral_png, neutral_tiff
@@ -61,7 +63,7 @@ def quiet_opencv() -> Iterator[None]:
         log.setLogLevel(level)
 
 
-def decode_file(data: bytes, structure: Structure) -> tuple[np.ndarray, list[str]]:
+def decode_file(data: bytes, structure: Structure) -> tuple[NDArray[Any], list[str]]:
     """Raw samples, and warnings.
 
     data: a whole file of the given structure (not EXR). Returns H×W×C (1 to 4) uint8, uint16 or float32 as stored, in
@@ -104,7 +106,9 @@ def decode_file(data: bytes, structure: Structure) -> tuple[np.ndarray, list[str
     return raw, warnings
 
 
-def decode_exr(data: bytes, pixels_per_byte: int = READING.photograph_pixels_per_byte) -> tuple[np.ndarray, list[str]]:
+def decode_exr(
+    data: bytes, pixels_per_byte: int = READING.photograph_pixels_per_byte
+) -> tuple[NDArray[Any], list[str]]:
     """Like `decode_file` for EXR: float32, premultiplied by alpha where there is one; see `check_size`."""
 
     def check(sizes: list[tuple[int, int]], samples: int) -> None:
@@ -124,7 +128,7 @@ def decode_exr(data: bytes, pixels_per_byte: int = READING.photograph_pixels_per
     return pixels if alpha is None else np.dstack([pixels, alpha]), [warning] if warning else []
 
 
-def turn(raw: np.ndarray, orientation: int) -> np.ndarray:
+def turn(raw: NDArray[Any], orientation: int) -> NDArray[Any]:
     """Brings stored rows and columns upright; orientation as in EXIF (1..8): where row 0 and column 0 are seen."""
     if orientation >= 5:
         raw = raw.transpose(1, 0, 2)  # now 5 is 1, 6 is 2 (mirrored), 7 is 3 (turned about), 8 is 4 (upside down)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,7 +19,7 @@ from .options import MASKS, READING
 from .picture import Picture, load_picture, picture_from_array
 
 
-def read_mask(source: str | Path | np.ndarray, size: tuple[int, int], name: str) -> NDArray[np.bool_]:
+def read_mask(source: str | Path | NDArray[Any], size: tuple[int, int], name: str) -> NDArray[np.bool_]:
     """An ignore mask (H, W) for a picture of `size` (W, H) px, True where the picture is to be ignored.
 
     source: any picture file that can be read, or an array as for `picture_from_array`, or of bool. White (brighter than
@@ -40,7 +41,7 @@ def read_mask(source: str | Path | np.ndarray, size: tuple[int, int], name: str)
     return mask
 
 
-def read_painted(source: str | Path | np.ndarray) -> NDArray[np.int8]:
+def read_painted(source: str | Path | NDArray[Any]) -> NDArray[np.int8]:
     """What an artist painted over a panorama (h, w), at its own size: -1 from the reference where it is black, 1 from
     the target where it is white, 0 where it is gray or transparent and the seam decides.
 
@@ -68,7 +69,7 @@ def without(picture: Picture, mask: NDArray[np.bool_]) -> Picture:
     return replace(picture, alpha=np.where(mask, np.float32(0), alpha))
 
 
-def _picture(source: str | Path | np.ndarray, label: str) -> Picture:
+def _picture(source: str | Path | NDArray[Any], label: str) -> Picture:
     if not isinstance(source, np.ndarray):
         return load_picture(source, READING.drawing_pixels_per_byte)
     return picture_from_array(source.astype(np.uint8) * 255 if source.dtype == bool else source, label)
@@ -100,7 +101,7 @@ def _gray(picture: Picture) -> NDArray[np.float32]:
     return values[..., 0] if values.shape[2] == 1 else cv2.cvtColor(values, cv2.COLOR_RGB2GRAY)
 
 
-def _stretched(mask: NDArray, size: tuple[int, int], label: str, what: str = "the picture") -> NDArray:
+def _stretched(mask: NDArray[Any], size: tuple[int, int], label: str, what: str = "the picture") -> NDArray[Any]:
     width, height = size
     own_height, own_width = mask.shape
     if (own_width, own_height) == size:
@@ -114,4 +115,5 @@ def _stretched(mask: NDArray, size: tuple[int, int], label: str, what: str = "th
         )
     rows = (2 * np.arange(height) + 1) * own_height // (2 * height)
     columns = (2 * np.arange(width) + 1) * own_width // (2 * width)
-    return mask[np.ix_(rows, columns)]
+    stretched: NDArray[Any] = mask[np.ix_(rows, columns)]
+    return stretched

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from ..raster.lazy import AnyImage, Coded, whole
@@ -40,8 +42,8 @@ class Picture:
     """
 
     light: AnyImage
-    alpha: np.ndarray | None
-    view: np.ndarray
+    alpha: NDArray[Any] | None
+    view: NDArray[Any]
     bits: int
     exif: Exif
     icc: bytes | None
@@ -49,7 +51,7 @@ class Picture:
     warnings: tuple[str, ...] = ()
 
     @property
-    def pixels(self) -> np.ndarray:
+    def pixels(self) -> NDArray[Any]:
         """All of its light as an array (H, W, C) float32."""
         return whole(self.light)
 
@@ -91,7 +93,7 @@ def _load(path: Path, pixels_per_byte: int) -> Picture:
     return _picture(turn(raw, exif.orientation), associated, exif.upright(), structure.icc, path.name, warnings)
 
 
-def picture_from_array(array: np.ndarray, name: str = "array") -> Picture:
+def picture_from_array(array: NDArray[Any], name: str = "array") -> Picture:
     """A Picture from an array (copied).
 
     array: uint8 or uint16, display-encoded sRGB; float32 or float64, scene-linear with sRGB primaries. H×W or H×W×C
@@ -114,7 +116,7 @@ def picture_from_array(array: np.ndarray, name: str = "array") -> Picture:
 
 
 def _picture(
-    raw: np.ndarray, associated: bool, exif: Exif, icc: bytes | None, name: str, warnings: list[str]
+    raw: NDArray[Any], associated: bool, exif: Exif, icc: bytes | None, name: str, warnings: list[str]
 ) -> Picture:
     """raw: upright H×W×1..4 in R, G, B, A order; associated: the colours are multiplied by alpha as stored."""
     channels = 1 if raw.shape[2] < 3 else 3
@@ -149,16 +151,17 @@ def _picture(
     return Picture(light, alpha, view, raw.dtype.itemsize * 8, exif, icc, name, tuple(warnings))
 
 
-def _straight(colour: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+def _straight(colour: NDArray[Any], alpha: NDArray[Any]) -> NDArray[Any]:
     """Colours divided by alpha, in the encoding they were multiplied in; 0 where alpha is 0."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         straight = np.where(alpha[..., None] == 0, np.float32(0), colour / alpha[..., None])
     if colour.dtype == np.float32:
         return straight.astype(np.float32)
-    return np.rint(np.clip(straight, 0, np.iinfo(colour.dtype).max)).astype(colour.dtype)
+    levels: NDArray[Any] = np.rint(np.clip(straight, 0, np.iinfo(colour.dtype).max)).astype(colour.dtype)
+    return levels
 
 
-def _finite(colour: np.ndarray, alpha: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None, float]:
+def _finite(colour: NDArray[Any], alpha: NDArray[Any] | None) -> tuple[NDArray[Any], NDArray[Any] | None, float]:
     """Colours and alpha with 0 wherever one of the values is not finite, and the share of such pixels."""
     good = np.isfinite(colour).all(axis=2)
     if alpha is not None:
@@ -169,7 +172,7 @@ def _finite(colour: np.ndarray, alpha: np.ndarray | None) -> tuple[np.ndarray, n
     return np.where(good[..., None], colour, np.float32(0)), alpha, 1.0 - float(good.mean())
 
 
-def _exposure(pixels: np.ndarray, alpha: np.ndarray | None) -> float:
+def _exposure(pixels: NDArray[Any], alpha: NDArray[Any] | None) -> float:
     """The factor that brings the light of a float picture into the range of a display.
 
     Half way (in stops) between the factor that puts the median on middle gray and the one that keeps the brightest
@@ -183,7 +186,7 @@ def _exposure(pixels: np.ndarray, alpha: np.ndarray | None) -> float:
     return float(np.clip(np.sqrt(0.18 / middle * 0.9 / bright), 1e-37, 1e37))
 
 
-def _float_view(pixels: np.ndarray, exposure: float) -> np.ndarray:
+def _float_view(pixels: NDArray[Any], exposure: float) -> NDArray[Any]:
     with np.errstate(over="ignore"):
         return encode(pixels * np.float32(exposure), 8)
 
@@ -205,16 +208,18 @@ def resized(picture: Picture, scale: float) -> Picture:
     if size == (width, height):
         return picture
 
-    def shrink(array: np.ndarray) -> np.ndarray:
-        return cv2.resize(array, size, interpolation=cv2.INTER_AREA).reshape(size[1], size[0], *array.shape[2:])
+    def shrink(array: NDArray[Any]) -> NDArray[Any]:
+        small: NDArray[Any] = cv2.resize(array, size, interpolation=cv2.INTER_AREA)
+        return small.reshape(size[1], size[0], *array.shape[2:])
 
     if picture.alpha is None:
         return replace(picture, light=shrink(picture.pixels), view=shrink(picture.view))
     weight, alpha = picture.alpha[..., None], shrink(picture.alpha)
 
-    def weighed(array: np.ndarray) -> np.ndarray:
+    def weighed(array: NDArray[Any]) -> NDArray[Any]:
         """What lies under transparent pixels has no say in what is seen beside them."""
-        return shrink(array * weight) / np.maximum(alpha, 1e-6)[..., None]
+        mean: NDArray[Any] = shrink(array * weight) / np.maximum(alpha, 1e-6)[..., None]
+        return mean
 
     view = np.clip(np.rint(weighed(picture.view)), 0, 255).astype(np.uint8)
     return replace(picture, light=weighed(picture.pixels), alpha=alpha, view=view)

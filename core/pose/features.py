@@ -6,6 +6,7 @@ SIFT: Lowe, IJCV 2004. Root normalisation (the Hellinger kernel): Arandjelović 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -72,10 +73,13 @@ def _shown(alpha: NDArray[np.float32] | None, size: tuple[int, int]) -> NDArray[
     if alpha is None:
         return None
     shown = cv2.resize((alpha > 0).astype(np.uint8) * 255, size, interpolation=cv2.INTER_NEAREST)
-    return cv2.erode(shown, np.ones((2 * FEATURES.alpha_margin + 1,) * 2, np.uint8))
+    clear: NDArray[np.uint8] = cv2.erode(shown, np.ones((2 * FEATURES.alpha_margin + 1,) * 2, np.uint8))
+    return clear
 
 
-def spread_evenly(points: NDArray, strength: NDArray, shape: tuple[int, ...], budget: int) -> NDArray[np.intp]:
+def spread_evenly(
+    points: NDArray[Any], strength: NDArray[Any], shape: tuple[int, ...], budget: int
+) -> NDArray[np.intp]:
     """Indices of at most `budget` points (N, 2), the strongest of each cell of an even grid first, in rising order.
 
     Round by round every cell gives its next strongest point until the budget is spent: a busy tree cannot starve the
@@ -135,4 +139,5 @@ def _products(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.floa
 
     Transposed views of row-major arrays are column-major, as BLAS wants them: nothing is copied.
     """
-    return sgemm(1.0, b.T, a.T, trans_a=True).T
+    products: NDArray[np.float32] = sgemm(1.0, b.T, a.T, trans_a=True).T
+    return products

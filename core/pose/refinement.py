@@ -134,7 +134,8 @@ def _beyond(pose: Pose, x: Array, y: Array) -> Array:
     direction = (e[:2, None] * q[2] - q[:2] * e[2]) * np.sign(q[2])
     length = np.maximum(np.hypot(direction[0], direction[1]), 1e-12)
     along = ((y[:2] - q[:2] / q[2]) * direction).sum(axis=0) / length
-    return np.minimum(along, 0.0)
+    behind: Array = np.minimum(along, 0.0)
+    return behind
 
 
 def shared_focal_sigma(camera: Camera, camera_prime: Camera) -> float:
@@ -269,7 +270,8 @@ class _Problem:
         d_direction = e[:2, None] * dq[:, 2:] + de[:, :2] * q[2] - dq[:, :2] * e[2] - q[:2] * de[:, 2:]
         d_direction *= side
         moved = (away * d_direction - d_point * direction).sum(axis=1) / length
-        return moved - along * (direction * d_direction).sum(axis=1) / length**2
+        derivative: Array = moved - along * (direction * d_direction).sum(axis=1) / length**2
+        return derivative
 
     def _infinity_derivatives(self, pose: Pose) -> tuple[Array, Array]:
         """Derivatives of H_inf (size, 3, 3) and e' (size, 3) by the unknowns."""

@@ -74,4 +74,5 @@ def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camer
 def nearest_rotation(M: Array) -> Array:
     """The rotation nearest to a multiple of M (orthogonal Procrustes)."""
     U, _, Vt = np.linalg.svd(M)
-    return U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt
+    R: Array = U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt
+    return R

@@ -9,6 +9,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from .options import PARTS
 
@@ -29,10 +30,10 @@ class Curve:
     An 8-bit level k stands at 257 k, so one table serves both depths and any kind of profile.
     """
 
-    table: np.ndarray
+    table: NDArray[Any]
 
     @cached_property
-    def levels_by_root(self) -> np.ndarray:
+    def levels_by_root(self) -> NDArray[Any]:
         """16-bit level (float32) of light s², for s = 0 .. 1 in 65536 steps.
 
         The square root spreads the darks: with a plain grid over light the first levels of a gamma curve collide.
@@ -41,9 +42,10 @@ class Curve:
         return np.interp(root * root, self.table.astype(np.float64), np.arange(_LEVELS)).astype(np.float32)
 
     @cached_property
-    def bytes_by_root(self) -> np.ndarray:
+    def bytes_by_root(self) -> NDArray[Any]:
         """8-bit level (uint8, rounded) of light s², for s = 0 .. 1 in 65536 steps."""
-        return np.rint(self.levels_by_root / 257.0).astype(np.uint8)
+        levels: NDArray[Any] = np.rint(self.levels_by_root / 257.0).astype(np.uint8)
+        return levels
 
 
 @lru_cache(maxsize=1)
@@ -54,7 +56,7 @@ def srgb_curve() -> Curve:
     return Curve(light.astype(np.float32))
 
 
-def decode(coded: np.ndarray, curves: tuple[Curve, ...] | None = None) -> np.ndarray:
+def decode(coded: NDArray[Any], curves: tuple[Curve, ...] | None = None) -> NDArray[Any]:
     """Display-encoded levels to light.
 
     coded: H×W×C uint8 or uint16; curves: one for all channels or one a channel, sRGB when None. Returns H×W×C float32
@@ -71,7 +73,7 @@ def decode(coded: np.ndarray, curves: tuple[Curve, ...] | None = None) -> np.nda
     return light
 
 
-def encode(light: np.ndarray, bits: int, curves: tuple[Curve, ...] | None = None) -> np.ndarray:
+def encode(light: NDArray[Any], bits: int, curves: tuple[Curve, ...] | None = None) -> NDArray[Any]:
     """Light to display-encoded levels, the inverse of `decode`: every level survives the round trip.
 
     light: H×W×C float32; below 0 and NaN become 0, above 1 the highest level. bits: 8 or 16. curves: one for all
@@ -91,7 +93,7 @@ def _parts(curves: tuple[Curve, ...]) -> list[tuple[Any, Curve]]:
     return [((..., channel), curve) for channel, curve in enumerate(curves)]
 
 
-def _encode(light: np.ndarray, bits: int, curve: Curve) -> np.ndarray:
+def _encode(light: NDArray[Any], bits: int, curve: Curve) -> NDArray[Any]:
     flat = light.reshape(-1)
     levels = np.empty(flat.size, np.uint8 if bits == 8 else np.uint16)
     for start in range(0, flat.size, PARTS.values_at_once):
@@ -118,7 +120,7 @@ class IccProfile:
 
     gray: bool
     curves: tuple[Curve, ...]
-    to_srgb: np.ndarray
+    to_srgb: NDArray[Any]
 
 
 def icc_channels(icc: bytes) -> int:
@@ -160,7 +162,7 @@ def _icc_tags(icc: bytes) -> dict[bytes, bytes]:
     return tags
 
 
-def _xyz(tag: bytes) -> np.ndarray:
+def _xyz(tag: bytes) -> NDArray[Any]:
     if tag[:4] != b"XYZ ":
         raise ValueError("not an XYZ tag")
     return np.array(struct.unpack_from(">3i", tag, 8)) / 65536.0
@@ -188,7 +190,7 @@ def _curve(tag: bytes) -> Curve | None:
     return Curve(light.astype(np.float32))
 
 
-def _parametric(tag: bytes, coded: np.ndarray) -> np.ndarray:
+def _parametric(tag: bytes, coded: NDArray[Any]) -> NDArray[Any]:
     (kind,) = struct.unpack_from(">H", tag, 8)
     if kind > 4:
         raise ValueError("unknown parametric curve")

@@ -19,7 +19,8 @@ def outside(inside: NDArray[np.bool_], step: int = 1) -> Array:
     steps = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # OpenCV's root has other last bits from call to call; squared distances are whole numbers
     steps = np.sqrt(np.rint(np.square(steps, dtype=np.float64)))
-    return np.maximum(steps - 1, 0.0) * step
+    distance: Array = np.maximum(steps - 1, 0.0) * step
+    return distance
 
 
 def distance_to_border(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -29,4 +30,5 @@ def distance_to_border(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
 
 def distance_inside(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Distance in px (H, W) to the nearest pixel outside a mask, however far."""
-    return cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    distance: NDArray[np.float32] = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return distance

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +50,7 @@ class Grid:
         return np.stack(np.meshgrid(self.xs, self.ys), axis=-1)
 
     def to_pixels(
-        self, values: NDArray, left: int, top: int, width: int, height: int, every: int = 1
+        self, values: NDArray[Any], left: int, top: int, width: int, height: int, every: int = 1
     ) -> NDArray[np.float32]:
         """Node values (rows, columns) as float32 pixels of a rectangle, by cubic convolution; every: of so many a side
         only the first.
@@ -64,7 +65,7 @@ class Grid:
             np.matmul(lines[:, near], across, out=out[:, part])
         return out
 
-    def at(self, values: NDArray, points: Array) -> Array:
+    def at(self, values: NDArray[Any], points: Array) -> Array:
         """Node values (rows, columns) at points (…, 2), by the same convolution; 0 where a point is NaN or lies beyond
         the cells that have neighbours."""
         place = (points - np.array(self.start) - (self.step - 1) / 2) / self.step

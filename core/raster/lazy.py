@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +73,7 @@ def extent(light: AnyImage) -> tuple[float, float]:
 class Coded(LazyImage):
     """Display-encoded levels (H, W, C) uint8 or uint16, and the curves that make light of them (see `decode`)."""
 
-    levels: NDArray
+    levels: NDArray[Any]
     curves: tuple[Curve, ...]
 
     @property

@@ -88,7 +88,7 @@ def push(sums: list[Plane], weights: list[Plane]) -> Plane:
     total, weight = sums.pop(), weights[len(sums)]
     whole = np.minimum(weight, 1)
     mean = np.float32(total.sum() / max(float(weight.sum()), float(LEAST_WEIGHT)))
-    out = total / np.maximum(weight, LEAST_WEIGHT) * whole + mean * (1 - whole)
+    out: Plane = total / np.maximum(weight, LEAST_WEIGHT) * whole + mean * (1 - whole)
     while sums:
         total, weight = sums.pop(), weights[len(sums)]
         out = expanded(out, weight.shape)
@@ -104,12 +104,14 @@ def push(sums: list[Plane], weights: list[Plane]) -> Plane:
 
 def reduced(values: Plane) -> Plane:
     """Half as many rows and columns (rounded up), smoothed by a Gaussian of 5 × 5."""
-    return cv2.pyrDown(values, borderType=cv2.BORDER_REFLECT_101)
+    smaller: Plane = cv2.pyrDown(values, borderType=cv2.BORDER_REFLECT_101)
+    return smaller
 
 
 def expanded(values: Plane, shape: tuple[int, ...]) -> Plane:
     """Twice as many rows and columns, to `shape` (h, w), smoothed alike."""
-    return cv2.pyrUp(values, dstsize=(shape[1], shape[0]))
+    larger: Plane = cv2.pyrUp(values, dstsize=(shape[1], shape[0]))
+    return larger
 
 
 def _has_gaps(weight: Plane) -> bool:

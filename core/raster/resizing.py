@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -15,9 +17,10 @@ def size_change(size: ArrayLike, new_size: ArrayLike) -> tuple[Array, Array]:
     return factor, (factor - 1) / 2
 
 
-def resized_points(points: NDArray, size: ArrayLike, new_size: ArrayLike) -> Array:
+def resized_points(points: NDArray[Any], size: ArrayLike, new_size: ArrayLike) -> Array:
     """Points (…, 2) px of a picture of one size (W, H) in px of the same picture at a new size.
 
     One coordinate (…,) with a length of one axis for either size works alike.
     """
-    return (points + 0.5) * (np.asarray(new_size) / np.asarray(size)) - 0.5
+    resized: Array = (points + 0.5) * (np.asarray(new_size) / np.asarray(size)) - 0.5
+    return resized

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +15,9 @@ from .options import PARTS
 
 
 def fetch(
-    source: NDArray | LazyImage, map_x: NDArray[np.float32], map_y: NDArray[np.float32],
+    source: NDArray[Any] | LazyImage, map_x: NDArray[np.float32], map_y: NDArray[np.float32],
     interpolation: int = cv2.INTER_CUBIC,
-) -> NDArray:
+) -> NDArray[Any]:
     """Samples (H, W, C) of a source (h, w, C) at map positions, in tiles, of the source's type; 0 where the map leaves
     the picture."""
     out = np.zeros((*map_x.shape, source.shape[2]), source.dtype)
@@ -29,7 +31,8 @@ def fetch(
 
 
 def _fetch_tile(
-    source: NDArray | LazyImage, x: NDArray[np.float32], y: NDArray[np.float32], out: NDArray, interpolation: int
+    source: NDArray[Any] | LazyImage, x: NDArray[np.float32], y: NDArray[np.float32], out: NDArray[Any],
+    interpolation: int,
 ) -> None:
     height, width = source.shape[:2]
     with np.errstate(invalid="ignore"):

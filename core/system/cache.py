@@ -25,6 +25,7 @@ import cv2
 import numpy as np
 import poselib
 import scipy
+from numpy.typing import NDArray
 
 from .options import SYSTEM
 
@@ -68,7 +69,7 @@ class Cache:
             path = self._folder / f"{_digest(what, decided_by)}.npz"
         except _Unknown:
             return make()
-        found = _read(path)
+        found: Kept | None = _read(path)
         if found is not None:
             return found
         made = make()
@@ -77,7 +78,7 @@ class Cache:
         return made
 
     def _keep(self, path: Path, value: Any) -> None:
-        arrays: list[np.ndarray] = []
+        arrays: list[NDArray[Any]] = []
         plan = _plan(value, arrays)
         size = sum(array.nbytes + 300 for array in arrays) + 1000
         if size > self._limit // SYSTEM.cache_entry_part:
@@ -133,13 +134,13 @@ def _read(path: Path) -> Any:
         return None
 
 
-def _write(file: IO[bytes], name: str, plan: Any, arrays: list[np.ndarray]) -> None:
+def _write(file: IO[bytes], name: str, plan: Any, arrays: list[NDArray[Any]]) -> None:
     """An .npz with the plan of a value in JSON, which names the entry too."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(_PLAN, json.dumps({"name": name, "value": plan}))
         for number, array in enumerate(arrays):
             with archive.open(f"{number}.npy", "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, array, allow_pickle=False)  # keeps the order of its axes too
+                np.lib.format.write_array(member, array, allow_pickle=False)  # type: ignore[no-untyped-call]  # keeps the order of its axes too
 
 
 def _unpacked(file: IO[bytes], name: str) -> Any:
@@ -150,11 +151,11 @@ def _unpacked(file: IO[bytes], name: str) -> Any:
         arrays = []
         for number in range(len(archive.namelist()) - 1):
             with archive.open(f"{number}.npy") as member:
-                arrays.append(np.lib.format.read_array(member, allow_pickle=False))
+                arrays.append(np.lib.format.read_array(member, allow_pickle=False))  # type: ignore[no-untyped-call]
     return _value(plan["value"], arrays)
 
 
-def _plan(value: Any, arrays: list[np.ndarray]) -> Any:
+def _plan(value: Any, arrays: list[NDArray[Any]]) -> Any:
     """The value as JSON: arrays by their number, NumPy's scalars as arrays of no dimension (their type counts)."""
     if value is None or isinstance(value, (bool, int, str)) or type(value) is float:
         return value
@@ -174,7 +175,7 @@ def _plan(value: Any, arrays: list[np.ndarray]) -> Any:
     return {"class": [module.removeprefix(_PACKAGE), type(value).__qualname__], "fields": parts}
 
 
-def _value(plan: Any, arrays: list[np.ndarray]) -> Any:
+def _value(plan: Any, arrays: list[NDArray[Any]]) -> Any:
     if not isinstance(plan, dict):
         return plan
     if "array" in plan:
@@ -193,7 +194,7 @@ def _value(plan: Any, arrays: list[np.ndarray]) -> Any:
 
 
 def _digest(what: str, decided_by: tuple[Any, ...]) -> str:
-    arrays: list[np.ndarray] = []
+    arrays: list[NDArray[Any]] = []
     plan = _plan(decided_by, arrays)
     digest = blake2b(json.dumps([what, _code(), plan]).encode(), digest_size=20)
     for array in arrays:

@@ -40,7 +40,7 @@ def messages_may_be_lost() -> Iterator[None]:
     _fill_closed()
     before = sys.stderr
     with open(os.devnull, "w", encoding="utf-8") as nowhere:
-        sys.stderr = _Unheard(before if before is not None else nowhere)  # type: ignore[assignment]
+        sys.stderr = _Unheard(before if before is not None else nowhere)
         try:
             yield
         finally:
