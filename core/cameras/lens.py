@@ -15,7 +15,24 @@ from .options import LENS
 
 
 def distort(points: Array, camera: Camera) -> Array:
-    """Ideal pixels (…, 2) to raw pixels of the camera's picture."""
+    """Apply lens distortion.
+
+    Parameters
+    ----------
+    points : (…, 2)
+        Ideal px, as a pinhole camera with the same K would see them.
+    camera : Camera
+        Whose lens it is.
+
+    Returns
+    -------
+    (…, 2)
+        Raw px of the camera's picture.
+
+    References
+    ----------
+    D. Brown, Close-Range Camera Calibration, Photogrammetric Engineering 37, 1971.
+    """
     if not camera.distortion.any():
         return points
     ideal = _normalised(points, camera)
@@ -23,7 +40,20 @@ def distort(points: Array, camera: Camera) -> Array:
 
 
 def undistort(points: Array, camera: Camera) -> Array:
-    """Raw pixels (…, 2) to ideal pixels: the inverse of `distort`, by fixed-point iteration with Newton's safeguard."""
+    """Remove lens distortion: the inverse of `distort`, by a damped fixed-point iteration.
+
+    Parameters
+    ----------
+    points : (…, 2)
+        Raw px of the camera's picture.
+    camera : Camera
+        Whose lens it is.
+
+    Returns
+    -------
+    (…, 2)
+        Ideal px.
+    """
     if not camera.distortion.any():
         return points
     raw = _normalised(points, camera)

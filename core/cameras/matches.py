@@ -11,10 +11,18 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Matches:
-    """Matched points x (reference) ↔ y (target), each (N, 2) float64 px.
+    """Matched points of two pictures.
 
-    scale: the unit of their noise in px; weight (N,): how much each counts, None for all alike; given: by the user, to
-    be used as they are.
+    Attributes
+    ----------
+    x, y : (N, 2) float64
+        Points of the reference and of the target, px; pixel centres are integers.
+    scale : float
+        px by which thresholds are multiplied: full pixels per pixel of the picture they were found in.
+    weight : (N,), optional
+        How much each counts; None if all count alike.
+    given : bool
+        By the user, hence all used.
     """
 
     x: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""The two-view formulas everything else stands on: F, H_inf, the epipole, distances, cheirality.
+"""Formulas of two-view geometry: F, H_inf, the epipole, distances, cheirality.
 
 Convention, everywhere: pixel centres are integers; the target camera sees a world point X of the reference camera's
 frame at R X + t; x' is a target pixel, x a reference pixel; x'ᵀ F x = 0. Source of the formulas: Hartley and Zisserman,
@@ -25,12 +25,12 @@ def homogeneous(points: NDArray[Any]) -> Array:
 
 
 def project(rays: Array) -> Array:
-    """π(a, b, c) = (a/c, b/c) of (…, 3) vectors; the caller looks after c > 0."""
+    """π(a, b, c) = (a/c, b/c) of (…, 3) vectors; c > 0 is not checked."""
     return rays[..., :2] / rays[..., 2:]
 
 
 def ahead_of_camera(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> NDArray[np.bool_]:
-    """Which homogeneous pixels (a, b, c), c's sign kept, lie in front of their camera; False for NaN.
+    """Which homogeneous pixels (a, b, c) of unchanged sign lie in front of their camera; False for NaN.
 
     What is less than LEAST_AHEAD in front, relative to its own length, would be shown outside any picture.
     """
@@ -72,7 +72,7 @@ def inverse_intrinsics(K: Array) -> Array:
 
 
 def infinite_homography(K: Array, K_prime: Array, R: Array) -> Array:
-    """H_inf = K' R K⁻¹, sign kept, so that H_inf p has a positive third part in front of the target camera."""
+    """H_inf = K' R K⁻¹, not normalised: the third part of H_inf p is positive in front of the target camera."""
     return K_prime @ R @ inverse_intrinsics(K)
 
 
@@ -114,11 +114,23 @@ def poses_from_fundamental(F: Array, K: Array, K_prime: Array) -> list[tuple[Arr
 
 
 def in_front(K: Array, K_prime: Array, R: Array, t: Array, x: Array, y: Array, slack: float = 0.0) -> NDArray[np.bool_]:
-    """Which matches (N, 2) triangulate in front of both cameras.
+    """Which matches triangulate in front of both cameras, by the closest points of their two rays.
 
-    Depths along both rays from the closest points of the two rays, r the reference ray and r' the target ray; `slack`
-    is the sine of the parallax angle below which a point counts as infinitely far, hence in front, if its rays agree in
-    direction.
+    Parameters
+    ----------
+    K, K_prime : (3, 3)
+        Intrinsics, px.
+    R, t : (3, 3), (3,)
+        Reference to target camera.
+    x, y : (N, 2)
+        px of the reference and of the target.
+    slack : float
+        Sine of the parallax angle below which a point counts as infinitely far, hence in front, if its rays agree in
+        direction.
+
+    Returns
+    -------
+    (N,) bool
     """
     ray = homogeneous(x) @ inverse_intrinsics(K).T
     ray_prime = homogeneous(y) @ inverse_intrinsics(K_prime).T

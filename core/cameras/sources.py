@@ -1,4 +1,4 @@
-"""Where intrinsics come from: given, a camera file, EXIF, or an assumption; and how far to believe them."""
+"""Intrinsics as given, from a camera file, from EXIF, or assumed; and how precise they are."""
 
 from __future__ import annotations
 
@@ -65,9 +65,33 @@ def cameras_for(
     sizes: tuple[tuple[int, int], tuple[int, int]],
     exifs: tuple[Exif, Exif],
 ) -> tuple[tuple[Camera, Camera], list[str]]:
-    """Both pictures' cameras by DESIGN 4's order, and warnings about what contradicts itself.
+    """What is known of both pictures' cameras before matching.
 
-    names: as a camera file would call the pictures; sizes: (W, H) px after orientation was applied. Raises BadRequest.
+    The user's word comes first, then EXIF, then the other picture's focal length, then a usual one.
+
+    Parameters
+    ----------
+    request : CameraRequest
+        What the user said.
+    names : (str, str)
+        What a camera file would call reference and target.
+    sizes : ((int, int), (int, int))
+        (W, H) px after orientation was applied.
+    exifs : (Exif, Exif)
+        Of the upright pictures.
+
+    Returns
+    -------
+    cameras : (Camera, Camera)
+    warnings : list of str
+        Where EXIF contradicts itself.
+
+    Raises
+    ------
+    BadRequest
+        The camera file lacks a picture or holds something else.
+    UnreadableImage
+        The camera file cannot be read.
     """
     warnings: list[str] = []
     if request.cameras is not None:

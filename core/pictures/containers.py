@@ -1,7 +1,7 @@
 """What a picture file says about itself before anybody decodes it: kind, size, damage, EXIF, ICC profile.
 
-Decoders are not asked, because they answer too late (a bomb has filled the memory) or not at all (OpenCV decodes half a
-JPEG without a word). Nothing here raises on damaged bytes: what cannot be read is not there.
+Decoders find damage too late (a decompression bomb has filled the memory) or not at all (OpenCV decodes half a JPEG
+without a word). Nothing here raises on damaged bytes: what cannot be read counts as absent.
 """
 
 from __future__ import annotations

@@ -52,12 +52,34 @@ def encode_picture(
     pixels: AnyImage, alpha: NDArray[Any] | None, bits: int, suffix: str, icc: bytes | None = None,
     exif: Exif | None = None,
 ) -> tuple[bytes, tuple[str, ...]]:
-    """The bytes of a picture file, and warnings.
+    """Encode a picture as a file.
 
-    pixels: light as in Picture; alpha, icc, exif: as there; bits: the deepest input's (8, 16 or 32); suffix: .png,
-    .jpg, .jpeg, .tif, .tiff or .exr. JPEG gets black where alpha says so, the others keep alpha. EXR holds linear sRGB,
-    premultiplied. Raises BadRequest for other suffixes, UnwritableOutput where the picture does not fit into the kind
-    of file.
+    Parameters
+    ----------
+    pixels : (H, W, C) array or LazyImage
+        Light as in Picture.
+    alpha : (H, W), optional
+        float32 in [0, 1], or bool. JPEG gets black where it is 0, the others keep it.
+    bits : int
+        The deepest input's: 8, 16 or 32.
+    suffix : str
+        .png, .jpg, .jpeg, .tif, .tiff or .exr. EXR holds linear sRGB, multiplied by alpha.
+    icc, exif : optional
+        As in Picture.
+
+    Returns
+    -------
+    data : bytes
+        The file.
+    warnings : tuple of str
+        For the user.
+
+    Raises
+    ------
+    BadRequest
+        Another suffix.
+    UnwritableOutput
+        The picture does not fit into this kind of file.
     """
     kind, _ = _writable(suffix)
     depth = output_bits((bits,), suffix)

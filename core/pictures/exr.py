@@ -91,11 +91,11 @@ def _layers(parts: list[Any]) -> Iterator[_Layer]:
 
 def _rank(layer: _Layer) -> int:
     """0 the unnamed layer, 1 Blender's Composite, 2 a view layer's Combined pass, 3 anything else."""
-    steps = layer.name.split(".")
+    levels = layer.name.split(".")
     if layer.name == "" or layer.name.lower() in ("rgb", "rgba"):
         return 0
-    if "Combined" in steps:
-        return 1 if steps[0] == "Composite" else 2
+    if "Combined" in levels:
+        return 1 if levels[0] == "Composite" else 2
     return 3
 
 

@@ -1,6 +1,6 @@
 """Masks of what is to be ignored in a picture: from a file or an array, and into the picture's alpha.
 
-What a picture does not show is in nobody's way: features, metrics, warp and blend all leave out what alpha hides.
+Features, metrics, warp and blend leave out what alpha hides, so nothing else has to know of masks.
 """
 
 from __future__ import annotations
@@ -20,13 +20,30 @@ from .picture import Picture, load_picture, picture_from_array
 
 
 def read_mask(source: str | Path | NDArray[Any], size: tuple[int, int], name: str) -> NDArray[np.bool_]:
-    """An ignore mask (H, W) for a picture of `size` (W, H) px, True where the picture is to be ignored.
+    """Read an ignore mask.
 
-    source: any picture file that can be read, or an array as for `picture_from_array`, or of bool. White (brighter than
-    half) is ignored. Where there is alpha and what it shows has one colour, alpha decides; otherwise colour times
-    alpha does. Another size is stretched (nearest) where the shape is the picture's to within a pixel. name: of the
-    picture in messages, like "the reference".
-    Raises UnreadableImage (file), BadRequest (a mask of another shape, of labels instead of white, or of everything).
+    Parameters
+    ----------
+    source : str, Path or array
+        Any picture file that can be read, or an array as for `picture_from_array`, or of bool. White (brighter than
+        half) is ignored. If there is alpha and what it shows has one colour, alpha decides; otherwise colour times
+        alpha does.
+    size : (int, int)
+        (W, H) px of the picture. A mask of another size but the same shape to within a pixel is stretched (nearest).
+    name : str
+        Of the picture in messages, like "the reference".
+
+    Returns
+    -------
+    (H, W) bool
+        True where the picture is to be ignored.
+
+    Raises
+    ------
+    UnreadableImage
+        The file cannot be read.
+    BadRequest
+        The mask has another shape, holds labels instead of white, or leaves nothing.
     """
     label = f"the mask of {name}" if isinstance(source, np.ndarray) else f"{source}: the mask of {name}"
     picture = _picture(source, label)
@@ -42,10 +59,23 @@ def read_mask(source: str | Path | NDArray[Any], size: tuple[int, int], name: st
 
 
 def read_painted(source: str | Path | NDArray[Any]) -> NDArray[np.int8]:
-    """What an artist painted over a panorama (h, w), at its own size: -1 from the reference where it is black, 1 from
-    the target where it is white, 0 where it is gray or transparent and the seam decides.
+    """Read what an artist painted over a panorama, at its own size.
 
-    source: any picture file that can be read, or an array as for `picture_from_array`. Raises UnreadableImage (file).
+    Parameters
+    ----------
+    source : str, Path or array
+        Any picture file that can be read, or an array as for `picture_from_array`.
+
+    Returns
+    -------
+    (h, w) int8
+        -1 where it is black: from the reference; 1 where it is white: from the target; 0 where it is gray or
+        transparent: the seam decides.
+
+    Raises
+    ------
+    UnreadableImage
+        The file cannot be read.
     """
     picture = _picture(source, "the mask of the seam")
     values = _gray(picture)

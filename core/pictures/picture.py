@@ -33,12 +33,25 @@ _ADVICE = {
 class Picture:
     """A picture from outside, upright (any EXIF orientation has been applied), row 0 on top.
 
-    light: float32 H×W×C, C = 1 or 3 (R, G, B), scene-linear, straight (not multiplied by alpha), in the primaries of
-    `icc` or, where that is None, of sRGB; of 8 and 16 bits it is worked out where it is asked for (see `lazy`), of all
-    pixels as `pixels`. alpha: float32 H×W in [0, 1], None when opaque everywhere. view: uint8 H×W×C,
-    the display-encoded picture that features and photometric metrics see. bits: 8, 16 or 32 (float) of the source.
-    exif: see `Exif.upright`; its orientation is the source's and is done with. icc: the embedded profile or None. name:
-    file name or "array". warnings: what the user should know.
+    Attributes
+    ----------
+    light : (H, W, C) array or LazyImage
+        float32, C = 1 or 3 (R, G, B), scene-linear, not multiplied by alpha, in the primaries of `icc` or, if that is
+        None, of sRGB. Decoded part by part from 8 and 16 bits (see `raster.lazy`).
+    alpha : (H, W) float32 in [0, 1], optional
+        None if opaque everywhere.
+    view : (H, W, C) uint8
+        The display-encoded picture that features and photometric metrics see.
+    bits : int
+        Of the source: 8, 16 or 32 (float).
+    exif : Exif
+        Upright; its orientation is the source's and was applied.
+    icc : bytes, optional
+        The embedded profile.
+    name : str
+        File name, or "array".
+    warnings : tuple of str
+        For the user.
     """
 
     light: AnyImage
@@ -57,11 +70,23 @@ class Picture:
 
 
 def load_picture(path: str | Path, pixels_per_byte: int = READING.photograph_pixels_per_byte) -> Picture:
-    """Reads a PNG, JPEG, TIFF, EXR, WebP or BMP file.
+    """Read a PNG, JPEG, TIFF, EXR, WebP or BMP file of 8, 16 or 32 bits (float), gray or colour, with or without alpha.
 
-    8, 16 or 32 bits (float), gray or colour, with or without alpha. pixels_per_byte: see `check_size`. Raises
-    UnreadableImage, with what was found and what to do, for everything else: missing, damaged, cut off, too large (over
-    400 megapixels or 65535 pixels a side) for memory or for its own length, HEIC and camera RAW.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    pixels_per_byte : int
+        Of a larger picture that the file may hold, at most; see `ReadingOptions`.
+
+    Returns
+    -------
+    Picture
+
+    Raises
+    ------
+    UnreadableImage
+        Missing, damaged, cut off, too large for memory or for its own length, HEIC or camera RAW, with what to do.
     """
     path = Path(path)
     try:
@@ -94,11 +119,24 @@ def _load(path: Path, pixels_per_byte: int) -> Picture:
 
 
 def picture_from_array(array: NDArray[Any], name: str = "array") -> Picture:
-    """A Picture from an array (copied).
+    """Make a Picture of an array, which is copied.
 
-    array: uint8 or uint16, display-encoded sRGB; float32 or float64, scene-linear with sRGB primaries. H×W or H×W×C
-    with C = 1 gray, 2 gray and alpha, 3 RGB, 4 RGBA; straight alpha; row 0 on top. Raises BadRequest for every other
-    array.
+    Parameters
+    ----------
+    array : (H, W) or (H, W, C)
+        uint8 or uint16: display-encoded sRGB; float32 or float64: scene-linear with sRGB primaries. C = 1 gray, 2 gray
+        and alpha, 3 RGB, 4 RGBA; colours are not multiplied by alpha; row 0 on top.
+    name : str
+        In messages.
+
+    Returns
+    -------
+    Picture
+
+    Raises
+    ------
+    BadRequest
+        The array has another shape or type.
     """
     if not isinstance(array, np.ndarray):
         raise BadRequest(f"{name}: a NumPy array is needed, not {type(array).__name__}")
@@ -202,7 +240,20 @@ def curves_for(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
 
 
 def resized(picture: Picture, scale: float) -> Picture:
-    """The picture made smaller by `scale` (at most 1), each new pixel the mean light of what it covers."""
+    """Shrink a picture.
+
+    Parameters
+    ----------
+    picture : Picture
+        The picture, which stays as it is.
+    scale : float
+        Of its sides, at most 1.
+
+    Returns
+    -------
+    Picture
+        Each pixel is the mean light of what it covers, weighted by alpha.
+    """
     height, width = picture.light.shape[:2]
     size = max(1, round(width * scale)), max(1, round(height * scale))
     if size == (width, height):
@@ -217,7 +268,7 @@ def resized(picture: Picture, scale: float) -> Picture:
     weight, alpha = picture.alpha[..., None], shrink(picture.alpha)
 
     def weighed(array: NDArray[Any]) -> NDArray[Any]:
-        """What lies under transparent pixels has no say in what is seen beside them."""
+        """Means weighted by alpha: what lies under transparent pixels does not count."""
         mean: NDArray[Any] = shrink(array * weight) / np.maximum(alpha, 1e-6)[..., None]
         return mean
 
@@ -226,11 +277,18 @@ def resized(picture: Picture, scale: float) -> Picture:
 
 
 def in_same_colour_space(a: Picture, b: Picture) -> tuple[Picture, Picture]:
-    """Both pictures with the same primaries, the same number of channels and, for two float pictures, comparable views.
+    """Bring two pictures to the same primaries and number of channels, and two float pictures to comparable views.
 
-    Equal profiles are kept (light stays in their primaries); otherwise each picture with a profile is converted to
-    linear sRGB and loses it. A profile that is not understood counts as sRGB then, with a warning. Gray beside colour
-    gets three channels. Returns new pictures; the given ones stay as they are.
+    Parameters
+    ----------
+    a, b : Picture
+        The pictures, which stay as they are.
+
+    Returns
+    -------
+    (Picture, Picture)
+        With equal profiles their light stays in these primaries; otherwise it is converted to linear sRGB. A profile
+        that is not understood counts as sRGB, with a warning. Gray beside colour gets three channels.
     """
     if a.icc != b.icc:
         a, b = _to_srgb(a), _to_srgb(b)

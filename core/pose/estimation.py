@@ -1,8 +1,8 @@
-"""How the two cameras stood: robust F, then focal length, rotation and baseline direction on the Sampson distance.
+"""Relative pose and calibration of two cameras from matches.
 
-H_inf cannot come from F alone (every H_inf + e' mᵀ fits it): it needs calibration. So F is only the way in; what is
-kept is the pose, refined with a prior on the focal length that weakens as the matches' evidence grows, and F, H_inf and
-e' are made from it.
+A robust F comes first, then focal length, rotation and baseline direction are refined on the Sampson distance. H_inf
+cannot come from F alone, for every H_inf + e' mᵀ fits it: it needs calibration. So the result is the pose, refined with
+a prior on the focal length that counts less the more the matches say, and F, H_inf and e' are computed from it.
 """
 
 from __future__ import annotations
@@ -40,9 +40,30 @@ from .zoom import with_two_focals
 
 
 def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int = 0) -> TwoView:
-    """Pose, calibration and inliers of a pair from its matches.
+    """Estimate pose, calibration and inliers of a pair from its matches.
 
-    Raises TooFewMatches, NoOverlap (the matches agree on nothing) or DegenerateGeometry (no pose has them in front).
+    Parameters
+    ----------
+    matches : Matches
+        In px of the pictures that the cameras describe, free of lens distortion.
+    camera, camera_prime : Camera
+        What is known of the reference's and the target's camera. Where both have a pose, only inliers are found.
+    seed : int
+        Of RANSAC; the same seed gives the same result.
+
+    Returns
+    -------
+    TwoView
+        Of the model that the matches support: `general`, `rotation` or `plane`.
+
+    Raises
+    ------
+    TooFewMatches
+        Fewer than `EstimationOptions.min_matches`.
+    NoOverlap
+        The matches agree on no more than chance would bring, or both pictures show the same.
+    DegenerateGeometry
+        No pose has the matches in front of both cameras, or given cameras contradict them.
     """
     if len(matches) < ESTIMATION.min_matches:
         raise TooFewMatches(
@@ -64,7 +85,7 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
             return rotated
         if camera.assumed or camera_prime.assumed:
             return _plane_without_pose(matches, homography, camera, camera_prime)
-    # on a plane, the calibration and the plane trade freely: what is known of it stays
+    # matches on a plane cannot tell its direction from the calibration: the calibration is not refined
     first, second = (
         c if parallax else replace(c.with_focal_held(), principal_sigma=0.0) for c in (camera, camera_prime)
     )
@@ -76,28 +97,17 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
             f"no pair of cameras explains more than {int(inliers.sum())} of {len(matches)} matches: the pictures "
             "seem to have no content in common, or the focal length that was given is not theirs"
         )
-    on_lines = matches.subset(inliers)
-    front = pose.in_front(on_lines)
-    if not parallax and front.mean() < ESTIMATION.min_front_share:
-        return _plane_without_pose(matches, homography, camera, camera_prime)
+    front = pose.in_front(matches.subset(inliers))
     if front.mean() < ESTIMATION.min_front_share:
+        if not parallax:
+            return _plane_without_pose(matches, homography, camera, camera_prime)
         raise DegenerateGeometry(
             f"only {front.mean():.0%} of {len(front)} consistent points lie in front of both cameras: "
             "the pictures' geometry makes no sense; give the focal length (--focal-px, --focal35) "
             "or check that neither picture is mirrored"
         )
-    why = (
-        f"{int(inliers.sum())} of {len(matches)} matches on their epipolar lines, "
-        f"{int(homography.inliers.sum())} on one homography"
-    )
-    if not parallax:
-        why += "; nothing leaves that plane along its epipolar lines beyond noise and coincidence"
-    if zoom:
-        why += "; the second focal length was freed: the matches contradict a common one"
-    if parallax:
-        known = known_focal(on_lines, pose, camera, camera_prime, sigma, zoom)
-    else:
-        known = held_focal(on_lines, pose, camera, camera_prime, sigma)
+    fit = matches.subset(inliers), pose, camera, camera_prime, sigma
+    known = known_focal(*fit, zoom) if parallax else held_focal(*fit)
     warnings = [*focal_warnings(pose, camera, camera_prime), *known.warnings]
     if camera.fixed and camera_prime.fixed:
         warnings += _contradiction(matches, F, inliers, sigma)
@@ -105,16 +115,29 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
     return TwoView(
         K=pose.K, K_prime=pose.K_prime, R=pose.R, t=pose.t, F=pose.F,
         H_inf=infinite_homography(pose.K, pose.K_prime, pose.R), e_prime=pose.K_prime @ pose.t,
-        inliers=inliers | matches.given, sigma=sigma, model="general" if parallax else "plane", why=why,
-        focal_source=known.source, focal_deviation=known.deviation, h_inf_spread=known.h_inf_spread,
-        warnings=tuple(warnings),
+        inliers=inliers | matches.given, sigma=sigma, model="general" if parallax else "plane",
+        why=_why(inliers, homography, parallax, zoom), focal_source=known.source, focal_deviation=known.deviation,
+        h_inf_spread=known.h_inf_spread, warnings=tuple(warnings),
     )  # fmt: skip
+
+
+def _why(inliers: NDArray[np.bool_], homography: Homography, parallax: bool, zoom: bool) -> str:
+    """In words, what the choice between the general and the plane model rests on."""
+    why = (
+        f"{int(inliers.sum())} of {len(inliers)} matches on their epipolar lines, "
+        f"{int(homography.inliers.sum())} on one homography"
+    )
+    if not parallax:
+        why += "; nothing leaves that plane along its epipolar lines beyond noise and coincidence"
+    if zoom:
+        why += "; the second focal length was freed: the matches contradict a common one"
+    return why
 
 
 def _same_viewpoint(
     matches: Matches, homography: Homography, camera: Camera, camera_prime: Camera
 ) -> TwoView | None:
-    """The rotation model, where it explains the homography's matches about as well; else None.
+    """The rotation model if it explains the homography's matches about as well, else None.
 
     Raises NoOverlap where the two pictures show the same to within half a pixel.
     """
@@ -203,7 +226,7 @@ def _fit_pose(
     starts = _best_starts(matches, candidates, homography, camera, camera_prime)
     refined = [_refine_with_inliers(matches, p, camera, camera_prime, False) for p in starts]
     best = _least_truncated(matches, refined)
-    # a wide threshold lets in stray matches that the pose bends to; one as sharp as the noise turns out does not
+    # a wide threshold lets in stray matches that pull the pose; one as sharp as the noise found does not
     sharp = min(ESTIMATION.sharp_sigmas * best[2], ESTIMATION.sharp_share * FUNDAMENTAL.inlier_px * matches.scale)
     F = robust_fundamental(matches, sharp, seed)
     again = pose_of_fundamental(matches, F, best[0].K, best[0].K_prime, sharp)
@@ -217,10 +240,10 @@ def _fit_pose(
 def _best_starts(
     matches: Matches, candidates: list[Array], homography: Homography, camera: Camera, camera_prime: Camera
 ) -> list[Pose]:
-    """The poses to refine from, best first: every F at a ladder of focal lengths, and, where most points lie on a
-    plane, which makes F meaningless, those that its homography allows.
+    """The poses to refine from, best first: every F at several focal lengths, and, if most points lie on a plane, where
+    F is unstable, those that its homography allows.
 
-    All are compared by one robust cost with a wide scale over all matches: the landscape has several valleys.
+    The cost has several minima, so all are refined a little and compared by one robust cost with a wide scale.
     """
     factors = [1.0]
     if not (camera.fixed or camera_prime.fixed) and shared_focal_sigma(camera, camera_prime) > ESTIMATION.ladder_sigma:
@@ -234,11 +257,11 @@ def _best_starts(
     if homography.inliers.sum() > ESTIMATION.plane_start_share * len(matches):
         on = few.subset(transfer_error(homography.H, few) < 2 * FUNDAMENTAL.inlier_px * matches.scale)
         starts += _poses_of_plane(on, homography.H, camera, camera_prime)
-    # a first look at all, then the best few in earnest
+    # a few iterations for all, many for the best three
     sigma = ESTIMATION.start_sigma_px * matches.scale
-    glance = few.thinned(ESTIMATION.start_matches // 2)
+    fewer = few.thinned(ESTIMATION.start_matches // 2)
     rough = sorted(
-        (refine_pose(glance, p, camera, camera_prime, sigma, iterations=3) for p in starts), key=lambda item: item[1]
+        (refine_pose(fewer, p, camera, camera_prime, sigma, iterations=3) for p in starts), key=lambda item: item[1]
     )
     fine = (refine_pose(few, p, camera, camera_prime, sigma, iterations=30) for p, _ in rough[:3])
     return [pose for pose, _ in sorted(fine, key=lambda item: item[1])]
@@ -261,7 +284,7 @@ def _poses_of_plane(on: Matches, H: Array, camera: Camera, camera_prime: Camera)
 def _refine_with_inliers(
     matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, zoom: bool
 ) -> tuple[Pose, NDArray[np.bool_], float]:
-    """Refine on the matches near their lines, let the noise scale follow, until the inliers stand still."""
+    """Refine on the matches near their lines with σ re-estimated, until the inliers stay: pose, inliers, σ px."""
     least, most = (px * matches.scale for px in (FUNDAMENTAL.least_noise_px, FUNDAMENTAL.inlier_px))
     sigma, threshold = most / 2, ESTIMATION.inlier_px * matches.scale
     inliers = np.zeros(len(matches), bool)
@@ -286,7 +309,7 @@ def _least_truncated(
 ) -> tuple[Pose, NDArray[np.bool_], float]:
     """The refinement with the least truncated squared residual over all matches, in the sharpest one's σ.
 
-    A point behind a camera is as wrong as one off its line: that alone tells the poses of a plane apart.
+    A point behind a camera counts as an outlier: nothing else distinguishes the two poses that a plane allows.
     """
     if len(refined) == 1:
         return refined[0]
@@ -302,7 +325,7 @@ def _least_truncated(
 def _from_known_cameras(
     matches: Matches, camera: Camera, camera_prime: Camera, pose: tuple[Array, Array], pose_prime: tuple[Array, Array]
 ) -> TwoView:
-    """Both cameras given with their poses: nothing to estimate but which matches they explain."""
+    """The geometry of cameras given with their poses; only the inliers and their noise are estimated."""
     (R1, t1), (R2, t2) = pose, pose_prime
     R = R2 @ R1.T
     t = t2 - R @ t1

@@ -1,6 +1,4 @@
-"""Points that both pictures share: SIFT with root normalisation, mutual nearest neighbours, spread evenly.
-
-SIFT: Lowe, IJCV 2004. Root normalisation (the Hellinger kernel): Arandjelović and Zisserman, CVPR 2012.
+"""SIFT features spread evenly over a picture, and matches between two sets of them.
 """
 
 from __future__ import annotations
@@ -33,10 +31,28 @@ def detect(
     view: NDArray[np.uint8], alpha: NDArray[np.float32] | None = None, budget: int = FEATURES.budget,
     pixels: int = FEATURES.pixels,
 ) -> Features:  # fmt: skip
-    """SIFT features of an 8-bit display-encoded picture (H, W, C), C = 1 or 3, at most `budget`, spread evenly.
+    """Detect SIFT features, spread evenly over the picture, with root-normalised descriptors.
 
-    alpha (H, W): nothing is looked for where it is 0, nor so close that the edge of the shown part would be the
-    feature. pixels: a larger picture is shrunk to so many first.
+    Parameters
+    ----------
+    view : (H, W, C) uint8
+        A display-encoded picture, C = 1 or 3 (R, G, B).
+    alpha : (H, W) float32, optional
+        No features where it is 0, nor so close that the edge of the shown part would be the feature.
+    budget : int
+        The most features that are returned.
+    pixels : int
+        A picture of more pixels is shrunk to about as many first.
+
+    Returns
+    -------
+    Features
+        In px of the full picture.
+
+    References
+    ----------
+    D. Lowe, Distinctive Image Features from Scale-Invariant Keypoints, IJCV 2004. R. Arandjelović and A. Zisserman,
+    Three Things Everyone Should Know to Improve Object Retrieval, CVPR 2012 (root normalisation).
     """
     gray = cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else np.ascontiguousarray(view[..., 0])
     height, width = gray.shape
@@ -62,7 +78,7 @@ def detect(
         floor = min(FEATURES.strong_contrast / FEATURES.octave_layers, np.partition(strength, -enough)[-enough])
     strong = np.flatnonzero(strength >= floor)
     chosen = strong[spread_evenly(points[strong], strength[strong], gray.shape, budget)]
-    # a descriptor costs more than a point: only those that are kept get one, though that needs the pyramid once more
+    # descriptors cost more than points, so only chosen points get one, though the pyramid is built a second time
     _, descriptors = sift.compute(gray, [keypoints[i] for i in chosen])
     descriptors = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-12))
     scale = float(np.mean(size_change(small, (width, height))[0]))
@@ -82,8 +98,8 @@ def spread_evenly(
 ) -> NDArray[np.intp]:
     """Indices of at most `budget` points (N, 2), the strongest of each cell of an even grid first, in rising order.
 
-    Round by round every cell gives its next strongest point until the budget is spent: a busy tree cannot starve the
-    quiet wall beside it. Ties fall by index, so the choice is the same on every machine.
+    In every round each cell gives its next strongest point until the budget is spent, so that a textured part does not
+    take the whole of it. Ties are decided by index: the choice is the same on every machine.
     """
     if len(points) <= budget:
         return np.arange(len(points))
@@ -99,7 +115,20 @@ def spread_evenly(
 
 
 def match(a: Features, b: Features, ratio: float = FEATURES.ratio) -> Matches:
-    """Mutual nearest neighbours of two feature sets that also pass Lowe's ratio test, each pair of places once."""
+    """Match two sets of features: mutual nearest neighbours that pass Lowe's ratio test.
+
+    Parameters
+    ----------
+    a, b : Features
+        Of the reference and of the target.
+    ratio : float
+        The most that the distance to the nearest neighbour may be of that to the second nearest.
+
+    Returns
+    -------
+    Matches
+        In px of the full pictures, each pair of places (to 0.1 px) once; `scale` is the larger one of a and b.
+    """
     scale = max(a.scale, b.scale)
     if len(a.points) < 2 or len(b.points) < 2:
         return Matches(np.empty((0, 2)), np.empty((0, 2)), scale)

@@ -1,4 +1,4 @@
-"""What the matches tell of the focal length, and what to say about it."""
+"""How well the matches determine the focal length, and warnings about it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class KnownFocal:
 def known_focal(
     matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, sigma: float, zoom: bool
 ) -> KnownFocal:
-    """How sure the focal length of a refined pose is, from its inlier matches."""
+    """The uncertainty of the focal length of a refined pose, from its inlier matches; sigma: their noise in px."""
     if camera.fixed or camera_prime.fixed:
         return KnownFocal(camera.source, 0.0, 0.0)
     with_prior, alone = focal_deviations(matches, pose, camera, camera_prime, sigma, zoom)
@@ -49,7 +49,7 @@ def known_focal(
 
 
 def held_focal(matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, sigma: float) -> KnownFocal:
-    """How sure a focal length is that the matches had no say in: as sure as what is known of the camera."""
+    """The same for a focal length that was not refined: its uncertainty is the prior's."""
     deviation = max(camera.log_sigma, camera_prime.log_sigma)
     few = matches.thinned(FOCAL.spread_matches)
     spread = _spread(few, pose, camera, camera_prime, sigma, 2 * deviation) if deviation else 0.0
@@ -75,7 +75,7 @@ def _spread(
 
 
 def focal_warnings(pose: Pose, camera: Camera, camera_prime: Camera) -> list[str]:
-    """Say when the matches moved a focal length far from what the file claims."""
+    """Warnings where the matches moved a focal length far from what the file claims."""
     out = []
     for name, K, cam in (("reference", pose.K, camera), ("target", pose.K_prime, camera_prime)):
         moved = K[0, 0] / cam.focal - 1

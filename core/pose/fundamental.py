@@ -1,4 +1,4 @@
-"""What the matches agree on before any camera is known: a fundamental matrix and a homography, against chance."""
+"""Robust fundamental matrix and homography from matches alone, and tests whether their support is more than chance."""
 
 from __future__ import annotations
 
@@ -102,7 +102,20 @@ class Homography:
 
 
 def fit_homography(matches: Matches, seed: int) -> Homography:
-    """The homography that explains most matches, by PoseLib's LO-RANSAC."""
+    """Fit the homography that explains most matches, by PoseLib's LO-RANSAC.
+
+    Parameters
+    ----------
+    matches : Matches
+        At least four.
+    seed : int
+        Of RANSAC.
+
+    Returns
+    -------
+    Homography
+        The identity without inliers if none is found.
+    """
     options = {
         "max_reproj_error": 2 * FUNDAMENTAL.inlier_px * matches.scale,
         "seed": seed,

@@ -67,12 +67,10 @@ def refine_pose(
     zoom: bool = False,
     iterations: int = 100,
 ) -> tuple[Pose, float]:
-    """The pose that minimises Σ log(1 + (r/σ)² + (c/σ')²) + priors of the calibration; and that cost.
+    """The pose that minimises Σ log(1 + (r/σ)² + (c/σ')²) + priors of the calibration, and that cost.
 
-    r: Sampson distances, c: distances beyond infinity, px.
-
-    sigma: noise of a Sampson distance in px. zoom: let the second focal length go its own way. A camera with a fixed
-    focal length keeps it.
+    r: Sampson distances, c: `cheirality_residual`, px. sigma: noise of a Sampson distance in px. zoom: the second focal
+    length is an unknown of its own. A fixed focal length stays.
     """
     problem = _Problem(matches, camera, camera_prime, sigma, zoom)
     cost, damping = problem.cost(pose), 1e-3
@@ -118,11 +116,10 @@ def _left_of_first(normal: Array) -> float:
 
 
 def cheirality_residual(pose: Pose, x: Array, y: Array) -> Array:
-    """How far (N,) (px, along its line, negative) each match lies on the wrong side of its point at infinity; 0 for
-    those in front.
+    """How far (N,) px, negative, each match lies along its line on the wrong side of its point at infinity; 0 in front.
 
-    F alone trades focal length against rotation almost freely; that the world lies in front of the cameras decides it.
-    Without this term a pair of parallel-looking cameras can end with most of its points behind them.
+    F alone hardly distinguishes a change of focal length from one of rotation. Without this term a pair of cameras with
+    nearly parallel axes can end with most of its points behind them.
     """
     return _beyond(pose, homogeneous(x).T, np.asarray(y).T)
 
@@ -141,8 +138,8 @@ def _beyond(pose: Pose, x: Array, y: Array) -> Array:
 def shared_focal_sigma(camera: Camera, camera_prime: Camera) -> float:
     """Standard deviation of the log of the factor that both focal lengths share, by what is known of each.
 
-    Each camera counts by its precision. Where both are known in the same way they are one piece of knowledge, told
-    twice (one lens, one maker's rounding): the sharper one counts alone.
+    Each camera counts by its precision. Two that are known in the same way are not independent (one lens, one maker's
+    rounding): the more precise one counts alone.
     """
     first, second = camera.log_sigma, camera_prime.log_sigma
     if camera.knowledge == camera_prime.knowledge or not first * second:
@@ -167,7 +164,7 @@ class _Problem:
         self.principal_free = believed_off > 0 and camera.size == camera_prime.size
         self.principal_sigma = believed_off * max(camera.size)
         self.size = 5 + self.focal_free + self.zoom + 2 * self.principal_free
-        # against the prior, residuals count as if none were smaller than what a lens leaves in them
+        # against the prior, residuals never count as more precise than lens distortion leaves them
         systematic_px = REFINEMENT.systematic_guess_px if self.assumed else REFINEMENT.systematic_px
         believed = max(sigma, systematic_px * matches.scale)
         tempered = min(1.0, REFINEMENT.effective_matches / max(1, len(matches))) * (sigma / believed) ** 2
@@ -192,16 +189,17 @@ class _Problem:
         return Pose(K, K_prime, rotation_from_vector(omega) @ pose.R, t / np.linalg.norm(t))
 
     def cost(self, pose: Pose) -> float:
+        """What is minimised."""
         r = self._sampson(pose.F)[0] / self.sigma
         c = _beyond(pose, self.x, self.y) / self.sigma_beyond
-        # one loss for both: what is off its line anyway has no say about infinity
+        # one loss for both: an outlier of the Sampson distance does not count for cheirality either
         return float(self.weight @ np.log1p(r * r + c * c) + sum(e * e for e, _ in self.priors(pose)))
 
     def _focal_prior(self, off: float) -> tuple[float, float]:
-        """Residual of log f, `off` from what is known, and its derivative.
+        """Residual of log f, `off` from its prior, and its derivative.
 
-        A guess is no measurement: far from it, what is left of the pull is that of Student's tails (3 degrees of
-        freedom), so that matches that know better are not drawn back.
+        An assumed focal length has the prior of a Student distribution, which pulls less the further away f is: it must
+        not override matches that determine f.
         """
         z = off / self.focal_sigma
         if not self.assumed or z == 0:
@@ -211,8 +209,8 @@ class _Problem:
         return float(value), float(z / (1 + z * z / freedom) / value / self.focal_sigma)
 
     def priors(self, pose: Pose) -> list[tuple[float, Array]]:
-        """Residuals of the prior with their derivatives by the unknowns; the second focal's ratio to the first is kept
-        near what the files say."""
+        """Residuals of the priors with their derivatives by the unknowns; a second focal length has one on its ratio
+        to the first."""
         size, out = self.size, []
         off = np.log(pose.K[0, 0] / self.camera.focal)
         if self.focal_free:
@@ -230,8 +228,8 @@ class _Problem:
                 d_second[1] = 1 / self.camera_prime.log_sigma
                 out.append((np.log(pose.K_prime[0, 0] / self.camera_prime.focal) * d_second[1], d_second))
         if self.principal_free:
-            moved = (pose.K - self.camera.K)[:2, 2] / self.principal_sigma
-            out += [(float(moved[i]), np.eye(size)[size - 7 + i]) for i in (0, 1)]
+            shift = (pose.K - self.camera.K)[:2, 2] / self.principal_sigma
+            out += [(float(shift[i]), np.eye(size)[size - 7 + i]) for i in (0, 1)]
         return out
 
     def normal_equations(self, pose: Pose) -> tuple[Array, Array]:
@@ -244,11 +242,11 @@ class _Problem:
         far = (beyond / self.sigma_beyond) ** 2
         loss = self.weight / (1 + (residual / self.sigma) ** 2 + far)
         _add(normal, gradient, residual, by_unknowns.T @ by_F, loss / self.sigma**2)
-        # those far off their lines are left out: they have no say anyway
-        wrong = far * loss > REFINEMENT.negligible_cheirality * self.weight
-        if wrong.any():
-            derivative = self._beyond_derivative(pose, wrong)
-            _add(normal, gradient, beyond[wrong], derivative, loss[wrong] / self.sigma_beyond**2)
+        # those far off their lines are left out: their weight is negligible
+        behind = far * loss > REFINEMENT.negligible_cheirality * self.weight
+        if behind.any():
+            derivative = self._beyond_derivative(pose, behind)
+            _add(normal, gradient, beyond[behind], derivative, loss[behind] / self.sigma_beyond**2)
         for e, d in self.priors(pose):
             normal += np.outer(d, d)
             gradient += e * d

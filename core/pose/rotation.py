@@ -1,4 +1,4 @@
-"""The same viewpoint: two pictures that differ by a rotation, and perhaps a zoom, of the camera."""
+"""Two pictures from the same viewpoint: the camera was rotated, and perhaps zoomed, between them."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Rotation:
 
 
 def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camera, sigma: float) -> Rotation:
-    """The rotation, and the focal lengths where they are not fixed, that explain matches of a homography H best.
+    """The rotation, and the focal lengths that are not fixed, which explain the matches of a homography H best.
 
-    Minimises the transfer error in units of `sigma` px, robustly, and the priors of the focal lengths; two that are not
-    fixed are expected to change in step.
+    Minimises the transfer error in units of `sigma` px with a Cauchy loss, and the priors of the focal lengths;
+    two that are not fixed are expected to be off by the same factor.
     """
     from scipy.optimize import least_squares  # takes long to load, and few pairs come here
 
@@ -48,7 +48,7 @@ def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camer
         ray = x @ unpack(p).H_inf.T
         with np.errstate(divide="ignore", invalid="ignore"):
             away = (project(ray) - few.y) / sigma
-        # behind the camera everything is equally wrong
+        # behind the camera the error has no meaning: the largest
         away = np.where((ray[:, 2:] > 0) & np.isfinite(away), np.clip(away, -most, most), most)
         prior = [p[3] / camera.log_sigma] if free else []
         if free_prime:

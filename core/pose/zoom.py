@@ -15,10 +15,10 @@ from .refinement import Pose, pose_of_fundamental, refine_pose
 def with_two_focals(
     matches: Matches, pose: Pose, F: Array, camera: Camera, camera_prime: Camera, sigma: float
 ) -> Pose | None:
-    """The pose with two focal lengths where they are evident, else None.
+    """The pose with two focal lengths if it is clearly better, else None.
 
-    pose: with a common one, sigma px the noise it leaves; F: of the matches, free of any camera. A focal length that is
-    given is not doubted.
+    pose: with a common one, sigma px the noise it leaves; F: of the matches alone. Given focal lengths are not changed.
+    F has as many unknowns as a pose with two focal lengths: if F leaves too much of the residuals, so would they.
     """
     if camera.fixed or camera_prime.fixed:
         return None
@@ -26,7 +26,7 @@ def with_two_focals(
     common = sampson_residuals(pose.F, few.x, few.y)
 
     def left(other: Array) -> float:
-        """The share of its robust residuals that another F leaves, over the matches that either explains."""
+        """The share of the robust residuals of `pose` that another F leaves, over matches that either explains."""
         residuals = common, sampson_residuals(other, few.x, few.y)
         explained = np.minimum(*np.abs(residuals)) < ZOOM.explained_px * few.scale
         before, after = (float(np.log1p((r[explained] / sigma) ** 2).sum()) for r in residuals)

@@ -18,8 +18,22 @@ def fetch(
     source: NDArray[Any] | LazyImage, map_x: NDArray[np.float32], map_y: NDArray[np.float32],
     interpolation: int = cv2.INTER_CUBIC,
 ) -> NDArray[Any]:
-    """Samples (H, W, C) of a source (h, w, C) at map positions, in tiles, of the source's type; 0 where the map leaves
-    the picture."""
+    """Sample a picture at the positions of a map, in tiles.
+
+    Parameters
+    ----------
+    source : (h, w, C) array or LazyImage
+        The picture.
+    map_x, map_y : (H, W) float32
+        px of the source for each sample, NaN for none.
+    interpolation : int
+        OpenCV's flag.
+
+    Returns
+    -------
+    (H, W, C)
+        Of the source's type; 0 where the map leaves the picture.
+    """
     out = np.zeros((*map_x.shape, source.shape[2]), source.dtype)
     step = PARTS.tile_side
     tops, lefts = (range(0, side, step) for side in map_x.shape)

@@ -1,8 +1,8 @@
-"""What was worked out before is not worked out again: results by the content that they follow from, on disk.
+"""A cache of results on disk, by the content that they are computed from.
 
-A key is a digest of everything that decides: pixels, matches, cameras, options, this program's own source and the
-libraries' versions. So nothing ever has to be declared stale; and an entry that is damaged, cut off or another's is no
-entry. Entries are arrays and plain values of our own dataclasses, never pickles: reading one runs nothing.
+A key is a digest of everything that decides a result: pixels, matches, cameras, options, this program's own source and
+the libraries' versions. So entries are never stale, and a damaged one counts as absent. Entries are arrays and plain
+values of our own dataclasses, never pickles: reading one runs no code.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from .options import SYSTEM
 
-Kept = TypeVar("Kept")
+Result = TypeVar("Result")
 # The package of the whole engine, whichever name it is installed under.
 _PACKAGE = __name__.rpartition(".system")[0]
 _PLAN = "plan.json"
@@ -57,11 +57,22 @@ class Cache:
     def __init__(self, folder: Path | None, limit: int = SYSTEM.cache_bytes) -> None:
         self._folder, self._limit = folder, limit
 
-    def remember(self, what: str, decided_by: tuple[Any, ...], make: Callable[[], Kept]) -> Kept:
-        """The result of make(), which `what` and `decided_by` decide: found, or made and kept.
+    def remember(self, what: str, decided_by: tuple[Any, ...], make: Callable[[], Result]) -> Result:
+        """Return the stored result of an earlier call, or call `make` and store what it returns.
 
-        decided_by, and what make returns: dataclasses of this package, arrays, plain values, tuples of them; anything
-        else is made anew each time. Raises what make raises, which is not kept.
+        Parameters
+        ----------
+        what : str
+            Names the computation.
+        decided_by : tuple
+            Everything the result depends on: dataclasses of this package, arrays, plain values, tuples of them.
+            Anything else is not stored, nor is a result of another type.
+        make : callable
+            Computes the result; what it raises is passed on.
+
+        Returns
+        -------
+        The result, equal bit for bit whether it was stored or not.
         """
         if self._folder is None:
             return make()
@@ -69,7 +80,7 @@ class Cache:
             path = self._folder / f"{_digest(what, decided_by)}.npz"
         except _Unknown:
             return make()
-        found: Kept | None = _read(path)
+        found: Result | None = _read(path)
         if found is not None:
             return found
         made = make()

@@ -231,7 +231,7 @@ def _is_left(entry: os.DirEntry[str]) -> bool:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """A short while in which signals wait, so that nobody's impatience (a second Ctrl-C) leaves anything half done."""
+    """SIGINT and SIGTERM wait until the end of this context, so that a second Ctrl-C leaves nothing half done."""
     if threading.current_thread() is not threading.main_thread():  # signals never come here
         yield
         return
