@@ -32,8 +32,10 @@ from .panorama.warp import Warp, build_warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
 from .pose import features
-from .pose.estimation import MIN_MATCHES, estimate
+from .pose.estimation import estimate
 from .pose.match_files import read_matches
+from .pose.options import ESTIMATION
+from .raster.resizing import resized_points
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, TooFewMatches
 from .system.threads import in_order
@@ -196,14 +198,14 @@ def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:
     found = []
-    most = (features.PREVIEW_BUDGET, features.PREVIEW_PIXELS) if quick else ()
+    most = (features.FEATURES.preview_budget, features.FEATURES.preview_pixels) if quick else ()
     for i, frame in enumerate(frames):
         seen = []
         for keypoints in in_order(lambda p: features.detect(p.view, p.alpha, *most), frame.pictures):
             seen.append(keypoints)
             progress("features", (i + 0.9 * len(seen) / len(frame.pictures)) / len(frames))
         found.append(features.match(seen[0], seen[1]))
-        if len(frames) == 1 and len(found[0]) < MIN_MATCHES:
+        if len(frames) == 1 and len(found[0]) < ESTIMATION.min_matches:
             _refuse_scarce(len(found[0]), frame, [len(one.points) for one in seen])
     x, y = np.concatenate([m.x for m in found]), np.concatenate([m.y for m in found])
     return Matches(x, y, max(m.scale for m in found))
@@ -216,9 +218,9 @@ def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
         if count < SCARCE:
             width, height = size_of(picture)
             raise TooFewMatches(
-                f"only {matches} matching points found, at least {MIN_MATCHES} needed: the {role(number)} "
-                f"({width}×{height} pixels) shows only {count} points of detail; choose a larger or sharper picture of "
-                "something with texture, or give matches by hand (--matches)"
+                f"only {matches} matching points found, at least {ESTIMATION.min_matches} needed: the "
+                f"{role(number)} ({width}×{height} pixels) shows only {count} points of detail; choose a larger or sharper "
+                "picture of something with texture, or give matches by hand (--matches)"
             )
 
 
@@ -227,7 +229,7 @@ def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, ...])
     sizes = frame.full_sizes
     matches = read_matches(source, *sizes)
     x, y = (
-        (points + 0.5) * (np.array(camera.size) / np.array(size)) - 0.5
+        resized_points(points, size, camera.size)
         for points, camera, size in zip((matches.x, matches.y), cameras, sizes, strict=True)
     )
     seen = _shown(frame.pictures[0], x) & _shown(frame.pictures[1], y)

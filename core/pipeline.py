@@ -28,6 +28,7 @@ from .panorama.warp import Warp
 from .pictures.masks import painted_over
 from .pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
 from .raster.arrays import Box, common, cut
+from .raster.resizing import resized_points
 from .system.errors import BadRequest, NoOverlap
 from .system.progress import Progress
 from .system.threads import in_order
@@ -83,7 +84,7 @@ class StitchResult:
         edge = self.edges[0]
         used = edge.matches.subset(np.flatnonzero(edge.two_view.inliers)[self.field.fit.inliers_used])
         x, y = (
-            (points + 0.5) * (np.array(full) / np.array(camera.size)) - 0.5
+            resized_points(points, camera.size, full)
             for points, full, camera in zip((used.x, used.y), self.full_sizes, self.cameras, strict=True)
         )
         return Matches(x, y, used.scale, used.weights)

@@ -1,4 +1,4 @@
-"""Where intrinsics come from: given, a camera file, EXIF, or an assumption; and how far to believe them."""
+"""Intrinsics as given, from a camera file, from EXIF, or assumed; and how precise they are."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..system.errors import BadRequest, UnreadableImage
-from .camera import PRINCIPAL_SIGMA, Camera, Knowledge
+from .camera import Camera, Knowledge
+from .options import INTRINSICS
 from .sensors import sensor_diagonal
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
 # Diagonal of the 36 × 24 mm frame that "35 mm equivalent" refers to.
 FULL_FRAME_DIAGONAL = float(np.hypot(36.0, 24.0))
-# Beliefs, as standard deviations of log f. Phone makers round and measure before distortion correction: 2-7 % off seen.
-EXIF_SIGMA, CROPPED_SIGMA, ASSUMED_SIGMA = 0.05, 0.2, 0.4
 
 
 @dataclass(frozen=True)
@@ -69,10 +68,33 @@ def role(number: int) -> str:
 def cameras_for(
     request: CameraRequest, names: Sequence[str], sizes: Sequence[tuple[int, int]], exifs: Sequence[Exif]
 ) -> tuple[list[Camera], list[str]]:
-    """The pictures' cameras by the best that is known of each (docs/method.md), and warnings about what contradicts
-    itself.
+    """What is known of the pictures' cameras before matching.
 
-    names: as a camera file would call the pictures; sizes: (W, H) px after orientation was applied. Raises BadRequest.
+    The user's word comes first, then EXIF, then another picture's focal length, then a usual one.
+
+    Parameters
+    ----------
+    request : CameraRequest
+        What the user said.
+    names : sequence of str
+        What a camera file would call the pictures.
+    sizes : sequence of (int, int)
+        (W, H) px after orientation was applied.
+    exifs : sequence of Exif
+        Of the upright pictures.
+
+    Returns
+    -------
+    cameras : list of Camera
+    warnings : list of str
+        Where EXIF contradicts itself.
+
+    Raises
+    ------
+    BadRequest
+        The camera file lacks a picture or holds something else.
+    UnreadableImage
+        The camera file cannot be read.
     """
     warnings: list[str] = []
     if request.cameras is not None:
@@ -97,7 +119,8 @@ def _like(known: Camera, unknown: Camera) -> Camera:
     """An unknown camera with the lens of a known one."""
     guess = known.focal * max(unknown.size) / max(known.size)
     # the same knowledge as the other picture's, so that the focal prior does not count it twice
-    return _camera(guess, unknown.size, f"the other picture ({known.source})", CROPPED_SIGMA, known.knowledge)
+    source = f"the other picture ({known.source})"
+    return _camera(guess, unknown.size, source, INTRINSICS.cropped_sigma, known.knowledge)
 
 
 def _one_camera(request: CameraRequest, index: int, size: tuple[int, int], exif: Exif, warnings: list[str]) -> Camera:
@@ -125,21 +148,24 @@ def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]
     if exif.focal_mm and exif.focal_plane_x_per_mm and exif.width and exif.height:
         shrink = max(size) / max(exif.width, exif.height)
         found.append((exif.focal_mm * exif.focal_plane_x_per_mm * shrink, "EXIF focal length and sensor resolution"))
-    found = [(f, source) for f, source in found if 0.2 * max(size) < f < 50 * max(size)]
+    least, most = INTRINSICS.least_focal * max(size), INTRINSICS.most_focal * max(size)
+    found = [(f, source) for f, source in found if least < f < most]
     if not found:
-        return _camera(0.9 * max(size), size, "assumed (0.9 × the longer side)", ASSUMED_SIGMA, Knowledge.ASSUMED)
+        sides, sigma = INTRINSICS.assumed_focal, INTRINSICS.assumed_sigma
+        source = f"assumed ({sides:g} × the longer side)"
+        return _camera(sides * max(size), size, source, sigma, Knowledge.ASSUMED)
     focal, source = found[0]
     for other, other_source in found[1:]:
-        if abs(np.log(other / focal)) > 0.15:
+        if abs(np.log(other / focal)) > INTRINSICS.contradiction:
             warnings.append(
                 f"the {name}'s EXIF contradicts itself: {focal:.0f} px by {source}, {other:.0f} px by "
                 f"{other_source}; the first is used"
             )
-    sigma = EXIF_SIGMA
+    sigma = INTRINSICS.exif_sigma
     if exif.width and exif.height:
         aspect, original = max(size) / min(size), max(exif.width, exif.height) / min(exif.width, exif.height)
-        if abs(np.log(aspect / original)) > 0.03:
-            sigma = CROPPED_SIGMA
+        if abs(np.log(aspect / original)) > INTRINSICS.cropped_aspect:
+            sigma = INTRINSICS.cropped_sigma
             warnings.append(
                 f"the {name} was cropped since it was taken ({exif.width}×{exif.height} in EXIF, {size[0]}×{size[1]} "
                 "now): its EXIF focal "
@@ -156,7 +182,7 @@ def _camera(
     focal: float, size: tuple[int, int], source: str, log_sigma: float, knowledge: Knowledge = Knowledge.GIVEN
 ) -> Camera:
     K = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1.0]])
-    return Camera(K, size, source, log_sigma, principal_sigma=PRINCIPAL_SIGMA, knowledge=knowledge)
+    return Camera(K, size, source, log_sigma, principal_sigma=INTRINSICS.principal_sigma, knowledge=knowledge)
 
 
 def _with_principal_point(camera: Camera, principal: tuple[float, ...]) -> Camera:

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import STRIP, Part, bounds
+from ..raster.arrays import Part, bounds
 from ..raster.lazy import AnyImage, LazyImage
+from ..raster.options import PARTS
 from ..system.threads import in_order
 
 BLOCK = 8
@@ -84,7 +85,7 @@ def match_exposure(
         return unchanged(channels)
     # whole blocks of the canvas
     rows, columns = (slice(part.start - part.start % BLOCK, part.stop + -part.stop % BLOCK) for part in box)
-    at_once = BLOCK * max(1, STRIP // (BLOCK * (columns.stop - columns.start)))
+    at_once = BLOCK * max(1, PARTS.strip_pixels // (BLOCK * (columns.stop - columns.start)))
 
     def means_of(top: int) -> list[NDArray[np.float64]]:
         part = slice(top, min(rows.stop, top + at_once)), columns

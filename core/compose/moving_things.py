@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.distance import distance_inside
+from ..raster.distance import distance_inside, distance_to_border
 from ..raster.picture_map import PictureMap
 from .overlap import Overlap
 
@@ -88,8 +88,7 @@ def _moving(
         return False
     left_over = targets - places @ np.linalg.lstsq(places, targets, rcond=None)[0]
     parallax = np.hypot(*np.ptp(left_over, axis=0)) / step
-    inner = np.pad(thing, 1).astype(np.uint8)
-    across = 2 * float(cv2.distanceTransform(inner, cv2.DIST_L2, cv2.DIST_MASK_5).max())
+    across = 2 * float(distance_to_border(thing).max())
     return across > WIDER * parallax
 
 

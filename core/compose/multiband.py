@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import strips
-from ..raster.pull_push import _down, _filled, _up, _weights
+from ..raster.pull_push import expanded, pulled, pulled_weights, push, reduced
 from ..system.threads import each
 
 Plane: TypeAlias = NDArray[np.float32]
@@ -43,16 +43,16 @@ def correction(
     """
     # one channel after the other: all at once would be the peak of a stitch's memory
     channels = range(difference.shape[2])
-    weights = _weights(same.astype(np.float32))
+    weights = pulled_weights(same.astype(np.float32))
     for k in channels:
         # on the far side of the seam: what the picture of this side would show there, had it the other's light
-        difference[..., k] = _filled(difference[..., k] * weights[0], weights)
+        difference[..., k] = push(pulled(difference[..., k] * weights[0], weights), weights)
     del weights
     # a pixel's width to either side, or else the finest band is cut with a pair of scissors
     share = cv2.blur(_from_nearest(chosen, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
     shares = [share]
     while len(shares) <= bands and min(shares[-1].shape) > 2:
-        shares.append(_down(shares[-1]))
+        shares.append(reduced(shares[-1]))
     for k in channels:
         light = np.ascontiguousarray(difference[..., k])
         blended = _masked_bands(light, shares)
@@ -88,9 +88,9 @@ def _masked_bands(light: Plane, shares: list[Plane]) -> Plane:
     share, *smoother = shares
     if not smoother:
         return light * share
-    coarser = _down(light)
-    band = _up(coarser, light.shape)
+    coarser = reduced(light)
+    band = expanded(coarser, light.shape)
     np.subtract(light, band, out=band)
     band *= share
-    band += _up(_masked_bands(coarser, smoother), light.shape)
+    band += expanded(_masked_bands(coarser, smoother), light.shape)
     return band

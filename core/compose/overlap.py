@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..panorama.layers import Layer
 from ..raster.arrays import beside, bounds, shown_only, strips
 from ..raster.log_encoding import log_encode
+from ..raster.robust import NORMAL_MEDIAN
 from ..system.threads import each
 
 WHOLE = 1 - 1 / 255
@@ -65,7 +66,7 @@ def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray
         return shown
     sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // SAMPLES)]]
     middle = np.median(sample, axis=0)
-    sigma = 1.4826 * np.median(np.abs(sample - middle), axis=0)
+    sigma = np.median(np.abs(sample - middle), axis=0) / NORMAL_MEDIAN
     most = np.maximum(SAME_SIGMAS * sigma, SAME_TONE)
     alike = np.empty(shown.shape, bool)
 

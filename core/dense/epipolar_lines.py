@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
 from ..cameras.lens import distort, undistort
+from ..cameras.projective import ahead_of_camera
 from ..cameras.two_view import TwoView
 from ..field.field import Field
 from ..field.transfer import target_points
 from ..raster.arrays import Array, Box, Plane
 from ..raster.grid import Grid
+from ..raster.resizing import resized_points
 from ..system.threads import each
 
 Places = NDArray[np.intp]
@@ -82,7 +84,7 @@ class SparseMap:
 
         def affine(columns: int, rows: int) -> tuple[Plane, Plane]:
             """By x and by y, at the middles of so many cells."""
-            xs, ys = ((np.arange(n) + 0.5) * (all_of / n) - 0.5 for n, all_of in ((columns, width), (rows, height)))
+            xs, ys = (resized_points(np.arange(n), n, all_of) for n, all_of in ((columns, width), (rows, height)))
             xs, ys = xs * self.step + self.start[0], ys * self.step + self.start[1]
             return (plane[0] * xs + plane[2]).astype(np.float32), (plane[1] * ys).astype(np.float32)[:, None]
 
@@ -166,7 +168,7 @@ class EpipolarLines:
             part = slice(top, top + STRIP)
             u, v, d = ideal[part, :, 0], ideal[part, :, 1], inverse_depth[part].astype(np.float64)
             ray = [H[k, 0] * u + H[k, 1] * v + (H[k, 2] + e[k] * d) for k in range(3)]
-            ray[2][ray[2] <= 1e-6 * np.maximum(np.abs(ray[0]), np.abs(ray[1]))] = np.nan
+            ray[2][~ahead_of_camera(*ray)] = np.nan
             near = 1 / ray[2]
             x, y = ray[0] * near, ray[1] * near
             slope_x, slope_y = (e[0] - x * e[2]) * near, (e[1] - y * e[2]) * near

@@ -21,7 +21,8 @@ from ..field.slack import SlackField
 from ..field.strict import StrictField
 from ..pictures.picture import Picture
 from ..raster.arrays import Box, Plane
-from ..raster.sampling import REMAP_LIMIT, fetch
+from ..raster.options import PARTS
+from ..raster.sampling import fetch
 from ..system.threads import in_order
 from .edge_aware_smoothing import Smoother, cut_edges, edge_weights, strengthen
 from .epipolar_lines import EpipolarLines, SparseMap
@@ -75,7 +76,7 @@ def refine(
     slack = isinstance(field, SlackField)
     side = max(cameras[0].size)
     margin = int(MOST_FADE * side) + 16
-    if max(side, *cameras[1].size) + 2 * margin > REMAP_LIMIT:
+    if max(side, *cameras[1].size) + 2 * margin > PARTS.max_remap_side:
         return Dense(None, f"a picture with a side of {max(side, *cameras[1].size)} px is too long to be searched")
     every = max(1, int(np.sqrt(np.prod(cameras[0].size) / POLISHED)))
     sparse = SparseMap.over_reference(field, two_view, *cameras, margin, every)

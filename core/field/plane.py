@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..cameras.projective import homogeneous, project
+from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..raster.arrays import Array
+from ..raster.robust import sigma_of
 
 DRAWS = 400
 # Matches count by exp(−distance / this share of the picture's side) from where the target goes on.
@@ -31,7 +32,7 @@ def fit_plane(x: Array, d: Array, sensitivity: Array, noise_px: float) -> Array:
         previous = coefficients
         coefficients = np.linalg.lstsq(design * weight[:, None], d * weight, rcond=None)[0]
         residual = sensitivity * (d - design @ coefficients)
-        scale_px = max(noise_px, float(np.median(np.abs(residual))) / 0.6745)
+        scale_px = max(noise_px, sigma_of(residual))
         weight = sensitivity / np.sqrt(1 + (residual / (2.385 * scale_px)) ** 2)
         if np.abs(coefficients - previous).max() < 1e-10 * np.abs(coefficients).max():
             break
@@ -47,7 +48,7 @@ def beyond_reference(H: Array, size: tuple[int, int], target_size: tuple[int, in
     last = np.array(target_size) - 1.0
     u, v = np.meshgrid(np.linspace(0, last[0], NODES), np.linspace(0, last[1], NODES))
     back = homogeneous(np.column_stack([u.ravel(), v.ravel()])) @ np.linalg.inv(H).T
-    points = project(back[back[:, 2] > 1e-6 * np.abs(back[:, :2]).max(axis=1)])
+    points = project(back[ahead_of_camera(*back.T)])
     end = np.array(size) - 1.0
     return np.clip(points[((points < 0) | (points > end)).any(axis=1)], 0, end)
 

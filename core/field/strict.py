@@ -16,6 +16,7 @@ from ..cameras.matches import Matches
 from ..cameras.two_view import TwoView
 from ..raster.arrays import Array
 from ..raster.grid import Grid
+from ..raster.robust import NORMAL_MEDIAN
 from ..system.errors import DegenerateGeometry
 from .fade import fade_width, fading, on_nodes, outside_overlap
 from .field import FieldValues, Fit
@@ -210,7 +211,7 @@ def _prune_and_smooth(
     # gross errors first: they would bend the spline towards themselves, so each is judged by the spline without it
     while True:
         error = np.abs(sensitivity[index] * inverse.held_out(g[index]))
-        if not drop(error <= max(GROSS_DEVIATIONS * np.median(error) / 0.6745, floor)):
+        if not drop(error <= max(GROSS_DEVIATIONS * np.median(error) / NORMAL_MEDIAN, floor)):
             break
     problem, left = problem.subset(left), left[left]
     smoothing = best_smoothing(problem, g[index], sensitivity[index])

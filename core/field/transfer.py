@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..cameras.projective import homogeneous, project
+from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..raster.arrays import Array
 
 
@@ -32,8 +32,7 @@ def transfer(view: Transfer, infinite: list[Array], inverse_depth: Array) -> tup
     e = view.e_prime
     depth = inverse_depth if e.any() else 0.0  # without a baseline depth, known or not (NaN), moves nothing
     a, b, c = (part + depth * e[k] for k, part in enumerate(infinite))
-    # relative to the ray's own length: less than this in front is behind for any picture
-    c = np.where(c <= 1e-6 * np.maximum(np.abs(a), np.abs(b)), np.nan, c)
+    c = np.where(ahead_of_camera(a, b, c), c, np.nan)
     return a / c, b / c
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from ..cameras.matches import Matches
 from ..cameras.projective import distance_to_line, homogeneous, normalisation, sampson_residuals
 from ..raster.arrays import Array
+from ..raster.robust import NORMAL_MEDIAN
 from .metrics import CoverageSamples
 
 # Less than this many points cannot be said to determine F.
@@ -65,7 +66,7 @@ def _refitted(F: Array, matches: Matches, limit: float) -> Array | None:
         if agree.sum() < LEAST_MATCHES:
             return None
         near = distance[agree]
-        knee = max(2.385 * float(np.median(near)) / 0.6745, 1e-9)
+        knee = max(2.385 * float(np.median(near)) / NORMAL_MEDIAN, 1e-9)
         F = eight_point(matches.x[agree], matches.y[agree], 1 / np.sqrt(1 + (near / knee) ** 2))
     return F
 

@@ -19,6 +19,7 @@ from ..measure.metrics import look_up
 from ..pipeline import StitchResult
 from ..raster.arrays import Array
 from ..raster.colour import encode
+from ..raster.resizing import size_change
 
 # Pixels along the longer side of the pictures that lie over the panorama, and nodes along that of the depth grid.
 LONGEST_SIDE = 1600
@@ -30,9 +31,9 @@ def scales(result: StitchResult) -> list[Array]:
     """For each picture the matrix S (3, 3) that brings px of the full picture to px of the one that was worked on."""
     out = []
     for full, camera in zip(result.full_sizes, result.cameras, strict=True):
-        factor = np.array(camera.size) / np.array(full)
+        factor, shift = size_change(full, camera.size)
         S = np.diag([*factor, 1.0])
-        S[:2, 2] = (factor - 1) / 2  # pixel centres are integers: the corner lies at −½
+        S[:2, 2] = shift
         out.append(S)
     return out
 

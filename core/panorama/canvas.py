@@ -13,9 +13,10 @@ import numpy as np
 
 from ..cameras.camera import Camera
 from ..cameras.lens import distort, undistort
-from ..cameras.projective import homogeneous, inverse_intrinsics
+from ..cameras.projective import ahead_of_camera, homogeneous, inverse_intrinsics
 from ..raster.arrays import Array, Box
-from ..raster.grid import NODES, Grid
+from ..raster.grid import Grid
+from ..raster.options import GRID
 from ..raster.picture_map import falls_inside
 from ..system.errors import OutputTooLarge
 from .projection import Projection, extent
@@ -85,7 +86,7 @@ class Canvas:
         """Raw pixels (len(ys), len(xs), 2) of the reference at columns xs and lines ys in px of the plane, NaN behind
         its camera; and p_3 there."""
         a, b, c = self.project_rows(np.eye(3), xs, ys, camera)
-        c = np.where(c > 1e-6 * np.maximum(np.abs(a), np.abs(b)), c, np.nan)
+        c = np.where(ahead_of_camera(a, b, c), c, np.nan)
         ideal = np.stack([a / c, b / c], axis=-1)
         return ideal if camera is None else distort(ideal, camera), c
 
@@ -106,7 +107,8 @@ def bounding_canvas(
     max_stretch = np.inf if projection is not None and projection.sphere else MAX_STRETCH
     cropped = False
     for _ in range(2):  # the second pass looks closer at what the first found
-        grid = Grid.over(int(left), int(top), max(1, int(right - left)), max(1, int(bottom - top)), nodes=NODES // 10)
+        width, height = max(1, int(right - left)), max(1, int(bottom - top))
+        grid = Grid.over(int(left), int(top), width, height, nodes=GRID.nodes // 10)
         useful, any_stretched = np.zeros((grid.rows, grid.columns), bool), False
         for places, size in zip(pictures_at(grid), sizes, strict=True):
             seen = falls_inside(places[..., 0], places[..., 1], size)
@@ -205,8 +207,7 @@ def border(size: tuple[int, int]) -> Array:
 
 def _raw(point: Array, camera: Camera) -> Array:
     """The raw pixel (2,) of a canvas point's image p (3,), NaN behind the camera."""
-    ahead = point[2] > 1e-6 * np.abs(point[:2]).max()
-    return distort(point[:2] / point[2], camera) if ahead else np.full(2, np.nan)
+    return distort(point[:2] / point[2], camera) if ahead_of_camera(*point) else np.full(2, np.nan)
 
 
 def _union(box: Array, reference: Box, limits: Array) -> tuple[int, int, int, int]:

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
 from ..cameras.lens import distort, undistort
-from ..cameras.projective import homogeneous, project
+from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..cameras.view import View
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
 from ..raster.arrays import Array, Box, box_of, strips
-from ..raster.grid import NODES, Grid
+from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, Placed, whole
+from ..raster.options import GRID
 from ..raster.picture_map import CanvasMap, PictureMap
 from ..system.errors import BadRequest, NoOverlap
 from ..system.threads import each
@@ -157,7 +158,7 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     margin = int(np.ceil(min(field.fit.fade_px, MAX_FADE * max(camera.size))))
     across, down = width + 2 * margin, height + 2 * margin
     share = min(4.0, max(1.0, across * down / (2 * width * height)))
-    flat = Grid.over(-margin, -margin, across, down, int(share * NODES))
+    flat = Grid.over(-margin, -margin, across, down, int(share * GRID.nodes))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)
     if values.far is None:
@@ -187,7 +188,7 @@ def _outline(H_plane: Array, view: View) -> Array:
 def _in_plane(points: Array) -> Array:
     """Reference pixels (N, 2) of canvas points (N, 3), NaN behind the reference camera."""
     points = points.copy()
-    points[points[:, 2] <= 1e-6 * np.abs(points[:, :2]).max(axis=1)] = np.nan
+    points[~ahead_of_camera(*points.T)] = np.nan
     return project(points)
 
 

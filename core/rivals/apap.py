@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.matches import Matches
-from ..cameras.projective import homogeneous
+from ..cameras.projective import LEAST_AHEAD, homogeneous
 from ..cameras.two_view import TwoView
 from ..field.field import FieldValues, Fit
 from ..field.strict import StrictField
@@ -24,8 +24,6 @@ from .homography import LinearEquations, direct_linear, knowing_only
 SIGMA, GAMMA = 0.05, 0.0025
 # Points are solved in slabs of about this many weights, so that memory stays bounded.
 SLAB = 4_000_000
-# Nothing is shown of what lies less than this in front of the target camera, relative to its lengths.
-LEAST_AHEAD = 1e-6
 
 
 @dataclass(frozen=True)

@@ -230,7 +230,7 @@ def test_each_stage_is_told_and_features_climb(clip: list[Pair], quick: StitchOp
 def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
     small_pair: Pair, quick: StitchOptions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(features, "PREVIEW_BUDGET", 500)
+    monkeypatch.setattr(features, "FEATURES", replace(features.FEATURES, preview_budget=500))
     frame = frame_of(small_pair, quick)
     real = features.detect
     asked: list[tuple[int, ...]] = []
@@ -241,7 +241,7 @@ def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
 
     monkeypatch.setattr(features, "detect", detect)
     found = {blend: align([frame], replace(quick, blend=blend), silent) for blend in ("feather", "linear")}
-    assert asked == [(), (), (500, features.PREVIEW_PIXELS), (500, features.PREVIEW_PIXELS)]
+    assert asked == [(), (), (500, features.FEATURES.preview_pixels), (500, features.FEATURES.preview_pixels)]
     points = np.stack(np.meshgrid(np.linspace(60, 180, 7), np.linspace(30, 150, 7)), axis=-1).reshape(-1, 2)
     away = np.linalg.norm(found["feather"].field.predict(points) - found["linear"].field.predict(points), axis=1)
     few, many = (len(found[blend].edges[0].matches) for blend in ("linear", "feather"))

@@ -325,8 +325,8 @@ def test_the_same_pixels_whichever_strip_is_done_first(
     small_pair: Pair, known: StitchOptions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Small pictures are one strip; here they are dozens, with dense refinement and all."""
-    for module in (arrays, visibility):
-        monkeypatch.setattr(module, "STRIP", 5_000)
+    monkeypatch.setattr(arrays, "PARTS", replace(arrays.PARTS, strip_pixels=5_000))
+    monkeypatch.setattr(visibility, "STRIP", 5_000)
     before, results = cv2.getNumThreads(), []
     try:
         for threads in (1, 3):

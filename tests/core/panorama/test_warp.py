@@ -328,8 +328,7 @@ def test_tiles_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     map_x[40:44, 50:60] = np.nan
     whole = fetch(source, map_x, map_y)
     for tile, limit in ((64, 32_000), (7, 32_000), (64, 20), (4096, 20)):
-        monkeypatch.setattr(sampling, "TILE", tile)
-        monkeypatch.setattr(sampling, "REMAP_LIMIT", limit)
+        monkeypatch.setattr(sampling, "PARTS", replace(sampling.PARTS, tile_side=tile, max_remap_side=limit))
         assert np.array_equal(fetch(source, map_x, map_y), whole)
 
 

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import homogeneous, infinite_homography, project
-from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
 from edf_stitch.core.pose.focal import KnownFocal, focal_warnings, known_focal
 from edf_stitch.core.pose.refinement import Pose, focal_deviations, refine_pose
 
 from ..point_scenes import FOCAL, SIZE, turned_by, unit
+
+ASSUMED_SIGMA, EXIF_SIGMA = INTRINSICS.assumed_sigma, INTRINSICS.exif_sigma
 
 # R and t of target cameras, each half a unit or more away: what they tell of the focal length follows from DESIGN 4
 CONVERGING = (turned_by(8, -15, 5), 0.8 * unit(1, -0.4, 0.3))
