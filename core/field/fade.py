@@ -7,6 +7,7 @@ import numpy as np
 from ..raster.arrays import Array
 from ..raster.distance import outside
 from ..raster.grid import Grid
+from .options import FADE
 from .spline import ThinPlateSpline
 
 
@@ -38,4 +39,4 @@ def fading(away: Array, width: float) -> Array:
 
 def fade_width(moved_px: Array, noise_scale: float) -> float:
     """Width (px) over which a field fades that moves its matches by moved_px (N,): five times its robust maximum."""
-    return max(5 * float(np.percentile(moved_px, 98)), 8 * noise_scale)
+    return max(FADE.length * float(np.percentile(moved_px, 98)), FADE.min_px * noise_scale)

@@ -11,14 +11,7 @@ import numpy as np
 
 from ..cameras.projective import homogeneous, project
 from ..raster.arrays import Array
-
-DRAWS = 400
-# Matches count by exp(−distance / this share of the picture's side) from where the target goes on.
-NEARBY = 0.2
-# Matches are counted by the area they stand for: in cells of this share of the side all together count as one.
-CELL = 1 / 16
-# Points of the target's grid, a side, that say where it goes on.
-NODES = 24
+from .options import PLANE
 
 
 def fit_plane(x: Array, d: Array, sensitivity: Array, noise_px: float) -> Array:
@@ -27,7 +20,7 @@ def fit_plane(x: Array, d: Array, sensitivity: Array, noise_px: float) -> Array:
     design = np.column_stack([(x - centre) / scale, np.ones(len(x))])
     weight = sensitivity.copy()
     coefficients = np.zeros(3)
-    for _ in range(50):
+    for _ in range(PLANE.max_reweightings):
         previous = coefficients
         coefficients = np.linalg.lstsq(design * weight[:, None], d * weight, rcond=None)[0]
         residual = sensitivity * (d - design @ coefficients)
@@ -45,7 +38,7 @@ def beyond_reference(H: Array, size: tuple[int, int], target_size: tuple[int, in
     size, target_size: (W, H) px. None where the target shows nothing else.
     """
     last = np.array(target_size) - 1.0
-    u, v = np.meshgrid(np.linspace(0, last[0], NODES), np.linspace(0, last[1], NODES))
+    u, v = np.meshgrid(np.linspace(0, last[0], PLANE.target_nodes), np.linspace(0, last[1], PLANE.target_nodes))
     back = homogeneous(np.column_stack([u.ravel(), v.ravel()])) @ np.linalg.inv(H).T
     points = project(back[back[:, 2] > 1e-6 * np.abs(back[:, :2]).max(axis=1)])
     end = np.array(size) - 1.0
@@ -63,15 +56,15 @@ def continued_plane(
     of them (MSAC, Torr and Zisserman 2000); the best is fitted to its matches.
     """
     distance = np.linalg.norm(x[:, None] - beyond[None], axis=2).min(axis=1)
-    cell = np.floor(x / (CELL * side)).astype(int)
+    cell = np.floor(x / (PLANE.cell * side)).astype(int)
     of = np.unique(cell, axis=0, return_inverse=True)[1].ravel()
-    area = np.exp(-distance / (NEARBY * side)) * weight / np.bincount(of, weight)[of]
+    area = np.exp(-distance / (PLANE.nearby * side)) * weight / np.bincount(of, weight)[of]
     random = np.random.default_rng(0)
-    corners = random.choice(len(x), (DRAWS, 3), p=area / area.sum())
+    corners = random.choice(len(x), (PLANE.draws, 3), p=area / area.sum())
     # normalised, so that a determinant says how far three points are from lying on a line
     centre = x.mean(axis=0)
     points = homogeneous((x - centre) / side)
-    corners = corners[np.abs(np.linalg.det(points[corners])) > CELL**2]
+    corners = corners[np.abs(np.linalg.det(points[corners])) > PLANE.cell**2]
     if not len(corners):
         return fit_plane(x, d, sensitivity, noise_px)
     planes = np.linalg.solve(points[corners], d[corners][..., None])[..., 0]

@@ -18,20 +18,9 @@ from ..raster.arrays import Array
 from ..raster.grid import Grid
 from .fade import fading, on_nodes
 from .field import FieldValues, Fit
+from .options import SLACK
 from .spline import SmoothingProblem, ThinPlateSpline
 from .strict import StrictField, robust_mean
-
-# λ of s in units of that of the strict field's spline, at least, and of W·H: the lens bends more slowly than the scene.
-STIFFER = 10.0
-LADDER = 10.0 ** np.arange(-5.0, 2.01, 0.5)
-# Slack has to lower the mean square of what is left out by this share: less is chance.
-GAIN = 0.03
-# Matches that decide about λ: their number hardly moves it, and the time goes with its cube.
-DECIDING = 500
-# s is nowhere longer than this times what 98 % of the matches ask for: a spline knows no bounds away from them.
-MOST = 2.0
-# Width of the fade in units of what fades, so that straight lines bend by little; px at least, in the matches' unit.
-FADE, LEAST_FADE = 10.0, 16.0
 
 
 @dataclass(frozen=True)
@@ -95,28 +84,29 @@ class SlackField:
 def fit_slack(strict: StrictField, matches: Matches) -> SlackField:
     """Slack for a strict field, from the matches that it was fitted to.
 
-    λ is what leave-one-out likes best of all that are STIFFER than the strict spline's; infinite where it likes none
-    much better than no slack.
+    λ is what leave-one-out likes best of all that are stiff enough beside the strict spline's; infinite where it likes
+    none much better than no slack.
     """
     kept = matches.subset(strict.fit.inliers_used)
-    few = kept.thinned(DECIDING)
+    few = kept.thinned(SLACK.deciding_matches)
     left = _left_across(strict, few)
-    ladder = np.maximum(LADDER, STIFFER * strict.fit.smoothing)
+    ladder = np.maximum(SLACK.smoothing_ladder, SLACK.min_relative_smoothing * strict.fit.smoothing)
     problem = _problem(strict, few)
     errors = np.linalg.norm(problem.held_out(left, ladder), axis=-1)
     *score, none = robust_mean(np.vstack([errors, np.linalg.norm(left, axis=1)]))
     best = int(np.argmin(score))
-    return _on_matches(strict, kept, float(ladder[best]) if score[best] < (1 - GAIN) * none else np.inf)
+    return _on_matches(strict, kept, float(ladder[best]) if score[best] < (1 - SLACK.min_gain) * none else np.inf)
 
 
 def _on_matches(strict: StrictField, matches: Matches, smoothing: float) -> SlackField:
     """Slack of all of some matches at a λ; infinite for none."""
     if np.isinf(smoothing):
         none = ThinPlateSpline(np.empty((0, 2)), np.empty((0, 2)), np.zeros((3, 2)), np.zeros(2), 1.0)
-        return SlackField(strict, none, smoothing, 0.0, LEAST_FADE * matches.scale)
+        return SlackField(strict, none, smoothing, 0.0, SLACK.min_fade_px * matches.scale)
     spline = _problem(strict, matches).solve(_left_across(strict, matches), smoothing)[0]
-    slack_px = MOST * float(np.percentile(np.linalg.norm(spline.at(matches.x), axis=1), 98))
-    return SlackField(strict, spline, smoothing, slack_px, max(FADE * slack_px, LEAST_FADE * matches.scale))
+    slack_px = SLACK.max_length * float(np.percentile(np.linalg.norm(spline.at(matches.x), axis=1), 98))
+    fade_px = max(SLACK.fade_length * slack_px, SLACK.min_fade_px * matches.scale)
+    return SlackField(strict, spline, smoothing, slack_px, fade_px)
 
 
 def _problem(strict: StrictField, matches: Matches) -> SmoothingProblem:

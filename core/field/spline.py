@@ -14,9 +14,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
-
-# Nodes are evaluated in slabs of about this many kernel values, so that memory stays bounded.
-SLAB = 2_000_000
+from .options import SPLINE
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,7 @@ class ThinPlateSpline:
         """Values (N,) or (N, k) at points (N, 2) px, float64."""
         p = (np.asarray(points, np.float64) - self.centre) / self.scale
         out = p @ self.affine[:2] + self.affine[2]
-        rows = max(1, SLAB // max(1, len(self.centres)))
+        rows = max(1, SPLINE.kernel_values_at_once // max(1, len(self.centres)))
         for start in range(0, len(p), rows):
             out[start : start + rows] += kernel(p[start : start + rows], self.centres) @ self.weights
         return out
@@ -56,7 +54,7 @@ class ThinPlateSpline:
         out = across[None] + down[:, None]
         if not len(self.centres):
             return out
-        rows = max(1, SLAB // max(1, dx2.size))
+        rows = max(1, SPLINE.kernel_values_at_once // max(1, dx2.size))
         for start in range(0, len(y), rows):
             r2 = dy2[start : start + rows, None, :] + dx2[None, :, :]
             np.maximum(r2, np.float32(1e-20), out=r2)

@@ -19,21 +19,10 @@ from ..raster.grid import Grid
 from ..system.errors import DegenerateGeometry
 from .fade import fade_width, fading, on_nodes, outside_overlap
 from .field import FieldValues, Fit
+from .options import FADE, STRICT
 from .plane import beyond_reference, continued_plane, fit_plane
 from .spline import SmoothingProblem, ThinPlateSpline, spread_points
 from .transfer import inverse_depths, target_points
-
-CENTRE_BUDGET = 1000
-# λ in units of W·H of the reference: where the search for the best one starts, and how far it goes.
-SMOOTHING_START = 1e-3
-SMOOTHING_LADDER = SMOOTHING_START * 10.0 ** np.arange(-3.0, 2.01, 0.5)
-PRUNE_SIGMAS = 3.0
-GROSS_DEVIATIONS = 10.0
-# Whatever σ says, an error this small (px) is no outlier; and so much agreement among the nearest makes a thing.
-PRUNE_FLOOR_PX, NEIGHBOURS, SUPPORT = 1.0, 8, 3
-MIN_CENTRES = 8
-# Flat things are flat to this much at least, in units of the matches' scale.
-PLANE_PX = 0.3
 
 
 @dataclass(frozen=True)
@@ -115,20 +104,20 @@ def fit_strict(
     d, sensitivity = inverse_depths(two_view, x, y)
     usable = np.isfinite(d) & np.isfinite(sensitivity)
     # where the line is seen end-on (beside the epipole) a pixel says nothing about d
-    usable &= sensitivity > 1e-3 * np.median(sensitivity[usable]) if usable.any() else usable
-    if usable.sum() < MIN_CENTRES:
+    usable &= sensitivity > STRICT.min_relative_sensitivity * np.median(sensitivity[usable]) if usable.any() else usable
+    if usable.sum() < STRICT.min_centres:
         raise DegenerateGeometry(
-            f"only {int(usable.sum())} of {len(x)} matches tell a depth, at least {MIN_CENTRES} needed: "
+            f"only {int(usable.sum())} of {len(x)} matches tell a depth, at least {STRICT.min_centres} needed: "
             "the camera moved too little, or straight at what it saw"
         )
     index = np.flatnonzero(usable)
     unit = float(np.sqrt(size[0] * size[1]))
-    noise_px = max(two_view.sigma, 0.1 * matches.scale)
+    noise_px = max(two_view.sigma, STRICT.noise_floor_px * matches.scale)
     weight = matches.weights[index]
     plane = fit_plane(x[index], d[index], sensitivity[index] * np.sqrt(weight), noise_px)
     beyond = beyond_reference(two_view.H_inf + np.outer(two_view.e_prime, plane), size, target_size)
     if len(beyond):
-        tolerance = 3 * max(noise_px, PLANE_PX * matches.scale)
+        tolerance = 3 * max(noise_px, STRICT.plane_noise_px * matches.scale)
         plane = continued_plane(x[index], d[index], sensitivity[index], weight, beyond, unit, tolerance, noise_px)
     off_line = np.linalg.norm(target_points(two_view, x[index], d[index]) - y[index], axis=1)
     index = _thinned(matches, index, off_line, unit)
@@ -151,15 +140,16 @@ def fit_strict(
 def _thinned(matches: Matches, index: NDArray[np.intp], off: Array, unit: float) -> NDArray[np.intp]:
     """As many of the matches `index` (n,), off (n,) px where they should be, as a spline can bear; of those the user
     gave all, up to that."""
-    if matches.given and len(index) <= CENTRE_BUDGET:
+    if matches.given and len(index) <= STRICT.max_centres:
         return index
-    return index[spread_points(matches.x[index], off / matches.weights[index], CENTRE_BUDGET, unit / 200)]
+    cell = unit / STRICT.thinning_cells
+    return index[spread_points(matches.x[index], off / matches.weights[index], STRICT.max_centres, cell)]
 
 
 def refuse_no_spread(x: Array, scale: float) -> None:
     """Raises DegenerateGeometry where points (N, 2) with noise of the unit `scale` px are too few for a spline, or lie
     on a line."""
-    if len(x) < MIN_CENTRES or np.linalg.svd(x - x.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(x)) < scale:
+    if len(x) < STRICT.min_centres or np.linalg.svd(x - x.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(x)) < scale:
         raise DegenerateGeometry("the matches do not determine a displacement field: they lie in one spot or on a line")
 
 
@@ -178,7 +168,7 @@ def _without_parallax(
     rms = float(np.sqrt(np.mean(off[index] ** 2)))
     kept = np.zeros(len(matches), bool)
     kept[_thinned(matches, index, off[index], float(np.sqrt(size[0] * size[1])))] = True
-    fit = Fit(kept, SMOOTHING_START, 8 * matches.scale, rms, rms, 0.0)
+    fit = Fit(kept, STRICT.initial_smoothing, FADE.min_px * matches.scale, rms, rms, 0.0)
     return StrictField(two_view, size, target_size, np.zeros(3), nothing, fit, fade)
 
 
@@ -190,18 +180,18 @@ def _prune_and_smooth(
 
     Returns the kept indices, the spline, its residuals, λ and the leave-one-out RMS in px.
     """
-    floor = PRUNE_FLOOR_PX * matches.scale
+    floor = STRICT.outlier_floor_px * matches.scale
     s = sensitivity[index]
     problem = SmoothingProblem.build(matches.x[index], np.median(s) / s / np.sqrt(matches.weights[index]), unit)
     supported = np.full(len(index), True) if matches.given else _supported(matches.x[index], g[index], s, floor)
-    inverse = problem.inverse(SMOOTHING_START)
+    inverse = problem.inverse(STRICT.initial_smoothing)
     left = np.full(len(index), True)
 
     def drop(keep: NDArray[np.bool_]) -> bool:
         """Take out what neither the threshold nor its neighbours keep; says whether anything went."""
         nonlocal index, inverse, supported
         keep = keep | supported
-        if keep.all() or keep.sum() < MIN_CENTRES:
+        if keep.all() or keep.sum() < STRICT.min_centres:
             return False
         index, inverse, supported = index[keep], inverse.subset(keep), supported[keep]
         left[left] = keep
@@ -210,14 +200,14 @@ def _prune_and_smooth(
     # gross errors first: they would bend the spline towards themselves, so each is judged by the spline without it
     while True:
         error = np.abs(sensitivity[index] * inverse.held_out(g[index]))
-        if not drop(error <= max(GROSS_DEVIATIONS * np.median(error) / 0.6745, floor)):
+        if not drop(error <= max(STRICT.gross_error_sigmas * np.median(error) / 0.6745, floor)):
             break
     problem, left = problem.subset(left), left[left]
     smoothing = best_smoothing(problem, g[index], sensitivity[index])
     inverse = problem.inverse(smoothing)
     while True:
         error = np.abs(sensitivity[index] * inverse.residual(g[index]))
-        if not drop(error <= max(PRUNE_SIGMAS * np.sqrt(np.mean(error**2)), floor)):
+        if not drop(error <= max(STRICT.outlier_sigmas * np.sqrt(np.mean(error**2)), floor)):
             break
     held_out = sensitivity[index] * inverse.held_out(g[index])
     spline, residual = problem.subset(left).solve(g[index], smoothing)
@@ -230,13 +220,13 @@ def _supported(x: Array, g: Array, sensitivity: Array, tolerance: float) -> NDAr
     A thing in front of a wall is as far from the spline as an outlier, but it does not stand alone: without this,
     pruning would peel it off from its edges inwards.
     """
-    if len(x) <= NEIGHBOURS:
+    if len(x) <= STRICT.neighbours:
         return np.zeros(len(x), bool)
     apart = np.subtract.outer(x[:, 0], x[:, 0]) ** 2 + np.subtract.outer(x[:, 1], x[:, 1]) ** 2
     np.fill_diagonal(apart, np.inf)
-    nearest = np.argpartition(apart, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]
+    nearest = np.argpartition(apart, STRICT.neighbours, axis=1)[:, :STRICT.neighbours]
     agrees = np.abs(g[nearest] - g[:, None]) * sensitivity[:, None] <= tolerance
-    return agrees.sum(axis=1) >= SUPPORT
+    return agrees.sum(axis=1) >= STRICT.agreeing_neighbours
 
 
 def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> float:
@@ -244,9 +234,9 @@ def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> f
 
     Large errors count in proportion, not squared: a few depth edges must not decide for the whole picture.
     """
-    error = problem.held_out(g, SMOOTHING_LADDER)
+    error = problem.held_out(g, STRICT.smoothing_ladder)
     error = (np.abs(error) if g.ndim == 1 else np.linalg.norm(error, axis=-1)) * sensitivity
-    return float(SMOOTHING_LADDER[int(np.argmin(robust_mean(error)))])
+    return float(STRICT.smoothing_ladder[int(np.argmin(robust_mean(error)))])
 
 
 def robust_mean(error: Array) -> Array:

@@ -17,8 +17,9 @@ from ..cameras.projective import homogeneous, infinite_homography, inverse_intri
 from ..cameras.two_view import TwoView
 from ..field.fade import fade_width, fading, outside_overlap
 from ..field.field import FieldValues, Fit
+from ..field.options import STRICT
 from ..field.spline import SmoothingProblem, ThinPlateSpline
-from ..field.strict import MIN_CENTRES, PRUNE_FLOOR_PX, PRUNE_SIGMAS, StrictField, best_smoothing, refuse_no_spread
+from ..field.strict import StrictField, best_smoothing, refuse_no_spread
 from ..field.transfer import target_points
 from ..pose.fundamental import transfer_error
 from ..pose.rotation import nearest_rotation
@@ -141,8 +142,9 @@ def _bent(
         # residuals are the weights times 8πλ
         spline, residual = problem.solve(g, smoothing)
         sigma = np.sqrt(np.mean(residual**2, axis=0))
-        good = (np.abs(residual) <= np.maximum(PRUNE_SIGMAS * sigma, PRUNE_FLOOR_PX * matches.scale)).all(axis=1)
-        if not prune or good.all() or good.sum() < MIN_CENTRES:
+        limit = np.maximum(STRICT.outlier_sigmas * sigma, STRICT.outlier_floor_px * matches.scale)
+        good = (np.abs(residual) <= limit).all(axis=1)
+        if not prune or good.all() or good.sum() < STRICT.min_centres:
             break
         problem, index, g = problem.subset(good), index[good], g[good]
     left = np.full(len(matches), False)
