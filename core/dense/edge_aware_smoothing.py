@@ -12,11 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-# Attenuation of λ from pass to pass (the paper's eq. 11); its third pass changes nothing that could be measured.
-PASSES, ATTENUATION = 2, 4.0
-# An edge of the guide is known to so many pixels.
-NEAR = 7
-MOST = 20.0
+from .options import SMOOTHING
 
 
 def edge_weights(guide: NDArray[np.float32], sigma: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -35,12 +31,12 @@ def cut_edges(
     step: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """The weights, lowered where known values (H, W) of neighbours differ by more than about `step`, if the guide has
-    an edge there too (within NEAR pixels): a jump in the middle of a plain surface is an error."""
+    an edge there too (within a few pixels): a jump in the middle of a plain surface is an error."""
     out = []
     for axis, weight in zip((1, 0), weights, strict=True):
         both = known.take(range(1, known.shape[axis]), axis) & known.take(range(known.shape[axis] - 1), axis)
         jump = np.square(np.abs(np.diff(values, axis=axis)) * both / np.float32(step))
-        edge = 1 - cv2.erode(weight, np.ones((NEAR, NEAR), np.uint8))
+        edge = 1 - cv2.erode(weight, np.ones((SMOOTHING.edge_reach_px,) * 2, np.uint8))
         out.append(weight / (1 + jump * edge))
     return out[0], out[1]
 
@@ -48,9 +44,9 @@ def cut_edges(
 def strengthen(
     weights: tuple[NDArray[np.float32], NDArray[np.float32]], plain: NDArray[np.float32], strength: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The weights, stronger between neighbours that tell little: 1 + `strength` times at plain (H, W) = ½, up to MOST
-    times that at 1."""
-    odds = plain / (1 - plain + np.float32(1 / MOST))
+    """The weights, stronger between neighbours with little texture: 1 + `strength` times at plain (H, W) = ½, and
+    more, to a bound, at 1."""
+    odds = plain / (1 - plain + np.float32(1 / SMOOTHING.max_plain_odds))
     across, down = (odds[:, 1:] + odds[:, :-1]) / 2, (odds[1:] + odds[:-1]) / 2
     return weights[0] * (1 + np.float32(strength) * across), weights[1] * (1 + np.float32(strength) * down)
 
@@ -64,9 +60,9 @@ class Smoother:
     @staticmethod
     def of(weights: tuple[NDArray[np.float32], NDArray[np.float32]], strength: float) -> Smoother:
         """weights: see `edge_weights`."""
-        share = 1.5 * ATTENUATION ** (PASSES - 1) / (ATTENUATION**PASSES - 1)
+        share = 1.5 * SMOOTHING.attenuation ** (SMOOTHING.passes - 1) / (SMOOTHING.attenuation**SMOOTHING.passes - 1)
         across = cv2.transpose(weights[0])
-        lam = [np.float32(strength * share / ATTENUATION**number) for number in range(PASSES)]
+        lam = [np.float32(strength * share / SMOOTHING.attenuation**number) for number in range(SMOOTHING.passes)]
         return Smoother(tuple((_Systems.of(each * across), _Systems.of(each * weights[1])) for each in lam))
 
     def smoothed(

@@ -19,26 +19,25 @@ from ..field.transfer import target_points
 from ..raster.arrays import Array, Box, Plane
 from ..raster.grid import Grid
 from ..system.threads import each
+from .options import LINES
 
 Places = NDArray[np.intp]
-# What is smooth is worked out at every so many-th row and column.
-EVERY = 2
-# Rows of nodes that are worked on at once.
-STRIP = 32
 
 
 def coarse_places(shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """Columns and rows of the middles of cells of EVERY × EVERY pixels (of so many rows and columns), with a cell
+    """Columns and rows of the middles of cells of a few pixels a side (of so many rows and columns), with a cell
     around them."""
-    rows, columns = ((np.arange(-1, -(-count // EVERY) + 1) + 0.5) * EVERY - 0.5 for count in shape[:2])
+    step = LINES.coarse_step
+    rows, columns = ((np.arange(-1, -(-count // step) + 1) + 0.5) * step - 0.5 for count in shape[:2])
     return columns, rows
 
 
 def in_between(shape: tuple[int, ...], coarse: Array) -> list[Plane]:
     """The planes (rows, columns) of a smooth function known (m, n, k) at `coarse_places`, linear between them. NaN
     spreads by a cell."""
-    size = EVERY * coarse.shape[1], EVERY * coarse.shape[0]
-    part = slice(EVERY, EVERY + shape[0]), slice(EVERY, EVERY + shape[1])
+    step = LINES.coarse_step
+    size = step * coarse.shape[1], step * coarse.shape[0]
+    part = slice(step, step + shape[0]), slice(step, step + shape[1])
     return [
         cv2.resize(coarse[..., k].astype(np.float32), size, interpolation=cv2.INTER_LINEAR)[part]
         for k in range(coarse.shape[-1])
@@ -163,7 +162,7 @@ class EpipolarLines:
         H, e = sparse.two_view.H_inf, sparse.two_view.e_prime
 
         def work_out(top: int) -> None:
-            part = slice(top, top + STRIP)
+            part = slice(top, top + LINES.strip_rows)
             u, v, d = ideal[part, :, 0], ideal[part, :, 1], inverse_depth[part].astype(np.float64)
             ray = [H[k, 0] * u + H[k, 1] * v + (H[k, 2] + e[k] * d) for k in range(3)]
             ray[2][ray[2] <= 1e-6 * np.maximum(np.abs(ray[0]), np.abs(ray[1]))] = np.nan
@@ -175,7 +174,7 @@ class EpipolarLines:
             direction[part, :, 0], direction[part, :, 1] = slope_x * per_px, slope_y * per_px
             depth_per_px[part], w_rate[part] = per_px, e[2] * near * per_px
 
-        each(work_out, range(0, rows, STRIP))
+        each(work_out, range(0, rows, LINES.strip_rows))
         return EpipolarLines(
             box, step, ideal, inverse_depth, base, shift, depth_per_px, direction, w_rate, sparse.camera_prime
         )  # fmt: skip

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..raster.arrays import Array
-
-# An epipole at infinity is set this many picture sides away: its lines then spread by a hundredth of a pixel.
-FAR = 1e6
+from .options import LINES
 
 
 @dataclass(frozen=True)
@@ -40,8 +38,8 @@ class EpipolarRows:
         low, high = box[:2], box[2:]
         middle, side = (low + high) / 2, float((high - low).max())
         away = epipole[:2] - epipole[2] * middle
-        if np.linalg.norm(away) >= abs(epipole[2]) * FAR * side:
-            centre = middle + FAR * side * away / np.linalg.norm(away)
+        if np.linalg.norm(away) >= abs(epipole[2]) * LINES.max_epipole_distance * side:
+            centre = middle + LINES.max_epipole_distance * side * away / np.linalg.norm(away)
         else:
             centre = epipole[:2] / epipole[2]
         u = np.linspace(0, 1, 65)

@@ -18,25 +18,9 @@ from ..cameras.matches import Matches
 from ..field.transfer import inverse_depths
 from ..raster.arrays import Array, Plane
 from ..system.threads import in_order
-from .epipolar_lines import EVERY, EpipolarLines, SparseMap, coarse_places, in_between
+from .epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
 from .epipolar_rows import EpipolarRows
-
-BLOCK, STEP_COST, JUMP_COST, UNIQUE = 3, 8, 48, 2
-# Costs (of a pixel at a place) that are held at once, four bytes each; more rows than that are matched band by band,
-# each with so many rows beside it.
-MOST_COSTS, NEIGHBOURS = 100_000_000, 32
-# How much more smoothly is matched at half the size what was not found at full size, and how much that counts.
-COARSE_SMOOTHER, COARSE_SHARE = 4, 0.1
-# A patch of fewer pixels (share of the rows' side, squared) than this is a speck.
-SPECK, SPECK_RANGE = 0.012, 2
-# Steps of a level in which the target is resampled before its tones are those of the reference.
-FINER = 32
-# Steps of the tone curve between the pictures.
-TONES = 64
-# Bends finer than this share of the picture's side are taken out of the field, the first that will do; how far all
-# but the furthest matches lie from it (percentile), and how much further is looked.
-BENDS = (0.2, 0.1, 0.05, 0.025, 0.0)
-FURTHEST, REACH, MORE_PX = 99.5, 1.25, 8.0
+from .options import LINES, MATCHING
 
 
 @dataclass(frozen=True)
@@ -115,10 +99,11 @@ def search_base(sparse: SparseMap, matches: Matches, plane: Array, most: float) 
     side = float(np.sqrt(np.prod(sparse.camera.size)))
     raw = distort(matches.x, sparse.camera)
     d, sensitivity = inverse_depths(sparse.two_view, matches.x, matches.y)
-    for share in BENDS:
+    for share in MATCHING.bend_sizes:
         base = sparse.smoothed(share * side, plane)
         at, _ = base.at(raw[None])
-        reach = REACH * float(np.percentile(np.abs((d - at[0]) * sensitivity), FURTHEST)) + MORE_PX
+        furthest = float(np.percentile(np.abs((d - at[0]) * sensitivity), MATCHING.reach_percentile))
+        reach = MATCHING.reach_factor * furthest + MATCHING.reach_margin_px
         if reach <= most:
             break
     return base, reach
@@ -128,7 +113,7 @@ def search(
     lines: EpipolarLines, sparse: SparseMap, reference: View, target: View, step: float, reach: float
 ) -> tuple[Plane, Plane]:
     """Moves (h, w) px along the lines to where the nodes are seen in the target, and how much (h, w) 0..1 each counts:
-    0 where nothing was found, 1 where it was at full size, COARSE_SHARE where only at half.
+    0 where nothing was found, 1 where it was at full size, little where only at half.
 
     reference, target: views with `step` px to each of their own; reach: px a node may move.
     """
@@ -139,7 +124,7 @@ def search(
     rows = EpipolarRows.over(epipole, box, step, count * step)
     alike = reference.levels.shape[2] == target.levels.shape[2]
     own, other = (v.levels if alike else _levels(v.gray) for v in (reference, target))
-    finer = cv2.multiply(other, float(FINER), dtype=cv2.CV_16U)
+    finer = cv2.multiply(other, float(MATCHING.sublevels), dtype=cv2.CV_16U)
     points = rows.points(*coarse_places(rows.shape))
     sent = sparse.target(points)
     ways = ArcLengths.of(sparse.two_view.e_prime, sent, rows)
@@ -161,17 +146,17 @@ def search(
     a[neither] = b[neither] = 128
     (moved, found), (coarse, found_too) = in_order(lambda match: match(a, b, count), (_matched, _matched_at_half))
     moved = np.where(found, moved, coarse)
-    counts = np.where(found, np.float32(1), found_too * np.float32(COARSE_SHARE))
+    counts = np.where(found, np.float32(1), found_too * np.float32(MATCHING.coarse_confidence))
     return _on_nodes(lines, rows, ways, moved, counts * seen, seen_too)
 
 
 def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """The second picture (h, w[, C]), levels times FINER, with the tones of the first: for each channel the monotone
-    curve that makes their histograms over `both` (h, w) one."""
-    ends = 256 * FINER
+    """The second picture (h, w[, C]), in sublevels, with the tones of the first: for each channel the monotone curve that makes
+    their histograms over `both` (h, w) one."""
+    ends = 256 * MATCHING.sublevels
     if not both.any():
-        return _levels(second / np.float32(FINER))
-    mask, share = both.view(np.uint8), np.linspace(0, 1, TONES + 1)
+        return _levels(second / np.float32(MATCHING.sublevels))
+    mask, share = both.view(np.uint8), np.linspace(0, 1, MATCHING.tone_quantiles + 1)
 
     def quantiles(picture: NDArray, k: int, count: int) -> Array:
         """Levels of a channel below which such shares lie, each level's own pixels half below it."""
@@ -196,19 +181,20 @@ def _matched(
 ) -> tuple[Plane, NDArray[np.bool_]]:
     """Columns (h, w) by which what a (h, w[, C]) shows lies further left in b, between −count/2 and count/2, and where
     that is sure; smoother: how many times the usual a step costs."""
-    least = -count // 2
+    least, block = -count // 2, MATCHING.block_px
+    speckle = MATCHING.speckle_side**2 * a.shape[0] * a.shape[1]
     matcher = cv2.StereoSGBM_create(
-        minDisparity=least, numDisparities=count, blockSize=BLOCK,
-        P1=smoother * STEP_COST * BLOCK**2, P2=smoother * JUMP_COST * BLOCK**2,
-        disp12MaxDiff=1, preFilterCap=31, uniquenessRatio=UNIQUE,
-        speckleWindowSize=int(SPECK**2 * a.shape[0] * a.shape[1]), speckleRange=SPECK_RANGE,
+        minDisparity=least, numDisparities=count, blockSize=block,
+        P1=smoother * MATCHING.step_cost * block**2, P2=smoother * MATCHING.jump_cost * block**2,
+        disp12MaxDiff=1, preFilterCap=31, uniquenessRatio=MATCHING.uniqueness_percent,
+        speckleWindowSize=int(speckle), speckleRange=MATCHING.speckle_range_px,
         mode=cv2.STEREO_SGBM_MODE_HH4,
     )  # fmt: skip
     height, width = a.shape[:2]
     found = np.empty((height, width), np.float32)
-    at_once = max(NEIGHBOURS, MOST_COSTS // (width * count))
+    at_once = max(MATCHING.band_margin_rows, MATCHING.costs_at_once // (width * count))
     for top in range(0, height, at_once):
-        low, high = max(0, top - NEIGHBOURS), min(height, top + at_once + NEIGHBOURS)
+        low, high = max(0, top - MATCHING.band_margin_rows), min(height, top + at_once + MATCHING.band_margin_rows)
         part = matcher.compute(a[low:high], b[low:high])[top - low :][:at_once]
         found[top : top + at_once] = part.astype(np.float32) / 16
     sure = found > least - 1
@@ -220,7 +206,7 @@ def _matched_at_half(a: NDArray[np.uint8], b: NDArray[np.uint8], count: int) -> 
     height, width = a.shape[:2]
     half = max(1, width // 2), max(1, height // 2)
     a_half, b_half = (cv2.resize(v, half, interpolation=cv2.INTER_AREA) for v in (a, b))
-    moved, sure = _matched(a_half, b_half, 16 * -(-count // 32), COARSE_SMOOTHER)
+    moved, sure = _matched(a_half, b_half, 16 * -(-count // 32), MATCHING.coarse_smoothness)
     moved, sure_too = (
         cv2.resize(v, (width, height), interpolation=cv2.INTER_NEAREST) for v in (moved, sure.astype(np.uint8))
     )
@@ -230,7 +216,7 @@ def _matched_at_half(a: NDArray[np.uint8], b: NDArray[np.uint8], count: int) -> 
 
 @dataclass(frozen=True)
 class ArcLengths:
-    """px (rows, n): how far along its line in the target each row is seen, at every EVERY-th column (`coarse_places`);
+    """px (rows, n): how far along its line in the target each row is seen, at the columns of `coarse_places`;
     ideal px, from anywhere on the line."""
 
     px: Plane
@@ -243,12 +229,14 @@ class ArcLengths:
         direction = np.where(np.isfinite(direction), direction, 0.0).sum(axis=1, keepdims=True)
         direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-300)
         px = (sent * direction).sum(axis=-1).astype(np.float32)
-        px = cv2.resize(px, (px.shape[1], EVERY * px.shape[0]), interpolation=cv2.INTER_LINEAR)
-        return ArcLengths(px[EVERY : EVERY + rows.shape[0]])
+        step = LINES.coarse_step
+        px = cv2.resize(px, (px.shape[1], step * px.shape[0]), interpolation=cv2.INTER_LINEAR)
+        return ArcLengths(px[step : step + rows.shape[0]])
 
     def at(self, u: Plane, row: NDArray[np.intp]) -> Plane:
         """At columns u of whole rows (…)."""
-        place = u * np.float32(1 / EVERY) + np.float32(0.5 + 0.5 / EVERY)
+        step = LINES.coarse_step
+        place = u * np.float32(1 / step) + np.float32(0.5 + 0.5 / step)
         before = np.clip(place.astype(np.intp), 0, self.px.shape[1] - 2)
         place -= before
         before += row * self.px.shape[1]

@@ -16,16 +16,7 @@ from ..raster.arrays import Plane
 from ..raster.distance import distance_inside, outside
 from ..raster.pull_push import carried_on
 from .epipolar_lines import EpipolarLines, SparseMap
-
-# Moves fade over so many times their own size (98 %) outside the overlap, as the field does, within this share of the
-# picture's side.
-FADE, LEAST_FADE, MOST_FADE = 5.0, 8.0, 0.15
-COARSE = 8
-# Confidence that counts for nothing and for all in what goes on beyond the overlap; it reaches so many nodes (a side)
-# over the rim of what it is about.
-DOUBTED, SURE, RIM = 0.2, 0.5, 9
-# Share of the fade's width over which doubtful moves give way before the border: twice their own size.
-GIVE_WAY = 2 / FADE
+from .options import BEYOND
 
 
 def build_refinement(
@@ -36,8 +27,9 @@ def build_refinement(
     rows, columns = there.shape
     step = width / columns, height / rows
     near = np.abs(along[there])
-    limit = MOST_FADE * max(sparse.camera.size)
-    fade = float(np.clip(FADE * np.percentile(near, 98) if near.size else 0.0, LEAST_FADE, max(limit, LEAST_FADE)))
+    limit = BEYOND.max_fade * max(sparse.camera.size)
+    wanted = BEYOND.fade_length * np.percentile(near, 98) if near.size else 0.0
+    fade = float(np.clip(wanted, BEYOND.min_fade_px, max(limit, BEYOND.min_fade_px)))
     fade /= min(step)
     margin = int(np.ceil(fade)) + 1
     inside = np.pad(there, margin)
@@ -47,16 +39,15 @@ def build_refinement(
         return cv2.copyMakeBorder(np.where(there, values, np.float32(0)), *[margin] * 4, cv2.BORDER_CONSTANT)
 
     sure = widened(np.clip(confidence, 0, 1))
-    weight = _trust(inside, sure, GIVE_WAY * fade)
+    weight = _trust(inside, sure, BEYOND.yielding_share * fade)
     to_side = across.any()
     along, across = (
         _beyond(widened(values), *weight) * share if values.any() else np.zeros(inside.shape, np.float32)
         for values in (along, across)
     )
     more = margin * step[0], margin * step[1]
-    smooth = EpipolarLines.over(
-        sparse, (left - more[0], top - more[1], width + 2 * more[0], height + 2 * more[1]), COARSE * min(step)
-    )
+    box = left - more[0], top - more[1], width + 2 * more[0], height + 2 * more[1]
+    smooth = EpipolarLines.over(sparse, box, BEYOND.coarse_step * min(step))
     per_px, *direction = (
         np.nan_to_num(_resized(np.ascontiguousarray(v), inside.shape), copy=False)
         for v in (smooth.depth_per_px, smooth.direction[..., 0], smooth.direction[..., 1])[: 3 if to_side else 1]
@@ -70,8 +61,9 @@ def build_refinement(
 
 def _trust(inside: NDArray[np.bool_], sure: Plane, width: float) -> tuple[Plane, Plane]:
     """How much (h, w) 0..1 each node counts in what goes on beyond the overlap, and how far it gives way to that."""
-    held = cv2.erode(sure, np.ones((RIM, RIM), np.uint8))
-    weight = inside * np.clip((held - np.float32(DOUBTED)) / np.float32(SURE - DOUBTED), 0, 1)
+    held = cv2.erode(sure, np.ones((BEYOND.confidence_erosion,) * 2, np.uint8))
+    ignored, trusted = BEYOND.ignored_confidence, BEYOND.trusted_confidence
+    weight = inside * np.clip((held - np.float32(ignored)) / np.float32(trusted - ignored), 0, 1)
     share = np.clip(1 - distance_inside(inside).astype(np.float32) / np.float32(width), 0, 1)
     return weight.astype(np.float32), np.where(inside, share, np.float32(1)).astype(np.float32)
 

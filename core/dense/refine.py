@@ -26,23 +26,10 @@ from ..system.threads import in_order
 from .edge_aware_smoothing import Smoother, cut_edges, edge_weights, strengthen
 from .epipolar_lines import EpipolarLines, SparseMap
 from .matching import View, search, search_base
-from .moved_depth import MOST_FADE, build_refinement
+from .moved_depth import build_refinement
+from .options import BEYOND, REFINE
 from .polish import likeness, polish
 from .unfolding import unfolded
-
-# Pixels of the overlap that are searched and polished at most: beyond, both pictures are shrunk.
-SEARCHED, POLISHED = 1.5e6, 3e6
-# Search range in px of what is searched: at least, at most.
-LEAST_REACH, MOST_REACH = 24.0, 96.0
-# Gray levels across an edge; strength of the first smoothing; what the field, or a guess, counts beside a found pixel.
-EDGE, FIRST_SMOOTHNESS, FIELD_SHARE = 4.0, 5.0, 1e-2
-# px between neighbours that are a depth edge
-JUMP = 0.3
-# Squared gradient along the line (gray levels per px) of half a texture; how much more neighbours without any hold
-# together, and how little they count, unless both pictures look alike there: noise does not, a soft surface does.
-TEXTURE, TIE, PLAIN_DOUBT = 1.0, 15.0, 0.99
-# Nodes, a side, that say where the overlap is; overlaps with fewer pixels a side are left alone.
-LOOK, LEAST_SIDE = 64, 32
 
 
 @dataclass(frozen=True)
@@ -74,17 +61,18 @@ def refine(
         return Dense(None, f"a {two_view.model} without a baseline has no epipolar lines to search along")
     slack = isinstance(field, SlackField)
     side = max(cameras[0].size)
-    margin = int(MOST_FADE * side) + 16
+    margin = int(BEYOND.max_fade * side) + 16
     if max(side, *cameras[1].size) + 2 * margin > REMAP_LIMIT:
         return Dense(None, f"a picture with a side of {max(side, *cameras[1].size)} px is too long to be searched")
-    every = max(1, int(np.sqrt(np.prod(cameras[0].size) / POLISHED)))
+    every = max(1, int(np.sqrt(np.prod(cameras[0].size) / REFINE.max_refined_px)))
     sparse = SparseMap.over_reference(field, two_view, *cameras, margin, every)
     box = _overlap(sparse, cameras[1].size)
     if box is None:
         return Dense(None, "the overlap is too small")
-    step, fine = (max(1.0, float(np.sqrt(box[2] * box[3] / most))) for most in (SEARCHED, POLISHED))
-    base, reach = search_base(sparse, matches.subset(field.fit.inliers_used), field.plane, MOST_REACH * step)
-    reach = float(np.clip(reach, LEAST_REACH * step, MOST_REACH * step))
+    limits = REFINE.max_searched_px, REFINE.max_refined_px
+    step, fine = (max(1.0, float(np.sqrt(box[2] * box[3] / most))) for most in limits)
+    base, reach = search_base(sparse, matches.subset(field.fit.inliers_used), field.plane, REFINE.max_reach_px * step)
+    reach = float(np.clip(reach, REFINE.min_reach_px * step, REFINE.max_reach_px * step))
     lines = EpipolarLines.over(base, box, fine)
     field_at = (lines.at(sparse) - lines.inverse_depth) / lines.depth_per_px
     coarse_views = _views(pictures, step)
@@ -93,11 +81,12 @@ def refine(
     along = np.where(found > 0, along, field_at)
     alike = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
     plain = _plain(lines, sparse, views[0]) * (1 - alike)
-    weights = edge_weights(_guide(pictures[0].view, lines), EDGE)
-    weights = strengthen(cut_edges(weights, along, found > 0, JUMP), plain, TIE)
-    share = np.maximum(found * (1 - np.float32(PLAIN_DOUBT) * plain), np.float32(FIELD_SHARE))
-    along = Smoother.of(weights, FIRST_SMOOTHNESS).smoothed(along, share)
-    polished = polish(lines, views[0], views[1], along, np.maximum(found, np.float32(FIELD_SHARE)), weights, slack)
+    weights = edge_weights(_guide(pictures[0].view, lines), REFINE.edge_levels)
+    weights = strengthen(cut_edges(weights, along, found > 0, REFINE.depth_edge_px), plain, REFINE.plain_strength)
+    share = np.maximum(found * (1 - np.float32(REFINE.plain_doubt) * plain), np.float32(REFINE.field_confidence))
+    along = Smoother.of(weights, REFINE.smoothness).smoothed(along, share)
+    known = np.maximum(found, np.float32(REFINE.field_confidence))
+    polished = polish(lines, views[0], views[1], along, known, weights, slack)
     confidence = np.clip(polished.likeness, 0, 1) * cv2.blur(found, (9, 9))
     there = _there(lines, polished.along, polished.across, pictures)
     if not there.any():
@@ -112,7 +101,7 @@ def _overlap(sparse: SparseMap, target_size: tuple[int, int]) -> Box | None:
     """The part of the reference (left, top, width, height) that the field shows in the target, with a little around
     it."""
     width, height = sparse.camera.size
-    lines = EpipolarLines.over(sparse, (0, 0, width, height), max(1.0, max(width, height) / LOOK))
+    lines = EpipolarLines.over(sparse, (0, 0, width, height), max(1.0, max(width, height) / REFINE.overlap_nodes))
     x, y = lines.target(np.zeros(lines.shape, np.float32))
     with np.errstate(invalid="ignore"):
         inside = (x >= 0) & (y >= 0) & (x <= target_size[0] - 1) & (y <= target_size[1] - 1)
@@ -123,7 +112,7 @@ def _overlap(sparse: SparseMap, target_size: tuple[int, int]) -> Box | None:
     low = np.maximum(np.floor(np.array([columns[0] - 1, rows[0] - 1]) * cell), 0).astype(int)
     high = np.minimum(np.ceil(np.array([columns[-1] + 2, rows[-1] + 2]) * cell), [width, height]).astype(int)
     across, down = (high - low).tolist()
-    return (int(low[0]), int(low[1]), across, down) if min(across, down) >= LEAST_SIDE else None
+    return (int(low[0]), int(low[1]), across, down) if min(across, down) >= REFINE.min_overlap_px else None
 
 
 def _views(pictures: tuple[Picture, Picture], step: float) -> tuple[View, View]:
@@ -155,7 +144,7 @@ def _plain(lines: EpipolarLines, sparse: SparseMap, reference: View) -> Plane:
         length += away
     slope *= slope
     slope /= np.maximum(length, np.float32(1e-24))
-    return TEXTURE / (TEXTURE + cv2.blur(slope, (7, 7)))
+    return REFINE.half_texture / (REFINE.half_texture + cv2.blur(slope, (7, 7)))
 
 
 def _there(lines: EpipolarLines, along: Plane, across: Plane, pictures: tuple[Picture, Picture]) -> NDArray[np.bool_]:

@@ -20,29 +20,15 @@ from ..panorama.warp import Warp
 from ..raster.arrays import Plane, beside
 from ..system.threads import each
 from .epipolar_lines import EpipolarLines
-
-# How often occlusion is looked at, and how often moves are smoothed each time: by medians, which leave what is right as
-# it is, then by means, which end what is left.
-LOOKS, MEDIANS, MEANS = 2, 4, 4
-# Nodes, a side, of a median; px of a mean at first: what does not help is done more widely.
-MEDIAN, LEAST_SIGMA = 5, 1.5
-# More px than noise moves a node by: smoothing that would move any of a patch further has met the edge of a near thing
-# whose rim was not told, and the patch stays as it was.
-MOST_MOVED = 8.0
-# The area (share of the usual) that is left at a place not folded; px around what is occluded that are left alone.
-LEAST_TURN, RIM = 0.1, 5
-# One node in so many tells what is usual.
-SPARSE = 17
-# Nodes that smoothing looks at on each side, at most; rows that are looked at at once.
-REACH, STRIP = 12, 128
+from .options import UNFOLDING
 
 
 def unfolded(
     lines: EpipolarLines, two_view: TwoView, target_size: tuple[int, int], along: Plane, across: Plane
 ) -> Plane:
     """The moves (h, w) along the lines without folds outside what is occluded and its rim."""
-    around = np.ones((RIM, RIM), np.uint8)
-    for _ in range(LOOKS):
+    around = np.ones((UNFOLDING.occlusion_margin,) * 2, np.uint8)
+    for _ in range(UNFOLDING.rounds):
         start, along = along, along.copy()
         x, y = lines.target(along, across)
         usual = _usual_area(x, y)
@@ -51,16 +37,17 @@ def unfolded(
             break
         free = cv2.dilate(_hidden(lines, two_view, target_size, along, x, y).astype(np.uint8), around) == 0
         folded &= free
-        for number in range(MEDIANS + MEANS):
+        for number in range(UNFOLDING.median_steps + UNFOLDING.mean_steps):
             if not folded.any():
                 break
-            sigma = LEAST_SIGMA * 2 ** (max(0, number - MEDIANS) / 6)
+            means = max(0, number - UNFOLDING.median_steps)
+            sigma = UNFOLDING.min_mean_sigma * 2 ** (means / UNFOLDING.means_per_doubling)
             reach = np.ones((2 * int(sigma) + 1,) * 2, np.uint8)
             near = cv2.dilate(folded.view(np.uint8), reach) & free
             rows, columns = np.nonzero(near.view(np.bool_))
             part = _span(rows, along.shape[0]), _span(columns, along.shape[1])
-            if number < MEDIANS:
-                smooth = cv2.medianBlur(np.ascontiguousarray(along[part]), MEDIAN)
+            if number < UNFOLDING.median_steps:
+                smooth = cv2.medianBlur(np.ascontiguousarray(along[part]), UNFOLDING.median_nodes)
             else:
                 smooth = cv2.GaussianBlur(along[part], (0, 0), sigma)
             np.copyto(along[part], smooth, where=near[part].view(np.bool_))
@@ -75,24 +62,25 @@ def unfolded(
 
 def _span(places: NDArray[np.intp], count: int) -> slice:
     """What of `count` rows or columns smoothing at some of them looks at."""
-    return slice(max(0, int(places.min(initial=count)) - REACH), min(count, int(places.max(initial=0)) + REACH + 1))
+    reach = UNFOLDING.smoothing_reach
+    return slice(max(0, int(places.min(initial=count)) - reach), min(count, int(places.max(initial=0)) + reach + 1))
 
 
 def _where_little_moved(along: Plane, start: Plane) -> Plane:
     """The moves, those of patches in which any is further from its start than noise goes put back."""
     moved = np.abs(along - start)
-    if not (moved > MOST_MOVED).any():
+    if not (moved > UNFOLDING.max_move_px).any():
         return along
     count, patch = cv2.connectedComponents((moved > 0).astype(np.uint8))
     most = np.zeros(count, np.float32)
     np.maximum.at(most, patch.ravel(), moved.ravel())
     most[0] = 0
-    return np.where(most[patch] > MOST_MOVED, start, along)
+    return np.where(most[patch] > UNFOLDING.max_move_px, start, along)
 
 
 def _usual_area(x: Plane, y: Plane) -> float:
     """The area, with its sign, that a map's nodes take up; NaN where it leads nowhere."""
-    known = _areas(x, y, np.arange(0, x.size, SPARSE))
+    known = _areas(x, y, np.arange(0, x.size, UNFOLDING.usual_area_every))
     known = known[np.isfinite(known)]
     return float(np.median(known)) if known.size else np.nan
 
@@ -115,18 +103,18 @@ def _areas(x: Plane, y: Plane, nodes: NDArray[np.intp]) -> NDArray[np.float32]:
 def _turned(areas: NDArray[np.float32], usual: float) -> NDArray[np.bool_]:
     """Which areas say that the map turns over."""
     with np.errstate(invalid="ignore"):
-        return areas * np.float32(np.sign(usual)) <= np.float32(LEAST_TURN * abs(usual))
+        return areas * np.float32(np.sign(usual)) <= np.float32(UNFOLDING.min_relative_area * abs(usual))
 
 
 def _turns_over(x: Plane, y: Plane, usual: float) -> NDArray[np.bool_]:
     folded = np.empty(x.shape, bool)
 
     def look(top: int) -> None:
-        rows = slice(top, min(top + STRIP, len(x)))
+        rows = slice(top, min(top + UNFOLDING.strip_rows, len(x)))
         near, here = beside(rows, 1, len(x))
         folded[rows] = _turned(jacobian(x[near], y[near]), usual)[here]
 
-    each(look, range(0, len(x), STRIP))
+    each(look, range(0, len(x), UNFOLDING.strip_rows))
     return folded
 
 
