@@ -14,11 +14,9 @@ from typing import NamedTuple
 from ..cameras.sources import CameraRequest
 from ..system.errors import BadRequest
 from ..system.text_files import read_lines
+from .options import CLIP
 
 COLUMNS = ("reference", "target", "name", "first", "last", "step", "focal_px", "focal35")
-MOST_FRAMES = 1_000_000
-# The frames of a clip that its alignment is estimated over, at most.
-ALIGNED_FRAMES = 5
 _LAYOUT = (
     "each line holds reference,target and optionally a name; a header names the columns in any order, from: "
     + ", ".join(COLUMNS)
@@ -59,7 +57,7 @@ class BatchItem:
         They depend on nothing but the frames, so that every shard and every later run finds the same alignment.
         """
         frames = self.frames or ()
-        count = min(len(frames), ALIGNED_FRAMES)
+        count = min(len(frames), CLIP.aligned_frames)
         return tuple(frames[round(i * (len(frames) - 1) / max(1, count - 1))] for i in range(count))
 
     def pair(self, frame: int | None = None) -> tuple[Path, Path]:
@@ -175,8 +173,8 @@ def _find_frames(
     high = max(either, default=low) if last is None else last
     if low < 0 or step < 1 or (first is not None and last is not None and last < first):
         raise BadRequest(f"frames {low} to {high} by {step}: they count from 0, up from first to last, by 1 or more")
-    if (high - low) // step >= MOST_FRAMES:
-        raise BadRequest(f"frames {low} to {high} in steps of {step} are more than {MOST_FRAMES}; split the clip")
+    if (high - low) // step >= CLIP.max_frames:
+        raise BadRequest(f"frames {low} to {high} in steps of {step} are more than {CLIP.max_frames}; split the clip")
     asked = range(low, high + 1, step)
     expected = asked if first is not None and last is not None else [n for n in asked if n in either]
     return tuple(n for n in expected if n in both), tuple(n for n in expected if n not in both)

@@ -21,11 +21,10 @@ from ..pipeline import StitchResult, Stopwatch, compose, read_frame, stitch
 from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage
 from ..system.progress import Progress
 from .list import BatchItem
+from .options import CLIP
 from .units import BatchRequest, Job, Unit, UnitFiles, plan, read_json
 
 SCHEMA = 1
-# What the parts of the work take, in pairs: for the progress only.
-ALIGNMENT_WEIGHT, FRAME_WEIGHT = 3.0, 0.3
 # Exit codes by how much they matter: not to be stitched, a file, what was asked for.
 _EXIT_CODES = (3, 4, 2)
 # What of the report's figures a line about an item tells.
@@ -181,7 +180,8 @@ class _Meter:
 def _weight(job: Job) -> float:
     if job.item.frames is None:
         return float(len(job.todo))
-    return ALIGNMENT_WEIGHT + FRAME_WEIGHT * (len(job.todo) + len(job.item.aligned_on)) if job.todo else 0.0
+    frames = len(job.todo) + len(job.item.aligned_on)
+    return CLIP.alignment_weight + CLIP.frame_weight * frames if job.todo else 0.0
 
 
 def _outcome(job: Job, meter: _Meter) -> Outcome:
@@ -255,7 +255,7 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
     size = None
     for unit in frames:
         try:
-            size, more = _frame(unit, locked, meter.stopwatch(FRAME_WEIGHT))
+            size, more = _frame(unit, locked, meter.stopwatch(CLIP.frame_weight))
             warnings |= dict.fromkeys(more)
         except Cancelled:
             raise
@@ -278,7 +278,7 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
 def _lock(job: Job, meter: _Meter) -> _Locked:
     """What the frames of a clip share; also writes its report, where that is due, from the first frame it was taken
     from."""
-    item, options, steps = job.item, job.options, meter.stopwatch(ALIGNMENT_WEIGHT)
+    item, options, steps = job.item, job.options, meter.stopwatch(CLIP.alignment_weight)
     used = _readable(item, options, steps)
     shown = next(iter(used))
     sizes = used[shown].full_sizes
@@ -286,7 +286,7 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
     quick = replace(options, crop="full", measure=False)
     decided = pooled_decision([
         compose(
-            read_frame(*item.pair(number), options), alignment, quick, meter.stopwatch(FRAME_WEIGHT), keep=True
+            read_frame(*item.pair(number), options), alignment, quick, meter.stopwatch(CLIP.frame_weight), keep=True
         ).decided
         for number in used
     ])
@@ -294,7 +294,7 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
     crop = options.crop
     if reports or crop == "inscribed":
         frame = read_frame(*item.pair(shown), options)
-        result = compose(frame, alignment, options, meter.stopwatch(FRAME_WEIGHT), decided)
+        result = compose(frame, alignment, options, meter.stopwatch(CLIP.frame_weight), decided)
         if crop == "inscribed":  # what one frame shows decides for all: the frames of a clip have one size
             whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
             crop = (x - left - whole[0], y - top - whole[1], result.canvas.width, result.canvas.height)

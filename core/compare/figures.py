@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..alignment import Geometry
 from ..measure.held_out import held_out
 from ..measure.metrics import canvas_quality, coverage_samples, off_line_mean, overlap_quality
@@ -33,8 +31,6 @@ FIGURES: dict[str, tuple[str, str, int, bool | None]] = {
     "truth_occluded_recall": ("occluded: recall", "", 2, True),
 }  # fmt: skip
 SHARES = ("folds", "occluded")
-# Canvas pixels this close to an occluded one may turn over with it.
-RIM = np.ones((7, 7), np.uint8)
 
 
 def figures_of(result: StitchResult, registration: Geometry, independent: Array, seed: int) -> dict[str, float]:

@@ -9,23 +9,19 @@ from numpy.typing import NDArray
 from ..measure.metrics import overlap_views
 from ..pipeline import StitchResult
 from ..raster.colour import encode
+from .options import COMPARISON
 
 Rgb = NDArray[np.uint8]
-# Larger pictures are shrunk to this for the page; differences are looked for before.
-LONGEST = 1600
-QUALITY = 88
-# Differences are shown so many times as strong.
-STRONGER = 4
 
 
 def field_pictures(result: StitchResult) -> dict[str, bytes]:
     """JPEG files by kind: panorama; average (of reference and warped target in the overlap: what is off shows twice);
-    difference (× STRONGER); warped, and reference the same way: the two that blink."""
+    difference (made stronger); warped, and reference the same way: the two that blink."""
     view, fetched, inside = overlap_views(result.reference, result.target, result.warp)
     view, fetched = _rgb(view), _rgb(fetched)
     box = _bounds(inside)
     here, there, both = view[box], fetched[box], inside[box][..., None]
-    apart = np.minimum(STRONGER * np.abs(here.astype(int) - there), 255)
+    apart = np.minimum(COMPARISON.difference_gain * np.abs(here.astype(int) - there), 255)
     pictures = {
         "panorama": _on_gray(result),
         "average": np.where(both, (here.astype(np.uint16) + there + 1) // 2, 0),
@@ -53,8 +49,9 @@ def _bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
 
 
 def _jpeg(picture: Rgb) -> bytes:
-    scale = min(1.0, LONGEST / max(picture.shape[:2]))
+    scale = min(1.0, COMPARISON.max_side_px / max(picture.shape[:2]))
     if scale < 1:
         picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    coded = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    quality = [cv2.IMWRITE_JPEG_QUALITY, COMPARISON.jpeg_quality]
+    coded = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), quality)
     return coded[1].tobytes()

@@ -151,8 +151,8 @@ def search(
 
 
 def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """The second picture (h, w[, C]), in sublevels, with the tones of the first: for each channel the monotone curve that makes
-    their histograms over `both` (h, w) one."""
+    """The second picture (h, w[, C]), in sublevels, with the tones of the first: for each channel the monotone curve
+    that makes their histograms over `both` (h, w) one."""
     ends = 256 * MATCHING.sublevels
     if not both.any():
         return _levels(second / np.float32(MATCHING.sublevels))

@@ -16,11 +16,7 @@ from ..field.field import Field
 from ..raster.arrays import Array
 from ..system.errors import DegenerateGeometry
 from .metrics import CoverageSamples
-
-FOLDS = 5
-TOWARDS_SHARE = 0.2
-# Of what shows the target, so much must lie outside the reference: a sliver has no direction.
-LEAST_BEYOND = 0.01
+from .options import HELD_OUT
 
 
 @dataclass(frozen=True)
@@ -43,9 +39,9 @@ def held_out(field: Field, matches: Matches, shown: CoverageSamples, seed: int =
     it is shown.
     """
     kept = matches.subset(field.fit.inliers_used)
-    fold = np.random.default_rng(seed).permutation(len(kept)) % FOLDS
+    fold = np.random.default_rng(seed).permutation(len(kept)) % HELD_OUT.folds
     error = np.full(len(kept), np.nan)
-    for i in range(FOLDS):
+    for i in range(HELD_OUT.folds):
         error[fold == i] = _errors(field, kept, fold == i)
     beyond = _furthest(kept.x, shown)
     towards = _errors(field, kept, beyond)
@@ -68,10 +64,10 @@ def _furthest(x: Array, shown: CoverageSamples) -> NDArray[np.bool_]:
     """Which points (N, 2) are the fifth furthest towards what only the target shows; none where that is nothing or a
     sliver."""
     furthest = np.zeros(len(x), bool)
-    if shown.overlap.any() and np.mean(~shown.overlap) >= LEAST_BEYOND:
+    if shown.overlap.any() and np.mean(~shown.overlap) >= HELD_OUT.min_beyond_share:
         direction = shown.points[~shown.overlap].mean(axis=0) - shown.points[shown.overlap].mean(axis=0)
         order = np.argsort(-(x @ direction), kind="stable")
-        furthest[order[: round(TOWARDS_SHARE * len(x))]] = True
+        furthest[order[: round(HELD_OUT.strip_share * len(x))]] = True
     return furthest
 
 

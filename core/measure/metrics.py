@@ -23,11 +23,7 @@ from ..raster.lazy import AnyImage
 from ..raster.log_encoding import log_encode
 from ..raster.sampling import fetch
 from ..system.threads import each, in_order
-
-# Constants of the structural similarity index for 8 bit (Wang et al., IEEE TIP 2004, section III-B).
-SSIM_C1, SSIM_C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
-# A field is smooth: about this many canvas pixels, evenly spread, say how far a map leaves the epipolar lines.
-SAMPLES = 20_000
+from .options import QUALITY
 
 
 def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
@@ -173,7 +169,8 @@ def _similarity(
     """The structural similarity (H, W) of two gray pictures in windows that `smooth` takes means over."""
     mx, my = smooth(x), smooth(y)
     vx, vy, vxy = smooth(x * x) - mx * mx, smooth(y * y) - my * my, smooth(x * y) - mx * my
-    return (2 * mx * my + SSIM_C1) * (2 * vxy + SSIM_C2) / ((mx * mx + my * my + SSIM_C1) * (vx + vy + SSIM_C2))
+    c1, c2 = QUALITY.ssim_c1, QUALITY.ssim_c2
+    return (2 * mx * my + c1) * (2 * vxy + c2) / ((mx * mx + my * my + c1) * (vx + vy + c2))
 
 
 def _seam_visibility(
@@ -217,7 +214,7 @@ class CoverageSamples:
     overlap: NDArray[np.bool_]
 
 
-def coverage_samples(warp: Warp, cameras: tuple[Camera, Camera], samples: int = SAMPLES) -> CoverageSamples:
+def coverage_samples(warp: Warp, cameras: tuple[Camera, Camera], samples: int = QUALITY.map_samples) -> CoverageSamples:
     """What a warp shows of the target at about `samples` pixels of the whole canvas, on an even grid.
 
     Of a round panorama no more than a flat one would show: beyond, pixels of the reference's plane mean nothing.

@@ -16,13 +16,7 @@ from ..cameras.matches import Matches
 from ..cameras.projective import distance_to_line, homogeneous, normalisation, sampson_residuals
 from ..raster.arrays import Array
 from .metrics import CoverageSamples
-
-# Less than this many points cannot be said to determine F.
-LEAST_MATCHES = 16
-# px within which a match counts, in units of the matches' scale; `fundamental` takes 1.5 and 3.
-SUPPORT_PX = 2.0
-# MAGSAC++ ends in one of several valleys: which one, a single draw leaves to chance.
-DRAWS, FITS = 5, 10
+from .options import INDEPENDENT
 
 
 def projectivity(F: Array, shown: CoverageSamples) -> float:
@@ -41,14 +35,16 @@ def independent_fundamental(matches: Matches, seed: int = 0) -> Array:
     the normalised 8-point algorithm on those, reweighted by their distances (Cauchy), gives F; the best F counts, that
     with the least truncated squared distance over all matches.
     """
-    limit = SUPPORT_PX * matches.scale
+    limit = INDEPENDENT.inlier_px * matches.scale
     best, least = np.full((3, 3), np.nan), np.inf
-    if len(matches) < LEAST_MATCHES:
+    if len(matches) < INDEPENDENT.min_matches:
         return best
-    for draw in range(DRAWS):
+    for draw in range(INDEPENDENT.draws):
         order = np.random.default_rng((seed, draw)).permutation(len(matches))  # OpenCV's samples follow the order
         drawn = matches.subset(order)
-        F, _ = cv2.findFundamentalMat(drawn.x, drawn.y, cv2.USAC_MAGSAC, limit, 0.9999, 10_000)
+        F, _ = cv2.findFundamentalMat(
+            drawn.x, drawn.y, cv2.USAC_MAGSAC, limit, INDEPENDENT.magsac_confidence, INDEPENDENT.magsac_iterations
+        )
         refitted = None if F is None or F.shape != (3, 3) else _refitted(F, drawn, limit)
         if refitted is not None:
             cost = float(np.minimum(sampson_residuals(refitted, matches.x, matches.y) ** 2, limit**2).sum())
@@ -59,10 +55,10 @@ def independent_fundamental(matches: Matches, seed: int = 0) -> Array:
 
 def _refitted(F: Array, matches: Matches, limit: float) -> Array | None:
     """F from the matches within `limit` px of it, and so on; None where they become too few."""
-    for _ in range(FITS):
+    for _ in range(INDEPENDENT.fits):
         distance = np.abs(sampson_residuals(F, matches.x, matches.y))
         agree = distance < limit
-        if agree.sum() < LEAST_MATCHES:
+        if agree.sum() < INDEPENDENT.min_matches:
             return None
         near = distance[agree]
         knee = max(2.385 * float(np.median(near)) / 0.6745, 1e-9)

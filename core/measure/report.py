@@ -15,6 +15,7 @@ from ..panorama.levelling import angles_of
 from ..panorama.warp import build_map
 from .held_out import held_out
 from .metrics import coverage_samples, look_up, off_line_mean, overlap_quality
+from .options import WARNING
 from .projectivity import independent_fundamental, projectivity
 
 if TYPE_CHECKING:
@@ -27,10 +28,6 @@ if TYPE_CHECKING:
     from ..pictures.picture import Picture
 
 SCHEMA = 1
-# More inliers than this behind infinity means that the focal length, hence H_inf, is doubtful.
-NEGATIVE_SHARE = 0.02
-# Holes that take up more of the canvas than this can be seen in the panorama as a whole.
-HOLES = 1e-4
 
 
 def make_report(
@@ -83,7 +80,7 @@ def make_report(
         "measured": measured,
     }  # fmt: skip
     warnings = _warnings(alignment, measured["folds"])
-    if decided.holes > HOLES * alignment.warp.map_x.size:
+    if decided.holes > WARNING.hole_share * alignment.warp.map_x.size:
         shown = (
             "filled smoothly from around there" if options.holes == "inpaint" else
             "transparent there (black in a JPEG); --holes inpaint fills them"
@@ -135,7 +132,7 @@ def _measured(
 def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
     two_view, field, warp = alignment.two_view, alignment.field, alignment.warp
     out = []
-    if field.fit.negative_share > NEGATIVE_SHARE:
+    if field.fit.negative_share > WARNING.behind_infinity_share:
         out.append(
             f"{field.fit.negative_share:.0%} of the points lie beyond infinity: the focal length "
             f"({two_view.K[0, 0]:.0f} px) is doubtful, and with it depth and H_inf; the picture itself hardly "
@@ -151,7 +148,7 @@ def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
             else "the target reaches too far to the side to be shown whole in a flat picture: its far end was cropped; "
             "--projection cylindrical or equirectangular shows it"
         )
-    if fold_share > 0.005:
+    if fold_share > WARNING.fold_share:
         out.append(f"the warp folds over in {fold_share:.1%} of the target: look for doubled or torn things there")
     return out
 

@@ -15,15 +15,13 @@ from ..cameras.matches import Matches
 from ..cameras.projective import homogeneous
 from ..cameras.two_view import TwoView
 from ..field.field import FieldValues, Fit
+from ..field.options import FADE
 from ..field.strict import StrictField
 from ..raster.arrays import Array
 from ..raster.grid import Grid
 from .homography import LinearEquations, direct_linear, knowing_only
+from .options import APAP
 
-# σ in units of √(W·H) of the reference: the paper's code has 50 to 140 px on pictures of 1 to 3 MP. γ: as there.
-SIGMA, GAMMA = 0.05, 0.0025
-# Points are solved in slabs of about this many weights, so that memory stays bounded.
-SLAB = 4_000_000
 # Nothing is shown of what lies less than this in front of the target camera, relative to its lengths.
 LEAST_AHEAD = 1e-6
 
@@ -55,7 +53,7 @@ class ApapField:
     def predict(self, points: Array) -> Array:
         """Target pixels (N, 2) of points (N, 2)."""
         out = np.empty((len(points), 2))
-        rows = max(1, SLAB // len(self.equations.x))
+        rows = max(1, APAP.weights_at_once // len(self.equations.x))
         for start in range(0, len(points), rows):
             p = points[start : start + rows]
             H = self.equations.solutions(self._weights(p) ** 2)
@@ -72,12 +70,12 @@ class ApapField:
         return np.maximum(np.exp(-apart / self.sigma**2), self.gamma)
 
 
-def fit_apap(strict: StrictField, matches: Matches, sigma: float | None = None, gamma: float = GAMMA) -> ApapField:
+def fit_apap(strict: StrictField, matches: Matches, sigma: float | None = None, gamma: float = APAP.gamma) -> ApapField:
     """APAP on the matches that the strict field stands on: outliers would each have their own place in the picture.
 
     sigma in px, from the picture's size where it is not given. Raises DegenerateGeometry.
     """
-    sigma = SIGMA * float(np.sqrt(strict.size[0] * strict.size[1])) if sigma is None else sigma
+    sigma = APAP.sigma * float(np.sqrt(strict.size[0] * strict.size[1])) if sigma is None else sigma
     return _field(strict.two_view, matches, sigma, gamma, strict.fit.inliers_used)
 
 
@@ -85,7 +83,8 @@ def _field(two_view: TwoView, matches: Matches, sigma: float, gamma: float, kept
     few = matches.subset(kept)
     equations = LinearEquations.of(few.x, few.y, few.weights)
     view = knowing_only(two_view, direct_linear(few.x, few.y, few.weights))
-    field = ApapField(view, equations, sigma, gamma, Fit(kept, np.nan, 8 * matches.scale, np.nan, np.nan, np.nan))
+    fit = Fit(kept, np.nan, FADE.min_px * matches.scale, np.nan, np.nan, np.nan)
+    field = ApapField(view, equations, sigma, gamma, fit)
     rms = float(np.sqrt(np.mean(np.sum((field.predict(few.x) - few.y) ** 2, axis=1))))
     return replace(field, fit=replace(field.fit, residual_px=rms))
 

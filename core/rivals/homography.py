@@ -12,17 +12,13 @@ from ..cameras.matches import Matches
 from ..cameras.projective import homogeneous, normalisation
 from ..cameras.two_view import TwoView
 from ..field.field import FieldValues, Fit
+from ..field.options import FADE
 from ..field.transfer import target_points
 from ..pose.fundamental import fit_homography, transfer_error
 from ..raster.arrays import Array
 from ..raster.grid import Grid
 from ..system.errors import DegenerateGeometry
-
-# px: what is further off has no say. Parallax is noise to a homography: with the few px of a keypoint's own it would
-# hold on to one plane of the scene, far from the best for all of it.
-REACH_PX = 10.0
-LEAST_MATCHES = 6
-REWEIGHTINGS, STILL = 300, 1e-12
+from .options import HOMOGRAPHY
 
 
 @dataclass(frozen=True)
@@ -61,10 +57,11 @@ def fit_one_homography(two_view: TwoView, matches: Matches, seed: int = 0) -> Ho
     start = np.eye(3)
     if not matches.given:
         cv2.setRNGSeed(seed)
-        reach = REACH_PX * matches.scale
+        reach = HOMOGRAPHY.inlier_px * matches.scale
         found, _ = cv2.findHomography(
-            matches.x, matches.y, cv2.USAC_MAGSAC, reach, maxIters=10_000, confidence=0.999
-        )
+            matches.x, matches.y, cv2.USAC_MAGSAC, reach,
+            maxIters=HOMOGRAPHY.magsac_iterations, confidence=HOMOGRAPHY.magsac_confidence,
+        )  # fmt: skip
         start = fit_homography(matches, seed).H if found is None or not np.isfinite(found).all() else found
         start = start * np.sign(np.median(homogeneous(matches.x) @ start[2]))
     return _field(two_view, *_settled(start, matches), matches=matches)
@@ -78,14 +75,15 @@ def _settled(H: Array, matches: Matches) -> tuple[Array, NDArray[np.bool_]]:
     if matches.given:
         return direct_linear(matches.x, matches.y, matches.weights), np.full(len(matches), True)
     H = H / np.linalg.norm(H)
-    if np.sum(transfer_error(H, matches) < REACH_PX * matches.scale) < LEAST_MATCHES:  # of other matches altogether
+    inlier_px = HOMOGRAPHY.inlier_px * matches.scale
+    if np.sum(transfer_error(H, matches) < inlier_px) < HOMOGRAPHY.min_matches:  # H is of other matches altogether
         H = direct_linear(matches.x, matches.y, matches.weights)
-    for _ in range(REWEIGHTINGS):
-        off = transfer_error(H, matches) / (REACH_PX * matches.scale)
+    for _ in range(HOMOGRAPHY.max_reweightings):
+        off = transfer_error(H, matches) / inlier_px
         weight = matches.weights * np.square(1 - np.square(np.minimum(off, 1.0)))
         near, previous = weight > 0, H
         H = direct_linear(matches.x[near], matches.y[near], weight[near])
-        if np.abs(H - previous).max() < STILL * np.abs(H).max():
+        if np.abs(H - previous).max() < HOMOGRAPHY.settled * np.abs(H).max():
             break
     return H, near
 
@@ -93,7 +91,7 @@ def _settled(H: Array, matches: Matches) -> tuple[Array, NDArray[np.bool_]]:
 def _field(two_view: TwoView, H: Array, kept: NDArray[np.bool_], matches: Matches) -> HomographyField:
     view = knowing_only(two_view, H)
     off = transfer_error(H, matches.subset(kept))
-    fit = Fit(kept, np.nan, 8 * matches.scale, float(np.sqrt(np.mean(off**2))), np.nan, np.nan)
+    fit = Fit(kept, np.nan, FADE.min_px * matches.scale, float(np.sqrt(np.mean(off**2))), np.nan, np.nan)
     return HomographyField(view, fit)
 
 
@@ -125,8 +123,9 @@ class LinearEquations:
     @staticmethod
     def of(x: Array, y: Array, weight: Array) -> LinearEquations:
         """Of matches (N, 2) and weights (N,). Raises DegenerateGeometry: too few, or in one spot or on a line."""
-        if len(x) < LEAST_MATCHES:
-            raise DegenerateGeometry(f"{len(x)} matches do not determine a homography, at least {LEAST_MATCHES} needed")
+        if len(x) < HOMOGRAPHY.min_matches:
+            needed = HOMOGRAPHY.min_matches
+            raise DegenerateGeometry(f"{len(x)} matches do not determine a homography, at least {needed} needed")
         for points in (x, y):
             spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
             if spread[1] < 1e-3 * spread[0] or spread[0] < 1e-9:

@@ -26,12 +26,7 @@ from ..pose.rotation import nearest_rotation
 from ..raster.arrays import Array
 from ..raster.grid import Grid
 from .homography import fit_one_homography, knowing_only
-
-# The focal lengths are known better than within this factor; without a bound parallax may drive them anywhere.
-MOST_ZOOM = 2.0
-FAR_OFF_PX = 1e4
-# A rotation, which has less freedom than a homography, may be so much worse.
-ROTATION_FACTOR, ROTATION_PX = 1.2, 0.5
+from .options import REW
 
 
 @dataclass(frozen=True)
@@ -109,15 +104,17 @@ def global_transformation(two_view: TwoView, matches: Matches) -> Array:
         ray = x @ transformation(p).T
         with np.errstate(divide="ignore", invalid="ignore"):
             off = project(ray) - matches.y
-        off = np.where(ray[:, 2:] > 0, np.clip(off, -FAR_OFF_PX, FAR_OFF_PX), FAR_OFF_PX)
+        off = np.where(ray[:, 2:] > 0, np.clip(off, -REW.max_error_px, REW.max_error_px), REW.max_error_px)
         return (off * np.sqrt(matches.weights)[:, None]).ravel()
 
-    scale = max(float(np.median(np.abs(residuals(np.zeros(4))))), 0.1 * matches.scale)
-    bound = np.array([np.pi, np.pi, np.pi, np.log(MOST_ZOOM)])
-    found = least_squares(residuals, np.zeros(4), bounds=(-bound, bound), loss="cauchy", f_scale=scale, max_nfev=100)
+    scale = max(float(np.median(np.abs(residuals(np.zeros(4))))), REW.noise_floor_px * matches.scale)
+    bound = np.array([np.pi, np.pi, np.pi, np.log(REW.max_zoom)])
+    found = least_squares(
+        residuals, np.zeros(4), bounds=(-bound, bound), loss="cauchy", f_scale=scale, max_nfev=REW.max_evaluations
+    )
     rotated = transformation(found.x)
     off, off_rotated = (float(np.median(transfer_error(M, matches))) for M in (H, rotated))
-    serves = off_rotated <= max(ROTATION_FACTOR * off, ROTATION_PX * matches.scale)
+    serves = off_rotated <= max(REW.max_error_ratio * off, REW.max_rotation_px * matches.scale)
     return rotated / np.linalg.norm(rotated) if serves else H
 
 
