@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +36,11 @@ def field_pictures(result: StitchResult) -> dict[str, bytes]:
 def _on_gray(result: StitchResult) -> Rgb:
     """The panorama over gray where it shows nothing."""
     alpha = result.alpha[..., None]
-    return np.rint(_rgb(encode(result.pixels, 8)) * alpha + 96 * (1 - alpha)).astype(np.uint8)
+    shown: Rgb = np.rint(_rgb(encode(result.pixels, 8)) * alpha + 96 * (1 - alpha)).astype(np.uint8)
+    return shown
 
 
-def _rgb(picture: NDArray) -> Rgb:
+def _rgb(picture: NDArray[Any]) -> Rgb:
     return np.repeat(picture, 3, axis=2) if picture.shape[2] == 1 else picture
 
 
@@ -54,4 +57,5 @@ def _jpeg(picture: Rgb) -> bytes:
         picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     quality = [cv2.IMWRITE_JPEG_QUALITY, COMPARISON.jpeg_quality]
     coded = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), quality)
-    return coded[1].tobytes()
+    result: bytes = coded[1].tobytes()
+    return result

@@ -1,8 +1,9 @@
-"""Dense refinement: every pixel of the overlap found along its epipolar line, where the pictures tell.
+"""Dense refinement: every pixel of the overlap is searched for along its epipolar line.
 
-The sparse field is right at its matches and smooth between them. Here each pixel is sought along its line around the
-field (`matching`), edges of the reference guide what is filled and smoothed (`edge_aware_smoothing`), and both
-pictures' gray levels settle the last fraction of a pixel (`polish`). Where they say nothing the field stays.
+The sparse field is right at its matches and smooth between them. Here each pixel is matched along its line close to
+the field (`matching`), gaps are filled and errors smoothed along the edges of the reference (`edge_aware_smoothing`),
+and both pictures' gray levels settle the last fraction of a pixel (`polish`). Where there is no texture the field
+stays.
 """
 
 from __future__ import annotations
@@ -34,10 +35,11 @@ from .unfolding import unfolded
 
 @dataclass(frozen=True)
 class Dense:
-    """What became of dense refinement: the relief, or None and why not.
+    """The result of dense refinement.
 
-    reach_px: how far along the lines was sought; found: share of the overlap where both pictures agreed on a place;
-    moved_px, across_px: RMS of the moves along the lines and across them.
+    relief: the refinement, or None, and then `why` says why not; reach_px: largest move along the lines that was
+    searched; found: share of the overlap that was matched; moved_px, across_px: RMS of the moves along the lines and
+    across them.
     """
 
     relief: RefinedDepth | None
@@ -52,10 +54,24 @@ def refine(
     field: StrictField | SlackField, two_view: TwoView, matches: Matches, pictures: tuple[Picture, Picture],
     cameras: tuple[Camera, Camera],
 ) -> Dense:  # fmt: skip
-    """Refines a strict or slack field of a pair.
+    """Refines a strict or slack field of a pair of pictures.
 
-    matches: the inliers that the field was fitted to, ideal px. A strict field keeps to its lines; a slack one may
-    leave them a little further than matches could tell.
+    Parameters
+    ----------
+    field : StrictField or SlackField
+        A strict field stays on its epipolar lines; a slack one may leave them, as it did before.
+    two_view : TwoView
+    matches : Matches
+        The matches that the field was given, ideal px.
+    pictures : (Picture, Picture)
+        Reference and target.
+    cameras : (Camera, Camera)
+        Of the same, with their lenses.
+
+    Returns
+    -------
+    Dense
+        Without refinement where there is no baseline, no overlap to speak of, or a picture is too large.
     """
     if not two_view.e_prime.any() or not np.isfinite(two_view.F).all():
         return Dense(None, f"a {two_view.model} without a baseline has no epipolar lines to search along")
@@ -71,35 +87,37 @@ def refine(
         return Dense(None, "the overlap is too small")
     limits = REFINE.max_searched_px, REFINE.max_refined_px
     step, fine = (max(1.0, float(np.sqrt(box[2] * box[3] / most))) for most in limits)
-    base, reach = search_base(sparse, matches.subset(field.fit.inliers_used), field.plane, REFINE.max_reach_px * step)
-    reach = float(np.clip(reach, REFINE.min_reach_px * step, REFINE.max_reach_px * step))
+    min_reach, max_reach = REFINE.min_reach_px * step, REFINE.max_reach_px * step
+    base, reach = search_base(sparse, matches.subset(field.fit.inliers_used), field.plane, max_reach)
+    reach = float(np.clip(reach, min_reach, max_reach))
     lines = EpipolarLines.over(base, box, fine)
     field_at = (lines.at(sparse) - lines.inverse_depth) / lines.depth_per_px
     coarse_views = _views(pictures, step)
     views = coarse_views if fine == step else _views(pictures, fine)
     along, found = search(lines, base, coarse_views[0], coarse_views[1], step, reach)
     along = np.where(found > 0, along, field_at)
-    alike = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
-    plain = _plain(lines, sparse, views[0]) * (1 - alike)
+    # smooth surfaces that look alike in both pictures are matched well without texture, noise is not
+    similar = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
+    plain = _plain(lines, sparse, views[0]) * (1 - similar)
     weights = edge_weights(_guide(pictures[0].view, lines), REFINE.edge_levels)
     weights = strengthen(cut_edges(weights, along, found > 0, REFINE.depth_edge_px), plain, REFINE.plain_strength)
-    share = np.maximum(found * (1 - np.float32(REFINE.plain_doubt) * plain), np.float32(REFINE.field_confidence))
-    along = Smoother.of(weights, REFINE.smoothness).smoothed(along, share)
+    weight = np.maximum(found * (1 - np.float32(REFINE.plain_doubt) * plain), np.float32(REFINE.field_confidence))
+    along = Smoother.of(weights, REFINE.smoothness).smoothed(along, weight)
     known = np.maximum(found, np.float32(REFINE.field_confidence))
     polished = polish(lines, views[0], views[1], along, known, weights, slack)
     confidence = np.clip(polished.likeness, 0, 1) * cv2.blur(found, (9, 9))
-    there = _there(lines, polished.along, polished.across, pictures)
-    if not there.any():
+    overlap = _in_both(lines, polished.along, polished.across, pictures)
+    if not overlap.any():
         return Dense(None, "the overlap is too small")
     along = unfolded(lines, two_view, cameras[1].size, polished.along, polished.across) - field_at
-    relief = build_refinement(lines, base, along, polished.across, confidence, there)
-    moved, across = (float(np.sqrt(np.square(v[there]).mean())) for v in (along, polished.across))
-    return Dense(relief, "", reach, float((found[there] > 0).mean()), moved, across)
+    refinement = build_refinement(lines, base, along, polished.across, confidence, overlap)
+    along_rms, across_rms = (float(np.sqrt(np.square(v[overlap]).mean())) for v in (along, polished.across))
+    return Dense(refinement, "", reach, float((found[overlap] > 0).mean()), along_rms, across_rms)
 
 
 def _overlap(sparse: SparseMap, target_size: tuple[int, int]) -> Box | None:
-    """The part of the reference (left, top, width, height) that the field shows in the target, with a little around
-    it."""
+    """The box (left, top, width, height) px around the part of the reference that the field maps into the target, with
+    one node of margin; None if it is too small."""
     width, height = sparse.camera.size
     lines = EpipolarLines.over(sparse, (0, 0, width, height), max(1.0, max(width, height) / REFINE.overlap_nodes))
     x, y = lines.target(np.zeros(lines.shape, np.float32))
@@ -116,47 +134,50 @@ def _overlap(sparse: SparseMap, target_size: tuple[int, int]) -> Box | None:
 
 
 def _views(pictures: tuple[Picture, Picture], step: float) -> tuple[View, View]:
-    """Both pictures with `step` px to each of their own."""
+    """Reference and target, shrunk by `step`."""
     reference, target = in_order(lambda picture: View.of(picture.view, picture.alpha, step), pictures)
     return reference, target
 
 
 def _guide(view: NDArray[np.uint8], lines: EpipolarLines) -> NDArray[np.float32]:
-    """The reference's colours at the nodes, a little smoothed: noise is no edge."""
+    """The reference's colours (h, w, C) at the nodes, slightly blurred so that noise makes no edges."""
     left, top, width, height = lines.box
     part = view[top : top + height, left : left + width]
     rows, columns = lines.shape
     if (rows, columns) != part.shape[:2]:
         part = cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
-    return cv2.GaussianBlur(part, (0, 0), 1.0).astype(np.float32)
+    result: Plane = cv2.GaussianBlur(part, (0, 0), 1.0).astype(np.float32)
+    return result
 
 
 def _plain(lines: EpipolarLines, sparse: SparseMap, reference: View) -> Plane:
-    """How little (h, w) 0..1 the reference shows around the nodes that a move along their lines would change."""
+    """Lack of texture (h, w) around the nodes, by the gradient along their epipolar lines: 0 for much, 1 for none."""
     epipole = np.linalg.svd(sparse.two_view.F)[2][2]
     gray = cv2.GaussianBlur(reference.gray, (0, 0), 1.0)
     slope, length = np.zeros((2, *lines.shape), np.float32)
     for k in (0, 1):
-        away = (lines.ideal[..., k] * epipole[2] - epipole[k]).astype(np.float32)
+        # the line through a node leads to the epipole
+        to_epipole = (lines.ideal[..., k] * epipole[2] - epipole[k]).astype(np.float32)
         gradient = cv2.Scharr(gray, cv2.CV_32F, 1 - k, k, scale=1 / 32)
-        slope += reference.at_nodes(gradient, lines)[0] * away
-        away *= away
-        length += away
+        slope += reference.at_nodes(gradient, lines)[0] * to_epipole
+        to_epipole *= to_epipole
+        length += to_epipole
     slope *= slope
     slope /= np.maximum(length, np.float32(1e-24))
-    return REFINE.half_texture / (REFINE.half_texture + cv2.blur(slope, (7, 7)))
+    result: Plane = REFINE.half_texture / (REFINE.half_texture + cv2.blur(slope, (7, 7)))
+    return result
 
 
-def _there(lines: EpipolarLines, along: Plane, across: Plane, pictures: tuple[Picture, Picture]) -> NDArray[np.bool_]:
-    """Where the nodes show both pictures."""
+def _in_both(lines: EpipolarLines, along: Plane, across: Plane, pictures: tuple[Picture, Picture]) -> NDArray[np.bool_]:
+    """The nodes (h, w) at which, after moves (h, w) px, both pictures show something."""
     height, width = pictures[1].view.shape[:2]
     x, y = lines.target(along, across)
     with np.errstate(invalid="ignore"):
-        there = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
+        inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
     if pictures[1].alpha is not None:
-        there &= fetch(pictures[1].alpha[..., None], x, y, cv2.INTER_LINEAR)[..., 0] > 0
+        inside &= fetch(pictures[1].alpha[..., None], x, y, cv2.INTER_LINEAR)[..., 0] > 0
     if pictures[0].alpha is not None:
         left, top, across_px, down = lines.box
         part = (pictures[0].alpha[top : top + down, left : left + across_px] > 0).astype(np.uint8)
-        there &= cv2.resize(part, lines.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
-    return there
+        inside &= cv2.resize(part, lines.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+    return inside

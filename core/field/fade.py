@@ -46,7 +46,8 @@ def outside_overlap(grid: Grid, target: Array, size: tuple[int, int], target_siz
 def fading(distance: Array, width: float) -> Array:
     """Weight α (…): 1 at distance 0, falling smoothly (3u² − 2u³) to 0 at distance `width`; both in px."""
     u = np.minimum(distance / width, 1.0)
-    return 1 - u * u * (3 - 2 * u)
+    result: Array = 1 - u * u * (3 - 2 * u)
+    return result
 
 
 def fade_width(displacement_px: Array, noise_scale: float) -> float:

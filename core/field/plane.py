@@ -45,7 +45,8 @@ def beyond_reference(H: Array, size: tuple[int, int], target_size: tuple[int, in
     back = homogeneous(np.column_stack([u.ravel(), v.ravel()])) @ np.linalg.inv(H).T
     points = project(back[back[:, 2] > 1e-6 * np.abs(back[:, :2]).max(axis=1)])
     end = np.array(size) - 1.0
-    return np.clip(points[((points < 0) | (points > end)).any(axis=1)], 0, end)
+    result: Array = np.clip(points[((points < 0) | (points > end)).any(axis=1)], 0, end)
+    return result
 
 
 def continued_plane(

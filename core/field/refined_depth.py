@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -26,7 +27,7 @@ class RefinedDepth:
     shift: Plane
     confidence: Plane
 
-    def at(self, x: NDArray, y: NDArray) -> tuple[Plane, Plane, Plane]:
+    def at(self, x: NDArray[Any], y: NDArray[Any]) -> tuple[Plane, Plane, Plane]:
         """inverse_depth (…), shift (…, 2) and confidence (…) at raw reference pixels x, y (rows, columns).
 
         Bilinear between nodes, 0 outside the grid.

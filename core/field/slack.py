@@ -80,7 +80,8 @@ class SlackField:
     def _bounded(self, slack: Array) -> Array:
         """Slack (…, 2) px, shortened to at most slack_px."""
         length = np.linalg.norm(slack, axis=-1, keepdims=True)
-        return slack * (self.slack_px / np.maximum(length, max(self.slack_px, 1e-300)))
+        result: Array = slack * (self.slack_px / np.maximum(length, max(self.slack_px, 1e-300)))
+        return result
 
 
 def fit_slack(strict: StrictField, matches: Matches) -> SlackField:
@@ -142,4 +143,5 @@ def _residuals_across(strict: StrictField, matches: Matches) -> Array:
         return residual
     line = np.cross(homogeneous(np.where(np.isfinite(predicted), predicted, 0.0)), e)
     normal = line[:, :2] / np.maximum(np.linalg.norm(line[:, :2], axis=1, keepdims=True), 1e-300)
-    return np.sum(residual * normal, axis=1, keepdims=True) * normal
+    result: Array = np.sum(residual * normal, axis=1, keepdims=True) * normal
+    return result

@@ -34,7 +34,7 @@ class ThinPlateSpline:
     def at(self, points: Array) -> Array:
         """Values (N,) or (N, k) at points (N, 2) px, in float64 throughout."""
         p = (np.asarray(points, np.float64) - self.centre) / self.scale
-        out = p @ self.affine[:2] + self.affine[2]
+        out: Array = p @ self.affine[:2] + self.affine[2]
         rows = max(1, SPLINE.kernel_values_at_once // max(1, len(self.centres)))
         for start in range(0, len(p), rows):
             out[start : start + rows] += kernel(p[start : start + rows], self.centres) @ self.weights
@@ -51,7 +51,7 @@ class ThinPlateSpline:
         dy2 = ((y[:, None] - self.centres[:, 1]) ** 2).astype(np.float32)
         weights = (0.5 * self.weights).astype(np.float32)
         across, down = np.multiply.outer(x, self.affine[0]), np.multiply.outer(y, self.affine[1]) + self.affine[2]
-        out = across[None] + down[:, None]
+        out: Array = across[None] + down[:, None]
         if not len(self.centres):
             return out
         rows = max(1, SPLINE.kernel_values_at_once // max(1, dx2.size))
@@ -67,7 +67,8 @@ class ThinPlateSpline:
 def kernel(points: Array, centres: Array) -> Array:
     """½ r² ln r² between points (N, 2) and centres (M, 2), zero at r = 0."""
     r2 = np.subtract.outer(points[:, 0], centres[:, 0]) ** 2 + np.subtract.outer(points[:, 1], centres[:, 1]) ** 2
-    return 0.5 * r2 * np.log(np.maximum(r2, 1e-300))
+    result: Array = 0.5 * r2 * np.log(np.maximum(r2, 1e-300))
+    return result
 
 
 @dataclass(frozen=True)

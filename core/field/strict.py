@@ -70,7 +70,8 @@ class StrictField:
 
     def at(self, points: Array) -> Array:
         """Inverse depth (N,) at points (N, 2) px in the overlap, where nothing fades."""
-        return points @ self.plane[:2] + self.plane[2] + self.spline.at(points)
+        result: Array = points @ self.plane[:2] + self.plane[2] + self.spline.at(points)
+        return result
 
     def predict(self, points: Array) -> Array:
         """Target pixels (N, 2) of points (N, 2) px in the overlap, where nothing fades."""
@@ -244,7 +245,8 @@ def _supported(x: Array, g: Array, sensitivity: Array, tolerance: float) -> NDAr
     np.fill_diagonal(distance2, np.inf)
     nearest = np.argpartition(distance2, STRICT.neighbours, axis=1)[:, :STRICT.neighbours]
     agrees = np.abs(g[nearest] - g[:, None]) * sensitivity[:, None] <= tolerance
-    return agrees.sum(axis=1) >= STRICT.agreeing_neighbours
+    result: NDArray[np.bool_] = agrees.sum(axis=1) >= STRICT.agreeing_neighbours
+    return result
 
 
 def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> float:
@@ -272,4 +274,5 @@ def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> f
 def robust_mean(error: Array) -> Array:
     """Mean (n,) of Huber's loss over each row of errors (n, N) ≥ 0: squared up to three medians, linear beyond."""
     knee = 3 * np.median(error, axis=1, keepdims=True) + 1e-12
-    return np.where(error < knee, error**2, knee * (2 * error - knee)).mean(axis=1)
+    result: Array = np.where(error < knee, error**2, knee * (2 * error - knee)).mean(axis=1)
+    return result

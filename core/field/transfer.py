@@ -80,4 +80,5 @@ def inverse_depths(two_view: TwoView, x: Array, y: Array) -> tuple[Array, Array]
 def _slope(ray: Array, e: Array) -> Array:
     """∂π(ray)/∂d (N, 2) for rays (N, 3) that change by e (3,) per unit of d."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return (e[:2] * ray[:, 2:] - ray[:, :2] * e[2]) / ray[:, 2:] ** 2
+        result: Array = (e[:2] * ray[:, 2:] - ray[:, :2] * e[2]) / ray[:, 2:] ** 2
+        return result

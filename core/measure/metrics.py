@@ -1,10 +1,11 @@
-"""How well a stitch holds: alignment and epipolar exactness in px, folds, and the overlap's PSNR and SSIM."""
+"""Figures of a stitch: alignment and distance from epipolar lines in px, PSNR and SSIM of the overlap, its seam."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -27,7 +28,7 @@ from .options import QUALITY
 
 
 def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
-    """Peak signal-to-noise ratio in dB of two 8-bit pictures (H, W, C) over a mask (H, W); inf where they are equal."""
+    """Peak signal-to-noise ratio in dB of two 8-bit pictures (H, W, C) over a mask (H, W), not empty; inf if equal."""
 
     def total(rows: slice) -> float:
         first, second = (picture[rows][mask[rows]].astype(np.float32) for picture in (a, b))
@@ -38,17 +39,27 @@ def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) ->
 
 
 def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
-    """Mean structural similarity of two 8-bit pictures (H, W, C) as gray, 11×11 Gaussian of σ 1.5, where the whole
-    window lies in the mask.
+    """Mean structural similarity (Wang et al., IEEE TIP 2004) of two 8-bit pictures.
 
-    NaN where no window fits (Wang et al. 2004).
+    Parameters
+    ----------
+    a, b : (H, W, C) uint8 array
+        Compared as gray, in 11×11 Gaussian windows of σ 1.5.
+    mask : (H, W) bool array
+        Only windows that lie in it entirely count.
+
+    Returns
+    -------
+    float
+        NaN if no window fits.
     """
     inner = cv2.erode(np.pad(mask.astype(np.uint8), 5), np.ones((11, 11), np.uint8))[5:-5, 5:-5] > 0
     if not inner.any():
         return float("nan")
 
     def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
-        return cv2.GaussianBlur(values, (11, 11), 1.5)
+        result: NDArray[np.float32] = cv2.GaussianBlur(values, (11, 11), 1.5)
+        return result
 
     def total(rows: slice) -> float:
         near, here = beside(rows, 5, len(mask))
@@ -58,15 +69,16 @@ def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) ->
     return sum(in_order(total, strips(mask.shape))) / int(inner.sum())
 
 
-def _gray(picture: NDArray) -> NDArray:
+def _gray(picture: NDArray[Any]) -> NDArray[Any]:
+    """Gray levels (H, W) of a picture (H, W, 1 or 3)."""
     return picture[..., 0] if picture.shape[2] == 1 else cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
 
 
 def overlap_views(
     reference: Picture, target: Picture, warp: Warp
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.bool_]]:
-    """The 8-bit views (H, W, C) of the reference and, on its pixels, of the warped target; and where (H, W) both show
-    something whole; by a flat warp."""
+    """Views (H, W, C) uint8 of the reference and of the target warped onto its pixels, and the mask (H, W) of pixels
+    where both are opaque; for a flat warp."""
     height, width = reference.view.shape[:2]
     x, y = warp.canvas.offset
     box = (slice(y, y + height), slice(x, x + width))
@@ -74,7 +86,7 @@ def overlap_views(
     if reference.alpha is not None:
         inside = inside & (reference.alpha > 0)
     if target.alpha is not None:
-        # whole, where the colours are fetched from: what is hidden has no colour to compare
+        # opaque where the colours are interpolated from: a transparent pixel has no colour to compare
         alpha = fetch(target.alpha[..., None], warp.map_x[box], warp.map_y[box], cv2.INTER_LINEAR)
         inside = inside & (alpha[..., 0] > 1 - 1 / 255)
     map_x, map_y = (np.where(inside, m[box], -1).astype(np.float32) for m in (warp.map_x, warp.map_y))
@@ -82,9 +94,9 @@ def overlap_views(
 
 
 def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
-    """PSNR (dB), SSIM and size of the overlap, between the 8-bit views of the reference and of the warped target.
+    """PSNR (dB), SSIM and pixels of the overlap, between the 8-bit views of the reference and of the warped target.
 
-    Exposure differences are in it; it is what a reader of the literature calls alignment quality on the overlap.
+    Differences in exposure lower it. The literature calls it alignment quality on the overlap.
     """
     view, fetched, inside = overlap_views(reference, target, warp)
     if not inside.any():
@@ -97,16 +109,16 @@ def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str
 
 
 def canvas_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
-    """The same as published tables have it: both pictures black outside the overlap, averaged over the whole canvas.
+    """The same as in published tables: both pictures black outside the overlap, averaged over the whole canvas.
 
-    For comparison with them only: black counts as perfect, so a larger canvas looks better.
+    Only for comparison with them: black counts as perfect, so a larger canvas scores higher.
     """
     view, fetched, inside = overlap_views(reference, target, warp)
     if not inside.any():
         return {"canvas_psnr_db": float("nan"), "canvas_ssim": float("nan")}
     share = float(inside.sum()) / (warp.canvas.width * warp.canvas.height)
     bare = [np.where(inside[..., None], part, 0).astype(np.uint8) for part in (view, fetched)]
-    # a window's width of black around it holds all that is not perfect
+    # black around the pictures, so that every window that touches them counts
     first, second = (np.pad(part, ((6, 6), (6, 6), (0, 0))) for part in bare)
     similar = ssim(first, second, np.ones(first.shape[:2], bool))
     pixels = (first.shape[0] - 10) * (first.shape[1] - 10)
@@ -119,27 +131,41 @@ def canvas_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str,
 def appearance(
     panorama: Layer, reference: Layer, target: Layer, from_target: NDArray[np.bool_] | None, floats: tuple[bool, bool]
 ) -> dict[str, float]:
-    """How much of a panorama's overlap looks as one of its pictures does, and how much its seam shows.
+    """Whether the panorama's overlap looks like one of its pictures, and how visible its seam is.
 
-    source_fidelity_mean, source_fidelity_p5: for every pixel of the overlap the better of the structural similarities
-    (gray, 7×7) to the reference and to the target, which is exposed as it is in the panorama: mean and 5th percentile;
-    a ghost looks like neither. seam_visibility: by how many levels (of 255) the step from pixel to pixel across the
-    seam differs from the same step in the picture that is nearer to it, mean over the seam. NaN where there is none.
+    Parameters
+    ----------
+    panorama, reference, target : Layer
+        On the canvas; the target with the exposure it has in the panorama.
+    from_target : (H, W) bool array, optional
+        Pixels that the panorama takes from the target; None if there is no seam.
+    floats : (bool, bool)
+        Whether the pictures are floats, and so may be brighter than white.
+
+    Returns
+    -------
+    dict
+        source_fidelity_mean and source_fidelity_p5: mean and 5th percentile over the overlap of the better structural
+        similarity (gray, 7×7) to the reference or to the target: a ghost looks like neither. seam_visibility: levels of
+        255 by which the step between neighbours across the seam differs from the same step in the picture where it
+        differs less, mean over the seam. NaN where undefined.
     """
     box = bounds((reference.alpha > 0) & (target.alpha > 0))
     if box is None:
         return {"source_fidelity_mean": math.nan, "source_fidelity_p5": math.nan, "seam_visibility": math.nan}
-    # what else is there may be missing for want of room in 8 bit: light beyond white is looked at as tones
+    # with floats there may be light brighter than white, which 8 bits cannot hold: compared in log encoding
     levels = [_levels(part.light, box, any(floats)) for part in (panorama, reference, target)]
     both = ((reference.alpha > 0) & (target.alpha > 0))[box]
 
     def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
-        return cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
+        result: NDArray[np.float32] = cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
+        return result
 
     def better(rows: slice) -> NDArray[np.float32]:
-        near, here = beside(rows, 3, len(both))
-        whole, first, second = (_gray(part[near].astype(np.float32)) for part in levels)
-        return np.maximum(*(_similarity(whole, part, smooth)[here][both[rows]] for part in (first, second)))
+        with_margin, own = beside(rows, 3, len(both))
+        stitched, first, second = (_gray(part[with_margin].astype(np.float32)) for part in levels)
+        similarities = (_similarity(stitched, part, smooth)[own][both[rows]] for part in (first, second))
+        return np.asarray(np.maximum(*similarities))
 
     fidelity = np.concatenate(list(in_order(better, strips(both.shape))))
     seam = math.nan if from_target is None else _seam_visibility(levels, from_target[box], both)
@@ -149,8 +175,8 @@ def appearance(
     }  # fmt: skip
 
 
-def _levels(light: AnyImage, box: Part, floats: bool) -> NDArray:
-    """Levels (h, w, C) of a part: uint8, or float32 on the same scale."""
+def _levels(light: AnyImage, box: Part, floats: bool) -> NDArray[Any]:
+    """Levels (h, w, C), 0 to 255, of a part of linear light: uint8, or log-encoded float32."""
     rows, columns = box
     shape = (rows.stop - rows.start, columns.stop - columns.start, light.shape[2])
     out = np.empty(shape, np.float32 if floats else np.uint8)
@@ -165,8 +191,8 @@ def _levels(light: AnyImage, box: Part, floats: bool) -> NDArray:
 
 def _similarity(
     x: NDArray[np.float32], y: NDArray[np.float32], smooth: Callable[[NDArray[np.float32]], NDArray[np.float32]]
-) -> NDArray:
-    """The structural similarity (H, W) of two gray pictures in windows that `smooth` takes means over."""
+) -> NDArray[Any]:
+    """The structural similarity (H, W) of gray pictures x, y (H, W); `smooth` averages over a window."""
     mx, my = smooth(x), smooth(y)
     vx, vy, vxy = smooth(x * x) - mx * mx, smooth(y * y) - my * my, smooth(x * y) - mx * my
     c1, c2 = QUALITY.ssim_c1, QUALITY.ssim_c2
@@ -174,20 +200,34 @@ def _similarity(
 
 
 def _seam_visibility(
-    levels: list[NDArray], from_target: NDArray[np.bool_], both: NDArray[np.bool_]
+    levels: list[NDArray[Any]], from_target: NDArray[np.bool_], both: NDArray[np.bool_]
 ) -> float:
-    beyond = []
+    """See `appearance`; levels (h, w, C) of panorama, reference and target; both (h, w): the overlap."""
+    excess = []
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         across = (from_target[here] != from_target[there]) & both[here] & both[there]
         steps = [part[here][across].astype(np.float32) - part[there][across] for part in levels]
-        beyond.append(np.minimum(*(np.abs(steps[0] - step).mean(axis=1) for step in steps[1:])))
-    every = np.concatenate(beyond)
+        excess.append(np.minimum(*(np.abs(steps[0] - step).mean(axis=1) for step in steps[1:])))
+    every = np.concatenate(excess)
     return float(every.mean(dtype=np.float64)) if every.size else math.nan
 
 
 def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
-    """The map (N, 2) at raw points (N, 2) of the reference, bilinear between canvas pixels; NaN outside.
-    camera: the reference's, if its lens matters."""
+    """The warp's map at points of the reference, bilinear between canvas pixels.
+
+    Parameters
+    ----------
+    warp : Warp
+    x : (N, 2) array
+        Raw (distorted) reference px.
+    camera : Camera, optional
+        The reference's, where its lens matters.
+
+    Returns
+    -------
+    (N, 2) array
+        Raw target px; NaN outside the canvas.
+    """
     at = warp.canvas.of_reference(x, camera)
     limit = np.array([warp.canvas.width, warp.canvas.height]) - 1
     outside = ((at < 0) | (at > limit)).any(axis=1)
@@ -204,9 +244,9 @@ def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
 
 @dataclass(frozen=True)
 class CoverageSamples:
-    """Canvas pixels that show the target, evenly spread, and where they show it, in ideal (undistorted) px of both.
+    """An even sample of the canvas pixels that show the target, in ideal (undistorted) px.
 
-    points (N, 2) of the reference's plane; target (N, 2); overlap (N,): which of them lie in the reference.
+    points (N, 2): on the reference's plane; target (N, 2): what they show; overlap (N,): which lie in the reference.
     """
 
     points: Array
@@ -215,9 +255,20 @@ class CoverageSamples:
 
 
 def coverage_samples(warp: Warp, cameras: tuple[Camera, Camera], samples: int = QUALITY.map_samples) -> CoverageSamples:
-    """What a warp shows of the target at about `samples` pixels of the whole canvas, on an even grid.
+    """Samples a warp on an even grid of about `samples` pixels over the whole canvas.
 
-    Of a round panorama no more than a flat one would show: beyond, pixels of the reference's plane mean nothing.
+    Parameters
+    ----------
+    warp : Warp
+    cameras : (Camera, Camera)
+        Of reference and target.
+    samples : int
+
+    Returns
+    -------
+    CoverageSamples
+        Of a cylindrical or spherical panorama only what a flat one would show: elsewhere the reference's plane has no
+        pixels.
     """
     canvas = warp.canvas
     step = max(1, int(np.sqrt(canvas.width * canvas.height / samples)))
@@ -237,7 +288,7 @@ def coverage_samples(warp: Warp, cameras: tuple[Camera, Camera], samples: int = 
 
 
 def off_line_mean(F: Array, shown: CoverageSamples) -> float:
-    """Mean distance in target px of the map from its epipolar lines over the overlap; NaN without overlap or F."""
+    """Mean distance (target px) of the map from the epipolar lines of F over the overlap; NaN without overlap or F."""
     if not (np.isfinite(F).all() and shown.overlap.any()):
         return float("nan")
     return float(distance_to_line(F, shown.points[shown.overlap], shown.target[shown.overlap]).mean())

@@ -1,4 +1,4 @@
-"""The report: everything that was measured and decided, as plain JSON-ready values."""
+"""The report: everything that was measured and decided, as JSON-ready values."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..field.slack import SlackField
 from ..panorama.canvas import Canvas
 from ..panorama.levelling import angles_of
 from ..panorama.warp import build_map
+from ..raster.arrays import Array
 from .held_out import held_out
 from .metrics import coverage_samples, look_up, off_line_mean, overlap_quality
 from .options import WARNING
@@ -34,11 +35,27 @@ def make_report(
     options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment, canvas: Canvas, decided: Decided,
     appearance: dict[str, float],
 ) -> tuple[dict[str, Any], list[str]]:
-    """The report of a stitch that shows `canvas`, and warnings in plain words drawn from it.
+    """The report of a stitch. It holds no times and no dates: the same input gives the same report.
 
-    decided: about its composition (hole_px: pixels that neither picture sees, beyond the reference and behind something
-    near; inpainted_px: how many of them were filled); appearance: of the panorama (see `metrics.appearance`).
-    No seconds, no dates: the same input gives the same report.
+    Parameters
+    ----------
+    options : StitchOptions
+    pictures : (Picture, Picture)
+        Reference and target.
+    alignment : Alignment
+    canvas : Canvas
+        What the panorama shows.
+    decided : Decided
+        About its composition: what is hidden, holes, exposure, folds.
+    appearance : dict
+        See `metrics.appearance`.
+
+    Returns
+    -------
+    report : dict
+        JSON-ready values.
+    warnings : list of str
+        In plain words, for the user.
     """
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
     field = alignment.field
@@ -95,7 +112,7 @@ def make_report(
 def _measured(
     options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment
 ) -> dict[str, float]:
-    """The figures of an alignment; those that cost time only where options.measure asks for them. NaN: undefined."""
+    """The figures of an alignment, NaN where undefined; expensive ones only if options.measure asks for them."""
     cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
     field, warp = alignment.field, alignment.warp
     inliers = matches.subset(two_view.inliers)
@@ -111,15 +128,15 @@ def _measured(
     if not options.measure:
         return measured
     ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
-    # where the pair has no F of its own, none that matches give means anything
+    # a pair without a baseline has no F: whatever matches give would mean nothing
     independent = independent_fundamental(ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
     unseen = held_out(field, ideal.subset(two_view.inliers), shown, options.seed)
     # pixels are compared in the reference's own frame, where only one of the two pictures is resampled
-    framed = warp
+    flat = warp
     if warp.canvas.projection is not None:
-        relief = None if alignment.dense is None else alignment.dense.relief
-        framed = build_map(field, two_view, Canvas(*cameras[0].size, (0, 0)), *cameras, relief)
-    return measured | overlap_quality(*pictures, framed) | {
+        refinement = None if alignment.dense is None else alignment.dense.relief
+        flat = build_map(field, two_view, Canvas(*cameras[0].size, (0, 0)), *cameras, refinement)
+    return measured | overlap_quality(*pictures, flat) | {
         "projectivity_own_px": projectivity(two_view.F, shown),
         "projectivity_independent_px": projectivity(independent, shown),
         "projectivity_points": int((~shown.overlap).sum()),
@@ -154,8 +171,8 @@ def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
 
 
 def _projection_entry(canvas: Canvas, two_view: TwoView) -> dict[str, Any]:
-    """How canvas pixels become rays in the reference camera's frame (see `projection`); level: yaw, pitch and roll of
-    the reference in degrees, as --level takes them."""
+    """How canvas pixels map to rays in the reference camera's frame (see `projection`); level: yaw, pitch and roll of
+    the reference in degrees, as for --level."""
     if canvas.projection is None:
         focal = float(np.sqrt(two_view.K[0, 0] * two_view.K[1, 1]))
         kind, centre, rotation = "perspective", two_view.K[:2, 2], np.eye(3)
@@ -187,13 +204,12 @@ def _dense_entry(dense: Dense | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _median(values: np.ndarray) -> float:
+def _median(values: Array) -> float:
     return float(np.median(values)) if values.size else math.nan
 
 
 def plain(value: Any) -> Any:
-    """The same with lists for arrays, Python numbers for NumPy's, and None for what JSON has no word for (NaN,
-    infinity)."""
+    """A value with what JSON lacks replaced: arrays by lists, NumPy's numbers by Python's, NaN and infinity by None."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
