@@ -1,7 +1,7 @@
 """compare.html: one page that opens offline, without scripts; pictures lie beside it.
 
-For every pair a table, every field's panorama with the average and the difference in the overlap, and a blink: the
-reference and the warped target in turn, a field at choice.
+For every pair a table, the panorama of every field with the average and the difference in the overlap, and the
+reference alternating with the warped target of a field that can be chosen.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ BLINK = "\n".join([
 
 
 def comparison_page(summary: Summary) -> str:
-    """The whole page, from what compare.json holds."""
+    """The page as HTML, from the content of compare.json."""
     pairs, fields = summary["pairs"], summary["fields"]
     done = sum(entry["status"] == "done" for entry in pairs)
     header = (

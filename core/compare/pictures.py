@@ -1,4 +1,4 @@
-"""What the page shows of a field: its panorama, the overlap to blink, and where the pictures differ there."""
+"""Pictures of a field for the page: its panorama, and the overlap of both pictures, their average and difference."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ Rgb = NDArray[np.uint8]
 
 
 def field_pictures(result: StitchResult) -> dict[str, bytes]:
-    """JPEG files by kind: panorama; average (of reference and warped target in the overlap: what is off shows twice);
-    difference (made stronger); warped, and reference the same way: the two that blink."""
+    """JPEG files by kind: panorama; average and difference (amplified) of reference and warped target in the overlap;
+    reference and warped, cut to the overlap, which the page shows in turn."""
     view, fetched, inside = overlap_views(result.reference, result.target, result.warp)
     view, fetched = _rgb(view), _rgb(fetched)
     box = _bounds(inside)
-    here, there, both = view[box], fetched[box], inside[box][..., None]
-    apart = np.minimum(COMPARISON.difference_gain * np.abs(here.astype(int) - there), 255)
+    reference, warped, both = view[box], fetched[box], inside[box][..., None]
+    difference = np.minimum(COMPARISON.difference_gain * np.abs(reference.astype(int) - warped), 255)
     pictures = {
         "panorama": _on_gray(result),
-        "average": np.where(both, (here.astype(np.uint16) + there + 1) // 2, 0),
-        "difference": np.where(both, apart, 0), "warped": np.where(both, there, 0),
-        "reference": np.where(both, here, 0),  # cut as the field's overlap is, which differs from field to field
+        "average": np.where(both, (reference.astype(np.uint16) + warped + 1) // 2, 0),
+        "difference": np.where(both, difference, 0), "warped": np.where(both, warped, 0),
+        "reference": np.where(both, reference, 0),  # the overlap differs from field to field
     }  # fmt: skip
     return {kind: _jpeg(picture.astype(np.uint8)) for kind, picture in pictures.items()}
 
 
 def _on_gray(result: StitchResult) -> Rgb:
-    """The panorama over gray where it shows nothing."""
+    """The panorama over a gray background."""
     alpha = result.alpha[..., None]
     shown: Rgb = np.rint(_rgb(encode(result.pixels, 8)) * alpha + 96 * (1 - alpha)).astype(np.uint8)
     return shown

@@ -1,6 +1,6 @@
 """The slack field: the strict field plus a stiff spline of the matches' residuals across their epipolar lines.
 
-x' = π(H_inf p + d e') + s(p) (docs/method.md). It compensates lens distortion that is not modelled and errors of F;
+x' = π(H_inf p + d e') + s(p) (docs/method.md, 4). It compensates lens distortion that is not modelled and errors of F;
 outside the overlap s fades to 0 and the field stays on its epipolar lines. Cross-validation decides how stiff s is:
 where the residuals are nothing but noise, s = 0.
 """

@@ -1,7 +1,7 @@
 """The strict field: one scalar, inverse depth d in units of 1 / baseline, for every point of the canvas.
 
-The target pixel of a canvas point p is x'(p) ~ H_inf p + d(p) e' (docs/method.md; displacements along epipolar lines
-are an idea of Yu and Da, arXiv 2311.16637). d is affine exactly where the scene is a plane, so a thin-plate spline for
+The target pixel of a canvas point p is x'(p) ~ H_inf p + d(p) e' (docs/method.md, 2; displacing along epipolar lines
+is an idea of Yu and Da, arXiv 2311.16637). d is affine exactly where the scene is a plane, so a thin-plate spline for
 d bends only where matches ask for it.
 """
 
@@ -94,7 +94,7 @@ class StrictField:
 def fit_strict(
     two_view: TwoView, matches: Matches, size: tuple[int, int], target_size: tuple[int, int], fade: str = "plane"
 ) -> StrictField:
-    """Fits the strict field to inlier matches (docs/method.md).
+    """Fits the strict field to inlier matches (docs/method.md, 4).
 
     Parameters
     ----------

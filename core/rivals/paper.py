@@ -1,4 +1,4 @@
-"""The field of Yu and Da (arXiv 2311.16637), in a solvable form, for comparison (docs/method.md).
+"""The field of Yu and Da (arXiv 2311.16637), in a solvable form, for comparison (docs/method.md, 4).
 
 x' = c + α g(c) with c = π(H_inf p), target px from pixel (0, 0). The affine part of g has one constant direction and
 its two radial parts are independent, so it does not stay on the epipolar lines.
