@@ -219,8 +219,8 @@ def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
             width, height = size_of(picture)
             raise TooFewMatches(
                 f"only {matches} matching points found, at least {ESTIMATION.min_matches} needed: the "
-                f"{role(number)} ({width}×{height} pixels) shows only {count} points of detail; choose a larger or sharper "
-                "picture of something with texture, or give matches by hand (--matches)"
+                f"{role(number)} ({width}×{height} pixels) shows only {count} points of detail; choose a larger or "
+                "sharper picture of something with texture, or give matches by hand (--matches)"
             )
 
 

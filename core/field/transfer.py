@@ -21,25 +21,55 @@ class Transfer(Protocol):
 
 
 def target_points(view: Transfer, points: Array, inverse_depth: Array) -> Array:
-    """π(H_inf p + d e') (…, 2) for points (…, 2) and d (…); NaN where the point lies behind its camera."""
+    """Pixels of a picture, π(H_inf p + d e').
+
+    Parameters
+    ----------
+    view : Transfer
+    points : (…, 2) array
+        p, ideal pixels of the reference's plane.
+    inverse_depth : (…) array
+        d; NaN is allowed where there is no baseline.
+
+    Returns
+    -------
+    (…, 2) array
+        Ideal pixels, NaN where the point lies behind the picture's camera.
+    """
     x, y = points[..., 0], points[..., 1]
     return np.stack(transfer(view, [(h[0] * x + h[1] * y) + h[2] for h in view.H_inf], inverse_depth), axis=-1)
 
 
 def transfer(view: Transfer, infinite: list[Array], inverse_depth: Array) -> tuple[Array, Array]:
-    """x and y (…) of π(q + d e') for the three coordinates (…) of q = H_inf p (see `Canvas.project_rows`) and d (…);
-    NaN where the point lies behind its camera."""
+    """x and y (…) of π(q + d e') for the three coordinates (…) of q = H_inf p (see `Canvas.project_rows`) and d (…).
+
+    NaN where the point lies behind the picture's camera.
+    """
     e = view.e_prime
-    depth = inverse_depth if e.any() else 0.0  # without a baseline depth, known or not (NaN), moves nothing
+    depth = inverse_depth if e.any() else 0.0  # without a baseline no depth, not even NaN, moves a point
     a, b, c = (part + depth * e[k] for k, part in enumerate(infinite))
     c = np.where(ahead_of_camera(a, b, c), c, np.nan)
     return a / c, b / c
 
 
 def inverse_depths(view: Transfer, x: Array, y: Array) -> tuple[Array, Array]:
-    """d_i = argmin |π(q_i + d e') − y_i| along each epipolar line, and s_i = |∂π/∂d| there in px per unit of d.
+    """Inverse depths of matches: d_i = argmin |π(H_inf x_i + d e') − y_i|.
 
-    Started at −(y×q)·(y×e') / |y×e'|², then Gauss-Newton; q = H_inf x. NaN where that runs behind its camera.
+    The algebraic solution −(y×q)·(y×e') / |y×e'|², q = H_inf x, is refined by Gauss-Newton steps.
+
+    Parameters
+    ----------
+    view : Transfer
+        With a baseline (e' ≠ 0).
+    x, y : (N, 2) array
+        Matched points of the reference and of the target, ideal px.
+
+    Returns
+    -------
+    d : (N,) array
+        Inverse depths, NaN where the point comes to lie behind the picture's camera.
+    sensitivity : (N,) array
+        |∂π/∂d| there, target px per unit of d.
     """
     q = homogeneous(x) @ view.H_inf.T
     e = view.e_prime
@@ -58,6 +88,7 @@ def inverse_depths(view: Transfer, x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _slope(ray: Array, e: Array) -> Array:
-    """∂π(ray)/∂d when the ray moves by e per unit of d."""
+    """∂π(ray)/∂d (N, 2) for rays (N, 3) that change by e (3,) per unit of d."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return (e[:2] * ray[:, 2:] - ray[:, :2] * e[2]) / ray[:, 2:] ** 2
+        result: Array = (e[:2] * ray[:, 2:] - ray[:, :2] * e[2]) / ray[:, 2:] ** 2
+        return result

@@ -13,8 +13,9 @@ from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import distance_to_line
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.cameras.view import views_of
+from edf_stitch.core.field.options import STRICT
 from edf_stitch.core.field.slack import SlackField, _on_matches, fit_slack
-from edf_stitch.core.field.strict import CENTRE_BUDGET, StrictField, fit_strict
+from edf_stitch.core.field.strict import StrictField, fit_strict
 from edf_stitch.core.field.transfer import inverse_depths, target_points
 from edf_stitch.core.fields import fit_field
 from edf_stitch.core.panorama.canvas import Canvas
@@ -276,7 +277,7 @@ def test_without_parallax_too_there_are_at_most_a_thousand_centres() -> None:
     view = without_parallax()
     x, y, _ = some_matches(view, planar, 2000)
     field = fit_field("slack", "plane", view, Matches(x, y), SIZE, SIZE)
-    assert isinstance(field, SlackField) and len(field.spline.centres) <= CENTRE_BUDGET
+    assert isinstance(field, SlackField) and len(field.spline.centres) <= STRICT.max_centres
 
 
 @pytest.fixture(scope="module")

@@ -15,13 +15,13 @@ from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.choices import FIELDS
 from edf_stitch.core.field.field import Field
-from edf_stitch.core.field.strict import MIN_CENTRES
+from edf_stitch.core.field.options import STRICT
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.fields import fit_field
 from edf_stitch.core.measure.held_out import HeldOut, held_out
 from edf_stitch.core.measure.metrics import CoverageSamples, look_up
 from edf_stitch.core.panorama.warp import build_warp
-from edf_stitch.core.rivals.homography import LEAST_MATCHES
+from edf_stitch.core.rivals.options import HOMOGRAPHY
 from edf_stitch.core.system.errors import DegenerateGeometry
 
 SIZE = (400, 300)
@@ -178,7 +178,7 @@ def test_outliers_that_the_whole_fit_dropped_take_no_part(view: TwoView) -> None
 @pytest.mark.parametrize("name", FIELDS)
 def test_too_few_or_badly_placed_matches_give_nan_without_a_word(name: str, view: TwoView) -> None:
     # APAP begins with the strict field, and so with more matches than its own homographies need: it is never short
-    few = matches_of(view, planar, LEAST_MATCHES if name == "homography" else MIN_CENTRES)
+    few = matches_of(view, planar, HOMOGRAPHY.min_matches if name == "homography" else STRICT.min_centres)
     # 38 on one line, 8 off it: without the strip only a line is left
     x = np.concatenate([np.column_stack([np.full(38, 100.0), np.linspace(20, 280, 38)]),
                         np.column_stack([np.full(8, 300.0), np.linspace(20, 280, 8)])])  # fmt: skip
@@ -231,7 +231,7 @@ def test_matches_on_a_line_refit_nothing(view: TwoView) -> None:
     with pytest.raises(DegenerateGeometry, match="on a line"):
         field.refitted(lined)
     with pytest.raises(DegenerateGeometry):
-        field.refitted(matches.subset(np.arange(MIN_CENTRES - 1)))
+        field.refitted(matches.subset(np.arange(STRICT.min_centres - 1)))
 
 
 @pytest.mark.parametrize("name", ["strict", "slack"])

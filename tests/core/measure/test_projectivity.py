@@ -15,7 +15,8 @@ from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.measure.metrics import CoverageSamples, coverage_samples
-from edf_stitch.core.measure.projectivity import LEAST_MATCHES, eight_point, independent_fundamental, projectivity
+from edf_stitch.core.measure.options import INDEPENDENT
+from edf_stitch.core.measure.projectivity import eight_point, independent_fundamental, projectivity
 from edf_stitch.core.panorama.warp import build_warp
 
 SIZE = (400, 300)
@@ -171,9 +172,10 @@ def test_an_f_that_is_off_is_found_out(by_hand: SimpleNamespace) -> None:
 
 def test_matches_that_determine_no_f(by_hand: SimpleNamespace) -> None:
     view, _ = wall(by_hand)
-    for count in (LEAST_MATCHES - 1, 5, 0):
-        assert np.isnan(independent_fundamental(matches_of(view, LEAST_MATCHES).subset(np.arange(count)))).all()
-    assert np.isfinite(independent_fundamental(matches_of(view, LEAST_MATCHES))).all()
+    enough = matches_of(view, INDEPENDENT.min_matches)
+    for count in (INDEPENDENT.min_matches - 1, 5, 0):
+        assert np.isnan(independent_fundamental(enough.subset(np.arange(count)))).all()
+    assert np.isfinite(independent_fundamental(enough)).all()
     random = np.random.default_rng(2)
     chance = Matches(random.uniform(0, 300, (20, 2)), random.uniform(0, 300, (20, 2)))
     assert np.isnan(independent_fundamental(chance)).all()
