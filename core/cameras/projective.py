@@ -7,10 +7,13 @@ Multiple View Geometry, 2nd ed., chapters 9 (F, epipoles, pose from E), 11.4 (Sa
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import Array
+if TYPE_CHECKING:  # Blender renders with these, and has no OpenCV
+    from ..raster.arrays import Array
 
 
 def homogeneous(points: NDArray) -> Array:
