@@ -225,17 +225,12 @@ def _refuse_scarce(matches: int, frame: Frame, *details: int) -> None:
 
 
 def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, Camera]) -> Matches:
-    """Matches from a file or array, moved to the scale of the work, without those in masked parts."""
-    sizes = frame.full_sizes
-    matches = read_matches(source, *sizes)
-    x, y = (
-        (points + 0.5) * (np.array(camera.size) / np.array(size)) - 0.5
-        for points, camera, size in zip((matches.x, matches.y), cameras, sizes, strict=True)
-    )
-    seen = _shown(frame.reference, x) & _shown(frame.target, y)
+    """Matches from a file or array, at the scale of the work, without those in masked parts."""
+    matches = read_matches(source, *frame.full_sizes, (cameras[0].size, cameras[1].size))
+    seen = _shown(frame.reference, matches.x) & _shown(frame.target, matches.y)
     if not seen.any():
         raise NoOverlap("all the given matches lie in parts of the pictures that are masked or transparent")
-    return replace(matches, x=x, y=y).subset(seen)
+    return matches.subset(seen)
 
 
 def _shown(picture: Picture, points: NDArray[np.float64]) -> NDArray[np.bool_]:

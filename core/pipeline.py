@@ -80,7 +80,7 @@ class StitchResult:
 
     @property
     def used_matches(self) -> Matches:
-        """The matches that the field stands on, in px of the full pictures: given back, they make the same field."""
+        """The matches that the field stands on, in px of the full pictures."""
         used = self.matches.subset(np.flatnonzero(self.two_view.inliers)[self.field.fit.inliers_used])
         x, y = (
             (points + 0.5) * (np.array(full) / np.array(camera.size)) - 0.5

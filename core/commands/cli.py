@@ -161,7 +161,7 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
     files = parser.add_argument_group("files")
     files.add_argument(
         "--report", type=Path, metavar="FILE.json",
-        help="everything that was measured and decided; FILE.matches.csv: the matches, as --matches takes them",
+        help="everything that was measured and decided; FILE.matches.csv: all matches, as --matches takes them",
     )  # fmt: skip
     files.add_argument(
         "--layers", type=Path, metavar="DIR",

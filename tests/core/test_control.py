@@ -14,6 +14,7 @@ from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.choices import FIELDS, Crop
 from edf_stitch.core.compose.crop import largest_rectangle
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.output.match_table import match_file
 from edf_stitch.core.output.outputs import warp_bytes
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.pose.match_files import matches_csv
@@ -59,19 +60,47 @@ def rows_of(result: StitchResult) -> np.ndarray:
 # --- matches --------------------------------------------------------------------------------------------------------
 
 
-# One homography, and REW that begins with one, weigh matches by how far they are off: those that are given count alike.
-@pytest.mark.parametrize("field", [name for name in FIELDS if name not in ("rew", "homography")])
-@pytest.mark.parametrize("focal", ["given", "estimated"])
-def test_exported_matches_given_back_make_the_same_warp(
-    small_pair: Pair, smooth: StitchOptions, field: str, focal: str
+def reported(result: StitchResult, folder: Path) -> Path:
+    """The file of matches beside its report."""
+    path = folder / "report.matches.csv"
+    path.write_bytes(match_file(result))
+    return path
+
+
+def same_bytes(one: StitchResult, other: StitchResult) -> bool:
+    return one.pixels.tobytes() == other.pixels.tobytes() and warp_bytes(one) == warp_bytes(other)
+
+
+# A third of the size has a factor that rounds: points there and back differ in their last digits.
+@pytest.mark.parametrize(
+    ("field", "scale", "focal"),
+    [*((name, 1.0, "given") for name in FIELDS), ("slack", 0.6, "estimated"), ("strict", 1 / 3 + 0.4, "given")],
+)
+def test_reported_matches_given_back_make_the_same_panorama(
+    small_pair: Pair, quick: StitchOptions, tmp_path: Path, field: str, scale: float, focal: str
 ) -> None:
-    options = replace(smooth, field=field, camera=smooth.camera if focal == "given" else CameraRequest())
+    camera = quick.camera if focal == "given" else CameraRequest()
+    options = replace(quick, field=field, scale=scale, camera=camera)
     first = stitch(small_pair.reference, small_pair.target, options)
-    again = stitch(small_pair.reference, small_pair.target, replace(options, matches=rows_of(first)))
-    assert len(again.matches) == len(first.used_matches) and again.matches.given
-    assert apart(first, again).max() < 0.05
-    third = stitch(small_pair.reference, small_pair.target, replace(options, matches=rows_of(again)))
-    assert np.array_equal(rows_of(again), rows_of(first)) and apart(again, third).max() == 0
+    back = replace(options, matches=reported(first, tmp_path))
+    again = stitch(small_pair.reference, small_pair.target, back)
+    assert same_bytes(first, again) and not again.matches.given
+    assert match_file(again) == match_file(first)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.6])
+def test_the_users_own_matches_are_reported_as_given(
+    small_pair: Pair, small_result: StitchResult, smooth: StitchOptions, tmp_path: Path, scale: float
+) -> None:
+    """With their weights, and read back they are given and make the same panorama."""
+    rows = rows_of(small_result) + 0.1  # no float of theirs is what a change of size leads to
+    rows[::2, 4] = 0.5
+    options = replace(smooth, matches=rows, scale=scale)
+    first = stitch(small_pair.reference, small_pair.target, options)
+    back = replace(options, matches=reported(first, tmp_path))
+    again = stitch(small_pair.reference, small_pair.target, back)
+    assert again.matches.given and np.allclose(again.matches.weights[:2], [0.5, 1.1])
+    assert same_bytes(first, again) and match_file(again) == match_file(first)
 
 
 def test_a_file_of_matches_is_as_good_as_an_array(
