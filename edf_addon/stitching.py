@@ -64,9 +64,12 @@ def make_job(
         job["masks"]["seam"] = "seam.npy"
     if settings.camera == "CAMERAS":
         job["cameras"] = cameras.describe_both(settings, scene, context.evaluated_depsgraph_get())
-    if settings.edited_matches:
-        np.save(folder / "matches.npy", match_rows(settings))
+    if settings.edited_matches and (file := untouched_matches(settings)):
+        job["matches"] = "matches.csv"
+        (folder / job["matches"]).write_text(file, "utf-8")
+    elif settings.edited_matches:
         job["matches"] = "matches.npy"
+        np.save(folder / job["matches"], match_rows(settings))
     memory = {
         "scene": scene.session_uid, "settings": properties.keep(settings),
         "pictures": {side: image.name for side, image in chosen.items()},
@@ -82,6 +85,30 @@ def match_rows(settings: Any) -> np.ndarray:
 
     rows = [[m.x, m.y, m.x2, m.y2, m.weight if m.enabled else 0.0] for m in settings.matches]
     return np.array(rows, np.float64)
+
+
+def untouched_matches(settings: Any) -> str:
+    """The file of the matches that a panorama's stitch found, where the list still shows them as they were: from it
+    the same panorama comes again, which the list's single floats could not promise. "" for a list that was edited."""
+    names = {side: getattr(settings, side).name for side in SIDES}
+    for image in bpy.data.images:
+        found = result.read(image)
+        if found is None or found["pictures"] != names or "file" not in found["matches"]:
+            continue
+        matches = found["matches"]
+        if len(matches["rows"]) == len(settings.matches) and all(
+            match.enabled == (state == "USED") and abs(match.weight - weight) < 1e-6 and _lies_at(match, row)
+            for match, row, weight, state in zip(
+                settings.matches, matches["rows"], matches["weights"], matches["states"], strict=True
+            )
+        ):
+            return str(matches["file"])
+    return ""
+
+
+def _lies_at(match: Any, row: Any) -> bool:
+    """Whether an entry of the list is where a stitch had it: x, y, x2, y2 px."""
+    return max(abs(match.x - row[0]), abs(match.y - row[1]), abs(match.x2 - row[2]), abs(match.y2 - row[3])) < 0.01
 
 
 def take_over(
@@ -170,7 +197,7 @@ def fill_matches(settings: Any, matches: dict[str, Any], edited: bool) -> None:
             match.weight, match.enabled = weight or 1.0, state == "USED"
         settings.match_index = -1
     for match, row, error, state in zip(settings.matches, rows, errors, states, strict=True):
-        if max(abs(match.x - row[0]), abs(match.y - row[1]), abs(match.x2 - row[2]), abs(match.y2 - row[3])) < 0.01:
+        if _lies_at(match, row):
             match.error = -1.0 if error is None else error
             match.state = state
 

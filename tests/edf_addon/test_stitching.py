@@ -109,7 +109,28 @@ def test_the_same_again_from_what_the_panorama_keeps(chosen, pixels_of):
     assert (settings.field, settings.seed, settings.edited_matches) == ("STRICT", 3, True)
     assert sum(match.enabled for match in settings.matches) == count
     again = pixels_of(settings.result)
-    assert again.shape == first.shape and np.abs(again - first).mean() < 1e-3
+    assert np.array_equal(again, first)
+
+
+def test_a_list_that_was_not_touched_makes_the_same_panorama(chosen, pixels_of):
+    """At another scale too; what was switched off and on again counts as untouched, and what stays off does not."""
+    settings = chosen.settings
+    settings.scale = 0.6
+    bpy.ops.edf.stitch()
+    first = pixels_of(settings.result)
+    match = next(match for match in settings.matches if match.enabled)
+    match.enabled = False
+    settings.edited_matches = True
+    assert stitching.untouched_matches(settings) == ""
+    match.enabled = True
+    assert bpy.ops.edf.stitch() == {"FINISHED"}
+    assert np.array_equal(pixels_of(settings.result), first)
+    match.x += 0.5
+    assert stitching.untouched_matches(settings) == ""
+    match.x -= 0.5
+    assert stitching.untouched_matches(settings)
+    settings.reference, settings.target = settings.target, settings.reference
+    assert stitching.untouched_matches(settings) == "", "of other pictures"
 
 
 def test_edited_matches_are_used_and_nothing_else(chosen):
