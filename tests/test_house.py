@@ -211,3 +211,17 @@ def test_names_of_the_first_layout_are_gone():
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_no_file_is_over_400_lines(path):
     assert len(path.read_text("utf-8").splitlines()) <= 400
+
+
+def test_the_method_names_modules_that_are_there():
+    """docs/method.md goes along when a module moves, and the sections that the code cites are there."""
+    method = (ROOT / "docs" / "method.md").read_text("utf-8")
+    named = set(re.findall(r"`(\w+/\w+\.py)`", method))
+    assert len(named) > 40 and not {name for name in named if not (ROOT / "core" / name).is_file()}
+    sections = set(re.findall(r"^## (\d+)\.", method, re.MULTILINE))
+    tests = [path for path in sorted((ROOT / "tests").rglob("*.py")) if path != Path(__file__)]
+    for path in [*SOURCES, *tests]:
+        text = path.read_text("utf-8")
+        for cited in re.findall(r"docs/method\.md, (\d+(?: and \d+)*)", text):
+            assert set(cited.split(" and ")) <= sections, path
+        assert not re.search(r"\bDESIGN\b", text), f"{path} cites what is not in the repository"

@@ -66,7 +66,7 @@ def cameras_for(
     sizes: tuple[tuple[int, int], tuple[int, int]],
     exifs: tuple[Exif, Exif],
 ) -> tuple[tuple[Camera, Camera], list[str]]:
-    """Both pictures' cameras by DESIGN 4's order, and warnings about what contradicts itself.
+    """Both pictures' cameras by the order of docs/method.md, 3, and warnings about what contradicts itself.
 
     names: as a camera file would call the pictures; sizes: (W, H) px after orientation was applied. Raises BadRequest.
     """

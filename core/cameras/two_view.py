@@ -12,7 +12,7 @@ from ..raster.arrays import Array
 
 @dataclass(frozen=True)
 class TwoView:
-    """The geometry of a pair: target pixel of a canvas point p at inverse depth d is H_inf p + d e' (DESIGN 1).
+    """The geometry of a pair: a canvas point p at inverse depth d is seen at H_inf p + d e' (docs/method.md, 2).
 
     K, K_prime (3, 3) px; R (3, 3), t (3,), |t| = 1: target sees X at R X + t; F with x'ᵀ F x = 0; H_inf = K' R K⁻¹;
     e_prime = K' t. `inliers` (N,) marks the matches it explains, `sigma` is their Sampson noise in px.

@@ -30,7 +30,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command; returns its exit code (DESIGN 5: 0, 1, 2, 3, 4, 130)."""
+    """Runs the command; returns its exit code (README: 0, 1, 2, 3, 4, 130)."""
     with messages_may_be_lost():
         code = _run(argv)
         try:

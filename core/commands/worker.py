@@ -3,7 +3,7 @@
 FOLDER/job.json says what to do; everything made lies in FOLDER afterwards, with result.json as its index. stdout
 carries one JSON object a line: {"stage", "share"} while working, at the end {"done": true} or {"error", "kind",
 "exit_code"}. The work ends on SIGINT (Windows: CTRL_BREAK) and when stdin closes, so that it never outlives whoever
-started it; FOLDER goes then too. Exit status as the command's (DESIGN 5).
+started it; FOLDER goes then too. Exit status as the command's.
 
 job.json: `reference`, `target`: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as shown; "exif_of": a
 file whose EXIF (orientation included) belongs to the array. `options`: fields of StitchOptions, their `camera` those of

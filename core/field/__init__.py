@@ -1,4 +1,4 @@
 """From inlier matches to inverse depth d at every point: x' ~ H_inf p + d e'.
 
-May import system, raster and cameras.
+Method: docs/method.md, 4. May import system, raster and cameras.
 """

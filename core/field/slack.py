@@ -1,6 +1,6 @@
 """The slack field: the strict one, and a stiff spline of what the matches leave across their lines.
 
-x' = π(H_inf p + d e') + s(p) (DESIGN 1, "Slack"). It buys back what lens distortion and errors in F cost; outside the
+x' = π(H_inf p + d e') + s(p) (docs/method.md, 4). It buys back what lens distortion and errors in F cost; outside the
 overlap s fades to nothing, and the field keeps to its epipolar lines. How stiff it is the matches decide: where they
 tell of nothing but noise, there is no slack at all.
 """

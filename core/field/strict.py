@@ -1,8 +1,8 @@
 """The epipolar displacement field: one scalar d, inverse depth in baselines, for every point of the canvas.
 
-Target pixel of a canvas point p: x'(p) ~ H_inf p + d(p) e' (DESIGN 1; the idea of sliding along epipolar lines: Yu and
-Da, arXiv 2311.16637). d is affine exactly where the scene is a plane, so a thin-plate spline for d bends only where
-matches ask for it.
+Target pixel of a canvas point p: x'(p) ~ H_inf p + d(p) e' (docs/method.md, 2; the idea of sliding along epipolar
+lines: Yu and Da, arXiv 2311.16637). d is affine exactly where the scene is a plane, so a thin-plate spline for d bends
+only where matches ask for it.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class StrictField:
 def fit_strict(
     two_view: TwoView, matches: Matches, size: tuple[int, int], target_size: tuple[int, int], fade: str = "plane"
 ) -> StrictField:
-    """The strict field of inlier matches (DESIGN 1, "The strict field, in full").
+    """The strict field of inlier matches (docs/method.md, 4).
 
     size, target_size: (W, H) px; fade: one of FADES. Matches given by the user are all kept. Raises DegenerateGeometry.
     """

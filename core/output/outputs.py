@@ -121,7 +121,7 @@ def _mask_bytes(mask: np.ndarray, shown: np.ndarray | None = None) -> bytes:
 
 
 def warp_bytes(result: StitchResult) -> bytes:
-    """The .npz of DESIGN 5: x' ~ H_inf p + inverse_depth e' for canvas pixels p + offset; NaN for what a model lacks.
+    """The .npz (docs/formats.md): x' ~ H_inf p + inverse_depth e' for canvas pixels p + offset; NaN: a model lacks it.
 
     A round panorama has p = K r for unit rays r (see `projection`) and no offset, but projection (its name), focal (px
     per radian), centre (canvas px of the direction ahead) and rotation (from its axes to the reference camera's).

@@ -1,4 +1,4 @@
 """From pictures to matches, and from matches to how the cameras stood.
 
-May import system, raster, pictures and cameras.
+Method: docs/method.md, 3. May import system, raster, pictures and cameras.
 """

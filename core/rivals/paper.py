@@ -1,4 +1,4 @@
-"""The paper's field (Yu and Da, arXiv 2311.16637), made solvable, for comparison (DESIGN 1, "The paper's field").
+"""The paper's field (Yu and Da, arXiv 2311.16637), made solvable, for comparison (docs/method.md, 4).
 
 x' = c + α g(c) with c = π(H_inf p), target pixels with the origin at pixel (0, 0). Its affine part moves along one
 constant direction and its radial parts are free, so it leaves the epipolar lines.

@@ -1,4 +1,4 @@
-"""What a stitch leaves on disk: the files that were asked for, with the meaning DESIGN 5 gives them, or nothing."""
+"""What a stitch leaves on disk: the files that were asked for, with the meaning of docs/formats.md, or nothing."""
 
 from __future__ import annotations
 
