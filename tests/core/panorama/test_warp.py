@@ -1,5 +1,4 @@
-"""The backward map lies on the epipolar lines, means what docs/formats.md says,
-and fetches pixels without spoiling them."""
+"""The backward map lies on the epipolar lines, means what docs/formats.md says, and does not spoil pixels."""
 
 from __future__ import annotations
 
