@@ -8,13 +8,13 @@ import importlib.util
 import sys
 from pathlib import Path
 
-COMMAND = Path(__file__).absolute().parent.parent / "edf_addon" / "command.py"
+COMMAND = Path(__file__).absolute().parent.parent / "edf_addon" / "jobs" / "command.py"
 
 
 def main(arguments: list[str]) -> int:
     """Exit status of a command. What starts the worker stands in one file that needs nothing of the package, so that
     file alone is loaded here."""
-    spec = importlib.util.spec_from_file_location("edf_stitch.edf_addon.command", COMMAND)
+    spec = importlib.util.spec_from_file_location("edf_stitch.edf_addon.jobs.command", COMMAND)
     if spec is None or spec.loader is None:
         raise ImportError(f"{COMMAND} cannot be loaded")
     command = importlib.util.module_from_spec(spec)
