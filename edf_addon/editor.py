@@ -6,15 +6,24 @@ from typing import Any
 
 import bpy
 
-from . import photo, properties, result
+from . import properties
+from .bridge import images, photo, result
 
 REFERENCE, TARGET, PANORAMA = "reference", "target", "panorama"
 
 
-def panorama(context: Any) -> bpy.types.Image | None:
-    """The panorama that is meant: the one that the editor shows, else the one that was stitched last."""
-    image = getattr(context.space_data, "image", None)
-    if image is not None and result.read(image) is not None:
+def shown(context: Any) -> bpy.types.Image | None:
+    """What the Image Editor shows that the context is of."""
+    return getattr(context.space_data, "image", None)
+
+
+def panorama(context: Any, name: str = "") -> bpy.types.Image | None:
+    """The panorama that is meant: the named image; else the one that the editor shows, else the one that was stitched
+    last. Raises Unusable for a name that is none's."""
+    if name:
+        return images.named(name)
+    image = shown(context)
+    if result.read(image) is not None:
         return image
     last = properties.settings_of(context.scene).result
     return last if last is not None and result.read(last) is not None else None

@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
     if arguments[:1] == ["render"]:
         importlib.import_module(f"{NAME}.synthetic_scenes.render").main(arguments[1:])
         return 0
-    return int(importlib.import_module(f"{NAME}.edf_addon.command").run(arguments))
+    return int(importlib.import_module(f"{NAME}.edf_addon.jobs.command").run(arguments))
 
 
 if __name__ == "__main__":

@@ -152,6 +152,21 @@ def test_core_has_no_circle_of_imports():
     assert house.circles({"a": {"b"}, "b": {"c"}, "c": {"a"}}), "a circle is seen where there is one"
 
 
+def test_the_add_ons_modules_stand_in_rooms_that_import_what_the_table_allows():
+    """What lies beside the rooms is named; an import inside a function counts like any other."""
+    graph = house.imports(house.ADDON, late=True)
+    rooms = house.by_room(graph)
+    assert set(rooms) == set(house.ADDON_MAY_IMPORT)
+    folders = {room for room in rooms if (house.ADDON / room).is_dir()}
+    assert set(rooms) - folders == set(house.BESIDE) and all(name.count("/") <= 1 for name in graph)
+    for room, imported in rooms.items():
+        assert not imported - set(house.ADDON_MAY_IMPORT[room]), room
+    for room in folders:
+        tree = ast.parse((house.ADDON / room / "__init__.py").read_text("utf-8"))
+        assert ast.get_docstring(tree) and len(tree.body) == 1, room
+    assert not house.circles(graph) and not house.circles(rooms)
+
+
 def test_names_of_the_first_layout_are_gone():
     assert not house.old_names()
 

@@ -1,0 +1,353 @@
+"""What is drawn over the pictures in the Image Editor: matches, epipolar lines, differences, what is painted out.
+
+The draw handler reads the settings and the result and changes nothing. There is no drawing under `-b`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from .. import editor, idnames, properties
+from ..bridge import compat, result
+
+MATCH_RADIUS, LINE_WIDTH = 3.5, 1.6
+LINE, POINTER = (1.0, 0.85, 0.2, 0.95), (1.0, 1.0, 1.0, 0.9)
+CHOSEN, WAITING = (1.0, 1.0, 1.0, 1.0), (0.2, 1.0, 0.9, 1.0)
+SHADE = (0.0, 0.0, 0.0, 0.55)
+PAINTED_OUT, FROM_TARGET = (0.9, 0.08, 0.05, 0.6), (1.0, 0.55, 0.1, 0.6)
+LONGEST_SIDE = 2048  # of a picture that lies under its mask
+
+# The draw handler, and the keymap items of the pointer.
+_handlers: list[Any] = []
+_keys: list[tuple[Any, Any]] = []
+# Where the pointer is: the picture's side and px there; None while it is over none of the pictures.
+_pointer: dict[str, Any] = {"side": None, "point": None}
+# The point that was clicked and waits for its counterpart, by side; px of the upright picture.
+pending: dict[str, tuple[float, float]] = {}
+# Textures made of pictures, by what they were made of.
+_textures: dict[tuple, Any] = {}
+
+
+class EDF_OT_pointer(bpy.types.Operator):  # noqa: N801
+    """Follow the pointer with epipolar lines"""
+
+    bl_idname = idnames.Operator.POINTER
+    bl_label = "Epipolar Lines under the Pointer"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        space = context.space_data
+        return (
+            space is not None and space.type == "IMAGE_EDITOR" and space.image is not None
+            and properties.settings_of(context.scene).show_epipolar
+        )  # fmt: skip
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        follow(context, (event.mouse_region_x, event.mouse_region_y))
+        return {"PASS_THROUGH"}
+
+
+def follow(context: Any, position: tuple[float, float]) -> None:
+    """The pointer stands at `position` px of the context's region."""
+    import numpy as np
+
+    from . import overlay_geometry
+
+    space, settings = context.space_data, properties.settings_of(context.scene)
+    side = editor.side_of(settings, space.image)
+    point = None
+    if side is not None and context.region.type == "WINDOW":
+        size = (space.image.size[0], space.image.size[1])
+        point = overlay_geometry.from_view(np.array(context.region.view2d.region_to_view(*position)), size)
+        if ((point >= -0.5) & (point <= np.array(size) - 0.5)).all():
+            point = overlay_geometry.upright(point, size, editor.orientation(settings, side))
+        else:
+            side = point = None
+    _pointer.update(side=side, point=point)
+    editor.redraw()
+
+
+def match_arrays(settings: Any) -> dict[str, Any]:
+    """The matches of the list: `reference`, `target` (N, 2) px, `error` (N,) NaN where not measured, `enabled`."""
+    import numpy as np
+
+    count = len(settings.matches)
+    columns = {name: np.empty(count, np.float32) for name in ("x", "y", "x2", "y2", "error")}
+    for name, values in columns.items():
+        settings.matches.foreach_get(name, values)
+    enabled = np.empty(count, bool)
+    settings.matches.foreach_get("enabled", enabled)
+    return {
+        editor.REFERENCE: np.stack([columns["x"], columns["y"]], axis=-1).astype(np.float64),
+        editor.TARGET: np.stack([columns["x2"], columns["y2"]], axis=-1).astype(np.float64),
+        "error": np.where(columns["error"] < 0, np.nan, columns["error"]).astype(np.float64), "enabled": enabled,
+    }  # fmt: skip
+
+
+def draw() -> None:
+    """What Blender calls after it has drawn a picture."""
+    context = bpy.context
+    space, settings = context.space_data, properties.settings_of(context.scene)
+    image = space.image
+    side = editor.side_of(settings, image)
+    if side is None or not space.overlay.show_overlays or not all(image.size):
+        return
+    import gpu
+
+    gpu.state.blend_set("ALPHA")
+    view = _View(context, settings, image, side)
+    if image == settings.seam_mask:
+        _draw_under_mask(view, editor.panorama(context), image)
+    elif side == editor.PANORAMA:
+        _draw_cover(view, settings, image)
+    elif image == getattr(settings, f"ignore_{side}"):
+        _draw_under_mask(view, getattr(settings, side), image)
+    if settings.show_matches:
+        _draw_matches(view, settings)
+    if settings.show_epipolar:
+        _draw_lines(view)
+    _draw_waiting(view)
+    gpu.state.blend_set("NONE")
+
+
+class _View:
+    """One editor's window region and the picture in it."""
+
+    def __init__(self, context: Any, settings: Any, image: bpy.types.Image, side: str) -> None:
+        import numpy as np
+
+        view2d, region = context.region.view2d, context.region
+        self.size, self.side = (image.size[0], image.size[1]), side
+        self.orientation = editor.orientation(settings, side)
+        self.region = (region.width, region.height)
+        self.seen = np.array([view2d.region_to_view(0, 0), view2d.region_to_view(*self.region)])
+        self.unit = context.preferences.system.ui_scale
+        panorama = editor.panorama(context)
+        self.result = result.read(panorama) if panorama is not None else None
+
+    def at(self, points: Any) -> Any:
+        """px of this editor's upright picture, in region px."""
+        from . import overlay_geometry
+
+        points = overlay_geometry.as_stored(points, self.size, self.orientation)
+        return overlay_geometry.to_region(points, self.size, self.seen, self.region)
+
+    def corners(self) -> Any:
+        """Where the picture's own corners are: lower left, lower right, upper right, upper left."""
+        import numpy as np
+
+        from . import overlay_geometry
+
+        width, height = self.size
+        corners = np.array([[0, height], [width, height], [width, 0], [0, 0]]) - 0.5
+        return overlay_geometry.to_region(corners, self.size, self.seen, self.region)
+
+
+def _draw_matches(view: _View, settings: Any) -> None:
+    import numpy as np
+
+    from . import overlay_geometry as geometry_of
+
+    matches = match_arrays(settings)
+    points = _points_in(view, matches[editor.REFERENCE], matches[editor.TARGET])
+    if points is None or not len(points):
+        return
+    places = view.at(points)
+    colours = geometry_of.residual_colours(matches["error"])
+    colours[~matches["enabled"]] = (0.35, 0.35, 0.35, 0.55)
+    visible = ((places > -10) & (places < np.array(view.region) + 10)).all(axis=1)
+    # the worst on top
+    order = np.argsort(np.nan_to_num(matches["error"], nan=-1.0), kind="stable")
+    order = order[visible[order]]
+    radius = MATCH_RADIUS * view.unit
+    shade = np.tile(np.array(SHADE, np.float32), (len(order), 1))
+    _triangles(*geometry_of.discs(places[order], radius + view.unit, shade))
+    _triangles(*geometry_of.discs(places[order], radius, colours[order]))
+    if 0 <= settings.match_index < len(places):
+        _lines(geometry_of.rings(places[[settings.match_index]], 2.2 * radius), CHOSEN, view)
+
+
+def _points_in(view: _View, reference: Any, target: Any) -> Any:
+    """The matches in the picture that the editor shows."""
+    from . import overlay_geometry
+
+    if view.side == editor.PANORAMA:
+        return overlay_geometry.on_panorama(view.result, reference) if view.result else None
+    return reference if view.side == editor.REFERENCE else target
+
+
+def _draw_lines(view: _View) -> None:
+    from . import overlay_geometry as geometry_of
+
+    if view.result is None or _pointer["point"] is None:
+        return
+    known, side, point = view.result, _pointer["side"], _pointer["point"][None]
+    if side == editor.PANORAMA:
+        side, point = editor.REFERENCE, geometry_of.from_panorama(known, point)
+    found = geometry_of.epipolar_lines(known["geometry"], point[0], side)
+    here = editor.REFERENCE if view.side == editor.PANORAMA else view.side
+    line = found.get(here)
+    if line is not None:
+        if view.side == editor.PANORAMA:
+            ends = geometry_of.line_on_panorama(known, line)
+        else:
+            ends = geometry_of.segments(line)
+        ends = view.at(ends)
+        _lines(ends, SHADE, view, 2 * LINE_WIDTH)
+        _lines(ends, LINE, view)
+    if here == side:
+        at = geometry_of.on_panorama(known, point) if view.side == editor.PANORAMA else point
+        _lines(geometry_of.rings(view.at(at), 6 * view.unit), POINTER, view)
+
+
+def _draw_waiting(view: _View) -> None:
+    """The point that was clicked and has no counterpart yet."""
+    import numpy as np
+
+    from . import overlay_geometry as geometry_of
+
+    for side, point in pending.items():
+        if side == view.side:
+            place = view.at(np.array([point]))
+            _lines(geometry_of.rings(place, 7 * view.unit), SHADE, view, 2.5 * LINE_WIDTH)
+            _lines(geometry_of.rings(place, 7 * view.unit), WAITING, view)
+
+
+def _draw_cover(view: _View, settings: Any, image: bpy.types.Image) -> None:
+    """The difference or the displacement over the panorama; a difference means something only alone."""
+    if settings.overlay == "NONE":
+        return
+    texture = _texture_of_cover(image, settings.overlay)
+    if texture is not None:
+        opacity = settings.overlay_opacity if settings.overlay == "DISPLACEMENT" else 1.0
+        _textured(texture, view.corners(), (1.0, 1.0, 1.0, opacity))
+
+
+def _draw_under_mask(view: _View, picture: bpy.types.Image | None, mask: bpy.types.Image) -> None:
+    """The picture that a mask is painted over, and on it in red what is painted out; of a seam what comes from the
+    target in orange, darkened what comes from the reference."""
+    import gpu
+
+    if picture is None:
+        return
+    _textured(_texture_of_picture(picture), view.corners(), (1.0, 1.0, 1.0, 1.0))
+    seam = view.side == editor.PANORAMA
+    gpu.state.blend_set("ALPHA" if seam else "ADDITIVE")  # black adds nothing
+    _textured(gpu.texture.from_image(mask), view.corners(), FROM_TARGET if seam else PAINTED_OUT)
+    gpu.state.blend_set("ALPHA")
+
+
+def _texture_of_picture(image: bpy.types.Image) -> Any:
+    """A picture as it is shown, reduced: Blender's own textures hold light instead. Made once for each."""
+    import numpy as np
+
+    from .overlay_geometry import display_encoded
+
+    key = ("picture", image.session_uid, *image.size)
+    if key not in _textures:
+        width, height = image.size
+        values = np.empty(width * height * 4, np.float32)
+        image.pixels.foreach_get(values)
+        step = -(-max(width, height) // LONGEST_SIDE)
+        values = np.ascontiguousarray(values.reshape(height, width, 4)[::step, ::step])
+        _keep(key, display_encoded(values) if image.is_float else values)
+    return _textures[key]
+
+
+def _texture_of_cover(image: bpy.types.Image, kind: str) -> Any:
+    key = (kind, image.session_uid, *image.size)
+    if key not in _textures:
+        pixels = result.cover(image, kind)
+        if pixels is None:
+            return None
+        _keep(key, pixels)
+    return _textures[key]
+
+
+def _keep(key: tuple, pixels: Any) -> None:
+    """Make a texture of pixels (H, W, 4) float32, the bottom row first; only a few are kept."""
+    import gpu
+
+    while len(_textures) > 7:
+        del _textures[next(iter(_textures))]
+    height, width = pixels.shape[:2]
+    data = gpu.types.Buffer("FLOAT", width * height * 4, pixels.ravel())
+    _textures[key] = gpu.types.GPUTexture((width, height), format="RGBA16F", data=data)
+
+
+def _textured(texture: Any, corners: Any, colour: tuple[float, ...]) -> None:
+    """A texture times a colour, on the rectangle of four corners in region px."""
+    from gpu_extras.batch import batch_for_shader
+
+    shader = compat.picture_shader()
+    around = ((0, 0), (1, 0), (1, 1), (0, 1))
+    batch = batch_for_shader(shader, "TRI_FAN", {"pos": corners.tolist(), "uv": around})
+    shader.bind()
+    shader.uniform_float("color", colour)
+    shader.uniform_sampler("image", texture)
+    batch.draw(shader)
+
+
+def _triangles(corners: Any, colours: Any) -> None:
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    if len(corners):
+        shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+        batch_for_shader(shader, "TRIS", {"pos": _flat(corners), "color": colours}).draw(shader)
+
+
+def _lines(ends: Any, colour: tuple[float, ...], view: _View, width: float = LINE_WIDTH) -> None:
+    """Separate segments (2·N, 2), start and end alternating, of one colour."""
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    if not len(ends):
+        return
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    batch = batch_for_shader(shader, "LINES", {"pos": _flat(ends)})
+    shader.bind()
+    shader.uniform_float("viewportSize", view.region)
+    shader.uniform_float("lineWidth", width * view.unit)
+    shader.uniform_float("color", colour)
+    batch.draw(shader)
+
+
+def _flat(points: Any) -> Any:
+    """(N, 2) as the shaders want them: (N, 3) float32."""
+    import numpy as np
+
+    return np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
+
+
+CLASSES = (EDF_OT_pointer,)
+
+
+def register() -> None:
+    """Draw from now on, where there is a window."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    if bpy.app.background:
+        return
+    _handlers.append(bpy.types.SpaceImageEditor.draw_handler_add(draw, (), "WINDOW", "POST_PIXEL"))
+    keys = bpy.context.window_manager.keyconfigs.addon
+    if keys is not None:
+        keymap = keys.keymaps.new(name="Image", space_type="IMAGE_EDITOR")
+        _keys.append((keymap, keymap.keymap_items.new(idnames.Operator.POINTER, "MOUSEMOVE", "ANY", any=True)))
+
+
+def unregister() -> None:
+    """Draw nothing any more."""
+    while _keys:
+        keymap, item = _keys.pop()
+        keymap.keymap_items.remove(item)
+    while _handlers:
+        bpy.types.SpaceImageEditor.draw_handler_remove(_handlers.pop(), "WINDOW")
+    _textures.clear()
+    pending.clear()
+    _pointer.update(side=None, point=None)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
