@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from . import properties
-from .bridge import images, photo, result
+from .bridge import images, ownership, photo, result
 
 REFERENCE, TARGET, PANORAMA = "reference", "target", "panorama"
 
@@ -48,10 +48,29 @@ def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:
     return PANORAMA if image == settings.seam_mask or result.read(image) is not None else None
 
 
-def orientation(settings: Any, side: str) -> int:
-    """How a picture of the stitch is stored, as in EXIF; masks lie as their pictures do."""
-    picture = None if side == PANORAMA else getattr(settings, side)
-    return 1 if picture is None else photo.orientation(picture)
+def beneath(settings: Any, image: bpy.types.Image | None) -> bpy.types.Image | None:
+    """What a mask of the panel is painted over; any other image itself."""
+    if image is not None and image == settings.seam_mask:
+        return settings.result
+    for side in (REFERENCE, TARGET):
+        if image is not None and image == getattr(settings, f"ignore_{side}"):
+            return getattr(settings, side)
+    return image
+
+
+def side_in(panorama: bpy.types.Image | None, picture: bpy.types.Image | None) -> str | None:
+    """What a picture is in a panorama, by the panorama's own pictures, whatever is chosen now; None where it has no
+    part in it."""
+    if panorama is None or picture is None:
+        return None
+    own = ownership.pictures(panorama)
+    return PANORAMA if picture == panorama else ownership.SIDES[own.index(picture)] if picture in own else None
+
+
+def orientation(settings: Any, image: bpy.types.Image) -> int:
+    """How an image is stored, as in EXIF; masks lie as their pictures do."""
+    picture = beneath(settings, image)
+    return 1 if picture is None or result.read(picture) is not None else photo.orientation(picture)
 
 
 def all_spaces(context: Any) -> list[tuple[bpy.types.Area, bpy.types.SpaceImageEditor]]:

@@ -41,18 +41,19 @@ MAY_IMPORT = {
     "pipeline": (*BELOW_MEASURE, "measure", "options", "alignment"),
 }
 # The same for the add-on. What lies beside its rooms is known to all of them, or to those after it.
-BESIDE = ("idnames", "properties", "status", "editor", "explain")
+BESIDE = ("idnames", "pair", "properties", "status", "editor", "explain")
 ADDON_MAY_IMPORT = {
     "idnames": (),
     "status": (),
     "explain": (),
-    "properties": ("idnames", "status"),
+    "pair": ("status",),
+    "properties": ("idnames", "pair", "status"),
     "bridge": (),
     "editor": ("bridge", "properties"),
     "jobs": ("bridge", "properties", "status", "explain"),
     "scene": ("bridge", "properties", "editor"),
     "overlays": ("bridge", "scene", "idnames", "properties", "editor"),
-    "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "properties", "editor"),
+    "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "pair", "properties", "editor"),
     "panels": ("bridge", "jobs", "scene", "overlays", "operators", *BESIDE),
 }
 # Names of the first layout that only its builders knew (modules, classes, functions), and what they are called now.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -21,9 +21,9 @@ def set_colour_space(image: bpy.types.Image, name: str) -> None:
         pass
 
 
-def scene_by_uid(uid: int) -> bpy.types.Scene | None:
-    """The scene of a `session_uid`, which survives undo and renaming (a reference to the scene does not)."""
-    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
+def by_uid(kind: Iterable[Any], uid: int | None) -> Any:
+    """The scene, image or object of a `session_uid`, which survives undo and renaming (a reference to it does not)."""
+    return next((one for one in kind if one.session_uid == uid), None)
 
 
 @contextmanager

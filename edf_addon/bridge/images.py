@@ -7,7 +7,9 @@ all that Blender leaves behind (16 bits, ICC profile, EXIF); what was painted, g
 
 from __future__ import annotations
 
+import hashlib
 import os
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 # Kinds of files that the engine reads itself.
 READABLE = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".webp", ".bmp"})
+# How a fingerprint begins: of a file, or of pixels that are in no file.
+FILE, PIXELS = "file ", "pixels "
 # Bits per pixel, over all channels, of images without alpha.
 OPAQUE_DEPTHS = (8, 24, 48, 96)
 
@@ -54,13 +58,13 @@ def describe(
     if image.type == "RENDER_RESULT":
         return {"name": image.name, "path": _save_render(image, folder / f"{side}.exr", scene)}
     path = file_of(image, user)
-    if path is not None and path.is_file() and is_files_own(image) and path.suffix.lower() in READABLE:
+    if _goes_as_file(image, path):
         return {"name": image.name, "path": str(path)}
     packed = image.packed_file
     if packed is not None:
         kept = folder / f"{side}.packed"
         kept.write_bytes(packed.data)
-        if not image.is_dirty and not image.is_float and _is_plain(image):
+        if _goes_as_packed(image):
             return {"name": image.name, "path": kept.name}
         path = kept
     if image.source == "FILE" and path is not None and not path.is_file() and not image.has_data:
@@ -72,6 +76,61 @@ def describe(
     if path is not None and path.is_file():
         entry["exif_of"] = str(path) if packed is None else path.name
     return entry
+
+
+def fingerprint(image: bpy.types.Image, user: bpy.types.ImageUser | None = None) -> str:
+    """What tells the content of a picture from any other: a digest of what the worker gets of it, its file or its
+    pixels. "" for a Render Result, whose pixels Blender does not give. Raises Unusable, OSError."""
+    if image.type == "RENDER_RESULT":
+        return ""
+    path = file_of(image, user)
+    if path is not None and _goes_as_file(image, path):
+        return FILE + _digest_of_file(path)
+    return FILE + _digest(image.packed_file.data) if _goes_as_packed(image) else PIXELS + _digest_of_pixels(image)
+
+
+def has_changed(image: bpy.types.Image, known: str) -> bool:
+    """Whether a picture has another content than when `fingerprint` gave `known`. Being renamed, moved, packed or saved
+    is no change; a file that is not there is one."""
+    try:
+        if known.startswith(PIXELS):
+            return known != PIXELS + _digest_of_pixels(image)
+        path, packed = file_of(image), image.packed_file
+        if image.is_dirty or path is None and packed is None:
+            return True
+        return known != FILE + (_digest(packed.data) if path is None else _digest_of_file(path))
+    except (Unusable, OSError):
+        return True
+
+
+def _digest_of_pixels(image: bpy.types.Image) -> str:
+    pixels = read(image)
+    return f"{'×'.join(map(str, pixels.shape))} {_digest(pixels.data)}"
+
+
+def _digest_of_file(path: Path) -> str:
+    stamp = path.stat()
+    return _digest_of_version(path, stamp.st_mtime_ns, stamp.st_size)
+
+
+@lru_cache(maxsize=32)
+def _digest_of_version(path: Path, _changed: int, _size: int) -> str:
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+
+
+def _digest(data: bytes | memoryview) -> str:
+    return hashlib.blake2b(data, digest_size=16).hexdigest()
+
+
+def _goes_as_file(image: bpy.types.Image, path: Path | None) -> bool:
+    """Whether the worker reads the picture's file itself."""
+    return path is not None and path.is_file() and is_files_own(image) and path.suffix.lower() in READABLE
+
+
+def _goes_as_packed(image: bpy.types.Image) -> bool:
+    """Whether the worker reads the picture's packed file as it is."""
+    return image.packed_file is not None and not image.is_dirty and not image.is_float and _is_plain(image)
 
 
 def file_of(image: bpy.types.Image, user: bpy.types.ImageUser | None = None) -> Path | None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 KEY = "edf_stitch"
-VERSION = 1
+VERSION = 2
 # Images that belong to a panorama hang on it by custom properties too: key, then the worker's name of the file.
 COMPANION = "edf_stitch "
 
@@ -22,8 +22,8 @@ COMPANION = "edf_stitch "
 def store(image: bpy.types.Image, result: dict[str, Any]) -> None:
     """Keeps a result with its image, as compact JSON.
 
-    result: the worker's result.json without its files, and `settings` (see properties.keep), `pictures`: {reference,
-    target: the images' names}.
+    result: the worker's result.json without its files, and `settings` (see properties.keep), `pictures`: of each the
+    name and fingerprint (see ownership), `cameras`: what the worker got of the scene's own for each, or null.
     """
     image[KEY] = json.dumps({"version": VERSION, **result}, separators=(",", ":"), ensure_ascii=False)
 

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from .. import properties
-from ..bridge import cameras, compat, images, result
+from ..bridge import cameras, compat, images, ownership, result
 from ..bridge.images import Unusable
 
 if TYPE_CHECKING:
     import numpy as np
 
-SIDES = ("reference", "target")
 # The worker's pictures that lie over the panorama: kept with it, out of the artist's lists of images.
 HIDDEN = ("heat", "difference")
 # Those that are values and no colours.
@@ -23,7 +22,7 @@ VALUES = ("reference mask", "target mask", "occluded", "inpainted", "seam", "con
 
 def why_not(settings: Any) -> str:
     """Why nothing can be stitched as things stand, in words; "" where it can."""
-    for side in SIDES:
+    for side in ownership.SIDES:
         if getattr(settings, side) is None:
             return f"no {side} is chosen: pick one of the file's images, or open a pair"
     if settings.reference == settings.target:
@@ -47,7 +46,7 @@ def make_job(
     settings = properties.settings_of(scene)
     if reason := why_not(settings):
         raise Unusable(reason)
-    chosen = {side: getattr(settings, side) for side in SIDES}
+    chosen = {side: getattr(settings, side) for side in ownership.SIDES}
     editor = context.space_data if isinstance(context.space_data, bpy.types.SpaceImageEditor) else None
     user = None if editor is None else editor.image_user
     job: dict[str, Any] = {side: images.describe(image, side, folder, scene, user) for side, image in chosen.items()}
@@ -55,7 +54,7 @@ def make_job(
     wanted = [name for name in ("layers", "masks", "depth") if getattr(settings, f"take_{name}")]
     job["take"] = wanted if scale is None else []
     job["masks"] = {}
-    for side in SIDES:
+    for side in ownership.SIDES:
         mask = getattr(settings, f"ignore_{side}")
         if mask is not None:
             np.save(folder / f"ignore_{side}.npy", images.read(mask))
@@ -70,7 +69,11 @@ def make_job(
         job["matches"] = "matches.npy"
     memory = {
         "scene": scene.session_uid, "settings": properties.keep(settings),
-        "pictures": {side: image.name for side, image in chosen.items()},
+        "pictures": ownership.describe(list(chosen.values()), user),
+        "cameras": [job["cameras"][side] for side in ownership.SIDES] if "cameras" in job else None,
+        # a reference to any of these would not survive an undo while the work goes on
+        "held": [image.session_uid for image in chosen.values()],
+        "chosen": {name: one.session_uid for name, one in properties.pointers(settings).items() if one is not None},
         "space": chosen["reference"].colorspace_settings.name, "edited": settings.edited_matches,
         "pack": settings.pack, "fake_user": settings.fake_user,
     }  # fmt: skip
@@ -97,20 +100,25 @@ def take_over(
         for one in made:
             bpy.data.images.remove(one)
         raise
-    scene = compat.scene_by_uid(memory["scene"])
+    words = _in_words(image, found)
+    scene = compat.by_uid(bpy.data.scenes, memory["scene"])
     if scene is not None:
         settings = properties.settings_of(scene)
         settings.result = image
-        fill_matches(settings, found["matches"], memory["edited"])
+        is_the_same_pair = [one and one.session_uid for one in (settings.reference, settings.target)] == memory["held"]
+        if is_the_same_pair:
+            fill_matches(settings, found["matches"], memory["edited"])
+        else:
+            words += " Other pictures are chosen by now: Restore Settings brings its own, and their matches."
     show(context, image)
-    return _in_words(image, found)
+    return words
 
 
 def _bring_all(
     folder: Path, found: dict[str, Any], memory: dict[str, Any], kind: str, made: list[bpy.types.Image]
 ) -> bpy.types.Image:
     """The panorama, holding everything that belongs to it; `made` gets each image as soon as it is there."""
-    name = f"{PurePath(memory['pictures']['reference']).stem} {kind}"
+    name = f"{PurePath(memory['pictures'][0]['name']).stem} {kind}"
     last = bpy.data.images.get(name) if kind == "preview" else None
     if last is not None and result.read(last) is None:
         last = None  # somebody else's
@@ -136,7 +144,11 @@ def _bring_all(
     for what, one in others.items():
         result.attach(panorama, what, one)
     kept = {key: value for key, value in found.items() if key != "files"}
-    result.store(panorama, {**kept, "kind": kind, "settings": memory["settings"], "pictures": memory["pictures"]})
+    remembered = {name: memory[name] for name in ("settings", "pictures", "cameras")}
+    result.store(panorama, {**kept, "kind": kind, **remembered})
+    everything = [*bpy.data.images, *bpy.data.objects]
+    chosen = {name: compat.by_uid(everything, uid) for name, uid in memory["chosen"].items()}
+    ownership.hold(panorama, [compat.by_uid(bpy.data.images, uid) for uid in memory["held"]], chosen)
     if last is not None:
         _replace(last, panorama, others, name)
     return panorama

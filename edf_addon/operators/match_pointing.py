@@ -37,6 +37,7 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
     def invoke(self, context: Any, _event: Any) -> set[str]:
         settings = properties.settings_of(context.scene)
         self._dragged: tuple[int, str] | None = None
+        self._pair = _pair(settings)
         settings.show_matches = True
         drawing.pending.clear()
         if editor.side_of(settings, context.space_data.image) not in (editor.REFERENCE, editor.TARGET):
@@ -51,6 +52,9 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
         settings = properties.settings_of(context.scene)
         if settings.reference is None or settings.target is None:
             return self._done(context)
+        if self._pair != _pair(settings):  # chosen anew in the sidebar: what was begun belongs to the others
+            self._pair, self._dragged = _pair(settings), None
+            drawing.pending.clear()
         if event.type in {"RET", "NUMPAD_ENTER", "ESC"} and event.value == "PRESS":
             if event.type != "ESC" or not drawing.pending:
                 return self._done(context)
@@ -80,7 +84,7 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
         side = editor.side_of(settings, space.image)
         if side not in (editor.REFERENCE, editor.TARGET):
             return {"PASS_THROUGH"}
-        point, scale = _to_picture(settings, side, space, region, position)
+        point, scale = _to_picture(settings, space, region, position)
         reach = REACH * context.preferences.system.ui_scale / scale
         there = None if drawing.pending else at(settings, side, point, reach)
         if there is not None:
@@ -111,7 +115,7 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
         place = _under(context, event)
         index, side = self._dragged
         if place is not None and editor.side_of(settings, place[0].image) == side:
-            point, _ = _to_picture(settings, side, *place)
+            point, _ = _to_picture(settings, *place)
             if match_editing.inside(point, getattr(settings, side)):
                 match_editing.move(settings.matches[index], side, point)
                 match_editing.edited(settings)
@@ -145,6 +149,11 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
     def cancel(self, context: Any) -> None:
         """Blender ends it: another file is opened, the window is closed."""
         self._done(context)
+
+
+def _pair(settings: Any) -> tuple[int, int]:
+    """The pictures that are chosen; a reference to them would not survive an undo."""
+    return settings.reference.session_uid, settings.target.session_uid
 
 
 def at(settings: Any, side: str, point: Any, within: float) -> int | None:
@@ -207,7 +216,7 @@ def _under(context: Any, event: Any) -> tuple[Any, Any, tuple[float, float]] | N
 
 
 def _to_picture(
-    settings: Any, side: str, space: Any, region: Any, position: tuple[float, float]
+    settings: Any, space: Any, region: Any, position: tuple[float, float]
 ) -> tuple[tuple[float, float], float]:
     """The px of the upright picture under a position of the region, and how many px of the screen one of them takes."""
     import numpy as np
@@ -216,7 +225,7 @@ def _to_picture(
 
     size = (space.image.size[0], space.image.size[1])
     stored = overlay_geometry.from_view(np.array(region.view2d.region_to_view(*position)), size)
-    x, y = overlay_geometry.upright(stored, size, editor.orientation(settings, side))
+    x, y = overlay_geometry.upright(stored, size, editor.orientation(settings, space.image))
     (left, _), (right, _) = region.view2d.region_to_view(0, 0), region.view2d.region_to_view(region.width, 0)
     return (float(x), float(y)), region.width / max((right - left) * size[0], 1e-9)
 

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
-from .. import editor, idnames, properties
+from .. import editor, idnames, pair, properties
 from ..bridge import images
 from ..jobs import stitching
 
@@ -42,9 +42,8 @@ class EDF_OT_open_pair(bpy.types.Operator):  # noqa: N801
                 self.report({"ERROR"}, f"{name} cannot be opened: {error}")
                 return {"CANCELLED"}
         settings = properties.settings_of(context.scene)
-        if loaded != [settings.reference, settings.target]:
-            settings.edited_matches = False  # they are those of other pictures
-        settings.reference, settings.target = loaded
+        with pair.choosing(settings):
+            settings.reference, settings.target = loaded
         stitching.show(context, loaded[0])
         return {"FINISHED"}
 
@@ -58,13 +57,15 @@ class EDF_OT_swap(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: Any) -> set[str]:
         settings = properties.settings_of(context.scene)
-        for one, other in (*properties.PICTURES, *(properties.LENSES if settings.own_lens else ())):
-            mine, theirs = getattr(settings, one), getattr(settings, other)
-            setattr(settings, one, theirs)
-            setattr(settings, other, mine)
-        for match in settings.matches:
-            match.x, match.y, match.x2, match.y2 = match.x2, match.y2, match.x, match.y
-            match.error = -1.0
+        with pair.choosing(settings):
+            for one, other in (*properties.PICTURES, *(properties.LENSES if settings.own_lens else ())):
+                mine, theirs = getattr(settings, one), getattr(settings, other)
+                setattr(settings, one, theirs)
+                setattr(settings, other, mine)
+            for match in settings.matches:
+                match.x, match.y, match.x2, match.y2 = match.x2, match.y2, match.x, match.y
+                match.error = -1.0
+            pair.owns_matches(settings)
         return {"FINISHED"}
 
 

@@ -7,6 +7,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from .. import editor, idnames
+from ..bridge import ownership
 from ..scene import take_along
 
 ROLES = (
@@ -50,12 +51,14 @@ class EDF_OT_create_cameras(_OfAPanorama, bpy.types.Operator):  # noqa: N801
     def execute(self, context: Any) -> set[str]:
         image = editor.panorama(context)
         if not self.properties.is_property_set("baseline"):
-            self.baseline = take_along.usual_baseline(context.scene, image)
+            self.baseline = take_along.usual_baseline(image)
         try:
             made = take_along.create_cameras(context.scene, image, self.baseline)
         except ValueError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        for words in ownership.changes(image):
+            self.report({"WARNING"}, words)
         if "PANORAMA" not in made:
             words = "Blender has cylindrical lenses from 4.3 on: the panorama's own camera is left out"
             self.report({"WARNING"}, words)
@@ -83,7 +86,7 @@ class EDF_OT_depth_mesh(_OfAPanorama, bpy.types.Operator):  # noqa: N801
     def execute(self, context: Any) -> set[str]:
         image = editor.panorama(context)
         if not self.properties.is_property_set("baseline"):
-            self.baseline = take_along.usual_baseline(context.scene, image)
+            self.baseline = take_along.usual_baseline(image)
         try:
             take_along.depth_mesh(context.scene, image, self.baseline, self.farthest)
         except ValueError as error:

@@ -6,8 +6,8 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
-from .. import editor, idnames, properties
-from ..bridge import images, result
+from .. import editor, idnames, pair, properties
+from ..bridge import images, ownership, result
 from ..jobs import modal, stitching
 
 
@@ -35,9 +35,11 @@ class EDF_OT_stitch(_Stitching, bpy.types.Operator):  # noqa: N801
     target: StringProperty(name="Target", description="Name of the image to choose first", options={"SKIP_SAVE"})
 
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
-        for side in stitching.SIDES:
-            if name := getattr(self, side):
-                setattr(properties.settings_of(context.scene), side, images.named(name))
+        settings = properties.settings_of(context.scene)
+        named = {side: images.named(name) for side in ownership.SIDES if (name := getattr(self, side))}
+        with pair.choosing(settings):
+            for side, image in named.items():
+                setattr(settings, side, image)
         return super().prepare(context, folder)
 
 
@@ -70,7 +72,8 @@ class EDF_OT_restitch(_Stitching, bpy.types.Operator):  # noqa: N801
 
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
         settings = properties.settings_of(context.scene)
-        bring_back(settings, editor.panorama(context, self.image))
+        for words in bring_back(settings, editor.panorama(context, self.image)):
+            self.report({"WARNING"}, words)
         settings.edited_matches = True
         return super().prepare(context, folder)
 
@@ -90,10 +93,12 @@ class EDF_OT_restore(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: Any) -> set[str]:
         try:
-            bring_back(properties.settings_of(context.scene), editor.panorama(context, self.image))
+            changes = bring_back(properties.settings_of(context.scene), editor.panorama(context, self.image))
         except images.Unusable as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        for words in changes:
+            self.report({"WARNING"}, words)
         return {"FINISHED"}
 
 
@@ -127,15 +132,19 @@ class EDF_OT_reset(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-def bring_back(settings: Any, image: bpy.types.Image | None) -> None:
-    """Settings, pictures and matches of a panorama. Raises Unusable."""
+def bring_back(settings: Any, image: bpy.types.Image | None) -> list[str]:
+    """Settings, pictures and matches of a panorama; returns what has changed since, in words. Raises Unusable."""
     found = result.read(image)
-    if found is None:
+    if image is None or found is None:
         raise images.Unusable("this image carries no settings: it is no panorama that was stitched here")
-    for side, name in found["pictures"].items():
-        setattr(settings, side, images.named(name))
-    properties.restore(settings, found["settings"])
-    stitching.fill_matches(settings, found["matches"], edited=False)
+    if lost := ownership.missing(image):
+        raise images.Unusable("; ".join(lost))
+    with pair.choosing(settings):
+        settings.reference, settings.target = ownership.pictures(image)
+        properties.restore(settings, found["settings"], ownership.chosen(image))
+        stitching.fill_matches(settings, found["matches"], edited=False)
+        pair.owns_matches(settings)
+    return ownership.changes(image)
 
 
 CLASSES = (EDF_OT_stitch, EDF_OT_preview, EDF_OT_restitch, EDF_OT_restore, EDF_OT_cancel, EDF_OT_reset)

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from .. import editor, idnames, properties
-from ..bridge import compat, result
+from ..bridge import compat, ownership, result
 
 MATCH_RADIUS, LINE_WIDTH = 3.5, 1.6
 LINE, POINTER = (1.0, 0.85, 0.2, 0.95), (1.0, 1.0, 1.0, 0.9)
@@ -22,8 +22,8 @@ LONGEST_SIDE = 2048  # of a picture that lies under its mask
 # The draw handler, and the keymap items of the pointer.
 _handlers: list[Any] = []
 _keys: list[tuple[Any, Any]] = []
-# Where the pointer is: the picture's side and px there; None while it is over none of the pictures.
-_pointer: dict[str, Any] = {"side": None, "point": None}
+# Where the pointer is: px of a picture, which it is in which panorama (its session_uid); None while it is over none.
+_pointer: dict[str, Any] = {"panorama": None, "side": None, "point": None}
 # The point that was clicked and waits for its counterpart, by side; px of the upright picture.
 pending: dict[str, tuple[float, float]] = {}
 # Textures made of pictures, by what they were made of.
@@ -57,16 +57,17 @@ def follow(context: Any, position: tuple[float, float]) -> None:
     from . import overlay_geometry
 
     space, settings = context.space_data, properties.settings_of(context.scene)
-    side = editor.side_of(settings, space.image)
+    panorama = editor.panorama(context)
+    side = editor.side_in(panorama, editor.beneath(settings, space.image))
     point = None
     if side is not None and context.region.type == "WINDOW":
         size = (space.image.size[0], space.image.size[1])
         point = overlay_geometry.from_view(np.array(context.region.view2d.region_to_view(*position)), size)
         if ((point >= -0.5) & (point <= np.array(size) - 0.5)).all():
-            point = overlay_geometry.upright(point, size, editor.orientation(settings, side))
+            point = overlay_geometry.upright(point, size, editor.orientation(settings, space.image))
         else:
             side = point = None
-    _pointer.update(side=side, point=point)
+    _pointer.update(panorama=panorama and panorama.session_uid, side=side, point=point)
     editor.redraw()
 
 
@@ -93,40 +94,38 @@ def draw() -> None:
     space, settings = context.space_data, properties.settings_of(context.scene)
     image = space.image
     side = editor.side_of(settings, image)
-    if side is None or not space.overlay.show_overlays or not all(image.size):
+    if image is None or not space.overlay.show_overlays or not all(image.size):
         return
     import gpu
 
     gpu.state.blend_set("ALPHA")
-    view = _View(context, settings, image, side)
+    view = _View(context, settings, image)
     if image == settings.seam_mask:
-        _draw_under_mask(view, editor.panorama(context), image)
+        _draw_under_mask(view, editor.panorama(context), image, FROM_TARGET)
     elif side == editor.PANORAMA:
         _draw_cover(view, settings, image)
-    elif image == getattr(settings, f"ignore_{side}"):
-        _draw_under_mask(view, getattr(settings, side), image)
-    if settings.show_matches:
-        _draw_matches(view, settings)
+    elif view.picture != image:
+        _draw_under_mask(view, view.picture, image, PAINTED_OUT)
+    if settings.show_matches and side is not None:
+        _draw_matches(view, settings, side)
     if settings.show_epipolar:
         _draw_lines(view)
-    _draw_waiting(view)
+    _draw_waiting(view, side)
     gpu.state.blend_set("NONE")
 
 
 class _View:
     """One editor's window region and the picture in it."""
 
-    def __init__(self, context: Any, settings: Any, image: bpy.types.Image, side: str) -> None:
+    def __init__(self, context: Any, settings: Any, image: bpy.types.Image) -> None:
         import numpy as np
 
         view2d, region = context.region.view2d, context.region
-        self.size, self.side = (image.size[0], image.size[1]), side
-        self.orientation = editor.orientation(settings, side)
+        self.size, self.picture = (image.size[0], image.size[1]), editor.beneath(settings, image)
+        self.orientation = editor.orientation(settings, image)
         self.region = (region.width, region.height)
         self.seen = np.array([view2d.region_to_view(0, 0), view2d.region_to_view(*self.region)])
         self.unit = context.preferences.system.ui_scale
-        panorama = editor.panorama(context)
-        self.result = result.read(panorama) if panorama is not None else None
 
     def at(self, points: Any) -> Any:
         """px of this editor's upright picture, in region px."""
@@ -146,13 +145,13 @@ class _View:
         return overlay_geometry.to_region(corners, self.size, self.seen, self.region)
 
 
-def _draw_matches(view: _View, settings: Any) -> None:
+def _draw_matches(view: _View, settings: Any, side: str) -> None:
     import numpy as np
 
     from . import overlay_geometry as geometry_of
 
     matches = match_arrays(settings)
-    points = _points_in(view, matches[editor.REFERENCE], matches[editor.TARGET])
+    points = points_on(settings, matches, side, view.picture)
     if points is None or not len(points):
         return
     places = view.at(points)
@@ -170,28 +169,33 @@ def _draw_matches(view: _View, settings: Any) -> None:
         _lines(geometry_of.rings(places[[settings.match_index]], 2.2 * radius), CHOSEN, view)
 
 
-def _points_in(view: _View, reference: Any, target: Any) -> Any:
-    """The matches in the picture that the editor shows."""
+def points_on(settings: Any, matches: dict[str, Any], side: str, picture: bpy.types.Image | None) -> Any:
+    """The matches (N, 2) in px of a picture, which is `side` to the chosen pair; None on a panorama of others."""
     from . import overlay_geometry
 
-    if view.side == editor.PANORAMA:
-        return overlay_geometry.on_panorama(view.result, reference) if view.result else None
-    return reference if view.side == editor.REFERENCE else target
+    if side != editor.PANORAMA:
+        return matches[side]
+    known = result.read(picture)
+    if known is None or ownership.pictures(picture) != [settings.reference, settings.target]:
+        return None
+    return overlay_geometry.on_panorama(known, matches[editor.REFERENCE])
 
 
 def _draw_lines(view: _View) -> None:
     from . import overlay_geometry as geometry_of
 
-    if view.result is None or _pointer["point"] is None:
+    panorama = compat.by_uid(bpy.data.images, _pointer["panorama"])
+    known, shows = result.read(panorama), editor.side_in(panorama, view.picture)
+    if known is None or shows is None or _pointer["point"] is None:
         return
-    known, side, point = view.result, _pointer["side"], _pointer["point"][None]
+    side, point = _pointer["side"], _pointer["point"][None]
     if side == editor.PANORAMA:
         side, point = editor.REFERENCE, geometry_of.from_panorama(known, point)
     found = geometry_of.epipolar_lines(known["geometry"], point[0], side)
-    here = editor.REFERENCE if view.side == editor.PANORAMA else view.side
+    here = editor.REFERENCE if shows == editor.PANORAMA else shows
     line = found.get(here)
     if line is not None:
-        if view.side == editor.PANORAMA:
+        if shows == editor.PANORAMA:
             ends = geometry_of.line_on_panorama(known, line)
         else:
             ends = geometry_of.segments(line)
@@ -199,18 +203,18 @@ def _draw_lines(view: _View) -> None:
         _lines(ends, SHADE, view, 2 * LINE_WIDTH)
         _lines(ends, LINE, view)
     if here == side:
-        at = geometry_of.on_panorama(known, point) if view.side == editor.PANORAMA else point
+        at = geometry_of.on_panorama(known, point) if shows == editor.PANORAMA else point
         _lines(geometry_of.rings(view.at(at), 6 * view.unit), POINTER, view)
 
 
-def _draw_waiting(view: _View) -> None:
+def _draw_waiting(view: _View, shown: str | None) -> None:
     """The point that was clicked and has no counterpart yet."""
     import numpy as np
 
     from . import overlay_geometry as geometry_of
 
     for side, point in pending.items():
-        if side == view.side:
+        if side == shown:
             place = view.at(np.array([point]))
             _lines(geometry_of.rings(place, 7 * view.unit), SHADE, view, 2.5 * LINE_WIDTH)
             _lines(geometry_of.rings(place, 7 * view.unit), WAITING, view)
@@ -226,7 +230,9 @@ def _draw_cover(view: _View, settings: Any, image: bpy.types.Image) -> None:
         _textured(texture, view.corners(), (1.0, 1.0, 1.0, opacity))
 
 
-def _draw_under_mask(view: _View, picture: bpy.types.Image | None, mask: bpy.types.Image) -> None:
+def _draw_under_mask(
+    view: _View, picture: bpy.types.Image | None, mask: bpy.types.Image, colour: tuple[float, ...]
+) -> None:
     """The picture that a mask is painted over, and on it in red what is painted out; of a seam what comes from the
     target in orange, darkened what comes from the reference."""
     import gpu
@@ -234,9 +240,8 @@ def _draw_under_mask(view: _View, picture: bpy.types.Image | None, mask: bpy.typ
     if picture is None:
         return
     _textured(_texture_of_picture(picture), view.corners(), (1.0, 1.0, 1.0, 1.0))
-    seam = view.side == editor.PANORAMA
-    gpu.state.blend_set("ALPHA" if seam else "ADDITIVE")  # black adds nothing
-    _textured(gpu.texture.from_image(mask), view.corners(), FROM_TARGET if seam else PAINTED_OUT)
+    gpu.state.blend_set("ADDITIVE" if colour == PAINTED_OUT else "ALPHA")  # black adds nothing
+    _textured(gpu.texture.from_image(mask), view.corners(), colour)
     gpu.state.blend_set("ALPHA")
 
 
@@ -348,6 +353,6 @@ def unregister() -> None:
         bpy.types.SpaceImageEditor.draw_handler_remove(_handlers.pop(), "WINDOW")
     _textures.clear()
     pending.clear()
-    _pointer.update(side=None, point=None)
+    _pointer.update(panorama=None, side=None, point=None)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

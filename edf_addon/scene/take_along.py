@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 from mathutils import Matrix
 
-from .. import editor, properties
-from ..bridge import compat, photo
+from .. import editor
+from ..bridge import compat, ownership, photo
 
 RIG, MESH = "RIG", "MESH"
 # What an object is to which panorama, as custom properties of it.
@@ -38,18 +38,18 @@ def lacking(image: bpy.types.Image | None, depth: bool = False) -> str:
     return ""
 
 
-def known_baseline(settings: Any) -> float | None:
-    """How far the scene's own cameras stand apart, where the pictures were taken with them."""
-    if settings.camera != "CAMERAS" or settings.reference_camera is None or settings.target_camera is None:
+def known_baseline(known: dict[str, Any]) -> float | None:
+    """How far apart the scene's own cameras stood, where a panorama's pictures were taken with them."""
+    if known["cameras"] is None:
         return None
-    ends = [camera.matrix_world.translation for camera in (settings.reference_camera, settings.target_camera)]
-    return (ends[1] - ends[0]).length
+    reference, target = (Matrix(camera["matrix_world"]).translation for camera in known["cameras"])
+    return (target - reference).length
 
 
-def usual_baseline(scene: bpy.types.Scene, image: bpy.types.Image) -> float:
-    """As far as this panorama's cameras stand apart already, else as the scene's own do, else 1."""
+def usual_baseline(image: bpy.types.Image) -> float:
+    """As far as this panorama's cameras stand apart already, else as those did that took its pictures, else 1."""
     rig = find(image, RIG)
-    return rig["baseline"] if rig is not None else known_baseline(properties.settings_of(scene)) or 1.0
+    return rig["baseline"] if rig is not None else known_baseline(editor.known(image)) or 1.0
 
 
 def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> dict[str, bpy.types.Object]:
@@ -57,8 +57,8 @@ def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: flo
     where Blender has no lens like it. Raises ValueError."""
     from . import scene_geometry
 
-    settings = properties.settings_of(scene)
-    pictures = {"REFERENCE": settings.reference, "TARGET": settings.target, "PANORAMA": image}
+    reference, target = ownership.pictures(image)
+    pictures = {"REFERENCE": reference, "TARGET": target, "PANORAMA": image}
     rig = _rig(scene, image, baseline)
     made = {}
     for placed in scene_geometry.placed_cameras(editor.known(image), baseline):
@@ -113,16 +113,15 @@ def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
     """Gives the scene a World that shows the panorama where its rig's cameras see it, or those of a new rig would."""
+    import numpy as np
+
     from ...core.cameras.blender_world import world_rotation
     from . import scene_geometry
 
     known = editor.known(image)
     rig = find(image, RIG)
-    camera = scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(known))
-    if rig is not None:
-        import numpy as np
-
-        camera = np.array(rig.matrix_world) @ camera
+    stands = _place_of_rig(known) if rig is None else rig.matrix_world
+    camera = np.array(stands) @ scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(known))
     turn = world_rotation(camera, scene_geometry.matrix(known["report"]["canvas"]["projection"]["rotation"]))
     world = bpy.data.worlds.new(image.name)
     tree = compat.node_tree(world)
@@ -172,15 +171,19 @@ def _rig(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> bpy
     if rig is None:
         rig = _link(scene, image, RIG, None)
         rig.empty_display_size = 0.2 * baseline
-        settings = properties.settings_of(scene)
-        if known_baseline(settings) is not None:
-            from . import scene_geometry
-
-            here = scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(editor.known(image)))
-            stands = settings.reference_camera.matrix_world.normalized()
-            rig.matrix_world = stands @ Matrix(here.tolist()).inverted()
+        rig.matrix_world = _place_of_rig(editor.known(image))
     rig["baseline"] = baseline
     return rig
+
+
+def _place_of_rig(known: dict[str, Any]) -> Matrix:
+    """Where a new rig stands: its reference camera where the scene's own stood that took the picture, if one did."""
+    from . import scene_geometry
+
+    if known["cameras"] is None:
+        return Matrix()
+    here = scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(known))
+    return Matrix(known["cameras"][0]["matrix_world"]).normalized() @ Matrix(here.tolist()).inverted()
 
 
 def _link(scene: bpy.types.Scene, image: bpy.types.Image, role: str, data: Any) -> bpy.types.Object:

@@ -70,7 +70,7 @@ def test_a_script_gets_the_panorama(chosen, pixels_of):
     assert alone.mean() > 0.1
     assert np.array_equal(pixels_of(panorama)[alone], pixels_of(settings.reference)[alone]), "top is top"
     kept = result.read(panorama)
-    assert kept["pictures"] == {"reference": "reference.png", "target": "target.png"}
+    assert [one["name"] for one in kept["pictures"]] == ["reference.png", "target.png"]
     assert kept["report"]["two_view"]["model"] == "general" and kept["has_depth"]
     assert kept["geometry"]["full_sizes"] == [[240, 180], [240, 180]]
     assert len(kept["matches"]["rows"]) == len(settings.matches) > 50
@@ -309,7 +309,7 @@ def test_a_reference_that_is_deleted_meanwhile_changes_nothing_for_the_work(work
     assert working.until(lambda: False) == {"FINISHED"}
     settings = bpy.context.scene.edf_stitch
     assert settings.result.name == "reference panorama" and settings.reference is None
-    with pytest.raises(RuntimeError, match="no image named “reference.png”"):
+    with pytest.raises(RuntimeError, match="“reference.png”, the reference of this panorama, is no longer in the file"):
         bpy.ops.edf.restitch()
 
 
@@ -425,7 +425,7 @@ def test_settings_of_a_later_version_are_taken_as_far_as_they_are_known(blender)
     kept = properties.keep(blender.settings)
     kept |= {"field": "NO_SUCH_FIELD", "from_the_future": 3, "seed": 9, "reference_camera": "gone"}
     blender.settings.field = "PAPER"
-    properties.restore(blender.settings, kept)
+    properties.restore(blender.settings, kept, {})
     assert (blender.settings.field, blender.settings.seed) == ("SLACK", 9)
     assert json.loads(json.dumps(kept)) == kept
 

@@ -6,7 +6,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from edf_stitch.core.cameras.projective import homogeneous, project, rotation_from_vector  # noqa: E402
-from edf_stitch.edf_addon.bridge import compat, result  # noqa: E402
+from edf_stitch.edf_addon.bridge import cameras, compat, ownership, result  # noqa: E402
 from edf_stitch.edf_addon.scene import take_along  # noqa: E402
 
 SIZE, SIZE_PRIME, CANVAS = (400, 300), (320, 480), (560, 360)
@@ -26,10 +26,15 @@ def stitched(blender, by_hand, monkeypatch):
     }  # fmt: skip
     depth = {"columns": COLUMNS, "rows": ROWS, "inverse_depth": d, "shows": np.ones(ROWS * COLUMNS, int)}
     report = {"canvas": {"projection": {"kind": "perspective"}}}
-    known = {"geometry": geometry, "depth": depth, "has_depth": True, "report": report}
+    pictures = [{"name": name, "fingerprint": ""} for name in ("reference", "target")]
+    known = {
+        "geometry": geometry, "depth": depth, "has_depth": True, "report": report, "pictures": pictures,
+        "cameras": None,
+    }  # fmt: skip
     settings = blender.settings
     for side, size in (("reference", SIZE), ("target", SIZE_PRIME), ("result", CANVAS)):
         setattr(settings, side, bpy.data.images.new(side, *size))
+    ownership.hold(settings.result, [settings.reference, settings.target], {})
     monkeypatch.setattr(result, "read", lambda image: known if image == settings.result else None)
     return known
 
@@ -119,7 +124,7 @@ def test_all_hangs_on_one_empty(stitched):
     assert set(collection.objects) == set(bpy.data.objects)
 
 
-def test_with_the_scenes_own_cameras_the_rig_stands_where_they_do(stitched):
+def test_with_the_scenes_own_cameras_the_rig_stands_where_they_stood(stitched):
     from mathutils import Euler, Matrix
 
     settings = bpy.context.scene.edf_stitch
@@ -128,13 +133,17 @@ def test_with_the_scenes_own_cameras_the_rig_stands_where_they_do(stitched):
         bpy.context.scene.collection.objects.link(camera)
         camera.matrix_world = Matrix.Translation(place) @ Euler((1, 0.2, 0.4)).to_matrix().to_4x4()
         setattr(settings, f"{name}_camera", camera)
-    settings.camera = "CAMERAS"
     bpy.context.view_layer.update()
-    assert take_along.known_baseline(settings) == pytest.approx(5)
+    described = cameras.describe_both(settings, bpy.context.scene, bpy.context.evaluated_depsgraph_get())
+    stitched["cameras"] = [described[side] for side in ownership.SIDES]
+    stood = np.array(settings.reference_camera.matrix_world)
+    settings.reference_camera.location = 9, 9, 9  # moved since, and no longer chosen
+    settings.reference_camera = None
+    assert take_along.known_baseline(stitched) == pytest.approx(5)
     bpy.ops.edf.create_cameras()
     bpy.context.view_layer.update()
     made = take_along.find(settings.result, "REFERENCE")
-    np.testing.assert_allclose(np.array(made.matrix_world), np.array(settings.reference_camera.matrix_world), atol=1e-5)
+    np.testing.assert_allclose(np.array(made.matrix_world), stood, atol=1e-5)
     assert take_along.find(settings.result, "TARGET").matrix_basis.translation.length == pytest.approx(5)
 
 
