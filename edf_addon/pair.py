@@ -8,20 +8,20 @@ from typing import Any
 
 from . import status
 
-# While it holds something, both pictures are being chosen, one after the other.
+# The settings whose pictures are being chosen one after the other.
 _choosing: list[Any] = []
 
 
 @contextmanager
 def choosing(settings: Any) -> Iterator[None]:
-    """Both pictures are chosen at once, however many steps that takes; whoever does that takes care of the list of
-    matches, or it goes in the end if it is another pair's."""
+    """Both pictures are chosen at once, however many steps that takes; in the end the list of matches goes if nobody
+    has said that it is theirs."""
     _choosing.append(settings)
     try:
         yield
     finally:
-        _choosing.remove(settings)
-    chosen(settings, None)
+        _choosing.pop()
+        chosen(settings, None)
 
 
 def chosen(settings: Any, _context: Any) -> None:

@@ -50,7 +50,7 @@ ADDON_MAY_IMPORT = {
     "properties": ("idnames", "pair", "status"),
     "bridge": (),
     "editor": ("bridge", "properties"),
-    "jobs": ("bridge", "properties", "status", "explain"),
+    "jobs": ("bridge", "pair", "properties", "status", "explain"),
     "scene": ("bridge", "properties", "editor"),
     "overlays": ("bridge", "scene", "idnames", "properties", "editor"),
     "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "pair", "properties", "editor"),

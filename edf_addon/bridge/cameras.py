@@ -25,6 +25,23 @@ def describe(camera: bpy.types.Object, scene: bpy.types.Scene, depsgraph: bpy.ty
     }
 
 
+def is_as_described(
+    camera: bpy.types.Object, then: dict[str, Any], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
+) -> bool:
+    """Whether a camera has the lens and stands in the place that `describe` told of it `then`."""
+    try:
+        now = describe(camera, scene, depsgraph)
+    except Unusable:
+        return False
+    differ = [abs(a - b) for a, b in zip(_numbers(now), _numbers(then), strict=True)]
+    return now["lens"]["sensor_fit"] == then["lens"]["sensor_fit"] and max(differ) < 1e-5
+
+
+def _numbers(told: dict[str, Any]) -> list[float]:
+    lens = [value for _, value in sorted(told["lens"].items()) if isinstance(value, float)]
+    return [*lens, *told["lens"]["aspect"], *(value for row in told["matrix_world"] for value in row)]
+
+
 def describe_both(settings: Any, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
     """The two cameras that the settings name. Raises Unusable."""
     chosen = {"reference": settings.reference_camera, "target": settings.target_camera}

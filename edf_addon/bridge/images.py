@@ -78,12 +78,13 @@ def describe(
     return entry
 
 
-def fingerprint(image: bpy.types.Image, user: bpy.types.ImageUser | None = None) -> str:
+def fingerprint(image: bpy.types.Image) -> str:
     """What tells the content of a picture from any other: a digest of what the worker gets of it, its file or its
-    pixels. "" for a Render Result, whose pixels Blender does not give. Raises Unusable, OSError."""
-    if image.type == "RENDER_RESULT":
+    pixels. "" for a Render Result, whose pixels Blender does not give, and for a sequence, which is many pictures.
+    Raises Unusable, OSError."""
+    if image.type == "RENDER_RESULT" or image.source == "SEQUENCE":
         return ""
-    path = file_of(image, user)
+    path = file_of(image)
     if path is not None and _goes_as_file(image, path):
         return FILE + _digest_of_file(path)
     return FILE + _digest(image.packed_file.data) if _goes_as_packed(image) else PIXELS + _digest_of_pixels(image)

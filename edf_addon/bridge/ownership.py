@@ -11,7 +11,7 @@ from typing import Any
 
 import bpy
 
-from . import images, result
+from . import cameras, images, result
 
 # The sides of a pair, in the order of its pictures.
 SIDES = ("reference", "target")
@@ -19,9 +19,9 @@ SIDES = ("reference", "target")
 PICTURE, SETTING = "edf_stitch_picture ", "edf_stitch_setting "
 
 
-def describe(pictures: Sequence[bpy.types.Image], user: bpy.types.ImageUser | None = None) -> list[dict[str, str]]:
-    """Name and content of pictures, the reference first, as a result keeps them; user: see images.describe."""
-    return [{"name": image.name, "fingerprint": images.fingerprint(image, user)} for image in pictures]
+def describe(pictures: Sequence[bpy.types.Image]) -> list[dict[str, str]]:
+    """Name and content of pictures, the reference first, as a result keeps them. Raises Unusable, OSError."""
+    return [{"name": image.name, "fingerprint": images.fingerprint(image)} for image in pictures]
 
 
 def hold(
@@ -58,16 +58,35 @@ def changes(panorama: bpy.types.Image) -> list[str]:
     said = missing(panorama)
     for words, image, fingerprint in _named(panorama):
         if image is not None and not fingerprint:
-            said.append(f"{words} shows whatever was rendered last")
+            said.append(f"{words} shows whatever was rendered last, or the frame of now")
         elif image is not None and images.has_changed(image, fingerprint):
             said.append(f"{words} has changed since it was stitched, or its file is not there any more")
     return said
+
+
+def camera_changes(panorama: bpy.types.Image, context: Any) -> list[str]:
+    """Which of the scene's cameras that took a panorama's pictures are not as they were, a sentence each."""
+    known: Any = result.read(panorama)
+    held = chosen(panorama)
+    return [
+        f"“{camera.name}”, the {side} camera of this panorama, has moved since, or has another lens"
+        for side, then in zip(SIDES, known["cameras"] or (), strict=False)
+        if (camera := held.get(f"{side}_camera"))
+        and not cameras.is_as_described(camera, then, context.scene, context.evaluated_depsgraph_get())
+    ]  # fmt: skip
+
+
+def names(panorama: bpy.types.Image) -> list[str]:
+    """What a panorama's pictures are called."""
+    known: Any = result.read(panorama)
+    both = zip(pictures(panorama), known["pictures"], strict=True)
+    return [entry["name"] if image is None else image.name for image, entry in both]
 
 
 def _named(panorama: bpy.types.Image) -> list[tuple[str, bpy.types.Image | None, str]]:
     """Words for each picture of a panorama, the picture, and its fingerprint then."""
     known: Any = result.read(panorama)
     return [
-        (f"“{image.name if image else entry['name']}”, the {side} of this panorama,", image, entry["fingerprint"])
-        for side, image, entry in zip(SIDES, pictures(panorama), known["pictures"], strict=True)
+        (f"“{name}”, the {side} of this panorama,", image, entry["fingerprint"])
+        for side, name, image, entry in zip(SIDES, names(panorama), pictures(panorama), known["pictures"], strict=True)
     ]  # fmt: skip

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from .. import properties
+from .. import pair, properties
 from ..bridge import cameras, compat, images, ownership, result
 from ..bridge.images import Unusable
 
@@ -69,7 +69,7 @@ def make_job(
         job["matches"] = "matches.npy"
     memory = {
         "scene": scene.session_uid, "settings": properties.keep(settings),
-        "pictures": ownership.describe(list(chosen.values()), user),
+        "pictures": ownership.describe(list(chosen.values())),
         "cameras": [job["cameras"][side] for side in ownership.SIDES] if "cameras" in job else None,
         # a reference to any of these would not survive an undo while the work goes on
         "held": [image.session_uid for image in chosen.values()],
@@ -186,6 +186,7 @@ def fill_matches(settings: Any, matches: dict[str, Any], edited: bool) -> None:
         if max(abs(match.x - row[0]), abs(match.y - row[1]), abs(match.x2 - row[2]), abs(match.y2 - row[3])) < 0.01:
             match.error = -1.0 if error is None else error
             match.state = state
+    pair.owns_matches(settings)
 
 
 def show(context: bpy.types.Context, image: bpy.types.Image) -> None:

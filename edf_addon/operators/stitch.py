@@ -72,7 +72,7 @@ class EDF_OT_restitch(_Stitching, bpy.types.Operator):  # noqa: N801
 
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
         settings = properties.settings_of(context.scene)
-        for words in bring_back(settings, editor.panorama(context, self.image)):
+        for words in bring_back(context, editor.panorama(context, self.image)):
             self.report({"WARNING"}, words)
         settings.edited_matches = True
         return super().prepare(context, folder)
@@ -93,7 +93,7 @@ class EDF_OT_restore(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: Any) -> set[str]:
         try:
-            changes = bring_back(properties.settings_of(context.scene), editor.panorama(context, self.image))
+            changes = bring_back(context, editor.panorama(context, self.image))
         except images.Unusable as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -132,8 +132,9 @@ class EDF_OT_reset(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-def bring_back(settings: Any, image: bpy.types.Image | None) -> list[str]:
+def bring_back(context: Any, image: bpy.types.Image | None) -> list[str]:
     """Settings, pictures and matches of a panorama; returns what has changed since, in words. Raises Unusable."""
+    settings = properties.settings_of(context.scene)
     found = result.read(image)
     if image is None or found is None:
         raise images.Unusable("this image carries no settings: it is no panorama that was stitched here")
@@ -143,8 +144,7 @@ def bring_back(settings: Any, image: bpy.types.Image | None) -> list[str]:
         settings.reference, settings.target = ownership.pictures(image)
         properties.restore(settings, found["settings"], ownership.chosen(image))
         stitching.fill_matches(settings, found["matches"], edited=False)
-        pair.owns_matches(settings)
-    return ownership.changes(image)
+    return ownership.changes(image) + ownership.camera_changes(image, context)
 
 
 CLASSES = (EDF_OT_stitch, EDF_OT_preview, EDF_OT_restitch, EDF_OT_restore, EDF_OT_cancel, EDF_OT_reset)

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from .. import editor, explain, idnames
+from ..bridge import ownership
 from ..idnames import Operator
 from ..operators import scene_objects
 from ..scene import take_along
@@ -39,7 +40,8 @@ class EDF_PT_result(SubPanel, bpy.types.Panel):  # noqa: N801
         for warning in known["report"]["warnings"]:
             words(self.layout.box(), explain.sentence(warning), width, WARNING)
         column = self.layout.column(align=True)
-        for what, value in [("Panorama", image.name), *explain.facts(known["report"])]:
+        names = [("Panorama", image.name), ("Pictures", ", ".join(ownership.names(image)))]
+        for what, value in [*names, *explain.facts(known["report"])]:
             line = column.split(factor=LABELS)
             label = line.row()
             label.scale_y = LINE

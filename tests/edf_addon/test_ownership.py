@@ -1,5 +1,6 @@
 """A panorama owns its pictures, cameras and matches, whatever is chosen, renamed or replaced since it was stitched."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from edf_stitch.edf_addon import status  # noqa: E402
-from edf_stitch.edf_addon.bridge import ownership, result  # noqa: E402
+from edf_stitch.edf_addon.bridge import cameras, ownership, result  # noqa: E402
 from edf_stitch.edf_addon.operators import match_editing  # noqa: E402
 from edf_stitch.edf_addon.overlays import drawing  # noqa: E402
 from edf_stitch.edf_addon.scene import take_along  # noqa: E402
@@ -91,6 +92,8 @@ def test_another_picture_of_the_same_name_is_not_taken_for_it(settings):
     with pytest.raises(RuntimeError, match="is no longer in the file"):
         bpy.ops.edf.restitch()
     assert backgrounds(settings.result) == [None, settings.target]
+    settings.reference = bpy.data.images[name]
+    assert not len(settings.matches), "they belonged to the one that was deleted"
 
 
 def test_a_mask_comes_back_by_what_it_is_and_not_by_its_name(chosen):
@@ -224,6 +227,23 @@ def test_undo_brings_the_list_back_with_its_pictures(settings):
     assert len(settings.matches) == count
     bpy.ops.ed.redo()
     assert not len(bpy.context.scene.edf_stitch.matches)
+
+
+def test_a_camera_that_moved_since_is_told(settings):
+    """By place and by lens, of the one that took the picture."""
+    camera = bpy.data.objects.new("took it", bpy.data.cameras.new("lens"))
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.view_layer.update()
+    known = json.loads(settings.result[result.KEY])
+    then = cameras.describe(camera, bpy.context.scene, bpy.context.evaluated_depsgraph_get())
+    settings.result[result.KEY] = json.dumps({**known, "cameras": [then, then]})
+    ownership.hold(settings.result, [], {"reference_camera": camera})
+    said = []
+    for x, lens in ((0, 50), (1, 50), (0, 50), (0, 51)):
+        camera.location.x, camera.data.lens = x, lens
+        bpy.context.view_layer.update()
+        said.append(ownership.camera_changes(settings.result, bpy.context))
+    assert [len(one) for one in said] == [0, 1, 0, 1] and "“took it”, the reference camera" in said[1][0]
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from edf_stitch.edf_addon import properties, status  # noqa: E402
-from edf_stitch.edf_addon.bridge import result  # noqa: E402
+from edf_stitch.edf_addon.bridge import ownership, result  # noqa: E402
 from edf_stitch.edf_addon.jobs import health  # noqa: E402
 from edf_stitch.edf_addon.panels import choices, finished, main, rows, sidebar  # noqa: E402
 
@@ -137,14 +137,17 @@ def stitched(chosen, small_result):
     """A panorama whose report warns."""
     report = json.loads(json.dumps({**small_result.report, "warnings": ["the focal length is doubtful"]}))
     image = chosen.settings.result = bpy.data.images.new("panorama", 60, 40)
-    result.store(image, {"report": report, "has_depth": False, "heat_range": [3.0, 40.0], "geometry": {}})
+    result.store(image, {"report": report, "has_depth": False, "heat_range": [3.0, 40.0], "geometry": {},
+                         "pictures": ownership.describe([chosen.settings.reference, chosen.settings.target])})
+    ownership.hold(image, [chosen.settings.reference, chosen.settings.target], {})
     return chosen
 
 
 def test_a_panorama_says_how_it_went(draw, stitched):
     stitched.settings.overlay, stitched.settings.show_matches = "DISPLACEMENT", True
     said = text(draw())
-    for words in ("The focal length is doubtful.", "General scene", "Alignment", "Blue 3 px, red 40 px", "no depth"):
+    asked = ("The focal length is doubtful.", "General scene", "Alignment", "Blue 3 px, red 40 px", "no depth")
+    for words in ("reference.png, target.png", *asked):
         assert words in said, words
     assert ("edf.use_as_world", True) not in draw().buttons, "only a sphere can surround a scene"
 
