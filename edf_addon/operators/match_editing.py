@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty
 
-from .. import editor, idnames, pair, properties
+from .. import editor, idnames, properties
 from ..bridge import photo
 
 WHICH = (
@@ -151,8 +151,7 @@ def indices(settings: Any, which: str, worse_than: float) -> list[int]:
 
 
 def edited(settings: Any) -> None:
-    """From now on the list is what is meant, for the pictures that are chosen."""
-    pair.owns_matches(settings)
+    """From now on the list is what is meant."""
     settings.edited_matches = True
 
 
