@@ -1,6 +1,7 @@
 """A panorama owns its pictures, cameras and matches, whatever is chosen, renamed or replaced since it was stitched."""
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from edf_stitch.edf_addon import status  # noqa: E402
-from edf_stitch.edf_addon.bridge import cameras, ownership, result  # noqa: E402
+from edf_stitch.edf_addon.bridge import cameras, images, ownership, result  # noqa: E402
 from edf_stitch.edf_addon.operators import match_editing  # noqa: E402
 from edf_stitch.edf_addon.overlays import drawing  # noqa: E402
 from edf_stitch.edf_addon.scene import take_along  # noqa: E402
@@ -146,6 +147,18 @@ def test_another_file_under_the_same_picture_is_a_change(settings, folder):
     assert len(ownership.changes(settings.result)) == 1
 
 
+def test_another_content_of_the_same_file_is_a_change(chosen, tmp_path):
+    path = tmp_path / "reference.png"
+    path.write_bytes(Path(bpy.path.abspath(chosen.settings.reference.filepath)).read_bytes())
+    image = bpy.data.images.load(str(path))
+    known = images.fingerprint(image)
+    assert not images.has_changed(image, known)
+    path.write_bytes(Path(bpy.path.abspath(chosen.settings.target.filepath)).read_bytes())
+    assert images.has_changed(image, known)
+    path.unlink()
+    assert images.has_changed(image, known)
+
+
 def test_the_list_of_matches_goes_with_its_pictures_and_that_is_said(settings):
     count = len(settings.matches)
     settings.edited_matches = True
@@ -268,6 +281,8 @@ def test_the_pointer_is_in_the_panoramas_own_pictures(settings, pointed):
     assert pointed(target) == (panorama.session_uid, "target"), "though the panel has it as its reference"
     assert pointed(panorama) == (panorama.session_uid, "panorama")
     assert pointed(settings.target)[1] is None
+    settings.ignore_reference = other("mask")
+    assert pointed(settings.ignore_reference) == (panorama.session_uid, "target"), "as the picture that it lies over"
 
 
 def test_matches_are_drawn_on_no_panorama_of_other_pictures(settings):

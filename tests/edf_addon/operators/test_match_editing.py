@@ -1,5 +1,7 @@
 """Matches by hand, through the operators that the buttons call."""
 
+from types import SimpleNamespace
+
 import pytest
 
 bpy = pytest.importorskip("bpy")
@@ -85,6 +87,17 @@ def test_the_match_under_the_pointer_in_either_picture(settings):
     assert match_pointing.at(settings, "reference", (2.2, 4.1), 1) == 2
     assert match_pointing.at(settings, "target", (6.0, 7.3), 1) == 1
     assert match_pointing.at(settings, "reference", (20.0, 20), 5) is None
+
+
+def test_a_match_that_was_begun_is_forgotten_when_another_picture_is_chosen(settings):
+    editing = SimpleNamespace(_pair=match_pointing._pair(settings), _dragged=(3, "reference"))
+    for expected in (1, 0):
+        drawing.pending["reference"] = (5.0, 5.0)
+        tick = SimpleNamespace(type="TIMER", value="NOTHING")
+        assert match_pointing.EDF_OT_match_edit.modal(editing, bpy.context, tick) == {"PASS_THROUGH"}
+        assert len(drawing.pending) == expected and (editing._dragged is None) == (expected == 0)
+        settings.target = bpy.data.images.new("other", 40, 30)
+    drawing.pending.clear()
 
 
 def test_what_the_overlay_draws(settings):
