@@ -102,7 +102,7 @@ def refine(
     there = _there(lines, polished.along, polished.across, pictures)
     if not there.any():
         return Dense(None, "the overlap is too small")
-    along = unfolded(lines, two_view, cameras[1].size, polished.along, polished.across) - field_at
+    along = unfolded(lines, two_view, cameras, polished.along, polished.across) - field_at
     relief = build_refinement(lines, base, along, polished.across, confidence, there)
     moved, across = (float(np.sqrt(np.square(v[there]).mean())) for v in (along, polished.across))
     return Dense(relief, "", reach, float((found[there] > 0).mean()), moved, across)

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.camera import Camera
 from ..cameras.two_view import TwoView
 from ..panorama.canvas import Canvas
 from ..panorama.folding import jacobian
@@ -38,9 +39,12 @@ REACH, STRIP = 12, 128
 
 
 def unfolded(
-    lines: EpipolarLines, two_view: TwoView, target_size: tuple[int, int], along: Plane, across: Plane
+    lines: EpipolarLines, two_view: TwoView, cameras: tuple[Camera, Camera], along: Plane, across: Plane
 ) -> Plane:
-    """The moves (h, w) along the lines without folds outside what is occluded and its rim."""
+    """The moves (h, w) along the lines without folds outside what is occluded and its rim.
+
+    cameras: of reference and target.
+    """
     around = np.ones((RIM, RIM), np.uint8)
     for _ in range(LOOKS):
         start, along = along, along.copy()
@@ -49,7 +53,7 @@ def unfolded(
         folded = _turns_over(x, y, usual)
         if not folded.any():
             break
-        free = cv2.dilate(_hidden(lines, two_view, target_size, along, x, y).astype(np.uint8), around) == 0
+        free = cv2.dilate(_hidden(lines, two_view, cameras, along, x, y).astype(np.uint8), around) == 0
         folded &= free
         for number in range(MEDIANS + MEANS):
             if not folded.any():
@@ -131,7 +135,7 @@ def _turns_over(x: Plane, y: Plane, usual: float) -> NDArray[np.bool_]:
 
 
 def _hidden(
-    lines: EpipolarLines, two_view: TwoView, target_size: tuple[int, int], along: Plane, x: Plane, y: Plane
+    lines: EpipolarLines, two_view: TwoView, cameras: tuple[Camera, Camera], along: Plane, x: Plane, y: Plane
 ) -> NDArray[np.bool_]:
     """Which nodes (h, w) the target cannot see; x, y: where they fall."""
     rows, columns = lines.shape
@@ -141,4 +145,6 @@ def _hidden(
     to_reference = np.array([[sx, 0, left + (sx - 1) / 2], [0, sy, top + (sy - 1) / 2], [0, 0, 1]])
     depth = lines.inverse_depth + along * lines.depth_per_px
     warp = Warp(Canvas(columns, rows, (0, 0)), x, y, depth.astype(np.float32))
-    return occluded(warp, replace(two_view, H_inf=two_view.H_inf @ to_reference), target_size)
+    # the reference's camera in px of the nodes, so that its lens is undone there
+    of_nodes = replace(cameras[0], K=np.linalg.inv(to_reference) @ cameras[0].K, size=(columns, rows))
+    return occluded(warp, replace(two_view, H_inf=two_view.H_inf @ to_reference), cameras[1].size, of_nodes)

@@ -7,12 +7,14 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.dense import unfolding
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
 from edf_stitch.core.dense.unfolding import unfolded
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.folding import jacobian
-from edf_stitch.core.panorama.visibility import occluded
+from edf_stitch.core.panorama.visibility import inverse_depth_in_target, occluded
 from edf_stitch.core.panorama.warp import Warp
 
 from ..line_scenes import Field
@@ -20,6 +22,7 @@ from ..line_scenes import Field
 SIZE = (160, 120)
 FAR, NEAR = 0.02, 0.12  # 20 px apart
 CARD = np.s_[35:85, 60:110]
+CAMERAS = (Camera(np.eye(3), SIZE, "without a lens", 0.0),) * 2
 
 
 @pytest.fixture(params=["to the right", "to the left", "forward"])
@@ -60,7 +63,7 @@ def test_noise_that_turns_the_map_over_is_smoothed_and_nothing_else(made: tuple[
     along[50:80, 100:140] = noise((30, 40), 1.5, 1.0)
     along[20:40, 100:140] = noise((20, 40), 1.8, 1.6)  # coarser
     assert noisy(view, lines, along) > 80
-    found = unfolded(lines, view, SIZE, along, np.zeros_like(along))
+    found = unfolded(lines, view, CAMERAS, along, np.zeros_like(along))
     assert found.dtype == np.float32 and noisy(view, lines, found) <= 1
     assert np.array_equal(found[:, :70], along[:, :70]), "what does not fold is not touched"
     assert np.abs(found).max() <= np.abs(along).max()
@@ -74,7 +77,7 @@ def test_what_is_right_beside_a_wrong_node_keeps_its_place(made: tuple[TwoView, 
     along[30:90:9, 105:116:9] += 4.0
     wrong = along != right
     assert noisy(view, lines, along) > 8
-    found = unfolded(lines, view, SIZE, along, np.zeros_like(along))
+    found = unfolded(lines, view, CAMERAS, along, np.zeros_like(along))
     assert noisy(view, lines, found) == 0
     assert np.abs(found - right)[~wrong].max() < 0.05
 
@@ -87,7 +90,7 @@ def test_a_map_without_folds_stays_as_it_is(made: tuple[TwoView, EpipolarLines])
         epipole = view.e_prime[:2] / view.e_prime[2]
         along *= np.minimum(1, np.hypot(x - epipole[0], y - epipole[1]) / 30)
     assert not folded(lines, along).any()
-    assert np.array_equal(unfolded(lines, view, SIZE, along, np.zeros_like(along)), along)
+    assert np.array_equal(unfolded(lines, view, CAMERAS, along, np.zeros_like(along)), along)
 
 
 def test_a_near_thing_keeps_its_rim(made: tuple[TwoView, EpipolarLines]) -> None:
@@ -98,7 +101,7 @@ def test_a_near_thing_keeps_its_rim(made: tuple[TwoView, EpipolarLines]) -> None
     along = ((depth - lines.inverse_depth) / lines.depth_per_px).astype(np.float32)
     behind = hidden(view, lines, along)
     assert behind.sum() > 200 and folded(lines, along).any()
-    found = unfolded(lines, view, SIZE, along, np.zeros_like(along))
+    found = unfolded(lines, view, CAMERAS, along, np.zeros_like(along))
     assert (np.abs(found - along) > 0.5).mean() < 0.02
     middle = np.zeros(lines.shape, bool)
     middle[CARD] = True
@@ -115,5 +118,28 @@ def test_a_node_behind_the_target_hurts_nobody(made: tuple[TwoView, EpipolarLine
                    lines.depth_per_px, lines.direction, lines.w_rate, lines.camera_prime)  # fmt: skip
     along = np.zeros(lines.shape, np.float32)
     along[50:80, 100:140] = noise((30, 40), 1.5, 1.0)
-    found = unfolded(broken, view, SIZE, along, np.zeros_like(along))
+    found = unfolded(broken, view, CAMERAS, along, np.zeros_like(along))
     assert np.isfinite(found).all() and noisy(view, broken, found) <= 1
+
+
+@pytest.mark.parametrize("step", [1.0, 2.0])
+def test_the_depth_order_is_that_of_the_undistorted_nodes(
+    by_hand: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, step: float
+) -> None:
+    """What hides what is decided by depth in front of the target: that of a node's ideal pixel, not of its raw one."""
+    cameras = by_hand.camera(SIZE, 200.0, (-0.3,)), by_hand.camera(SIZE, 200.0)
+    view = by_hand.view(*cameras, (0.0, 20, 0), (-1, 0.05, 0.1))
+    sparse = SparseMap.over_reference(Field(lambda points: np.full(points.shape[:-1], FAR)), view, *cameras, 10)
+    lines = EpipolarLines.over(sparse, (10, 20, 120, 80), step)
+    asked = []
+
+    def ask(warp: Warp, two_view: TwoView, target_size: tuple[int, int], camera: Camera | None = None) -> np.ndarray:
+        asked.append(inverse_depth_in_target(warp, two_view, camera))
+        return occluded(warp, two_view, target_size, camera)
+
+    monkeypatch.setattr(unfolding, "occluded", ask)
+    along = noise(lines.shape, 3.0, 1.0)
+    unfolded(lines, view, cameras, along, np.zeros_like(along))
+    d = lines.inverse_depth + along * lines.depth_per_px
+    ray = np.concatenate([lines.ideal, np.ones((*lines.shape, 1))], axis=-1) @ view.H_inf[2] + d * view.e_prime[2]
+    assert np.allclose(asked[0], np.maximum(d, 0) / ray, rtol=1e-5)
