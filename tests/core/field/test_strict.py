@@ -470,8 +470,9 @@ def test_too_few_depths_are_refused() -> None:
         fit_strict(forward, Matches(centre + away, centre - 1.5 * away), SIZE, SIZE)
 
 
-def test_a_handful_of_matches_makes_a_field() -> None:
-    x, y, _ = some_matches(SIDE, planar, MIN_CENTRES + 2, 0.2, seed=6)
+@pytest.mark.parametrize("count", [MIN_CENTRES, MIN_CENTRES + 2])
+def test_a_handful_of_matches_makes_a_field(count: int) -> None:
+    x, y, _ = some_matches(SIDE, planar, count, 0.2, seed=6)
     field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     assert np.isfinite(field.on_grid(Grid.over(0, 0, *SIZE)).inverse_depth).all()
     assert error_px(field, x, planar).max() < 1.5
