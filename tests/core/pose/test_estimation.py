@@ -584,3 +584,14 @@ def test_of_the_poses_of_a_plane_those_that_have_it_in_front_are_left() -> None:
     for pose in poses:
         assert np.abs(sampson_residuals(pose.F, truth.matches.x, truth.matches.y)).max() < 1e-6
     assert min(rotation_angle(pose.R, truth.R) + np.linalg.norm(pose.t - truth.t) for pose in poses) < 1e-6
+
+
+def test_where_no_pose_has_most_of_a_plane_its_homography_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    truth = scene("a plane", 0, 100)
+    with_pose = estimate(truth.matches, known(), known())
+    assert with_pose.model == "plane" and np.isfinite(with_pose.t).all()
+    found = Pose(with_pose.K, with_pose.K_prime, with_pose.R, with_pose.t)
+    few = np.arange(100) < 60
+    monkeypatch.setattr("edf_stitch.core.pose.estimation._fit_pose", lambda *_: (found, few, 0.5, False))
+    view = estimate(truth.matches, known(), known())
+    assert view.model == "plane" and np.isnan(view.t).all() and not view.e_prime.any() and view.inliers.sum() > 90
