@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from edf_stitch.core.compose.composition import composed, pooled_decision
-from edf_stitch.core.compose.wraparound import WrappedImage, roll_for, rolled
+from edf_stitch.core.compose.wraparound import WrappedImage, roll_for, rolled, rolled_maps
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
@@ -89,3 +89,14 @@ def test_rolled_light_is_rolled_however_it_is_cut_up(columns: int) -> None:
     one, whole = WrappedImage(light, columns), rolled(light, columns)
     for part in (np.s_[:, :], np.s_[10:20, 5:300], np.s_[:, W - 80 :], np.s_[3:4, :1], np.s_[5:9, 7:7]):
         assert np.array_equal(one[part], whole[part])
+
+
+def test_a_warp_is_rolled_with_all_that_it_says() -> None:
+    random = np.random.default_rng(0)
+    x, y, depth, confidence = random.random((4, 5, 8)).astype(np.float32)
+    canvas = replace(CANVAS, width=8, height=5)
+    found = rolled_maps(Warp(canvas, x, y, depth, confidence), 3)
+    pairs = (found.map_x, x), (found.map_y, y), (found.inverse_depth, depth), (found.confidence, confidence)
+    for values, whole in pairs:
+        assert np.array_equal(values, np.concatenate([whole[:, 3:], whole[:, :3]], axis=1))
+    assert found.canvas == canvas and rolled_maps(Warp(canvas, x, y, depth), -2).confidence is None

@@ -256,3 +256,13 @@ def test_doubt_alone_hides_nothing() -> None:
     assert np.array_equal(by_agreement(told, unsure, TARGET, ~everywhere), told), "beyond the reference: nothing"
     nothing = np.zeros(SHAPE, bool)
     assert not by_agreement(nothing, unsure, TARGET, everywhere).any()
+
+
+def test_a_wall_at_infinity_is_hidden_by_what_stands_before_it() -> None:
+    """Points that are infinitely far off own nothing, and are hidden all the same."""
+    warp, hidden = SIDEWAYS.truth()
+    wall = np.isclose(warp.inverse_depth, 0.1)
+    d = np.where(wall, np.float32(0), warp.inverse_depth)
+    far = SIDEWAYS.warp(1 / np.maximum(d, 1e-9))
+    found = occluded(far, SIDEWAYS.view, TARGET)
+    assert found.sum() > 0.8 * hidden.sum() and wall[found].mean() > 0.5
