@@ -124,5 +124,5 @@ def test_dark_blocks_tell_nothing_of_the_exposure() -> None:
     flared = light / GAIN
     light[:, :104] = 0.002
     flared[:, :104] = 0.04
-    found = match_exposure(layer(light), layer(flared), NOTHING, LDR)
+    found = match_exposure(layer(light), layer(flared), NOTHING, HDR)
     assert np.allclose(found.gain, GAIN, rtol=1e-3) and found.blocks == (H // 8) * (W // 8 - 13)
