@@ -19,11 +19,9 @@ import random
 import re
 import resource
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
@@ -42,8 +40,8 @@ STITCHES = (
     "tests/core/test_pipeline.py::test_transparent_parts_are_neither_matched_nor_shown",
     "tests/core/test_pipeline.py::test_pictures_of_two_sizes",
 )  # fmt: skip
-SELECTED = ("-x", "-q", "-m", "not slow and not blender and not soak", "-p", "no:cacheprovider")
-# Time that a test run may take: so many times what it takes unmutated, and seconds on top.
+SELECTED = ("-x", "-q", "-m", "not slow and not blender and not soak", "-p", "no:cacheprovider", "--durations=0")
+# Time of the processor that tests may take: so many times what they take unmutated, and seconds on top.
 PATIENCE, GRACE = 4.0, 10.0
 MOST_MEMORY = 8 << 30  # bytes; a wrong size must not take the machine down
 
@@ -91,16 +89,6 @@ class Row:
     change: str
     start: str
     by: str
-
-
-@dataclass(frozen=True)
-class Reason:
-    """Why a mutation changes nothing that a caller could see."""
-
-    file: str
-    function: str
-    change: str
-    why: str
 
 
 class Finder(ast.NodeVisitor):
@@ -277,7 +265,7 @@ class Tree:
                 shutil.copy(ROOT / name, self.root / name)
         # before any installed one; BLAS with several threads may give other last bits from call to call
         self.environment = {**os.environ, "PYTHONPATH": str(folder), "OPENBLAS_NUM_THREADS": "1"}
-        self.limits: dict[tuple[str, ...], float] = {}
+        self.seconds: dict[str, float] = {}
         where = subprocess.run(
             [sys.executable, "-c", "import edf_stitch.core as core; print(core.__path__[0])"],
             cwd=folder, env=self.environment, capture_output=True, text=True, check=True,
@@ -287,52 +275,64 @@ class Tree:
 
     def noticed_by(self, mutation: Mutation) -> str:
         """The first test that fails, "time limit" where the tests came to no end, "" where all pass."""
+        path = self.root / mutation.file
+        before = path.read_bytes()
         for tests in self.stages(mutation.file):
-            if tests not in self.limits:
-                start = time.monotonic()
-                wrong = self.failing(tests, None)
-                if wrong:
-                    raise SystemExit(f"fails without any mutation: {wrong}")
-                self.limits[tests] = PATIENCE * (time.monotonic() - start) + GRACE
-            path = self.root / mutation.file
-            before = path.read_bytes()
+            limit = int(PATIENCE * sum(map(self.usual, tests)) + GRACE)
             self.write(path, before[: mutation.start] + mutation.text.encode() + before[mutation.stop :])
             try:
-                by = self.failing(tests, self.limits[tests])
+                by, _ = self.failing(tests, limit)
             finally:
                 self.write(path, before)
             if by:
                 return by
         return ""
 
+    def usual(self, test: str) -> float:
+        """Seconds that a file of tests takes without any mutation; all of its folder are run once for that."""
+        if test not in self.seconds:
+            folder = test.rpartition("/")[0]
+            tests = STITCHES if test in STITCHES else tuple(self.tests_in(folder))
+            wrong, out = self.failing(tests, None)
+            if wrong:
+                raise SystemExit(f"fails without any mutation: {wrong}")
+            for name in tests:
+                took = re.findall(rf"^([\d.]+)s \w+ +{re.escape(name)}\b", out, re.MULTILINE)
+                self.seconds[name] = sum(map(float, took))
+        return self.seconds[test]
+
+    def tests_in(self, folder: str) -> list[str]:
+        """The files of tests in a folder."""
+        return sorted(f"{folder}/{path.name}" for path in (self.root / folder).glob("test_*.py"))
+
     def stages(self, file: str) -> Iterator[tuple[str, ...]]:
         """What is run one after the other: the tests of the module, of its room, whole stitches."""
         _, room, name = file.split("/")
-        own = f"tests/core/{room}/test_{name}"
-        folder = self.root / "tests/core" / room
-        all_of = sorted(f"tests/core/{room}/{path.name}" for path in folder.glob("test_*.py"))
+        own, all_of = f"tests/core/{room}/test_{name}", self.tests_in(f"tests/core/{room}")
         if own in all_of:
             yield (own,)
-        yield tuple(path for path in all_of if path != own)
+        yield tuple(test for test in all_of if test != own)
         yield STITCHES
 
-    def failing(self, tests: tuple[str, ...], limit: float | None) -> str:
-        """The first of these tests that fails."""
+    def failing(self, tests: tuple[str, ...], limit: int | None) -> tuple[str, str]:
+        """The first of these tests that fails within so many seconds of the processor, and what pytest said."""
+
+        def hold_down() -> None:
+            resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+            if limit:
+                resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+
         command = [sys.executable, "-m", "pytest", *SELECTED, *tests]
-        run = subprocess.Popen(
+        run = subprocess.run(
             command, cwd=self.root, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            start_new_session=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY,) * 2),
+            preexec_fn=hold_down,
         )  # fmt: skip
-        try:
-            out, _ = run.communicate(timeout=limit)
-        except subprocess.TimeoutExpired:
-            os.killpg(run.pid, signal.SIGKILL)
-            run.communicate()
-            return "time limit"
         if run.returncode == 0:
-            return ""
-        named = re.search(r"^(?:FAILED|ERROR) (\S+)", out, re.MULTILINE)
-        return named[1].removeprefix("tests/core/") if named else f"pytest ended with {run.returncode}"
+            return "", run.stdout
+        if run.returncode < 0:
+            return "time limit", run.stdout
+        named = re.search(r"^(?:FAILED|ERROR) (\S+)", run.stdout, re.MULTILINE)
+        return named[1].removeprefix("tests/core/") if named else f"pytest ended with {run.returncode}", run.stdout
 
     @staticmethod
     def write(path: Path, source: bytes) -> None:
@@ -342,16 +342,14 @@ class Tree:
             compiled.unlink()
 
 
-def _read(path: Path, of: type[Row] | type[Reason]) -> list:
-    if not path.exists():
-        return []
+def _read(path: Path) -> list[dict[str, str]]:
     with path.open(newline="", encoding="utf-8") as file:
-        return [of(**line) for line in csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE)]
+        return list(csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE))
 
 
 def report(rows: list[Row]) -> bool:
     """Prints what was noticed in each room and what was not; says whether that meets the goal."""
-    why = {(one.file, one.function, one.change): one.why for one in _read(EQUIVALENT, Reason)}
+    why = {(one["file"], one["function"], one["change"]): one["why"] for one in _read(EQUIVALENT)}
     rooms: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
         rooms[row.file.split("/")[1]].append(row)
@@ -377,10 +375,11 @@ def main() -> int:
     parser.add_argument("--resume", action="store_true", help="go on with the table; what was deleted there runs again")
     asked = parser.parse_args()
     table = ROOT / f"mutation_seed{asked.seed}.tsv"
-    done = {(row.file, row.start, row.change): row for row in _read(table, Row)} if asked.resume else {}
+    again = asked.resume and table.exists()
+    done = {(row["file"], row["start"], row["change"]): Row(**row) for row in _read(table)} if again else {}
     columns = [field.name for field in fields(Row)]
     mutations, rows = drawn(asked.room, asked.count, asked.seed), []
-    with tempfile.TemporaryDirectory() as folder, table.open("a" if asked.resume else "w", encoding="utf-8") as out:
+    with tempfile.TemporaryDirectory() as folder, table.open("a" if again else "w", encoding="utf-8") as out:
         if not out.tell():
             print(*columns, sep="\t", file=out)
         tree = Tree(Path(folder))
