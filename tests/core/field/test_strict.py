@@ -19,7 +19,14 @@ from edf_stitch.core.cameras.projective import (
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.field.plane import fit_plane
 from edf_stitch.core.field.spline import SmoothingProblem
-from edf_stitch.core.field.strict import CENTRE_BUDGET, MIN_CENTRES, SMOOTHING_LADDER, StrictField, fit_strict
+from edf_stitch.core.field.strict import (
+    CENTRE_BUDGET,
+    MIN_CENTRES,
+    SMOOTHING_LADDER,
+    StrictField,
+    _supported,
+    fit_strict,
+)
 from edf_stitch.core.field.transfer import inverse_depths, target_points
 from edf_stitch.core.raster.grid import Grid
 from edf_stitch.core.system.errors import DegenerateGeometry
@@ -476,3 +483,17 @@ def test_a_handful_of_matches_makes_a_field(count: int) -> None:
     field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     assert np.isfinite(field.on_grid(Grid.over(0, 0, *SIZE)).inverse_depth).all()
     assert error_px(field, x, planar).max() < 1.5
+
+
+@pytest.mark.parametrize("together, kept", [(4, True), (3, False)])
+def test_three_of_the_eight_nearest_that_agree_protect_a_point(together: int, kept: bool) -> None:
+    """A few points close together before a wall: each has one neighbour fewer than they are."""
+    wall = np.stack(np.meshgrid(np.arange(10.0), np.arange(10.0)), axis=-1).reshape(-1, 2) * 10
+    thing = np.array([[45.0, 45], [46, 45], [45, 46], [46, 46]])[:together]
+    x, g = np.vstack([wall, thing]), np.r_[np.zeros(100), np.full(together, 0.02)]
+    sensitivity = np.full(len(x), 1000.0)  # so 20 px before it
+    found = _supported(x, g, sensitivity, 1.0)
+    assert (found[100:] == kept).all() and found[:100].all()
+    assert _supported(x, g, sensitivity, 30.0).all(), "within the tolerance all agree"
+    assert _supported(x, g, 0.01 * sensitivity, 1.0).all(), "as it is seen, not in depth"
+    assert not _supported(x[:8], g[:8], sensitivity[:8], 1.0).any(), "eight have no eight neighbours"
