@@ -1,7 +1,7 @@
-"""How the target lies on the reference: from pictures to matches, geometry, field and map.
+"""How pictures lie on the reference: from pictures to matches, geometry, field and maps.
 
-Everything that is decided about a pair before a pixel of it is fetched. Several frames of two fixed cameras share one
-alignment: their matches are pooled, so that a clip does not swim.
+Everything that is decided before a pixel is fetched. Several frames of fixed cameras share one alignment: their matches
+are pooled, so that a clip does not swim.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cameras.camera import Camera
+from .cameras.edge import Edge
 from .cameras.lens import undistort
 from .cameras.matches import Matches
-from .cameras.sources import cameras_for
-from .cameras.two_view import TwoView
+from .cameras.sources import cameras_for, role
+from .cameras.view import View, views_of
 from .dense.refine import Dense, refine
 from .field.field import Field
 from .field.slack import SlackField
@@ -31,8 +32,10 @@ from .panorama.warp import Warp, build_warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
 from .pose import features
-from .pose.estimation import MIN_MATCHES, estimate
+from .pose.estimation import estimate
 from .pose.match_files import read_matches
+from .pose.options import ESTIMATION
+from .raster.resizing import resized_points
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, TooFewMatches
 from .system.threads import in_order
@@ -45,15 +48,15 @@ ReportProgress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Alignment:
-    """Where every canvas pixel is seen in the target, and why.
+    """Where every canvas pixel is seen in each picture, and why.
 
-    cameras: as known before; matches: all found or given, in px of the (raw) pictures; two_view: the geometry, its
-    inliers among them; field; dense: its refinement, None where none was asked for; warp; warnings in plain words.
+    cameras: as known before; edges: pairs of pictures with their matches and geometry; views: what follows from them
+    for each picture; field; dense: its refinement, None where none was asked for; warp; warnings in plain words.
     """
 
-    cameras: tuple[Camera, Camera]
-    matches: Matches
-    two_view: TwoView
+    cameras: tuple[Camera, ...]
+    edges: tuple[Edge, ...]
+    views: tuple[View, ...]
     field: Field
     warp: Warp
     warnings: tuple[str, ...]
@@ -62,111 +65,111 @@ class Alignment:
 
 @dataclass(frozen=True)
 class Frame:
-    """Two pictures as they are worked on, without what is masked and at the scale asked for; their full sizes; and what
-    was painted over the panorama (see `masks.read_painted`)."""
+    """Pictures as they are worked on, the reference first, without what is masked and at the scale asked for; their
+    full sizes; and what was painted over the panorama (see `masks.read_painted`)."""
 
-    reference: Picture
-    target: Picture
-    full_sizes: tuple[tuple[int, int], tuple[int, int]]
+    pictures: tuple[Picture, ...]
+    full_sizes: tuple[tuple[int, int], ...]
     painted: NDArray[np.int8] | None = None
 
 
-def prepare(reference: Picture, target: Picture, options: StitchOptions) -> Frame:
-    """A frame of two full pictures in one colour space. Raises BadRequest or UnreadableImage about a mask."""
-
-    def worked_on(picture: Picture, mask: Path | np.ndarray | None, name: str) -> Picture:
-        shown = picture if mask is None else without(picture, read_mask(mask, size_of(picture), name))
-        return resized(shown, options.scale)
-
-    return Frame(
-        worked_on(reference, options.ignore_reference, "the reference"),
-        worked_on(target, options.ignore_target, "the target"),
-        (size_of(reference), size_of(target)),
-        None if options.mask is None else read_painted(options.mask),
-    )
+def prepare(pictures: Sequence[Picture], options: StitchOptions) -> Frame:
+    """A frame of full pictures in one colour space. Raises BadRequest or UnreadableImage about a mask."""
+    worked_on = []
+    for number, picture in enumerate(pictures):
+        mask = options.ignored(number)
+        shown = picture
+        if mask is not None:
+            shown = without(picture, read_mask(mask, size_of(picture), f"the {role(number)}"))
+        worked_on.append(resized(shown, options.scale))
+    painted = None if options.mask is None else read_painted(options.mask)
+    return Frame(tuple(worked_on), tuple(size_of(picture) for picture in pictures), painted)
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """How two cameras stood, before any field: what all fields of a pair have in common.
+    """How the cameras stood, before any field: what all fields of the same pictures have in common.
 
-    cameras, matches, two_view, warnings: as in `Alignment`; ideal: the matches in ideal (undistorted) pixels.
+    cameras, edges, warnings: as in `Alignment`.
     """
 
-    cameras: tuple[Camera, Camera]
-    matches: Matches
-    ideal: Matches
-    two_view: TwoView
+    cameras: tuple[Camera, ...]
+    edges: tuple[Edge, ...]
     warnings: tuple[str, ...]
 
 
-def align(frames: Sequence[Frame], options: StitchOptions, steps: ReportProgress) -> Alignment:
-    """Aligns the target of each frame with the reference; all frames share both cameras, hence one alignment.
+def align(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Alignment:
+    """Aligns the pictures of each frame with its reference; all frames share their cameras, hence one alignment.
 
     Raises StitchError and its kinds.
     """
-    return fit_and_warp(estimate_geometry(frames, options, steps), frames, options, steps)
+    return fit_and_warp(estimate_geometry(frames, options, progress), frames, options, progress)
 
 
-def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, steps: ReportProgress) -> Geometry:
-    """Matches and two-view geometry of frames that share both cameras. Raises StitchError and its kinds."""
-    first, second, sizes = frames[0].reference, frames[0].target, frames[0].full_sizes
+def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Geometry:
+    """Matches and geometry of frames that share their cameras. Raises StitchError and its kinds."""
+    pictures, sizes = frames[0].pictures, frames[0].full_sizes
     if any(frame.full_sizes != sizes for frame in frames):
         raise BadRequest("the frames of a clip differ in size: one alignment is for one camera each")
-    full, warnings = cameras_for(options.camera, (first.name, second.name), sizes, (first.exif, second.exif))
-    cameras = full[0].resized(size_of(first)), full[1].resized(size_of(second))
+    full, warnings = cameras_for(
+        options.camera, [picture.name for picture in pictures], sizes, [picture.exif for picture in pictures]
+    )
+    cameras = tuple(camera.resized(size_of(picture)) for camera, picture in zip(full, pictures, strict=True))
     cache = Cache(options.cache)
     if options.matches is None:
-        steps("features", 0.0)
-        seen = tuple((p.view, p.alpha) for frame in frames for p in (frame.reference, frame.target))
+        progress("features", 0.0)
+        seen = tuple((picture.view, picture.alpha) for frame in frames for picture in frame.pictures)
         quick = options.preview
-        matches = cache.remember("matches", (*seen, quick), lambda: _found_in(frames, steps, quick))
+        matches = cache.remember("matches", (*seen, quick), lambda: _found_in(frames, progress, quick))
     else:
         matches = _given(options.matches, frames[0], cameras)
 
-    steps("geometry", 0.0)
+    progress("geometry", 0.0)
     ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
     two_view = cache.remember(
-        "two_view", (ideal, cameras, options.seed), lambda: estimate(ideal, *cameras, seed=options.seed)
+        "two_view", (ideal, cameras, options.seed), lambda: estimate(ideal, cameras[0], cameras[1], seed=options.seed)
     )
-    return Geometry(cameras, matches, ideal, two_view, (*warnings, *two_view.warnings))
+    return Geometry(cameras, (Edge(0, 1, matches, ideal, two_view),), (*warnings, *two_view.warnings))
 
 
 def fit_and_warp(
-    registration: Geometry, frames: Sequence[Frame], options: StitchOptions, steps: ReportProgress
+    geometry: Geometry, frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress
 ) -> Alignment:
-    """Field and map of the frames whose geometry is known. Raises StitchError and its kinds."""
-    cameras, two_view = registration.cameras, registration.two_view
-    steps("field", 0.0)
-    inliers, sizes = registration.ideal.subset(two_view.inliers), (cameras[0].size, cameras[1].size)
-    decided = (options.field, options.fade, two_view, inliers, *sizes, options.seed)
+    """Field and maps of the frames whose geometry is known. Raises StitchError and its kinds."""
+    cameras = geometry.cameras
+    (edge,) = geometry.edges
+    progress("field", 0.0)
+    inliers, pair = edge.inliers, edge.pair(cameras)
+    decided = (options.field, options.fade, edge.two_view, inliers, pair[0].size, pair[1].size, options.seed)
     field = Cache(options.cache).remember("field", decided, lambda: fit_field(*decided))
 
     dense = None
     if options.dense:
-        steps("dense", 0.0)
-        seen = tuple((p.view, p.alpha) for p in (frames[0].reference, frames[0].target))
+        progress("dense", 0.0)
+        seen = tuple((picture.view, picture.alpha) for picture in frames[0].pictures)
         dense = Cache(options.cache).remember(
             "dense", (len(frames), field, inliers, seen, cameras),
-            lambda: _refined(field, field.two_view, inliers, frames, cameras),
+            lambda: _refined(field, edge, inliers, frames, pair),
         )  # fmt: skip
 
-    steps("warp", 0.0)
-    relief = None if dense is None else dense.relief
-    projection = _projection(options, field.two_view, frames[0], cameras)
-    warp = build_warp(field, field.two_view, *cameras, projection, relief)
-    return Alignment(cameras, registration.matches, field.two_view, field, warp, registration.warnings, dense)
+    progress("warp", 0.0)
+    # a rival's geometry is as little as it knows
+    views = views_of(field.two_view, cameras)
+    refined = None if dense is None else dense.relief
+    warp = build_warp(field, views, _projection(options, views, frames[0]), refined)
+    edges = (replace(edge, two_view=field.two_view),)
+    return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense)
 
 
 def _refined(
-    field: Field, two_view: TwoView, inliers: Matches, frames: Sequence[Frame], cameras: tuple[Camera, Camera]
+    field: Field, edge: Edge, inliers: Matches, frames: Sequence[Frame], cameras: tuple[Camera, Camera]
 ) -> Dense:
     """The field's dense refinement, or why there is none."""
     if len(frames) > 1:
         return Dense(None, "one smooth field serves all frames of a clip, so that nothing swims")
     if not isinstance(field, (StrictField, SlackField)):
         return Dense(None, f"the field {field.name!r} is shown as it is")
-    return refine(field, two_view, inliers, (frames[0].reference, frames[0].target), cameras)
+    return refine(field, field.two_view, inliers, edge.pair(frames[0].pictures), cameras)
 
 
 def size_of(picture: Picture) -> tuple[int, int]:
@@ -175,64 +178,61 @@ def size_of(picture: Picture) -> tuple[int, int]:
     return width, height
 
 
-def _projection(
-    options: StitchOptions, two_view: TwoView, frame: Frame, cameras: tuple[Camera, Camera]
-) -> Projection | None:
+def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> Projection | None:
     """The round projection that is asked for, levelled; None for a flat panorama."""
     if options.projection == "perspective":
         return None
+    known = [view.R for view in views if np.isfinite(view.R).all()]
     upright = None
     if options.level == "auto":
-        (normals, lengths), (normals_too, lengths_too) = (
-            edges(picture, camera, K)
-            for picture, camera, K in zip(
-                (frame.reference, frame.target), cameras, (two_view.K, two_view.K_prime), strict=True
-            )
-        )
-        upright = normals, lengths
-        if np.isfinite(two_view.R).all():
-            upright = np.vstack([normals, normals_too @ two_view.R]), np.concatenate([lengths, lengths_too])
-    return round_projection(options.projection, two_view.K, rotation_for(options.level, two_view.R, upright))
+        found = [
+            (normals if number == 0 else normals @ view.R, lengths)
+            for number, (picture, view) in enumerate(zip(frame.pictures, views, strict=True))
+            if np.isfinite(view.R).all()
+            for normals, lengths in (edges(picture, view.camera, view.K),)
+        ]
+        normals, lengths = zip(*found, strict=True)
+        upright = np.vstack(normals), np.concatenate(lengths)
+    return round_projection(options.projection, views[0].K, rotation_for(options.level, known, upright))
 
 
-def _found_in(frames: Sequence[Frame], steps: ReportProgress, quick: bool) -> Matches:
+def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:
     found = []
-    most = (features.PREVIEW_BUDGET, features.PREVIEW_PIXELS) if quick else ()
+    most = (features.FEATURES.preview_budget, features.FEATURES.preview_pixels) if quick else ()
     for i, frame in enumerate(frames):
         seen = []
-        for keypoints in in_order(lambda p: features.detect(p.view, p.alpha, *most), (frame.reference, frame.target)):
+        for keypoints in in_order(lambda p: features.detect(p.view, p.alpha, *most), frame.pictures):
             seen.append(keypoints)
-            steps("features", (i + 0.45 * len(seen)) / len(frames))
-        first, second = seen
-        found.append(features.match(first, second))
-        if len(frames) == 1 and len(found[0]) < MIN_MATCHES:
-            _refuse_scarce(len(found[0]), frame, len(first.points), len(second.points))
+            progress("features", (i + 0.9 * len(seen) / len(frame.pictures)) / len(frames))
+        found.append(features.match(seen[0], seen[1]))
+        if len(frames) == 1 and len(found[0]) < ESTIMATION.min_matches:
+            _refuse_scarce(len(found[0]), frame, [len(one.points) for one in seen])
     x, y = np.concatenate([m.x for m in found]), np.concatenate([m.y for m in found])
     return Matches(x, y, max(m.scale for m in found))
 
 
-def _refuse_scarce(matches: int, frame: Frame, *details: int) -> None:
+def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
     """Raises TooFewMatches where there are few because one picture has hardly any points of detail; else it is the
     pair's fault, which `estimate` says."""
-    for name, picture, count in zip(("reference", "target"), (frame.reference, frame.target), details, strict=True):
+    for number, (picture, count) in enumerate(zip(frame.pictures, details, strict=True)):
         if count < SCARCE:
             width, height = size_of(picture)
             raise TooFewMatches(
-                f"only {matches} matching points found, at least {MIN_MATCHES} needed: the {name} ({width}×{height} "
-                f"pixels) shows only {count} points of detail; choose a larger or sharper picture of something with "
-                "texture, or give matches by hand (--matches)"
+                f"only {matches} matching points found, at least {ESTIMATION.min_matches} needed: the "
+                f"{role(number)} ({width}×{height} pixels) shows only {count} points of detail; choose a larger or "
+                "sharper picture of something with texture, or give matches by hand (--matches)"
             )
 
 
-def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, Camera]) -> Matches:
+def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, ...]) -> Matches:
     """Matches from a file or array, moved to the scale of the work, without those in masked parts."""
     sizes = frame.full_sizes
     matches = read_matches(source, *sizes)
     x, y = (
-        (points + 0.5) * (np.array(camera.size) / np.array(size)) - 0.5
+        resized_points(points, size, camera.size)
         for points, camera, size in zip((matches.x, matches.y), cameras, sizes, strict=True)
     )
-    seen = _shown(frame.reference, x) & _shown(frame.target, y)
+    seen = _shown(frame.pictures[0], x) & _shown(frame.pictures[1], y)
     if not seen.any():
         raise NoOverlap("all the given matches lie in parts of the pictures that are masked or transparent")
     return replace(matches, x=x, y=y).subset(seen)

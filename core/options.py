@@ -21,7 +21,8 @@ class StitchOptions:
 
     field: one of FIELDS; fade: what it ends in outside the overlap, one of FADES; camera: what is known of the cameras;
     matches: to be used as given instead of searched for, a file or (N, 4 or 5) rows x, y, x2, y2[, weight] in px of the
-    full pictures; ignore_reference, ignore_target: masks of what is to be kept out, files or arrays, white = ignored;
+    full pictures; ignore: for each picture, the reference first, a mask of what is to be kept out, a file or array,
+    white = ignored, or None (which those that are not named get, too);
     projection: one of PROJECTIONS; level: how a cylindrical or equirectangular panorama is turned, one of LEVELS or
     yaw, pitch, roll of the reference camera in degrees (see `levelling`); scale: both pictures are resized by this
     first, at most 1; crop: what of the panorama is kept (see `crop_box`); dense: whether every pixel of the overlap is
@@ -38,8 +39,7 @@ class StitchOptions:
     fade: str = "plane"
     camera: CameraRequest = CameraRequest()
     matches: Path | np.ndarray | None = None
-    ignore_reference: Path | np.ndarray | None = None
-    ignore_target: Path | np.ndarray | None = None
+    ignore: tuple[Path | np.ndarray | None, ...] = ()
     projection: str = "perspective"
     level: Level = "auto"
     scale: float = 1.0
@@ -54,6 +54,10 @@ class StitchOptions:
     measure: bool = True
     cache: Path | None = dataclasses.field(default=None, compare=False)
 
+    def ignored(self, number: int) -> Path | np.ndarray | None:
+        """The mask of what is to be kept out of picture `number`."""
+        return self.ignore[number] if number < len(self.ignore) else None
+
     @property
     def has_seam(self) -> bool:
         """An average has none; bands need one, if only that which lies midway between the borders."""
@@ -67,7 +71,7 @@ class StitchOptions:
     @property
     def files_read(self) -> list[Path]:
         """The files that these options name."""
-        named = (self.camera.cameras, self.matches, self.ignore_reference, self.ignore_target, self.mask)
+        named = (self.camera.cameras, self.matches, *self.ignore, self.mask)
         return [Path(one) for one in named if isinstance(one, (str, Path))]
 
     def __post_init__(self) -> None:

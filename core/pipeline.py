@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .alignment import Alignment, Frame, align, prepare, size_of
+from .alignment import Alignment, Frame, align, prepare
 from .cameras.camera import Camera
+from .cameras.edge import Edge
 from .cameras.matches import Matches
-from .cameras.two_view import TwoView
+from .cameras.view import View
 from .compose.composition import Decided, composed
 from .compose.crop import crop_box
-from .compose.inpaint import holes_of
 from .field.field import Field
 from .measure.metrics import appearance
 from .measure.report import make_report
 from .options import StitchOptions
 from .panorama.canvas import Canvas
-from .panorama.layers import Layer, reference_layer, target_layer
-from .panorama.warp import Warp, reference_box
+from .panorama.layers import Layer, layer_of
+from .panorama.warp import Warp
 from .pictures.masks import painted_over
 from .pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
 from .raster.arrays import Box, common, cut
-from .system.errors import NoOverlap
+from .raster.resizing import resized_points
+from .system.errors import BadRequest, NoOverlap
 from .system.progress import Progress
 from .system.threads import in_order
 
@@ -37,36 +39,34 @@ Source = str | Path | np.ndarray | Picture
 
 @dataclass(frozen=True)
 class StitchResult:
-    """A finished panorama and everything it was made of.
+    """A finished panorama and everything it was made of. Tuples hold one entry for each picture, the reference first.
 
     panorama: what is shown on `canvas`, its light worked out where it is asked for (see `lazy`), as arrays `pixels`
-    (H, W, C) float32 scene-linear and alpha (H, W), straight; the two layers, the warp, occluded
-    (H, W) bool (what the target cannot see though the map falls inside it) and from_target (H, W) bool (which side of
-    the seam a pixel lies on, None without a seam) on `warp.canvas`, which is the same, but of a whole sphere the part
-    that the pictures cover (see `spread`); what was decided on the whole canvas; the geometry, the field, the matches
-    (all, before inlier choice), the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage. Scale and
-    crop are done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes` (W, H): of
-    the pictures as they came.
+    (H, W, C) float32 scene-linear and alpha (H, W), straight. On `warp.canvas`, which is the same, but of a whole
+    sphere the part that the pictures cover (see `spread`): the layers, the warp, occluded (H, W) bool (what a picture
+    cannot see though the map falls inside it) and labels (H, W) (which picture a pixel comes from, −1 none; None
+    without a seam). What was decided about each picture on the whole canvas; the edges with all matches, before inlier
+    choice; views; field; the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage. Scale and crop
+    are done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes` (W, H): of the
+    pictures as they came.
     """
 
     panorama: Layer
     canvas: Canvas
-    reference: Picture
-    target: Picture
-    reference_layer: Layer
-    target_layer: Layer
+    pictures: tuple[Picture, ...]
+    layers: tuple[Layer, ...]
     warp: Warp
-    occluded: np.ndarray
-    from_target: np.ndarray | None
-    decided: Decided
-    two_view: TwoView
+    occluded: tuple[np.ndarray, ...]
+    labels: np.ndarray | None
+    decided: tuple[Decided, ...]
+    edges: tuple[Edge, ...]
+    views: tuple[View, ...]
     field: Field
-    matches: Matches
-    cameras: tuple[Camera, Camera]
+    cameras: tuple[Camera, ...]
     warnings: tuple[str, ...]
     report: dict[str, Any]
     seconds: dict[str, float]
-    full_sizes: tuple[tuple[int, int], tuple[int, int]]
+    full_sizes: tuple[tuple[int, int], ...]
 
     @property
     def pixels(self) -> np.ndarray:
@@ -81,9 +81,10 @@ class StitchResult:
     @property
     def used_matches(self) -> Matches:
         """The matches that the field stands on, in px of the full pictures: given back, they make the same field."""
-        used = self.matches.subset(np.flatnonzero(self.two_view.inliers)[self.field.fit.inliers_used])
+        edge = self.edges[0]
+        used = edge.matches.subset(np.flatnonzero(edge.two_view.inliers)[self.field.fit.inliers_used])
         x, y = (
-            (points + 0.5) * (np.array(full) / np.array(camera.size)) - 0.5
+            resized_points(points, camera.size, full)
             for points, full, camera in zip((used.x, used.y), self.full_sizes, self.cameras, strict=True)
         )
         return Matches(x, y, used.scale, used.weights)
@@ -99,10 +100,10 @@ class StitchResult:
         if (self.canvas.width, self.canvas.height) == (self.warp.canvas.width, self.warp.canvas.height):
             return self
         box = self.spread
-        from_target = None if self.from_target is None else cut(self.from_target, box)
         return replace(
-            self, warp=self.warp.within(box), occluded=cut(self.occluded, box), from_target=from_target,
-            reference_layer=self.reference_layer.within(box), target_layer=self.target_layer.within(box),
+            self, warp=self.warp.within(box), layers=tuple(layer.within(box) for layer in self.layers),
+            occluded=tuple(cut(mask, box) for mask in self.occluded),
+            labels=None if self.labels is None else cut(self.labels, box, -1),
         )  # fmt: skip
 
     @property
@@ -110,84 +111,113 @@ class StitchResult:
         """(H, W) float32, 0..1: how sure dense refinement is of a pixel of the warp's canvas; 0 where it said
         nothing."""
         confidence = self.warp.confidence
-        return np.zeros(self.warp.map_x.shape, np.float32) if confidence is None else confidence
+        shape = self.warp.canvas.height, self.warp.canvas.width
+        return np.zeros(shape, np.float32) if confidence is None else confidence
 
     @property
     def inpainted(self) -> np.ndarray:
-        """(H, W) bool: what neither picture saw and was filled because that was asked for."""
+        """(H, W) bool: what no picture saw and was filled because that was asked for."""
+        filled = np.zeros(self.layers[0].alpha.shape, bool)
         asked = self.report["options"]
         if asked["holes"] != "inpaint" or asked["blend"] == "linear":
-            return np.zeros(self.occluded.shape, bool)
-        return holes_of(self.occluded, self.reference_layer, self.target_layer)
+            return filled
+        shown = self.layers[0].alpha > 0
+        for layer, hidden in zip(self.layers[1:], self.occluded[1:], strict=True):
+            filled |= hidden & (layer.alpha > 0)
+            shown = shown | (~hidden & (layer.alpha > 0))
+        return filled & ~shown
 
     @property
     def bits(self) -> int:
-        """Bits per channel of the deeper input (32: float)."""
-        return max(self.reference.bits, self.target.bits)
+        """Bits per channel of the deepest input (32: float)."""
+        return max(picture.bits for picture in self.pictures)
 
 
 def stitch(
-    reference: Source,
-    target: Source,
+    pictures: Sequence[Source],
     options: StitchOptions | None = None,
     progress: Callable[[str, float], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> StitchResult:
-    """Stitches the target into the reference's plane.
+    """Stitches pictures into one panorama, seen from where the first of them was taken.
 
-    reference, target: files, arrays (see `picture_from_array`: 8 and 16 bit display-encoded, float scene-linear; RGB(A)
-    or gray), or Pictures. progress(stage, share of everything done) and cancelled() are called between the steps of the
-    work.
-    Raises StitchError and its kinds; Cancelled where asked to stop.
+    Parameters
+    ----------
+    pictures
+        Files, arrays (see `picture_from_array`: 8 and 16 bit display-encoded, float scene-linear; RGB(A) or gray), or
+        Pictures; the first is the reference. Two, for now.
+    options
+        What may be chosen; the defaults are right for photographs of one camera.
+    progress
+        Called with a stage's name and the share (0..1) of everything that is done.
+    cancelled
+        Called between the steps of the work; says whether to stop.
+
+    Returns
+    -------
+    StitchResult
+        The panorama, its layers and maps, and the report.
+
+    Raises
+    ------
+    StitchError
+        And its kinds: what is wrong with the pictures or the options, and what would help; Cancelled where asked to
+        stop.
     """
     options = options or StitchOptions()
-    steps = Stopwatch(Progress(progress, cancelled))
+    stopwatch = Stopwatch(Progress(progress, cancelled))
 
-    steps("read")
-    frame = read_frame(reference, target, options)
-    return compose(frame, align([frame], options, steps), options, steps)
+    stopwatch("read")
+    frame = read_frame(pictures, options)
+    return compose(frame, align([frame], options, stopwatch), options, stopwatch)
 
 
-def read_frame(reference: Source, target: Source, options: StitchOptions) -> Frame:
-    """Both pictures, in the same colour space. Raises UnreadableImage, BadRequest, NoOverlap (one picture twice)."""
-    first, second = in_same_colour_space(*in_order(_picture, (reference, target)))
-    if first.view.shape == second.view.shape and np.array_equal(first.view, second.view):
+def check_count(count: int) -> None:
+    """Refuses (BadRequest) as many pictures as cannot be stitched."""
+    if count < 2:
+        raise BadRequest("one picture alone makes no panorama: give two that were taken from different places")
+    if count > 2:
+        raise BadRequest(f"{count} pictures given: two at a time for now; stitch them pair by pair")
+
+
+def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
+    """The pictures, in one colour space. Raises UnreadableImage, BadRequest, NoOverlap (one picture twice)."""
+    check_count(len(sources))
+    pictures = in_same_colour_space(list(in_order(_picture, sources)))
+    views = [picture.view for picture in pictures]
+    if any(np.array_equal(one, other) for one, other in combinations(views, 2)):
         raise NoOverlap("the two pictures are the same picture: choose two photographs taken from different places")
-    return prepare(first, second, options)
+    return prepare(pictures, options)
 
 
 def compose(
-    frame: Frame, alignment: Alignment, options: StitchOptions, steps: Stopwatch, decided: Decided | None = None,
-    keep: bool = False,
-) -> StitchResult:
-    """The panorama of two pictures by an alignment, which may come from other frames of the same two cameras, as may
-    what was decided about exposure and seam. decided, keep: see `composed`."""
-    first, second, whole = frame.reference, frame.target, alignment.warp
-    steps("warp", 0.5)
-    base, layer = reference_layer(first, whole.canvas, alignment.cameras[0]), target_layer(second, whole)
+    frame: Frame, alignment: Alignment, options: StitchOptions, progress: Stopwatch,
+    decided: Sequence[Decided] | None = None, keep: bool = False,
+) -> StitchResult:  # fmt: skip
+    """The panorama of pictures by an alignment, which may come from other frames of the same cameras, as may what was
+    decided about exposure and seam. decided, keep: see `composed`."""
+    pictures, whole = frame.pictures, alignment.warp
+    progress("warp", 0.5)
+    layers = tuple(layer_of(picture, one) for picture, one in zip(pictures, whole.maps, strict=True))
 
     painted = None if frame.painted is None else _on_canvas(frame.painted, whole.canvas)
-    floats = (first.bits == 32, second.bits == 32)
-    panorama, exposed, found = composed(
-        base, layer, whole, alignment.two_view, size_of(second), options, floats, painted, steps, decided, keep,
-        alignment.cameras[0],
-    )
-    seen = appearance(panorama, base, exposed, found.from_target, floats) if options.measure else {}
-    place = reference_box(whole.canvas, alignment.cameras[0])
-    box = crop_box(options.crop, whole.canvas.whole, panorama.alpha > 0, place)
+    floats = [picture.bits == 32 for picture in pictures]
+    made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
+    found, panorama, labels = made.decided, made.panorama, made.labels
+    seen = appearance(panorama, made.exposed, labels, any(floats)) if options.measure else {}
+    box = crop_box(options.crop, whole.canvas.whole, panorama.alpha > 0, whole.maps[0].box())
     panorama, shown = panorama.within(box), whole.canvas.within(box)
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))
-    base, layer, warp, hidden = base.within(box), layer.within(box), whole.within(box), cut(found.hidden, box)
-    from_target = None if found.from_target is None else cut(found.from_target, box)
 
-    steps("write", 0.0)
-    report, more = make_report(options, (first, second), alignment, shown, found, seen)
-    warnings = (*_named(first), *_named(second), *alignment.warnings, *more)
+    progress("write", 0.0)
+    report, more = make_report(options, pictures, alignment, shown, found, seen)
+    warnings = (*(line for picture in pictures for line in _named(picture)), *alignment.warnings, *more)
     report["warnings"] = list(warnings)
-    steps("write", 0.5)
+    progress("write", 0.5)
     return StitchResult(
-        panorama, shown, first, second, base, layer, warp, hidden, from_target, found,
-        alignment.two_view, alignment.field, alignment.matches, alignment.cameras, warnings, report, steps.seconds,
+        panorama, shown, pictures, tuple(layer.within(box) for layer in layers), whole.within(box),
+        tuple(cut(one.hidden, box) for one in found), None if labels is None else cut(labels, box, -1), found,
+        alignment.edges, alignment.views, alignment.field, alignment.cameras, warnings, report, progress.seconds,
         frame.full_sizes,
     )  # fmt: skip
 

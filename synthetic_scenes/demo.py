@@ -41,7 +41,7 @@ def run_demo(folder: Path, overwrite: bool, progress: Callable[[str, float], Non
         pair = rendered_pair(RECIPES[SCENE], Difficulty(), SIZE, folder / "pictures")
         # a camera's EXIF would tell the focal length
         known = CameraRequest(focal_px=(float(pair.cameras["reference"].K[0, 0]),))
-        result = stitch(pair.reference, pair.target, StitchOptions(camera=known), progress)
+        result = stitch((pair.reference, pair.target), StitchOptions(camera=known), progress)
         truth = truth_of(pair)
         picture, shown = on_the_wide_canvas(result, truth)
         measured = figures(result, truth) | whole_picture(picture, shown, truth)

@@ -61,7 +61,7 @@ def figures(result: StitchResult, truth: Truth) -> dict[str, float]:
     beyond_px (the same outside the reference: median); overlap_psnr_db, overlap_ssim; covered (share of what the target
     alone shows that the panorama holds).
     """
-    geometry, view = truth.geometry, result.two_view
+    geometry, view = truth.geometry, result.edges[0].two_view
     width, height = result.cameras[1].size
     known = {"rotation_deg": math.nan, "focal_percent": math.nan, "epipole_deg": math.nan, "h_inf_px": math.nan,
              "h_inf_p95_px": math.nan, "f_px": math.nan}  # fmt: skip
@@ -83,12 +83,11 @@ def figures(result: StitchResult, truth: Truth) -> dict[str, float]:
     if geometry.baseline and beyond.any():
         off = distance_to_line(geometry.F.T, shown.target[beyond], shown.points[beyond])
     here, there = _common(result, truth)
-    apart = np.hypot(
-        result.warp.map_x[here] - truth.target[there][..., 0], result.warp.map_y[here] - truth.target[there][..., 1]
-    )
+    found = result.warp.maps[1].arrays()
+    apart = np.hypot(found.x[here] - truth.target[there][..., 0], found.y[here] - truth.target[there][..., 1])
     only = truth.in_target & ~truth.in_reference
     both, alone = (part[there] & np.isfinite(apart) for part in (truth.overlap, only))
-    quality = overlap_quality(result.reference, result.target, result.warp)
+    quality = overlap_quality(result.pictures, result.warp)
     return {
         **known,
         "projectivity_px": float(off.mean()), "projectivity_p95_px": _percentile(off, 95),
@@ -126,13 +125,10 @@ def composition(result: StitchResult, truth: Truth) -> dict[str, float]:
     layers show alone, for beyond it the two pictures do not differ; source_fidelity_mean, source_fidelity_p5,
     seam_visibility (NaN without a seam): see `metrics.appearance`.
     """
-    floats = (result.reference.bits == 32, result.target.bits == 32)
-    reference = result.reference_layer
-    panorama, target, found = composed(
-        reference, result.target_layer, result.warp, result.two_view, result.cameras[1].size, StitchOptions(), floats,
-        None, lambda *_: None,
-    )  # fmt: skip
-    average = averaged(reference, target)
+    floats = [picture.bits == 32 for picture in result.pictures]
+    made = composed(result.layers, result.warp, result.views, StitchOptions(), floats, None, lambda *_: None)
+    panorama, (reference, target) = made.panorama, made.exposed
+    average = averaged(reference, target, reference.alpha > 0)
     both = ((reference.alpha > 0.5) & (target.alpha > 0.5) & (panorama.alpha > 0.5)).astype(np.float32)
     ours, shown = on_the_wide_canvas(replace(result, panorama=panorama), truth)
     theirs, shown_too = on_the_wide_canvas(replace(result, panorama=average), truth)
@@ -143,7 +139,7 @@ def composition(result: StitchResult, truth: Truth) -> dict[str, float]:
         "over_average_db": mine["whole_psnr_db"] - others["whole_psnr_db"],
         "over_average_ssim": mine["whole_ssim"] - others["whole_ssim"],
         "overlap_over_average_db": psnr(ours, truth.picture, overlap) - psnr(theirs, truth.picture, overlap),
-        **appearance(panorama, reference, target, found.from_target, floats),
+        **appearance(panorama, made.exposed, made.labels, any(floats)),
     }  # fmt: skip
 
 
@@ -155,7 +151,7 @@ def hidden_quality(result: StitchResult, truth: Truth) -> dict[str, float]:
     with np.errstate(invalid="ignore"):
         within = ((truth.target[there] >= 0) & (truth.target[there] <= (width - 1, height - 1))).all(axis=-1)
     asked = truth.in_reference[there] & within
-    said, hidden = result.occluded[here] & asked, asked & ~truth.in_target[there]
+    said, hidden = result.occluded[1][here] & asked, asked & ~truth.in_target[there]
     right = float((said & hidden).sum())
     return {
         "occluded_precision": right / said.sum() if said.any() else math.nan,

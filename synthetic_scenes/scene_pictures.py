@@ -54,7 +54,8 @@ def _lines(target: Rgb, truth: Truth, result: StitchResult) -> Rgb:
     chosen = np.random.default_rng(0).choice(len(rows), LINES, replace=False) if len(rows) > LINES else np.arange(0)
     points = np.column_stack([columns, rows])[chosen] + np.array(truth.corner, float)
     thick = max(1, round(max(width, height) / 400))
-    for F, colour, wide in ((truth.geometry.F, TRUE_COLOUR, 3 * thick), (result.two_view.F, ESTIMATED_COLOUR, thick)):
+    estimated = result.edges[0].two_view.F
+    for F, colour, wide in ((truth.geometry.F, TRUE_COLOUR, 3 * thick), (estimated, ESTIMATED_COLOUR, thick)):
         if np.isfinite(F).all():
             for line in homogeneous(points) @ F.T:
                 a, b = _ends(line, max(width, height))
@@ -75,8 +76,9 @@ def _ends(line: Array, reach: float) -> tuple[tuple[int, int], tuple[int, int]]:
 def _error_map(truth: Truth, result: StitchResult) -> Rgb:
     """How far the map is from the true one, dark to bright up to WORST_PX; gray where there is no truth to compare."""
     shape = truth.in_target.shape
+    picture_map = result.warp.maps[1].arrays()
     maps = []
-    for values in (result.warp.map_x, result.warp.map_y):
+    for values in (picture_map.x, picture_map.y):
         x, y = np.meshgrid(np.arange(shape[1]), np.arange(shape[0]))
         x, y = (x + truth.corner[0] + result.warp.canvas.offset[0], y + truth.corner[1] + result.warp.canvas.offset[1])
         inside = (x >= 0) & (y >= 0) & (x < values.shape[1]) & (y < values.shape[0])

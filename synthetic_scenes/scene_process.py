@@ -54,7 +54,7 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
         common = shown if common is None else common & shown
     seconds: dict[str, float] = {}
     for way, result in results.items():
-        view = result.two_view
+        view = result.edges[0].two_view
         measured = figures(result, truth)
         if common is not None:
             measured |= whole_picture(placed[way][0], common, truth)

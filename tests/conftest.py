@@ -70,13 +70,13 @@ def known(small_pair: Pair) -> StitchOptions:
 @pytest.fixture(scope="session")
 def result(pair: Pair) -> StitchResult:
     """The 400 × 300 pair, stitched from arrays with its true focal length."""
-    return stitch(pair.reference, pair.target, true_focal(pair))
+    return stitch((pair.reference, pair.target), true_focal(pair))
 
 
 @pytest.fixture(scope="session")
 def small_result(small_pair: Pair, known: StitchOptions) -> StitchResult:
     """The small pair, stitched from arrays with its true focal length."""
-    return stitch(small_pair.reference, small_pair.target, known)
+    return stitch((small_pair.reference, small_pair.target), known)
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ CORE = ROOT / "core"
 
 # Which rooms each may import, itself left out. Rooms stand in the order of the data.
 BELOW_POSE = ("system", "raster", "pictures", "cameras")
-BELOW_MEASURE = (*BELOW_POSE, "pose", "field", "panorama", "dense", "compose")
+BELOW_MEASURE = (*BELOW_POSE, "pose", "field", "dense", "panorama", "compose")
 TOP = ("choices", "options", "fields", "alignment", "pipeline")
 MAY_IMPORT = {
     "system": (),
@@ -24,9 +24,9 @@ MAY_IMPORT = {
     "pose": BELOW_POSE,
     "field": ("system", "raster", "cameras"),
     "rivals": ("system", "raster", "cameras", "pose", "field"),
+    "dense": (*BELOW_POSE, "field"),
     "panorama": (*BELOW_POSE, "field", "choices"),
-    "dense": (*BELOW_POSE, "field", "panorama"),
-    "compose": (*BELOW_POSE, "panorama", "choices", "options"),
+    "compose": (*BELOW_POSE, "field", "panorama", "choices", "options"),
     "measure": BELOW_MEASURE,
     "output": (*BELOW_MEASURE, "measure", "pipeline"),
     "batch": (*BELOW_MEASURE, "measure", "output", *TOP),

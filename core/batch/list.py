@@ -14,11 +14,9 @@ from typing import NamedTuple
 from ..cameras.sources import CameraRequest
 from ..system.errors import BadRequest
 from ..system.text_files import read_lines
+from .options import CLIP
 
 COLUMNS = ("reference", "target", "name", "first", "last", "step", "focal_px", "focal35")
-MOST_FRAMES = 1_000_000
-# The frames of a clip that its alignment is estimated over, at most.
-ALIGNED_FRAMES = 5
 _LAYOUT = (
     "each line holds reference,target and optionally a name; a header names the columns in any order, from: "
     + ", ".join(COLUMNS)
@@ -32,9 +30,9 @@ _NOT_IN_NAMES = re.compile(r'[\x00-\x1f/\\:*?"<>|]')
 class BatchItem:
     """One line of a list: a pair of pictures, or a clip of two cameras that stand still.
 
-    name: of its outputs; reference, target: files, or patterns like a_%04d.png or a_####.png where `frames`, the
-    numbers both sides have, is not None; missing: numbers that were to be expected and one side or both lack; camera:
-    what this line says of the cameras, in place of the options. Raises BadRequest for a name no file could have.
+    name: of its outputs; reference, target: files, or for clips patterns like a_%04d.png or a_####.png; frames: the
+    numbers that both sides have, None for a pair; missing: expected numbers that one side or both lack; camera: what
+    this line says about the cameras, instead of the options. Raises BadRequest for a name that no file can have.
     """
 
     name: str
@@ -59,7 +57,7 @@ class BatchItem:
         They depend on nothing but the frames, so that every shard and every later run finds the same alignment.
         """
         frames = self.frames or ()
-        count = min(len(frames), ALIGNED_FRAMES)
+        count = min(len(frames), CLIP.aligned_frames)
         return tuple(frames[round(i * (len(frames) - 1) / max(1, count - 1))] for i in range(count))
 
     def pair(self, frame: int | None = None) -> tuple[Path, Path]:
@@ -74,12 +72,27 @@ class BatchItem:
 
 
 def read_list(path: str | Path) -> list[BatchItem]:
-    """The items of a list, a CSV file in UTF-8 with commas, semicolons or tabs; see COLUMNS.
+    """Reads a list: a CSV file in UTF-8, separated by commas, semicolons or tabs.
 
-    Without a header the columns are reference, target and, if there, name. Lines that are empty or start with # are
-    left out. Relative paths start at the list's folder. A missing name is made from the reference's. first, last, step
-    say which frames of patterns are meant; without them all that are there. Whether pictures exist is not asked.
-    Raises BadRequest (content) with the line, UnreadableImage (file).
+    A header names columns out of COLUMNS; without one they are reference, target and perhaps name. Empty lines and
+    those that start with # are skipped. Relative paths start at the list's folder. A missing name is derived from the
+    reference's. first, last and step select frames of patterns; without them all frames found are meant.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    list of BatchItem
+        Whether the pictures of pairs exist is not checked.
+
+    Raises
+    ------
+    BadRequest
+        For the content, with the line's number.
+    UnreadableImage
+        The file cannot be read.
     """
     path = Path(path)
     items: list[BatchItem] = []
@@ -103,23 +116,41 @@ def read_list(path: str | Path) -> list[BatchItem]:
 
 
 def same_name(name: str) -> str:
-    """What two names share that are one file on some computers: case and the way accents are written aside."""
+    """A name without case and in one encoding of accents: names that are equal so are one file on some systems."""
     return unicodedata.normalize("NFC", name).casefold()
 
 
 def find_frames(
     reference: Path, target: Path, first: int | None = None, last: int | None = None, step: int = 1
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Frame numbers of two patterns that both sides have, and those that one side or both lack.
+    """Frame numbers of two patterns.
 
-    With first and last: of that range; else of all that are there, as far as bounds are given; every `step`-th. Raises
-    BadRequest for what is no pattern or no range.
+    Parameters
+    ----------
+    reference, target : Path
+        Patterns like a_%04d.png or a_####.png.
+    first, last : int, optional
+        Bounds; with both, every number between them is expected, otherwise those that either side has.
+    step : int
+        Of the numbers, from first.
+
+    Returns
+    -------
+    frames : tuple of int
+        Numbers that both sides have.
+    missing : tuple of int
+        Expected numbers that one side or both lack.
+
+    Raises
+    ------
+    BadRequest
+        No pattern, or no range.
     """
     return _find_frames(reference, target, first, last, step, _Folders())
 
 
 class _Pattern(NamedTuple):
-    """A file name with a frame's number in it."""
+    """A file name with a place for the frame's number, of at least `digits` digits."""
 
     before: str
     digits: int
@@ -135,12 +166,12 @@ class _Pattern(NamedTuple):
 
 
 class _Folders(dict[Path, list[str]]):
-    """What lies in folders, each looked into once."""
+    """File names by folder, each folder listed once."""
 
     def __missing__(self, folder: Path) -> list[str]:
         try:
             self[folder] = os.listdir(folder)
-        except OSError:  # told in its turn: there are no frames
+        except OSError:  # reported later, as a clip without frames
             self[folder] = []
         return self[folder]
 
@@ -175,8 +206,8 @@ def _find_frames(
     high = max(either, default=low) if last is None else last
     if low < 0 or step < 1 or (first is not None and last is not None and last < first):
         raise BadRequest(f"frames {low} to {high} by {step}: they count from 0, up from first to last, by 1 or more")
-    if (high - low) // step >= MOST_FRAMES:
-        raise BadRequest(f"frames {low} to {high} in steps of {step} are more than {MOST_FRAMES}; split the clip")
+    if (high - low) // step >= CLIP.max_frames:
+        raise BadRequest(f"frames {low} to {high} in steps of {step} are more than {CLIP.max_frames}; split the clip")
     asked = range(low, high + 1, step)
     expected = asked if first is not None and last is not None else [n for n in asked if n in either]
     return tuple(n for n in expected if n in both), tuple(n for n in expected if n not in both)
@@ -229,7 +260,7 @@ def _whole_number(cell: str, column: str) -> int:
 
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
-    """The named cells of each line that holds some, with its number as editors count, from 1."""
+    """The line number, from 1, and the cells by column of each line that is not empty."""
     separator = ""
     columns: tuple[str, ...] = ()
     for number, line in read_lines(path, "the list", _LAYOUT):

@@ -1,7 +1,7 @@
-"""Many pairs, and clips of two fixed cameras: one after the other, resumable, in shards; one bad pair stops nothing.
+"""Runs a batch of pairs and clips of two fixed cameras, resumable and in shards; a failure does not stop it.
 
-A clip has one alignment, one exposure and one seam, found over frames spread evenly through it: every frame gets the
-same map on the same canvas, cut at the same places, so that nothing swims and nothing flickers.
+A clip has one alignment, one exposure and one seam, estimated over frames spread evenly through it: every frame gets
+the same map on the same canvas with the same seam, so that nothing moves or flickers between frames.
 """
 
 from __future__ import annotations
@@ -21,14 +21,13 @@ from ..pipeline import StitchResult, Stopwatch, compose, read_frame, stitch
 from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage
 from ..system.progress import Progress
 from .list import BatchItem
+from .options import CLIP
 from .units import BatchRequest, Job, Unit, UnitFiles, plan, read_json
 
 SCHEMA = 1
-# What the parts of the work take, in pairs: for the progress only.
-ALIGNMENT_WEIGHT, FRAME_WEIGHT = 3.0, 0.3
-# Exit codes by how much they matter: not to be stitched, a file, what was asked for.
+# Exit codes, the most important first: cannot be stitched, a file, the request.
 _EXIT_CODES = (3, 4, 2)
-# What of the report's figures a line about an item tells.
+# The figures of the report in the line about an item.
 _FIGURES = {
     "alignment_median_px": "alignment {:.2f} px", "overlap_psnr_db": "PSNR {:.2f} dB", "overlap_ssim": "SSIM {:.3f}",
 }  # fmt: skip
@@ -46,7 +45,7 @@ class FrameTrouble:
 
 @dataclass(frozen=True)
 class Frames:
-    """What became of a clip's frames in this shard; missing: numbers that one side or both lack."""
+    """The frames of a clip in this shard, by how they ended; missing: numbers that one side or both lack."""
 
     done: int = 0
     skipped: int = 0
@@ -58,9 +57,9 @@ class Frames:
 class Outcome:
     """How an item ended.
 
-    status: "done", "skipped" (it was there) or "failed" (of a clip: any frame); message, exit_code: why, empty and 0
-    where nothing failed; panorama: its path below the folder, of a clip that of its first frame; size: (W, H) px;
-    measured: the report's figures, where there is one.
+    status: "done", "skipped" (it existed) or "failed" (of a clip: any frame); message, exit_code: why, empty and 0
+    if nothing failed; panorama: path relative to the folder, of a clip that of its first frame; size: (W, H) px;
+    measured: the report's figures, empty without a report.
     """
 
     name: str
@@ -74,7 +73,7 @@ class Outcome:
     frames: Frames | None = None
 
     def in_words(self, figures: bool = False) -> str:
-        """A line about it, with the figures that matter most if asked for."""
+        """A line for the user, with the most important figures if asked for."""
         words = [self.status if self.status == "skipped" else "×".join(map(str, self.size or ())) or self.status]
         if self.frames is not None:
             words.append(f"{self.frames.done} frames done, {self.frames.skipped} skipped")
@@ -86,7 +85,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class BatchSummary:
-    """What became of a batch so far: of `total` items those that are through, in order."""
+    """The outcomes so far, in order, of a batch of `total` items."""
 
     outcomes: tuple[Outcome, ...]
     total: int
@@ -94,15 +93,15 @@ class BatchSummary:
 
     @property
     def exit_code(self) -> int:
-        """0, or the failure's that matters most: 3 before 4 before 2."""
+        """0, or that of the most important failure: 3 before 4 before 2."""
         return _worst(outcome.exit_code for outcome in self.outcomes)
 
     def count(self, status: str) -> int:
-        """How many items ended so."""
+        """How many items ended with this status."""
         return sum(outcome.status == status for outcome in self.outcomes)
 
     def as_dict(self) -> dict[str, Any]:
-        """What batch.json holds: no seconds, no dates."""
+        """The content of batch.json; no times and no dates."""
         counts = {status: self.count(status) for status in ("done", "skipped", "failed")}
         return {
             "schema": SCHEMA, "total": self.total, **counts, "interrupted": self.interrupted,
@@ -118,12 +117,34 @@ def run_batch(
     cancelled: Callable[[], bool] | None = None,
     finished: Callable[[Outcome, int, int], None] | None = None,
 ) -> BatchSummary:
-    """Stitches this shard's items into the request's folder, where a summary of them lies after each.
+    """Stitches this shard's items into the request's folder and writes a summary there after each.
 
-    progress(what is being done, share of everything) and cancelled() are called between the steps of the work,
-    finished(outcome, its number from 1, their count) after each item. What goes wrong with an item is in its outcome.
-    Raises StitchError before the work (see `plan`), UnwritableOutput where the summary cannot be written. Cancelled
-    and KeyboardInterrupt keep what is finished and leave nothing of what is not.
+    Parameters
+    ----------
+    items : sequence of BatchItem
+    options : StitchOptions
+        Of every stitch.
+    request : BatchRequest
+    progress : callable, optional
+        progress(what is being done, share of everything), called between steps.
+    cancelled : callable, optional
+        cancelled() -> bool, called between steps.
+    finished : callable, optional
+        finished(outcome, number from 1, count), called after each item.
+
+    Returns
+    -------
+    BatchSummary
+        With what went wrong in the outcome of each item.
+
+    Raises
+    ------
+    StitchError
+        Before the work: see `plan`.
+    UnwritableOutput
+        The summary cannot be written.
+    Cancelled, KeyboardInterrupt
+        What is finished stays, nothing is left of what is not.
     """
     jobs = plan(items, options, request)
     weights = [_weight(job) for job in jobs]
@@ -151,7 +172,7 @@ def run_batch(
 
 
 class _Meter:
-    """Turns the progress of each piece of the work into that of all of it."""
+    """Turns the progress of each piece of the work into progress of the whole."""
 
     def __init__(self, progress: Tell | None, cancelled: Callable[[], bool] | None, total: float) -> None:
         self.cancelled = cancelled
@@ -159,11 +180,11 @@ class _Meter:
         self._label, self._done = "", 0.0
 
     def begin(self, label: str, done: float) -> None:
-        """An item begins, after so much of the total."""
+        """Begins an item, after `done` of the total weight."""
         self._label, self._done = label, done
 
     def piece(self, weight: float) -> Tell:
-        """The progress of the next piece of the item, which has this weight in the total."""
+        """The progress callback of the item's next piece, which has this weight in the total."""
         start = self._done
         self._done += weight
 
@@ -174,18 +195,19 @@ class _Meter:
         return tell
 
     def stopwatch(self, weight: float) -> Stopwatch:
-        """The same for work that is done in steps of its own."""
+        """The same for work that has steps of its own."""
         return Stopwatch(Progress(self.piece(weight), self.cancelled))
 
 
 def _weight(job: Job) -> float:
     if job.item.frames is None:
         return float(len(job.todo))
-    return ALIGNMENT_WEIGHT + FRAME_WEIGHT * (len(job.todo) + len(job.item.aligned_on)) if job.todo else 0.0
+    frames = len(job.todo) + len(job.item.aligned_on)
+    return CLIP.alignment_weight + CLIP.frame_weight * frames if job.todo else 0.0
 
 
 def _outcome(job: Job, meter: _Meter) -> Outcome:
-    """Does what there is to do for an item. Raises Cancelled only: whatever goes wrong with it stops no other."""
+    """Processes an item. Raises Cancelled only: any other failure becomes its outcome."""
     try:
         return _pair(job, meter) if job.item.frames is None else _clip(job, meter)
     except Cancelled:
@@ -212,12 +234,12 @@ def _worst(codes: Iterable[int]) -> int:
 
 def _pair(job: Job, meter: _Meter) -> Outcome:
     for unit in job.todo:
-        unit.write(stitch(*unit.pictures, unit.options, meter.piece(1.0), meter.cancelled))
+        unit.write(stitch(unit.pictures, unit.options, meter.piece(1.0), meter.cancelled))
     return _with_report(job, Outcome(job.item.name, "done" if job.todo else "skipped"))
 
 
 def _with_report(job: Job, outcome: Outcome) -> Outcome:
-    """The outcome with what the item's report says; another shard's report may be yet to come."""
+    """The outcome with figures from the item's report, which another shard may not have written yet."""
     for unit in job.units:
         if unit.panorama is not None:
             outcome = replace(outcome, panorama=unit.panorama.relative_to(unit.request.folder).as_posix())
@@ -232,12 +254,11 @@ def _with_report(job: Job, outcome: Outcome) -> Outcome:
 
 @dataclass(frozen=True)
 class _Locked:
-    """What all frames of a clip share: alignment, exposure and seam, full sizes of the pictures, options with the crop
-    settled."""
+    """What all frames of a clip share; sizes: (W, H) px of the full pictures; options: with a definite crop."""
 
     alignment: Alignment
-    decided: Decided
-    sizes: tuple[tuple[int, int], tuple[int, int]]
+    decided: tuple[Decided, ...]
+    sizes: tuple[tuple[int, int], ...]
     options: StitchOptions
 
 
@@ -255,7 +276,7 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
     size = None
     for unit in frames:
         try:
-            size, more = _frame(unit, locked, meter.stopwatch(FRAME_WEIGHT))
+            size, more = _frame(unit, locked, meter.stopwatch(CLIP.frame_weight))
             warnings |= dict.fromkeys(more)
         except Cancelled:
             raise
@@ -276,43 +297,42 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
 
 
 def _lock(job: Job, meter: _Meter) -> _Locked:
-    """What the frames of a clip share; also writes its report, where that is due, from the first frame it was taken
-    from."""
-    item, options, steps = job.item, job.options, meter.stopwatch(ALIGNMENT_WEIGHT)
-    used = _readable(item, options, steps)
-    shown = next(iter(used))
-    sizes = used[shown].full_sizes
-    alignment = align(list(used.values()), options, steps)
+    """Estimates what the frames of a clip share, and writes its report, if due, from the first frame used for it."""
+    item, options, progress = job.item, job.options, meter.stopwatch(CLIP.alignment_weight)
+    used = _readable(item, options, progress)
+    first = next(iter(used))
+    sizes = used[first].full_sizes
+    alignment = align(list(used.values()), options, progress)
     quick = replace(options, crop="full", measure=False)
     decided = pooled_decision([
         compose(
-            read_frame(*item.pair(number), options), alignment, quick, meter.stopwatch(FRAME_WEIGHT), keep=True
+            read_frame(item.pair(number), options), alignment, quick, meter.stopwatch(CLIP.frame_weight), keep=True
         ).decided
         for number in used
     ])
     reports = [unit for unit in job.todo if unit.frame is None]
     crop = options.crop
     if reports or crop == "inscribed":
-        frame = read_frame(*item.pair(shown), options)
-        result = compose(frame, alignment, options, meter.stopwatch(FRAME_WEIGHT), decided)
-        if crop == "inscribed":  # what one frame shows decides for all: the frames of a clip have one size
+        frame = read_frame(item.pair(first), options)
+        result = compose(frame, alignment, options, meter.stopwatch(CLIP.frame_weight), decided)
+        if crop == "inscribed":  # one frame decides for all: the frames of a clip have one size
             whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
             crop = (x - left - whole[0], y - top - whole[1], result.canvas.width, result.canvas.height)
-        about = {"frames": list(item.frames or ()), "aligned_on": list(used), "shown": shown}
+        about = {"frames": list(item.frames or ()), "aligned_on": list(used), "shown": first}
         for unit in reports:
             unit.write(replace(result, report={**result.report, "clip": about}))
     return _Locked(alignment, decided, sizes, replace(options, crop=crop, measure=False))
 
 
-def _readable(item: BatchItem, options: StitchOptions, steps: Stopwatch) -> dict[int, Frame]:
-    """The frames that a clip is aligned on, as far as they can be read and have the size of the first of them."""
+def _readable(item: BatchItem, options: StitchOptions, progress: Stopwatch) -> dict[int, Frame]:
+    """The frames that a clip is aligned on: those that can be read and have the size of the first of them."""
     used: dict[int, Frame] = {}
     troubles: list[StitchError] = []
     for at, number in enumerate(item.aligned_on):
-        steps("read", at / len(item.aligned_on))
+        progress("read", at / len(item.aligned_on))
         try:
-            frame = _without_light(read_frame(*item.pair(number), options))
-        except StitchError as trouble:  # told again when it is the frame's turn
+            frame = _without_light(read_frame(item.pair(number), options))
+        except StitchError as trouble:  # reported when it is the frame's turn
             troubles.append(trouble)
             continue
         if not used or frame.full_sizes == next(iter(used.values())).full_sizes:
@@ -324,22 +344,22 @@ def _readable(item: BatchItem, options: StitchOptions, steps: Stopwatch) -> dict
 
 
 def _without_light(frame: Frame) -> Frame:
-    """The frame without its float pixels, most of its memory: alignment looks at the views only."""
+    """The frame without its float pixels, most of its memory: alignment needs the 8-bit views only."""
 
     def bare(picture: Picture) -> Picture:
         return replace(picture, light=np.broadcast_to(np.float32(np.nan), picture.light.shape))
 
-    return replace(frame, reference=bare(frame.reference), target=bare(frame.target))
+    return replace(frame, pictures=tuple(bare(picture) for picture in frame.pictures))
 
 
-def _frame(unit: Unit, locked: _Locked, steps: Stopwatch) -> tuple[tuple[int, int], list[str]]:
+def _frame(unit: Unit, locked: _Locked, progress: Stopwatch) -> tuple[tuple[int, int], list[str]]:
     """Stitches one frame; returns the panorama's (W, H) and warnings."""
-    steps("read")
-    frame = read_frame(*unit.pictures, locked.options)
+    progress("read")
+    frame = read_frame(unit.pictures, locked.options)
     if frame.full_sizes != locked.sizes:
         found, needed = (" and ".join(f"{w}×{h}" for w, h in sizes) for sizes in (frame.full_sizes, locked.sizes))
         raise BadRequest(f"the pictures have {found} pixels, the clip {needed}: one alignment is for one camera each")
-    result: StitchResult = compose(frame, locked.alignment, locked.options, steps, locked.decided)
+    result: StitchResult = compose(frame, locked.alignment, locked.options, progress, locked.decided)
     height, width = result.panorama.alpha.shape
     return (width, height), unit.write(result)
 

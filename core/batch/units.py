@@ -1,7 +1,7 @@
-"""What a batch leaves in its folder, and which of it is there already.
+"""The outputs of a batch, and which of them exist already.
 
-Beside each output a stamp is kept in a hidden folder: a fingerprint of all that it was made from, and of the panorama
-itself. By it a later run skips what is there and right, makes again what is out of date, and leaves alone what it did
+For each output a hidden folder holds a stamp: a fingerprint of everything that it was made from, and of the panorama
+itself. With it a later run skips what is up to date, makes again what is out of date, and does not touch what it did
 not make or what somebody has changed since.
 """
 
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..options import StitchOptions
-from ..output.outputs import INPAINTED, MASKS, SEAM, OutputRequest, add_report, json_bytes, warp_bytes, write
+from ..output.outputs import OutputRequest, add_report, json_bytes, layer_files, warp_bytes, write
 from ..pictures.encoding import output_bits
 from ..pipeline import StitchResult
 from ..system.errors import BadRequest, UnreadableImage, UnwritableOutput
@@ -32,11 +32,11 @@ STAMPS = ".edf"
 
 @dataclass(frozen=True)
 class BatchRequest:
-    """Where a batch goes, and how.
+    """Where and how a batch is written.
 
-    folder: made where it is missing; suffix: of the panoramas; warp, layers: whether these are written too; resume:
-    skip what is there and right; overwrite: replace what is there; shard: (I, N), the I-th (from 1) of N runs that
-    share the work. Raises BadRequest.
+    folder: created if missing; suffix: of the panoramas; warp, layers: whether these are written too; resume: skip what
+    is up to date; overwrite: replace what exists; shard: (I, N), the I-th (from 1) of N runs that share the work.
+    Raises BadRequest.
     """
 
     folder: Path
@@ -54,16 +54,16 @@ class BatchRequest:
 
     @property
     def summary(self) -> Path:
-        """What became of the items; each shard has its own."""
+        """The file with the outcomes; each shard has its own."""
         index, count = self.shard
         return self.folder / ("batch.json" if count == 1 else f"batch.shard-{index}-of-{count}.json")
 
 
 @dataclass(frozen=True)
 class Unit:
-    """What appears together: all of a pair, one frame of a clip, or (without a frame) a clip's report.
+    """Outputs that appear together: all of a pair, one frame of a clip, or (frame None) the report of a clip.
 
-    made_from: fingerprint of all that decides about its bytes.
+    made_from: fingerprint of everything that decides about their bytes.
     """
 
     item: BatchItem
@@ -84,17 +84,19 @@ class Unit:
 
     @property
     def stamp(self) -> Path:
-        """Where the fingerprint is kept."""
+        """The file with the fingerprints."""
         return self.request.folder / STAMPS / self._named(".json").relative_to(self.request.folder)
 
     @property
     def outputs(self) -> list[Path]:
-        """All that will be there, apart from what float pictures add."""
+        """All files it will consist of, except those that only float pictures have."""
         out = [self.panorama] if self.panorama else []
         if self._layers:
-            out += [self._layers / f"{name}.png" for name in ("reference", "target", *MASKS)]
-            out += [self._layers / f"{SEAM}.png"] if self.options.has_seam else []
-            out += [self._layers / f"{INPAINTED}.png"] if self.options.holes == "inpaint" else []
+            names = layer_files(
+                [path.name for path in self.pictures], seam=self.options.has_seam,
+                inpainted=self.options.holes == "inpaint",
+            )  # fmt: skip
+            out += [self._layers / name for name in names]
         if self.report:
             out += [self.report, self._named(".matches.csv"), self._named(".timing.json")]
             out += [self._named(".warp.npz")] if self.request.warp else []
@@ -107,7 +109,7 @@ class Unit:
         return self.item.pair(frames[0] if self.frame is None and frames else self.frame)
 
     def write(self, result: StitchResult) -> list[str]:
-        """Puts everything in place, or nothing; returns all warnings. Raises UnwritableOutput and BadRequest."""
+        """Writes all files or none; returns all warnings. Raises UnwritableOutput and BadRequest."""
         warnings = list(result.warnings)
         may_replace = self.request.overwrite or self.request.resume
         files = UnitFiles(may_replace, (*self.pictures, *self.options.files_read))
@@ -124,7 +126,7 @@ class Unit:
         return warnings
 
     def is_due(self) -> bool:
-        """Whether it has to be made. Raises UnwritableOutput where something is in the way that may not be replaced."""
+        """Whether it has to be made. Raises UnwritableOutput if a file exists that may not be replaced."""
         there = [path for path in self.outputs if os.path.exists(path)]
         if not there:
             return True
@@ -158,7 +160,7 @@ class Unit:
         return self.panorama is None or [self.panorama.stat().st_size] == (stamp.get("panorama") or [])[:1]
 
     def _is_untouched(self, stamp: dict[str, Any]) -> bool:
-        """Whether a panorama that is there is the one that was written."""
+        """Whether a panorama that exists is the one that was written."""
         if self.panorama is None or not os.path.exists(self.panorama):
             return True
         return fingerprint_of_bytes(self.panorama.read_bytes()) == stamp.get("panorama")
@@ -166,7 +168,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Job:
-    """What of an item falls to this shard, and what of that is still to be made."""
+    """The units of an item in this shard, and those of them that are still to be made."""
 
     item: BatchItem
     options: StitchOptions
@@ -175,7 +177,7 @@ class Job:
 
 
 class UnitFiles(OutputFiles):
-    """Output files whose folders are made as they are needed; `prints` holds [bytes, SHA-256] of each."""
+    """Output files whose folders are created when needed; prints: [number of bytes, SHA-256] of each."""
 
     def __init__(self, overwrite: bool = False, inputs: Iterable[str | Path] = ()) -> None:
         super().__init__(overwrite, inputs)
@@ -194,9 +196,26 @@ class UnitFiles(OutputFiles):
 def plan(items: Sequence[BatchItem], options: StitchOptions, request: BatchRequest) -> list[Job]:
     """This shard's work, in the order of the items.
 
-    Shards take turns with pairs and with the frames of clips: given the same items they never share an output. Raises
-    UnreadableImage where a file that the options name is missing, BadRequest and UnwritableOutput where outputs
-    collide, would replace a picture that is read, cannot be written, or exist and may not be replaced.
+    Shards take turns with pairs and with the frames of clips: given the same items they never share an output.
+
+    Parameters
+    ----------
+    items : sequence of BatchItem
+    options : StitchOptions
+    request : BatchRequest
+
+    Returns
+    -------
+    list of Job
+
+    Raises
+    ------
+    UnreadableImage
+        A file that the options name is missing.
+    BadRequest
+        Two outputs have one name, or one would replace a picture that is read.
+    UnwritableOutput
+        An output cannot be written, or exists and may not be replaced.
     """
     names: set[str] = set()
     for item in items:
@@ -224,12 +243,12 @@ def plan(items: Sequence[BatchItem], options: StitchOptions, request: BatchReque
 
 
 def fingerprint_of_bytes(data: bytes) -> list[int | str]:
-    """Their number and their SHA-256."""
+    """The number of bytes and their SHA-256."""
     return [len(data), hashlib.sha256(data).hexdigest()]
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """What a JSON file of ours holds; empty where there is none that can be read."""
+    """The object in a JSON file; empty if it cannot be read or is none."""
     try:
         value = json.loads(path.read_bytes())
     except (OSError, ValueError):
@@ -256,7 +275,7 @@ def _units(item: BatchItem, options: StitchOptions, request: BatchRequest, versi
 
 
 def _identity(path: Path) -> list[str | int]:
-    """What changes when a file does, without reading it; its folder may be moved."""
+    """Name, size and time of a file: these change when it does, and not when its folder is moved."""
     try:
         state = path.stat()
     except OSError:
@@ -271,7 +290,7 @@ def _plain(value: Any) -> Any:
 
 
 def _check(units: Sequence[Unit], request: BatchRequest) -> None:
-    """Asks before the work whether options and outputs will do. Raises StitchError's kinds as `plan` does."""
+    """Checks before the work that inputs exist and outputs can be written; raises as `plan` does."""
     for path in {path for unit in units for path in unit.options.files_read}:
         if not path.is_file():
             raise UnreadableImage(f"{path}: no such file; every pair of the batch would need it")

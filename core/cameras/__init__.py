@@ -1,4 +1,4 @@
-"""What is known of cameras, as data: intrinsics and their sources, lenses, matches, the geometry of a pair.
+"""What is known of cameras, as data: intrinsics and their sources, lenses, matches, pairs, views.
 
 May import system, raster and pictures.
 """

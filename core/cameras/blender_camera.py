@@ -7,6 +7,7 @@ tried against Camera.calc_matrix_camera in every version from 4.2 to 5.2.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +71,7 @@ def lens_for(K: Array, size: tuple[int, int], sensor_width: float = 36.0) -> Ble
     )  # fmt: skip
 
 
-def pose_of(matrix_world: NDArray) -> tuple[Array, Array]:
+def pose_of(matrix_world: NDArray[Any]) -> tuple[Array, Array]:
     """R (3, 3), t (3,), world to camera, of a camera object's world matrix (4, 4); its scale does not matter."""
     axes = np.asarray(matrix_world, np.float64)[:3, :3]
     place = np.asarray(matrix_world, np.float64)[:3, 3]

@@ -9,6 +9,8 @@ no shift) with the reference camera's world matrix sees the panorama of level 0,
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +21,7 @@ from .blender_camera import pose_of
 _TEXTURE_AXES = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
-def world_rotation(matrix_world: NDArray, rotation: NDArray) -> Array:
+def world_rotation(matrix_world: NDArray[Any], rotation: NDArray[Any]) -> Array:
     """The rotation (3, 3) that the Mapping node takes as XYZ Euler angles (mathutils: Matrix(…).to_euler("XYZ")).
 
     matrix_world (4, 4): of the reference camera as it stands in the scene; rotation (3, 3): from the panorama's axes to

@@ -8,25 +8,39 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-# Where the axis meets the sensor is not its middle: about so far off, in units of the longer side.
-PRINCIPAL_SIGMA = 0.01
+from ..raster.resizing import size_change
 
 
 class Knowledge(StrEnum):
     """How a focal length is known."""
 
     GIVEN = "given"  # by the user, a camera file or Blender: exact
-    EXIF = "exif"  # by the picture's metadata: to some per cent
-    ASSUMED = "assumed"  # by nobody: a usual one
+    EXIF = "exif"  # from the picture's metadata: to some per cent
+    ASSUMED = "assumed"  # not known at all: a usual focal length
 
 
 @dataclass(frozen=True)
 class Camera:
     """One picture's camera as known before matching.
 
-    K (3, 3) px with integer pixel centres; size (W, H) px; source in words; log_sigma: standard deviation of log f
-    (0: fixed); distortion (5,) OpenCV's k1, k2, p1, p2, k3; pose (R, t) world to camera, where given; principal_sigma:
-    standard deviation of the principal point in units of the longer side (0: fixed); knowledge: how f is known.
+    Attributes
+    ----------
+    K : (3, 3)
+        Intrinsics in px; pixel centres are integers.
+    size : (int, int)
+        (W, H) px.
+    source : str
+        Where the focal length comes from, in words.
+    log_sigma : float
+        Standard deviation of log f; 0 for a fixed focal length.
+    distortion : (5,)
+        k1, k2, p1, p2, k3 as in OpenCV.
+    pose : (R, t), optional
+        World to camera: x ~ K (R X + t).
+    principal_sigma : float
+        Standard deviation of the principal point in units of the longer side; 0 if it is fixed.
+    knowledge : Knowledge
+        How the focal length is known.
     """
 
     K: NDArray[np.float64]
@@ -63,10 +77,10 @@ class Camera:
 
     def resized(self, size: tuple[int, int]) -> Camera:
         """The camera of its picture resized to (W, H) px."""
-        factor = np.array(size) / np.array(self.size)
+        factor, shift = size_change(self.size, size)
         K = self.K.copy()
         K[:2] *= factor[:, None]
-        K[:2, 2] += (factor - 1) / 2  # pixel centres are integers: the corner lies at −½
+        K[:2, 2] += shift
         return replace(self, K=K, size=size)
 
 

@@ -11,10 +11,28 @@ import numpy as np
 
 from ..raster.arrays import Array
 from .camera import Camera
+from .options import LENS
 
 
 def distort(points: Array, camera: Camera) -> Array:
-    """Ideal pixels (…, 2) to raw pixels of the camera's picture."""
+    """Apply lens distortion.
+
+    Parameters
+    ----------
+    points : (…, 2)
+        Ideal px, as a pinhole camera with the same K would see them.
+    camera : Camera
+        Whose lens it is.
+
+    Returns
+    -------
+    (…, 2)
+        Raw px of the camera's picture.
+
+    References
+    ----------
+    D. Brown, Close-Range Camera Calibration, Photogrammetric Engineering 37, 1971.
+    """
     if not camera.distortion.any():
         return points
     ideal = _normalised(points, camera)
@@ -22,17 +40,30 @@ def distort(points: Array, camera: Camera) -> Array:
 
 
 def undistort(points: Array, camera: Camera) -> Array:
-    """Raw pixels (…, 2) to ideal pixels: the inverse of `distort`, by fixed-point iteration with Newton's safeguard."""
+    """Remove lens distortion: the inverse of `distort`, by a damped fixed-point iteration.
+
+    Parameters
+    ----------
+    points : (…, 2)
+        Raw px of the camera's picture.
+    camera : Camera
+        Whose lens it is.
+
+    Returns
+    -------
+    (…, 2)
+        Ideal px.
+    """
     if not camera.distortion.any():
         return points
     raw = _normalised(points, camera)
     limit = _trusted_radius(camera)
     ideal = raw.copy()
-    for _ in range(60):
+    for _ in range(LENS.iterations):
         # where the lens stretches by more than 1, a full step would overshoot for ever
         step = (raw - _distorted(ideal, camera.distortion, limit)) / np.maximum(1.0, _stretch(ideal, camera, limit))
         ideal += step
-        if np.nanmax(np.abs(step), initial=0.0) < 1e-12:
+        if np.nanmax(np.abs(step), initial=0.0) < LENS.tolerance:
             break
     return _pixels(ideal, camera)
 
@@ -52,12 +83,13 @@ def _trusted_radius(camera: Camera) -> float:
     its raw radius is 1.2 × the corner's."""
     width, height = camera.size
     corners = _normalised(np.array([[0.0, 0], [width, 0], [0, height], [width, height]]), camera)
-    reach = 1.2 * float(np.hypot(corners[:, 0], corners[:, 1]).max())
-    r = np.linspace(0, 3 * reach, 1200)  # while the slope is at least a half, twice `reach` is as far as it takes
+    reach = LENS.reach * float(np.hypot(corners[:, 0], corners[:, 1]).max())
+    # while the slope is at least a half, twice `reach` is as far as it takes
+    r = np.linspace(0, 3 * reach, LENS.radius_samples)
     k1, k2, _, _, k3 = camera.distortion
     slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
     raw = r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
-    return float(r[int(np.argmax((slope < 0.5) | (raw > reach)))])
+    return float(r[int(np.argmax((slope < LENS.least_slope) | (raw > reach)))])
 
 
 def _distorted(ideal: Array, distortion: Array, limit: float) -> Array:
@@ -70,7 +102,8 @@ def _distorted(ideal: Array, distortion: Array, limit: float) -> Array:
     radial = k1 * r2 + k2 * r2**2 + k3 * r2**3
     dx = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
     dy = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return ideal + np.concatenate([dx, dy], axis=-1) / inward
+    raw: Array = ideal + np.concatenate([dx, dy], axis=-1) / inward
+    return raw
 
 
 def _normalised(points: Array, camera: Camera) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +11,18 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Matches:
-    """Matched points x (reference) ↔ y (target), each (N, 2) float64 px.
+    """Matched points of two pictures.
 
-    scale: the unit of their noise in px; weight (N,): how much each counts, None for all alike; given: by the user, to
-    be used as they are.
+    Attributes
+    ----------
+    x, y : (N, 2) float64
+        Points of the reference and of the target, px; pixel centres are integers.
+    scale : float
+        px by which thresholds are multiplied: full pixels per pixel of the picture they were found in.
+    weight : (N,), optional
+        How much each counts; None if all count alike.
+    given : bool
+        By the user, hence all used.
     """
 
     x: NDArray[np.float64]
@@ -30,7 +39,7 @@ class Matches:
         """How much each match counts (N,); ones where nothing was said."""
         return np.ones(len(self.x)) if self.weight is None else self.weight
 
-    def subset(self, keep: NDArray) -> Matches:
+    def subset(self, keep: NDArray[Any]) -> Matches:
         """The matches that a mask or index array selects."""
         weight = None if self.weight is None else self.weight[keep]
         return replace(self, x=self.x[keep], y=self.y[keep], weight=weight)

@@ -1,4 +1,4 @@
-"""The two-view formulas everything else stands on: F, H_inf, the epipole, distances, cheirality.
+"""Formulas of two-view geometry: F, H_inf, the epipole, distances, cheirality.
 
 Convention, everywhere: pixel centres are integers; the target camera sees a world point X of the reference camera's
 frame at R X + t; x' is a target pixel, x a reference pixel; x'ᵀ F x = 0. Source of the formulas: Hartley and Zisserman,
@@ -7,21 +7,35 @@ Multiple View Geometry, 2nd ed., chapters 9 (F, epipoles, pose from E), 11.4 (Sa
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
 
+# The third homogeneous coordinate of a point in front of its camera, relative to the larger of the other two.
+LEAST_AHEAD = 1e-6
 
-def homogeneous(points: NDArray) -> Array:
+
+def homogeneous(points: NDArray[Any]) -> Array:
     """(…, 2) points as (…, 3) with a one behind."""
     points = np.asarray(points, np.float64)
     return np.concatenate([points, np.ones((*points.shape[:-1], 1))], axis=-1)
 
 
 def project(rays: Array) -> Array:
-    """π(a, b, c) = (a/c, b/c) of (…, 3) vectors; the caller looks after c > 0."""
+    """π(a, b, c) = (a/c, b/c) of (…, 3) vectors; c > 0 is not checked."""
     return rays[..., :2] / rays[..., 2:]
+
+
+def ahead_of_camera(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which homogeneous pixels (a, b, c) of unchanged sign lie in front of their camera; False for NaN.
+
+    What is less than LEAST_AHEAD in front, relative to its own length, would be shown outside any picture.
+    """
+    ahead: NDArray[np.bool_] = c > LEAST_AHEAD * np.maximum(np.abs(a), np.abs(b))
+    return ahead
 
 
 def normalisation(points: Array) -> Array:
@@ -42,7 +56,8 @@ def rotation_from_vector(omega: Array) -> Array:
     if angle < 1e-12:
         return np.eye(3) + skew(omega)
     axis = skew(omega / angle)
-    return np.eye(3) + np.sin(angle) * axis + (1 - np.cos(angle)) * axis @ axis
+    R: Array = np.eye(3) + np.sin(angle) * axis + (1 - np.cos(angle)) * axis @ axis
+    return R
 
 
 def rotation_angle(R1: Array, R2: Array) -> float:
@@ -57,7 +72,7 @@ def inverse_intrinsics(K: Array) -> Array:
 
 
 def infinite_homography(K: Array, K_prime: Array, R: Array) -> Array:
-    """H_inf = K' R K⁻¹, sign kept, so that H_inf p has a positive third part in front of the target camera."""
+    """H_inf = K' R K⁻¹, not normalised: the third part of H_inf p is positive in front of the target camera."""
     return K_prime @ R @ inverse_intrinsics(K)
 
 
@@ -71,16 +86,18 @@ def sampson_residuals(F: Array, x: Array, y: Array) -> Array:
     """Signed first-order distance in px of matches x ↔ y (N, 2) from satisfying yᵀ F x = 0 (H&Z eq. 11.9, rooted)."""
     line_y, line_x, algebraic = _lines(F, x, y)
     gradient = line_y[:, 0] ** 2 + line_y[:, 1] ** 2 + line_x[:, 0] ** 2 + line_x[:, 1] ** 2
-    return algebraic / np.sqrt(np.maximum(gradient, 1e-300))
+    residuals: Array = algebraic / np.sqrt(np.maximum(gradient, 1e-300))
+    return residuals
 
 
-def distance_to_line(F: Array, x: NDArray, y: NDArray) -> Array:
+def distance_to_line(F: Array, x: NDArray[Any], y: NDArray[Any]) -> Array:
     """Distance in px of each target point y from the epipolar line F x of its reference point x."""
     line_y, _, algebraic = _lines(F, x, y)
-    return np.abs(algebraic) / np.maximum(np.hypot(line_y[:, 0], line_y[:, 1]), 1e-300)
+    distances: Array = np.abs(algebraic) / np.maximum(np.hypot(line_y[:, 0], line_y[:, 1]), 1e-300)
+    return distances
 
 
-def _lines(F: Array, x: NDArray, y: NDArray) -> tuple[Array, Array, Array]:
+def _lines(F: Array, x: NDArray[Any], y: NDArray[Any]) -> tuple[Array, Array, Array]:
     a, b = homogeneous(x), homogeneous(y)
     line_y, line_x = a @ F.T, b @ F
     return line_y, line_x, np.sum(b * line_y, axis=1)
@@ -97,11 +114,23 @@ def poses_from_fundamental(F: Array, K: Array, K_prime: Array) -> list[tuple[Arr
 
 
 def in_front(K: Array, K_prime: Array, R: Array, t: Array, x: Array, y: Array, slack: float = 0.0) -> NDArray[np.bool_]:
-    """Which matches (N, 2) triangulate in front of both cameras.
+    """Which matches triangulate in front of both cameras, by the closest points of their two rays.
 
-    Depths along both rays from the closest points of the two rays, r the reference ray and r' the target ray; `slack`
-    is the sine of the parallax angle below which a point counts as infinitely far, hence in front, if its rays agree in
-    direction.
+    Parameters
+    ----------
+    K, K_prime : (3, 3)
+        Intrinsics, px.
+    R, t : (3, 3), (3,)
+        Reference to target camera.
+    x, y : (N, 2)
+        px of the reference and of the target.
+    slack : float
+        Sine of the parallax angle below which a point counts as infinitely far, hence in front, if its rays agree in
+        direction.
+
+    Returns
+    -------
+    (N,) bool
     """
     ray = homogeneous(x) @ inverse_intrinsics(K).T
     ray_prime = homogeneous(y) @ inverse_intrinsics(K_prime).T
@@ -114,4 +143,5 @@ def in_front(K: Array, K_prime: Array, R: Array, t: Array, x: Array, y: Array, s
     depth = cosine * along_prime - along
     depth_prime = along_prime - cosine * along
     far = (1 - cosine**2 < slack**2) & (cosine > 0)
-    return far | ((depth > 0) & (depth_prime > 0))
+    front: NDArray[np.bool_] = far | ((depth > 0) & (depth_prime > 0))
+    return front

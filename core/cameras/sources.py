@@ -1,8 +1,9 @@
-"""Where intrinsics come from: given, a camera file, EXIF, or an assumption; and how far to believe them."""
+"""Intrinsics as given, from a camera file, from EXIF, or assumed; and how precise they are."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..system.errors import BadRequest, UnreadableImage
-from .camera import PRINCIPAL_SIGMA, Camera, Knowledge
+from .camera import Camera, Knowledge
+from .options import INTRINSICS
 from .sensors import sensor_diagonal
 
 if TYPE_CHECKING:
@@ -19,8 +21,6 @@ if TYPE_CHECKING:
 
 # Diagonal of the 36 × 24 mm frame that "35 mm equivalent" refers to.
 FULL_FRAME_DIAGONAL = float(np.hypot(36.0, 24.0))
-# Beliefs, as standard deviations of log f. Phone makers round and measure before distortion correction: 2-7 % off seen.
-EXIF_SIGMA, CROPPED_SIGMA, ASSUMED_SIGMA = 0.05, 0.2, 0.4
 
 
 @dataclass(frozen=True)
@@ -60,32 +60,67 @@ class CameraRequest:
             raise BadRequest("--principal takes X,Y for both pictures or X,Y,X2,Y2")
 
 
-def cameras_for(
-    request: CameraRequest,
-    names: tuple[str, str],
-    sizes: tuple[tuple[int, int], tuple[int, int]],
-    exifs: tuple[Exif, Exif],
-) -> tuple[tuple[Camera, Camera], list[str]]:
-    """Both pictures' cameras by DESIGN 4's order, and warnings about what contradicts itself.
+def role(number: int) -> str:
+    """What messages and camera files call a picture."""
+    return "reference" if number == 0 else "target"
 
-    names: as a camera file would call the pictures; sizes: (W, H) px after orientation was applied. Raises BadRequest.
+
+def cameras_for(
+    request: CameraRequest, names: Sequence[str], sizes: Sequence[tuple[int, int]], exifs: Sequence[Exif]
+) -> tuple[list[Camera], list[str]]:
+    """What is known of the pictures' cameras before matching.
+
+    The user's word comes first, then EXIF, then another picture's focal length, then a usual one.
+
+    Parameters
+    ----------
+    request : CameraRequest
+        What the user said.
+    names : sequence of str
+        What a camera file would call the pictures.
+    sizes : sequence of (int, int)
+        (W, H) px after orientation was applied.
+    exifs : sequence of Exif
+        Of the upright pictures.
+
+    Returns
+    -------
+    cameras : list of Camera
+    warnings : list of str
+        Where EXIF contradicts itself.
+
+    Raises
+    ------
+    BadRequest
+        The camera file lacks a picture or holds something else.
+    UnreadableImage
+        The camera file cannot be read.
     """
     warnings: list[str] = []
     if request.cameras is not None:
-        first, second = read_camera_file(request.cameras, names, sizes)
+        cameras = read_camera_file(request.cameras, names, sizes)
     else:
-        first, second = (_one_camera(request, i, sizes[i], exifs[i], warnings) for i in (0, 1))
-        if first.assumed != second.assumed:  # one lens took both pictures more often than not
-            known, unknown = (second, first) if first.assumed else (first, second)
-            guess = known.focal * max(unknown.size) / max(known.size)
-            # the same knowledge as the other picture's, so that the focal prior does not count it twice
-            source = f"the other picture ({known.source})"
-            borrowed = _camera(guess, unknown.size, source, CROPPED_SIGMA, known.knowledge)
-            first, second = (borrowed, second) if first.assumed else (first, borrowed)
+        cameras = [
+            _one_camera(request, number, size, exif, warnings)
+            for number, (size, exif) in enumerate(zip(sizes, exifs, strict=True))
+        ]
+        known = [camera for camera in cameras if not camera.assumed]
+        if known:  # one lens took all pictures more often than not
+            cameras = [_like(known[0], camera) if camera.assumed else camera for camera in cameras]
     if request.principal:
-        values = (*request.principal, *request.principal)[:4]
-        first, second = (_with_principal_point(c, values[2 * i : 2 * i + 2]) for i, c in enumerate((first, second)))
-    return (first, second), warnings
+        values = [request.principal[i : i + 2] for i in range(0, len(request.principal), 2)]
+        cameras = [
+            _with_principal_point(camera, values[min(number, len(values) - 1)]) for number, camera in enumerate(cameras)
+        ]
+    return cameras, warnings
+
+
+def _like(known: Camera, unknown: Camera) -> Camera:
+    """An unknown camera with the lens of a known one."""
+    guess = known.focal * max(unknown.size) / max(known.size)
+    # the same knowledge as the other picture's, so that the focal prior does not count it twice
+    source = f"the other picture ({known.source})"
+    return _camera(guess, unknown.size, source, INTRINSICS.cropped_sigma, known.knowledge)
 
 
 def _one_camera(request: CameraRequest, index: int, size: tuple[int, int], exif: Exif, warnings: list[str]) -> Camera:
@@ -99,7 +134,7 @@ def _one_camera(request: CameraRequest, index: int, size: tuple[int, int], exif:
         return _camera(pick(request.focal_mm) / pick(request.sensor_mm) * max(size), size, "given in mm", 0.0)
     if request.focal35:
         return _camera(_from_35mm(pick(request.focal35), size), size, "given as 35 mm equivalent", 0.0)
-    return _from_exif(exif, size, ("reference", "target")[index], warnings)
+    return _from_exif(exif, size, role(index), warnings)
 
 
 def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]) -> Camera:
@@ -113,21 +148,24 @@ def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]
     if exif.focal_mm and exif.focal_plane_x_per_mm and exif.width and exif.height:
         shrink = max(size) / max(exif.width, exif.height)
         found.append((exif.focal_mm * exif.focal_plane_x_per_mm * shrink, "EXIF focal length and sensor resolution"))
-    found = [(f, source) for f, source in found if 0.2 * max(size) < f < 50 * max(size)]
+    least, most = INTRINSICS.least_focal * max(size), INTRINSICS.most_focal * max(size)
+    found = [(f, source) for f, source in found if least < f < most]
     if not found:
-        return _camera(0.9 * max(size), size, "assumed (0.9 × the longer side)", ASSUMED_SIGMA, Knowledge.ASSUMED)
+        sides, sigma = INTRINSICS.assumed_focal, INTRINSICS.assumed_sigma
+        source = f"assumed ({sides:g} × the longer side)"
+        return _camera(sides * max(size), size, source, sigma, Knowledge.ASSUMED)
     focal, source = found[0]
     for other, other_source in found[1:]:
-        if abs(np.log(other / focal)) > 0.15:
+        if abs(np.log(other / focal)) > INTRINSICS.contradiction:
             warnings.append(
                 f"the {name}'s EXIF contradicts itself: {focal:.0f} px by {source}, {other:.0f} px by "
                 f"{other_source}; the first is used"
             )
-    sigma = EXIF_SIGMA
+    sigma = INTRINSICS.exif_sigma
     if exif.width and exif.height:
         aspect, original = max(size) / min(size), max(exif.width, exif.height) / min(exif.width, exif.height)
-        if abs(np.log(aspect / original)) > 0.03:
-            sigma = CROPPED_SIGMA
+        if abs(np.log(aspect / original)) > INTRINSICS.cropped_aspect:
+            sigma = INTRINSICS.cropped_sigma
             warnings.append(
                 f"the {name} was cropped since it was taken ({exif.width}×{exif.height} in EXIF, {size[0]}×{size[1]} "
                 "now): its EXIF focal "
@@ -144,7 +182,7 @@ def _camera(
     focal: float, size: tuple[int, int], source: str, log_sigma: float, knowledge: Knowledge = Knowledge.GIVEN
 ) -> Camera:
     K = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1.0]])
-    return Camera(K, size, source, log_sigma, principal_sigma=PRINCIPAL_SIGMA, knowledge=knowledge)
+    return Camera(K, size, source, log_sigma, principal_sigma=INTRINSICS.principal_sigma, knowledge=knowledge)
 
 
 def _with_principal_point(camera: Camera, principal: tuple[float, ...]) -> Camera:
@@ -154,9 +192,9 @@ def _with_principal_point(camera: Camera, principal: tuple[float, ...]) -> Camer
 
 
 def read_camera_file(
-    source: str | Path | dict[str, Any], names: tuple[str, str], sizes: tuple[tuple[int, int], tuple[int, int]]
-) -> tuple[Camera, Camera]:
-    """Cameras of the two pictures from a JSON file or its content.
+    source: str | Path | dict[str, Any], names: Sequence[str], sizes: Sequence[tuple[int, int]]
+) -> list[Camera]:
+    """Cameras of the pictures from a JSON file or its content.
 
     Layout: {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "R": 3×3?, "t": [3]?}}} with NAME the
     picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes, integer pixel centres. Raises
@@ -173,16 +211,17 @@ def read_camera_file(
     if not isinstance(table, dict):
         raise BadRequest('a camera file holds {"cameras": {"NAME": {"K": [[…]], "R": [[…]], "t": […]}}}')
     out = []
-    for name, role, size in zip(names, ("reference", "target"), sizes, strict=True):
-        entry = table.get(name, table.get(role))
+    for number, (name, size) in enumerate(zip(names, sizes, strict=True)):
+        entry = table.get(name, table.get(role(number)))
         if not isinstance(entry, dict):
             raise BadRequest(
-                f"the camera file has no camera named {name!r} or {role!r}; it has: {', '.join(map(str, table))}"
+                f"the camera file has no camera named {name!r} or {role(number)!r}; it has: "
+                f"{', '.join(map(str, table))}"
             )
         out.append(_camera_from_entry(entry, name, size))
-    if (out[0].pose is None) != (out[1].pose is None):
+    if len({camera.pose is None for camera in out}) > 1:
         raise BadRequest("the camera file gives R and t for one picture only: give both or neither")
-    return out[0], out[1]
+    return out
 
 
 def _camera_from_entry(entry: dict[str, Any], name: str, size: tuple[int, int]) -> Camera:

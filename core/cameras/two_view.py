@@ -12,14 +12,35 @@ from ..raster.arrays import Array
 
 @dataclass(frozen=True)
 class TwoView:
-    """The geometry of a pair: target pixel of a canvas point p at inverse depth d is H_inf p + d e' (DESIGN 1).
+    """The geometry of a pair: a canvas point p at inverse depth d is seen at x' ~ H_inf p + d e' in the target.
 
-    K, K_prime (3, 3) px; R (3, 3), t (3,), |t| = 1: target sees X at R X + t; F with x'ᵀ F x = 0; H_inf = K' R K⁻¹;
-    e_prime = K' t. `inliers` (N,) marks the matches it explains, `sigma` is their Sampson noise in px.
-    model: `general`; `rotation` (same place: t = e_prime = 0, F NaN); `plane` (no parallax off a plane; where nothing
-    tells the cameras, H_inf is the plane's homography, e_prime = 0 and F, R, t are NaN). `why` says in words how it was
-    decided. `focal_deviation` is the standard deviation of log f left by matches and prior, `h_inf_spread` how far (px,
-    median over the target) H_inf moves within two of them; NaN where the matches tell nothing of it.
+    Attributes
+    ----------
+    K, K_prime : (3, 3)
+        Intrinsics of reference and target, px.
+    R, t : (3, 3), (3,)
+        Reference to target camera, R X + t, with |t| = 1.
+    F : (3, 3)
+        Fundamental matrix, x'ᵀ F x = 0.
+    H_inf, e_prime : (3, 3), (3,)
+        K' R K⁻¹ and K' t.
+    inliers : (N,) bool
+        The matches that are explained.
+    sigma : float
+        Noise of the inliers' Sampson distances, px.
+    model : str
+        `general`; `rotation`: both from the same place, t = e_prime = 0 and F is NaN; `plane`: no parallax off a plane.
+        If the cameras cannot be found from it, H_inf is the plane's homography, e_prime = 0 and F, R, t are NaN.
+    why : str
+        How the model was chosen, in words.
+    focal_source : str
+        Where the focal length comes from, in words.
+    focal_deviation : float
+        Standard deviation of log f by matches and prior; NaN if unknown.
+    h_inf_spread : float
+        px that H_inf moves when log f changes by two deviations, the median over the target; NaN if unknown.
+    warnings : tuple of str
+        For the user.
     """
 
     K: Array

@@ -142,8 +142,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
             args.focal_px, args.focal_mm, args.sensor_mm, args.focal35, args.principal, args.cameras
         ),
         matches=args.matches,
-        ignore_reference=args.ignore_ref,
-        ignore_target=args.ignore_target,
+        ignore=(args.ignore_ref, args.ignore_target) if args.ignore_ref or args.ignore_target else (),
         projection=args.projection,
         level=parse_level(args.level),
         scale=args.scale,

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from ..system.errors import BadRequest, Cancelled, StitchError, UnwritableOutput
+from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
 from .arguments import add_options, options_from
 from .messages import _MOST_WARNINGS, print_summary, progress_shown, say
@@ -149,11 +149,10 @@ _DEMO = "Render two pictures of a small scene through known cameras, stitch them
 def _add_stitch(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_stitch)
     parser.add_argument(
-        "reference", metavar="REF", type=Path, help="the picture whose plane and place the panorama keeps"
-    )
-    parser.add_argument(
-        "target", metavar="TARGET", type=Path, nargs="+", help="the picture to warp into it (one, for now)"
-    )
+        "pictures", metavar="PICTURE", type=Path, nargs="+",
+        help="the first is the reference, whose plane and place the panorama keeps; the others are warped into it (one "
+        "other, for now)",
+    )  # fmt: skip
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="OUT", help=".png, .jpg, .tif (8 or 16 bit) or .exr (float)"
     )
@@ -165,9 +164,9 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     files.add_argument(
         "--layers", type=Path, metavar="DIR",
-        help="both pictures on the canvas before blending, with alpha, and a mask of what the target cannot see",
+        help="each picture on the canvas before blending, with alpha; what it cannot see; which is shown where",
     )
-    files.add_argument("--warp", type=Path, metavar="FILE.npz", help="the map, the inverse depth and the geometry")
+    files.add_argument("--warp", type=Path, metavar="FILE.npz", help="the maps, the inverse depth and the geometry")
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")
     _add_loudness(parser)
 
@@ -179,8 +178,8 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
     add_options(parser)
     files = parser.add_argument_group("files")
     files.add_argument("--format", default=".png", metavar="SUFFIX", help=".png (default), .jpg, .tif or .exr")
-    files.add_argument("--layers", action="store_true", help="NAME.layers: both pictures on the canvas, with alpha")
-    files.add_argument("--warp", action="store_true", help="NAME.warp.npz: the map, the inverse depth and the geometry")
+    files.add_argument("--layers", action="store_true", help="NAME.layers: each picture on the canvas, with alpha")
+    files.add_argument("--warp", action="store_true", help="NAME.warp.npz: maps, inverse depth and geometry")
     files.add_argument("--resume", action="store_true", help="make only what is missing, or was made otherwise")
     files.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="the I-th of N runs that share LIST")
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")
@@ -245,22 +244,21 @@ def _add_loudness(parser: argparse.ArgumentParser) -> None:
 
 
 def _stitch(args: argparse.Namespace) -> int:
-    if len(args.target) > 1:
-        raise BadRequest(f"{1 + len(args.target)} pictures given: two at a time for now; stitch them pair by pair")
     from ..system.output_files import OutputFiles, undisturbed
 
     with undisturbed():  # NumPy prints a traceback of its own where a signal breaks into its loading
         from ..output.outputs import OutputRequest, check, write
-        from ..pipeline import stitch
+        from ..pipeline import check_count, stitch
         from ..system.memory import use_again
 
     use_again()
+    check_count(len(args.pictures))
     options = options_from(args, measure=bool(args.report or args.verbose))
     outputs = OutputRequest(args.output, args.report, args.layers, args.warp)
-    with OutputFiles(args.overwrite, [args.reference, *args.target, *options.files_read]) as files:
-        check(outputs, files)
+    with OutputFiles(args.overwrite, [*args.pictures, *options.files_read]) as files:
+        check(outputs, files, [path.name for path in args.pictures])
         with progress_shown(args.quiet) as show:
-            result = stitch(args.reference, args.target[0], options, progress=show)
+            result = stitch(args.pictures, options, progress=show)
             show("write", 0.98)
             warnings = [*result.warnings, *write(result, outputs, files)]
         _too_late_to_interrupt()

@@ -112,27 +112,27 @@ def _work(folder: Path, stop: _Stop) -> None:
             import_module(name)
         (folder / "result.json").write_text("{}")
         return
-    (reference, turn), (target, turn_prime) = (_picture(folder, job[side]) for side in SIDES)
+    pictures, turns = zip(*(_picture(folder, job[side]) for side in SIDES), strict=True)
     camera = {key: _tuples(value) for key, value in job["options"].pop("camera", {}).items()}
     if job.get("cameras"):
-        camera = {"cameras": cameras_of(job["cameras"], (reference, target))}
+        camera = {"cameras": cameras_of(job["cameras"], pictures)}
     masks = job.get("masks", {})
     rows = _array(folder / job["matches"]) if job.get("matches") else None
     options = StitchOptions(
         **{key: _tuples(value) for key, value in job["options"].items()}, camera=CameraRequest(**camera),
         matches=None if rows is None else rows[rows[:, 4] > 0],
-        ignore_reference=_mask(folder, masks.get("reference"), turn),
-        ignore_target=_mask(folder, masks.get("target"), turn_prime), mask=_mask(folder, masks.get("seam"), 1),
+        ignore=tuple(_mask(folder, masks.get(side), turn) for side, turn in zip(SIDES, turns, strict=True)),
+        mask=_mask(folder, masks.get("seam"), 1),
         cache=default_folder(),
     )  # fmt: skip
     result = stitch(
-        reference, target, options, lambda stage, share: _say({"stage": stage, "share": share * STITCH_SHARE}),
+        pictures, options, lambda stage, share: _say({"stage": stage, "share": share * STITCH_SHARE}),
         lambda: stop.asked,  # where Python swallowed the interruption, as it does in what tidies up after an object
     )  # fmt: skip
-    _write(folder, result.spread_out(), rows, job.get("take", []), (turn, turn_prime))
+    _write(folder, result.spread_out(), rows, job.get("take", []), turns)
 
 
-def cameras_of(entries: dict[str, Any], pictures: tuple[Any, Any]) -> dict[str, Any]:
+def cameras_of(entries: dict[str, Any], pictures: tuple[Any, ...]) -> dict[str, Any]:
     """What CameraRequest.cameras takes, of Blender's cameras (see job.json) and the upright pictures they took."""
     import numpy as np
 
@@ -180,7 +180,7 @@ def _array(path: Path) -> Any:
     return np.load(path, allow_pickle=False)
 
 
-def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[int, int]) -> None:
+def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[int, ...]) -> None:
     """Everything the window may ask for, with result.json as the index."""
     from ..output import inspection as seen
     from ..output.outputs import json_bytes
@@ -195,23 +195,23 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
         _say({"stage": "write", "share": min(0.99, STITCH_SHARE + 0.01 * len(files))})
 
     def picture(pixels: Any, alpha: Any) -> bytes:
-        return encode_picture(pixels, alpha, result.bits, kind, result.reference.icc, result.reference.exif)[0]
+        return encode_picture(pixels, alpha, result.bits, kind, result.pictures[0].icc, result.pictures[0].exif)[0]
 
     add("panorama", picture(result.panorama.light, _unless_opaque(result.panorama.alpha)))
-    for side, layer in zip(SIDES, (result.reference_layer, result.target_layer), strict=True):
+    for side, layer in zip(SIDES, result.layers, strict=True):
         if "layers" in take:
             add(f"{side} layer", picture(layer.light, layer.alpha))
         if "masks" in take:
             add(f"{side} mask", _png((layer.alpha.astype("float32") * 255).round().astype("uint8")), ".png")
     if "masks" in take:
-        add("occluded", _png(result.occluded.astype("uint8") * 255), ".png")
+        add("occluded", _png(result.occluded[1].astype("uint8") * 255), ".png")
         if result.inpainted.any():
             add("inpainted", _png(result.inpainted.astype("uint8") * 255), ".png")
-        if result.from_target is not None:
-            add("seam", _png(_painted(result.from_target, result.panorama.alpha > 0)), ".png")
+        if result.labels is not None:
+            add("seam", _png(_painted(result.labels > 0, result.panorama.alpha > 0)), ".png")
         if result.warp.confidence is not None:
             add("confidence", _png((result.warp.confidence * 255).round().astype("uint8")), ".png")
-    if "depth" in take and seen.has_depth(result.two_view):
+    if "depth" in take and seen.has_depth(result):
         add("inverse depth", encode_picture(result.warp.inverse_depth[..., None], None, 32, ".exr")[0], ".exr")
     heat, heat_range = seen.heat_map(result)
     add("heat", _png(heat), ".png")
@@ -220,7 +220,7 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
     index = {
         "files": files, "report": result.report, "warnings": result.warnings, "bits": result.bits,
         "heat_range": heat_range, "geometry": seen.full_geometry(result), "orientations": turns,
-        "has_depth": seen.has_depth(result.two_view), "depth": seen.depth_grid(result), "matches": matches,
+        "has_depth": seen.has_depth(result), "depth": seen.depth_grid(result), "matches": matches,
         "seconds": result.seconds,
     }  # fmt: skip
     (folder / "result.json").write_bytes(json_bytes(index))
@@ -233,11 +233,12 @@ def _png(values: Any) -> bytes:
     return cv2.imencode(".png", values if values.ndim == 2 else cv2.cvtColor(values, cv2.COLOR_RGBA2BGRA))[1].tobytes()
 
 
-def _painted(from_target: Any, shows: Any) -> Any:
-    """A seam in the form of a painted one: RGBA (H, W, 4), white from the target, transparent where nothing shows."""
+def _painted(further: Any, shows: Any) -> Any:
+    """A seam in the form of a painted one: RGBA (H, W, 4), white from a further picture, transparent where
+    nothing shows."""
     import numpy as np
 
-    gray, alpha = (np.where(mask, 255, 0).astype(np.uint8) for mask in (from_target, shows))
+    gray, alpha = (np.where(mask, 255, 0).astype(np.uint8) for mask in (further, shows))
     return np.dstack([gray, gray, gray, alpha])
 
 

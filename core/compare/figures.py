@@ -1,23 +1,21 @@
-"""What a field is worth on a pair, figure by figure, the same for all fields."""
+"""Figures of a field on a pair, measured alike for all fields."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from ..alignment import Geometry
+from ..cameras.edge import Edge
 from ..measure.held_out import held_out
 from ..measure.metrics import canvas_quality, coverage_samples, off_line_mean, overlap_quality
 from ..measure.projectivity import projectivity
 from ..pipeline import StitchResult
 from ..raster.arrays import Array
 
-# What people call a figure, its unit, digits, and whether more is better (None: neither).
+# Name, unit, digits, and whether more is better (None: neither) of each figure, by its key.
 FIGURES: dict[str, tuple[str, str, int, bool | None]] = {
     "overlap_psnr_db": ("overlap PSNR", "dB", 2, True), "overlap_ssim": ("overlap SSIM", "", 3, True),
     "projectivity_px": ("projectivity", "px", 2, False),
     "projectivity_independent_px": ("projectivity, independent F", "px", 2, False),
     "off_line_mean_px": ("off its lines in the overlap", "px", 2, False),
-    # each field over the matches that it stands on: whoever drops more has an easier time
+    # each field over the matches that it is fitted to: one that drops more of them has an easier time
     "held_out_rms_px": ("held out, RMS over the matches it keeps", "px", 2, False),
     "held_out_towards_rms_px": ("the same towards the rest", "px", 2, False),
     "alignment_median_px": ("matches, median", "px", 2, False), "alignment_p95_px": ("matches, 95th", "px", 2, False),
@@ -33,27 +31,23 @@ FIGURES: dict[str, tuple[str, str, int, bool | None]] = {
     "truth_occluded_recall": ("occluded: recall", "", 2, True),
 }  # fmt: skip
 SHARES = ("folds", "occluded")
-# Canvas pixels this close to an occluded one may turn over with it.
-RIM = np.ones((7, 7), np.uint8)
 
 
-def figures_of(result: StitchResult, registration: Geometry, independent: Array, seed: int) -> dict[str, float]:
-    """The figures of a field's stitch (on the whole flat canvas); NaN where one has no meaning.
+def figures_of(result: StitchResult, edge: Edge, independent: Array, seed: int) -> dict[str, float]:
+    """The figures of a stitch on its whole flat canvas, by the keys of FIGURES; NaN where undefined.
 
-    Projectivity and distances from lines are by the pair's own F and by `independent`, whatever the field knows of
-    them, so that all fields are measured alike; folds are counted outside what is occluded and its rim.
+    Projectivity is by the edge's own F and by `independent`, whatever the field knows of them, so that all fields are
+    measured alike; folds are counted outside occlusions and their rims.
     """
-    warp, size = result.warp, result.cameras[1].size
-    shown = coverage_samples(warp, result.cameras)
-    F = registration.two_view.F
-    inliers = registration.ideal.subset(registration.two_view.inliers)
-    unseen = held_out(result.field, inliers, shown, seed)
+    warp = result.warp
+    shown = coverage_samples(warp, result.cameras, edge.j)
+    F = edge.two_view.F
+    unseen = held_out(result.field, edge.inliers, shown, seed)
     measured = result.report["measured"]
-    inside = (result.reference_layer.alpha > 0) & warp.inside(size)
-    hidden = result.occluded & inside
+    inside = (result.layers[edge.i].alpha > 0) & warp.maps[edge.j].inside()
+    hidden = result.occluded[edge.j] & inside
     return {
-        **overlap_quality(result.reference, result.target, warp),
-        **canvas_quality(result.reference, result.target, warp),
+        **overlap_quality(result.pictures, warp, edge.j), **canvas_quality(result.pictures, warp, edge.j),
         "projectivity_px": projectivity(F, shown), "projectivity_independent_px": projectivity(independent, shown),
         "off_line_mean_px": off_line_mean(F, shown),
         "held_out_rms_px": unseen.rms_px, "held_out_towards_rms_px": unseen.towards_rms_px,

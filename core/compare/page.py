@@ -1,7 +1,7 @@
 """compare.html: one page that opens offline, without scripts; pictures lie beside it.
 
-For every pair a table, every field's panorama with the average and the difference in the overlap, and a blink: the
-reference and the warped target in turn, a field at choice.
+For every pair a table, the panorama of every field with the average and the difference in the overlap, and the
+reference alternating with the warped target of a field that can be chosen.
 """
 
 from __future__ import annotations
@@ -14,17 +14,15 @@ from urllib.parse import quote
 
 from ..output.page import STYLE, table
 from .figures import FIGURES
-from .pictures import STRONGER
+from .options import COMPARISON
 from .tables import Summary, best, failures, figure, medians, shown
 
 # The overview's columns: two figures a field.
 OVERVIEW = ("overlap_psnr_db", "overlap_ssim", "projectivity_px")
 KINDS = {
     "panorama": "panorama", "average": "average of both in the overlap: what is off shows twice",
-    "difference": f"difference × {STRONGER} in the overlap",
+    "difference": f"difference × {COMPARISON.difference_gain} in the overlap",
 }  # fmt: skip
-# More fields than there will ever be: each needs a rule of its own to be chosen without a script.
-MOST_FIELDS = 12
 BLINK = "\n".join([
     ".best { font-weight: 700; }",
     ".blink { margin: 0.8rem 0; }",
@@ -36,13 +34,13 @@ BLINK = "\n".join([
     "@keyframes blink { 0% { opacity: 1; } 50% { opacity: 0; } }",
     *(
         f".blink input:nth-of-type({k}):checked ~ .stacks > div:nth-child({k}) {{ display: block; }}"
-        for k in range(1, MOST_FIELDS + 1)
+        for k in range(1, COMPARISON.max_fields + 1)
     ),
 ])  # fmt: skip
 
 
 def comparison_page(summary: Summary) -> str:
-    """The whole page, from what compare.json holds."""
+    """The page as HTML, from the content of compare.json."""
     pairs, fields = summary["pairs"], summary["fields"]
     done = sum(entry["status"] == "done" for entry in pairs)
     header = (

@@ -1,4 +1,4 @@
-"""Which pairs are meant: two files, a folder of two pictures, or a folder of such folders."""
+"""The pairs to compare: two files, a folder of two pictures, or a folder of such folders."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from pathlib import Path
 from ..system.errors import BadRequest
 
 SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".webp", ".bmp"))
-# A folder that names its two so may hold other pictures beside them: `edf validate` keeps its true panorama there.
+# A folder with files of these names may hold other pictures as well: `edf validate` keeps its true panorama there.
 ROLES = ("reference", "target")
 
 
 @dataclass(frozen=True)
 class PairFiles:
-    """Two pictures and what they are called together; trouble: why they are not two, where they are not.
+    """Two pictures and the name of the pair.
 
-    folder: where both lie, None for two files that were named.
+    folder: that holds both, None for two files given by name; trouble: why they are no pair, empty if they are.
     """
 
     name: str
@@ -28,10 +28,23 @@ class PairFiles:
 
 
 def find_pairs(paths: Sequence[Path]) -> list[PairFiles]:
-    """The pairs that paths name, in their order, those of one folder by name; no two with the same name.
+    """Finds the pairs that paths stand for.
 
-    Of a folder the first picture by name is the reference, or the one called so. Folders without pictures beside
-    others that have some are passed over. Raises BadRequest.
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files, two for each pair with the reference first, and folders. In a folder the reference is the picture of that
+        name, or the first by name. Folders without pictures are skipped if others have some.
+
+    Returns
+    -------
+    list of PairFiles
+        In the order of the paths, those of one folder by name; no two have the same name.
+
+    Raises
+    ------
+    BadRequest
+        A file without its partner, or no pictures.
     """
     found: list[PairFiles] = []
     alone: Path | None = None
@@ -64,7 +77,7 @@ def _in_folder(folder: Path) -> list[PairFiles]:
 
 
 def _pair_of(folder: Path) -> PairFiles | None:
-    """A folder's pair; None where it holds no pictures."""
+    """The pair in a folder; None if it holds no pictures."""
     pictures = sorted(one for one in folder.iterdir() if one.suffix.lower() in SUFFIXES and one.is_file())
     if not pictures:
         return None

@@ -1,6 +1,8 @@
-"""What the page shows of a field: its panorama, the overlap to blink, and where the pictures differ there."""
+"""Pictures of a field for the page: its panorama, and the overlap of both pictures, their average and difference."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import cv2
 import numpy as np
@@ -9,39 +11,36 @@ from numpy.typing import NDArray
 from ..measure.metrics import overlap_views
 from ..pipeline import StitchResult
 from ..raster.colour import encode
+from .options import COMPARISON
 
 Rgb = NDArray[np.uint8]
-# Larger pictures are shrunk to this for the page; differences are looked for before.
-LONGEST = 1600
-QUALITY = 88
-# Differences are shown so many times as strong.
-STRONGER = 4
 
 
 def field_pictures(result: StitchResult) -> dict[str, bytes]:
-    """JPEG files by kind: panorama; average (of reference and warped target in the overlap: what is off shows twice);
-    difference (× STRONGER); warped, and reference the same way: the two that blink."""
-    view, fetched, inside = overlap_views(result.reference, result.target, result.warp)
+    """JPEG files by kind: panorama; average and difference (amplified) of reference and warped target in the overlap;
+    reference and warped, cut to the overlap, which the page shows in turn."""
+    view, fetched, inside = overlap_views(result.pictures, result.warp)
     view, fetched = _rgb(view), _rgb(fetched)
     box = _bounds(inside)
-    here, there, both = view[box], fetched[box], inside[box][..., None]
-    apart = np.minimum(STRONGER * np.abs(here.astype(int) - there), 255)
+    reference, warped, both = view[box], fetched[box], inside[box][..., None]
+    difference = np.minimum(COMPARISON.difference_gain * np.abs(reference.astype(int) - warped), 255)
     pictures = {
         "panorama": _on_gray(result),
-        "average": np.where(both, (here.astype(np.uint16) + there + 1) // 2, 0),
-        "difference": np.where(both, apart, 0), "warped": np.where(both, there, 0),
-        "reference": np.where(both, here, 0),  # cut as the field's overlap is, which differs from field to field
+        "average": np.where(both, (reference.astype(np.uint16) + warped + 1) // 2, 0),
+        "difference": np.where(both, difference, 0), "warped": np.where(both, warped, 0),
+        "reference": np.where(both, reference, 0),  # the overlap differs from field to field
     }  # fmt: skip
     return {kind: _jpeg(picture.astype(np.uint8)) for kind, picture in pictures.items()}
 
 
 def _on_gray(result: StitchResult) -> Rgb:
-    """The panorama over gray where it shows nothing."""
+    """The panorama over a gray background."""
     alpha = result.alpha[..., None]
-    return np.rint(_rgb(encode(result.pixels, 8)) * alpha + 96 * (1 - alpha)).astype(np.uint8)
+    shown: Rgb = np.rint(_rgb(encode(result.pixels, 8)) * alpha + 96 * (1 - alpha)).astype(np.uint8)
+    return shown
 
 
-def _rgb(picture: NDArray) -> Rgb:
+def _rgb(picture: NDArray[Any]) -> Rgb:
     return np.repeat(picture, 3, axis=2) if picture.shape[2] == 1 else picture
 
 
@@ -53,8 +52,10 @@ def _bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
 
 
 def _jpeg(picture: Rgb) -> bytes:
-    scale = min(1.0, LONGEST / max(picture.shape[:2]))
+    scale = min(1.0, COMPARISON.max_side_px / max(picture.shape[:2]))
     if scale < 1:
         picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    coded = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-    return coded[1].tobytes()
+    quality = [cv2.IMWRITE_JPEG_QUALITY, COMPARISON.jpeg_quality]
+    coded = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), quality)
+    result: bytes = coded[1].tobytes()
+    return result

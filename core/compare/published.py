@@ -1,9 +1,9 @@
-"""What others published or measured on the pairs of the literature: beside ours for information, never a target.
+"""Figures published or measured for other programs on the pairs of the literature: for information, not a target.
 
-Canvas values average over the whole zero-filled canvas, so black inflates them: twice the canvas is worth 3 dB. Yu and
+Canvas values average over the whole zero-filled canvas, so black raises them: twice the canvas gains 3 dB. Yu and
 Da, arXiv 2311.16637, tables of the paper: canvas SSIM, canvas PSNR (dB), projectivity (px), for EDF and for REW. The
-overlap values of rivals (PSNR dB, SSIM) were measured by this project with programs of others: Hugin, and APAP and REW
-in the best of their ports.
+overlap values (PSNR dB, SSIM) were measured by this project with other programs: Hugin, and the best ports of APAP and
+REW.
 """
 
 from __future__ import annotations

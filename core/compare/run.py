@@ -1,4 +1,4 @@
-"""The comparison itself: each pair read and registered once, then every field laid, composed and measured."""
+"""Runs a comparison: the geometry of each pair is estimated once, then every field is fitted, composed and measured."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ Show = Callable[[str, float], None]
 
 
 class PairTruth(Protocol):
-    """What is known of a rendered pair besides its pictures."""
+    """The truth about a rendered pair."""
 
     @property
     def camera(self) -> CameraRequest:
-        """What is told of the cameras."""
+        """What the stitch is told about the cameras."""
         ...
 
     def figures(self, results: Mapping[str, StitchResult]) -> dict[str, dict[str, float]]:
-        """Figures against the truth, by field; pictures are compared over the pixels that all of them show."""
+        """Figures against the truth, by field, over the pixels that all fields show."""
         ...
 
 
@@ -49,7 +49,7 @@ Truths = Callable[[Path], PairTruth | None]
 
 @dataclass(frozen=True)
 class ComparisonRequest:
-    """What is compared, and where it goes: all pairs with all fields. Raises BadRequest."""
+    """All pairs are compared with all fields, into a folder. Raises BadRequest."""
 
     folder: Path
     pairs: tuple[PairFiles, ...]
@@ -66,8 +66,8 @@ class ComparisonRequest:
 
 @dataclass
 class PairOutcome:
-    """What became of a pair: entry, as compare.json has it; pictures by path below `pictures`; seconds; the exit code
-    where nothing came of it."""
+    """The results of a pair: its entry in compare.json; pictures by path below `pictures`; CPU seconds by step; the
+    exit code, not 0 if no field could be stitched."""
 
     entry: dict[str, Any]
     pictures: dict[str, bytes] = field(default_factory=dict)
@@ -76,15 +76,15 @@ class PairOutcome:
 
 
 def check_options(options: StitchOptions, pairs: Sequence[PairFiles]) -> None:
-    """Refuses what would make figures of different things. Raises BadRequest."""
+    """Raises BadRequest for options with which figures could not be compared."""
     if options.crop != "full":
         raise BadRequest("a comparison looks at whole panoramas: leave --crop out")
     if getattr(options, "projection", "perspective") != "perspective":
         raise BadRequest("a comparison looks at flat panoramas, where all fields exist: leave --projection out")
     if len(pairs) > 1:
         for name, value in (
-            ("--matches", options.matches), ("--ignore-ref", options.ignore_reference),
-            ("--ignore-target", options.ignore_target),
+            ("--matches", options.matches), ("--ignore-ref", options.ignored(0)),
+            ("--ignore-target", options.ignored(1)),
         ):  # fmt: skip
             if value is not None:
                 raise BadRequest(f"{name} belongs to one pair, and {len(pairs)} are named")
@@ -94,12 +94,37 @@ def run_comparison(
     request: ComparisonRequest, options: StitchOptions, version: str, truths: Truths | None = None,
     show: Show | None = None, tell: Tell | None = None, cancelled: Callable[[], bool] | None = None,
 ) -> tuple[dict[str, Any], int]:  # fmt: skip
-    """Compares, and writes compare.json, .csv, .md, .html, pictures, timing.json and .md into the request's folder.
+    """Compares fields on pairs and writes all of FILES and the pictures into the request's folder.
 
-    options: of every stitch, whatever field they name; truths(folder): what is known of a rendered pair there;
-    show(what is being done, share of everything), tell(a line about each pair). Returns what compare.json holds and the
-    exit code: 0, or that of the first pair that nothing came of, which is a row that says why. Raises StitchError
-    before the work or where nothing can be written, Cancelled; nothing is left then.
+    Parameters
+    ----------
+    request : ComparisonRequest
+    options : StitchOptions
+        Of every stitch; the field they name does not matter.
+    version : str
+        Of this program, for the files.
+    truths : callable, optional
+        truths(folder) -> the truth about a rendered pair in that folder, or None.
+    show : callable, optional
+        show(what is being done, share of everything).
+    tell : callable, optional
+        tell(a line about a pair), after each.
+    cancelled : callable, optional
+        cancelled() -> bool, called between steps.
+
+    Returns
+    -------
+    summary : dict
+        The content of compare.json.
+    exit_code : int
+        0, or that of the first pair for which no field could be stitched.
+
+    Raises
+    ------
+    StitchError
+        Before the work, or if nothing can be written; nothing is left then.
+    Cancelled
+        Nothing is left.
     """
     check_options(options, request.pairs)
     read = [path for pair in request.pairs for path in (pair.reference, pair.target)]
@@ -107,8 +132,8 @@ def run_comparison(
         files.check_folder(request.folder, FILES)
         outcomes = []
         for number, pair in enumerate(request.pairs):
-            steps = _Steps(show, cancelled, number, len(request.pairs), len(request.fields))
-            outcomes.append(_outcome(pair, request.fields, options, truths, steps))
+            progress = _Steps(show, cancelled, number, len(request.pairs), len(request.fields))
+            outcomes.append(_outcome(pair, request.fields, options, truths, progress))
             if tell is not None:
                 tell(_in_words(outcomes[-1].entry, number + 1, len(request.pairs)))
         summary = {
@@ -132,7 +157,7 @@ def run_comparison(
 
 
 class _Steps:
-    """The progress of one pair's work, in pieces: registration, then each field."""
+    """The progress of the work on one pair, in pieces: its geometry, then each field."""
 
     def __init__(
         self, show: Show | None, cancelled: Callable[[], bool] | None, number: int, count: int, fields: int
@@ -142,7 +167,7 @@ class _Steps:
         self._piece, self._label = 0, ""
 
     def begin(self, label: str) -> Stopwatch:
-        """The next piece."""
+        """Begins the next piece."""
         piece, self._label = self._piece, label
         self._piece += 1
 
@@ -155,9 +180,9 @@ class _Steps:
 
 
 def _outcome(
-    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, steps: _Steps
+    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Steps
 ) -> PairOutcome:
-    """Does what there is to do for a pair. Raises Cancelled only: whatever goes wrong with it stops no other."""
+    """Processes a pair. Raises Cancelled only: any other failure becomes its outcome."""
     entry: dict[str, Any] = {
         "name": pair.name, "reference": pair.reference.name, "target": pair.target.name, "status": "failed",
         "message": "", "published": published(pair.name), "fields": {},
@@ -165,7 +190,7 @@ def _outcome(
     try:
         if pair.trouble:
             raise BadRequest(pair.trouble)
-        return _compared(pair, fields, options, truths, steps, entry)
+        return _compared(pair, fields, options, truths, progress, entry)
     except Cancelled:
         raise
     except (StitchError, MemoryError) as error:
@@ -175,32 +200,33 @@ def _outcome(
 
 
 def _compared(
-    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, steps: _Steps,
+    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Steps,
     entry: dict[str, Any],
 ) -> PairOutcome:  # fmt: skip
     truth = truths(pair.folder) if truths is not None and pair.folder is not None else None
-    # measured here, alike for all; nothing from a cache, or seconds would mean nothing
+    # figures are taken here, alike for all fields; a cache would make the seconds meaningless
     options = replace(options, measure=False, cache=None)
     if truth is not None:
         options = replace(options, camera=truth.camera)
-    watch, start = steps.begin("registration"), time.process_time()
+    watch, start = progress.begin("registration"), time.process_time()
     watch("read")
-    frame = read_frame(pair.reference, pair.target, options)
-    registration = estimate_geometry([frame], options, watch)
+    frame = read_frame((pair.reference, pair.target), options)
+    geometry = estimate_geometry([frame], options, watch)
+    edge = geometry.edges[0]
     seconds = {"registration": time.process_time() - start}
-    independent = independent_fundamental(registration.ideal, options.seed)
+    independent = independent_fundamental(edge.ideal, options.seed)
     outcome = PairOutcome(entry, seconds=seconds)
     results: dict[str, StitchResult] = {}
     for name in fields:
         try:
-            results[name] = _stitched(name, frame, registration, options, steps.begin(name), seconds)
+            results[name] = _stitched(name, frame, geometry, options, progress.begin(name), seconds)
         except Cancelled:
             raise
         except StitchError as error:
             entry["fields"][name] = {"status": "failed", "message": str(error), "figures": {}, "pictures": {}}
             outcome.exit_code = error.exit_code
             continue
-        figures = figures_of(results[name], registration, independent, options.seed)
+        figures = figures_of(results[name], edge, independent, options.seed)
         made = field_pictures(results[name])
         outcome.pictures |= {f"{pair.name}/{name}-{kind}.jpg": data for kind, data in made.items()}
         entry["fields"][name] = {
@@ -208,17 +234,17 @@ def _compared(
             "pictures": {kind: f"{PICTURES}/{pair.name}/{name}-{kind}.jpg" for kind in made},
         }  # fmt: skip
         if truth is None:
-            del results[name]  # only what the truth looks at is kept
+            del results[name]  # only needed to be compared with the truth
     if truth is not None:
         for name, figures in truth.figures(results).items():
             entry["fields"][name]["figures"] |= figures
     done = [one for one in entry["fields"].values() if one["status"] == "done"]
-    view = registration.two_view
+    view = edge.two_view
     entry |= {
         "status": "done" if done else "failed",
         "message": "" if done else next(one["message"] for one in entry["fields"].values()),
-        "size": list(registration.cameras[0].size), "target_size": list(registration.cameras[1].size),
-        "model": view.model, "why": view.why, "matches": len(registration.matches), "inliers": int(view.inliers.sum()),
+        "size": list(geometry.cameras[edge.i].size), "target_size": list(geometry.cameras[edge.j].size),
+        "model": view.model, "why": view.why, "matches": len(edge.matches), "inliers": int(view.inliers.sum()),
         "focal_source": view.focal_source, "rendered": truth is not None,
     }  # fmt: skip
     outcome.exit_code = 0 if done else outcome.exit_code
@@ -226,19 +252,19 @@ def _compared(
 
 
 def _stitched(
-    name: str, frame: Frame, registration: Geometry, options: StitchOptions, watch: Stopwatch,
+    name: str, frame: Frame, geometry: Geometry, options: StitchOptions, watch: Stopwatch,
     seconds: dict[str, float],
 ) -> StitchResult:  # fmt: skip
     chosen, start = replace(options, field=name), time.process_time()
-    alignment = fit_and_warp(registration, [frame], chosen, watch)
-    laid = time.process_time()
+    alignment = fit_and_warp(geometry, [frame], chosen, watch)
+    aligned = time.process_time()
     result = compose(frame, alignment, chosen, watch)
-    seconds |= {f"{name}: alignment": laid - start, f"{name}: composition": time.process_time() - laid}
+    seconds |= {f"{name}: alignment": aligned - start, f"{name}: composition": time.process_time() - aligned}
     return result
 
 
 def _in_words(entry: dict[str, Any], number: int, count: int) -> str:
-    """A line about a pair: its best field, or why there is none."""
+    """A line about a pair: its fields, best first, or why there are none."""
     if entry["status"] != "done":
         return f"[{number}/{count}] {entry['name']}: failed: {entry['message']}"
     psnr = {

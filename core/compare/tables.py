@@ -1,4 +1,4 @@
-"""The comparison as tables: Markdown, CSV, and seconds apart from both. The same results give the same bytes."""
+"""The comparison as tables in Markdown and CSV, without times; these have a table of their own."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Summary = dict[str, Any]
 
 
 def number(value: object) -> float | None:
-    """A figure that means something, else None."""
+    """A finite number as float, anything else as None."""
     return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
 
 def shown(value: object, name: str) -> str:
-    """A figure with the digits that it is worth; – for none."""
+    """A figure as text with the digits of FIGURES; – for none."""
     found = number(value)
     if found is None:
         return "–"
@@ -32,12 +32,12 @@ def shown(value: object, name: str) -> str:
 
 
 def figure(entry: dict[str, Any], field: str, name: str) -> float | None:
-    """A figure of a field on a pair."""
+    """A figure of a field on a pair, None if there is none."""
     return number(entry["fields"].get(field, {}).get("figures", {}).get(name))
 
 
 def best(entry: dict[str, Any], fields: Iterable[str], name: str) -> set[str]:
-    """The fields that are best on a pair by a figure, as it is shown; none where neither more nor less is better."""
+    """The fields that are best on a pair by a figure, as rounded in tables; none if neither more nor less is better."""
     more = FIGURES[name][3]
     values = {field: figure(entry, field, name) for field in fields}
     known = [value for value in values.values() if value is not None]
@@ -57,7 +57,7 @@ def medians(summary: Summary, name: str) -> dict[str, float | None]:
 
 
 def comparison_markdown(summary: Summary) -> str:
-    """Every figure that matters in a table of its own, best in bold, medians below; then what others published."""
+    """A table for each important figure, the best in bold, medians below; then published figures."""
     parts = ["# Fields compared", "", "Overlap, PSNR in dB / SSIM:", "", *_main_table(summary)]
     for name in TABLES:
         if any(figure(entry, field, name) is not None for entry in summary["pairs"] for field in summary["fields"]):
@@ -74,7 +74,7 @@ def comparison_markdown(summary: Summary) -> str:
 
 
 def failures(entry: dict[str, Any]) -> list[tuple[str, str]]:
-    """Why there are no figures: (field, or "" for the whole pair, message)."""
+    """(field, or "" for the whole pair; message) for everything that failed."""
     if entry["status"] != "done":
         return [("", entry["message"])]
     return [(name, one["message"]) for name, one in entry["fields"].items() if one["status"] != "done"]
@@ -104,7 +104,7 @@ def _table(summary: Summary, name: str) -> list[str]:
 
 
 def _published(summary: Summary) -> list[str]:
-    """Canvas values beside published ones; black counts as perfect there, and a larger canvas gains."""
+    """A table of canvas values beside published ones."""
     fields = summary["fields"]
     head = ["pair", *fields, "paper: EDF", "paper: REW", "measured elsewhere: overlap PSNR / SSIM"]
     rows = [head, ["---"] * len(head)]
@@ -143,7 +143,7 @@ def _line(cells: Iterable[str]) -> str:
 
 
 def comparison_csv(summary: Summary) -> str:
-    """A row for every field of every pair, all figures in full; empty: undefined. `why`: where there are none."""
+    """A row for every field of every pair with all figures in full precision; empty cells are undefined."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["pair", "reference", "target", "width", "height", "model", "field", "status", "why", *FIGURES])
@@ -159,7 +159,7 @@ def comparison_csv(summary: Summary) -> str:
 
 
 def timing_markdown(seconds: dict[str, dict[str, float]]) -> str:
-    """CPU seconds: what all fields share, and each field's own alignment and composition."""
+    """A table of CPU seconds: of what all fields share, and of each field's alignment and composition."""
     names = list(dict.fromkeys(name for one in seconds.values() for name in one))
     rows = [["pair", *names], ["---"] * (1 + len(names))]
     for pair, one in seconds.items():

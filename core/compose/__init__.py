@@ -1,4 +1,4 @@
 """From layers to one picture: exposure, seam, bands, holes, crop.
 
-May import system, raster, pictures, cameras, panorama, the options and their names.
+May import system, raster, pictures, cameras, field, panorama, the options and their names.
 """

@@ -19,104 +19,108 @@ from .overlap import Overlap
 HALF, DARK = np.float32(0.5), np.float32(0.02)
 
 
-def averaged(reference: Layer, target: Layer) -> Layer:
-    """Both count alike wherever both show something: the plain average of the literature, which hides nothing."""
-    return mixed(reference, target, np.broadcast_to(np.float32(0.5), reference.alpha.shape))
+def averaged(before: Layer, layer: Layer, count: NDArray) -> Layer:
+    """All pictures count alike wherever they show something: the plain average of the literature, which hides nothing.
+
+    count (H, W): how many of them `before` is the average of.
+    """
+    share = count.astype(np.float32)
+    share /= share + 1
+    return mixed(before, layer, share)
 
 
-def feathered(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Layer:
-    """Each picture counts by the distance to its own border, so that neither shows an edge; what the target cannot see
-    (hidden) comes from the reference."""
-    inner, inner_too = distance_to_border(reference.alpha > 0), distance_to_border(target.alpha > 0)
-    share = inner / np.maximum(inner + inner_too, 1e-6)
-    share[hidden & (reference.alpha > 0)] = 1
-    return mixed(reference, target, share)
+def feathered(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Layer:
+    """Each counts by the distance to its own border, so that neither shows an edge; what the added picture cannot see
+    (hidden) stays as it was before."""
+    inner_before, inner = distance_to_border(before.alpha > 0), distance_to_border(layer.alpha > 0)
+    share = inner_before / np.maximum(inner_before + inner, 1e-6)
+    share[hidden & (before.alpha > 0)] = 1
+    return mixed(before, layer, share)
 
 
-def distance_labels(reference: Layer, target: Layer) -> NDArray[np.bool_]:
-    """The seam that distances alone give (H, W): True, for the target, where its border is further away."""
-    return distance_to_border(reference.alpha > 0) < distance_to_border(target.alpha > 0)
+def distance_labels(before: Layer, layer: Layer) -> NDArray[np.bool_]:
+    """The seam that distances alone give (H, W): True, for the added layer, where its border is further away."""
+    return distance_to_border(before.alpha > 0) < distance_to_border(layer.alpha > 0)
 
 
-def feathered_across(
-    reference: Layer, target: Layer, from_target: NDArray[np.bool_], overlap: Overlap | None
-) -> Layer:
-    """One picture gives way to the other over the width of the coarsest band (see `multiband`), where both show the
-    same; elsewhere they are cut hard along the seam."""
+def feathered_across(before: Layer, layer: Layer, chosen: NDArray[np.bool_], overlap: Overlap | None) -> Layer:
+    """One gives way to the other over the width of the coarsest band (see `multiband`), where both show the same;
+    elsewhere they are cut hard along the seam. chosen (H, W): what comes from the added layer."""
     if overlap is None:
-        return cut_hard(reference, target, from_target)
-    share = np.where(from_target, np.float32(0), np.float32(1))
-    here = from_target[overlap.box]
+        return cut_hard(before, layer, chosen)
+    share = np.where(chosen, np.float32(0), np.float32(1))
+    here = chosen[overlap.box]
     past = distance_inside(here) - distance_inside(~here)
-    ramp = np.clip(0.5 - past / np.float32(1 << bands_for(from_target)), 0, 1)
+    ramp = np.clip(0.5 - past / np.float32(1 << bands_for(chosen)), 0, 1)
     share[overlap.box] = np.where(overlap.same, ramp, share[overlap.box])
-    return mixed(reference, target, share)
+    return mixed(before, layer, share)
 
 
-def mixed(reference: Layer, target: Layer, share: NDArray[np.float32]) -> Layer:
-    """One layer from two on the same canvas, straight alpha: share (H, W) is the reference's weight where both show
+def mixed(before: Layer, layer: Layer, share: NDArray[np.float32]) -> Layer:
+    """One layer from two on the same canvas, straight alpha: share (H, W) is the weight of `before` where both show
     something; where one shows nothing the other is taken as it is."""
-    shows, shows_too = reference.alpha > 0, target.alpha > 0
-    both = shows & shows_too
-    alpha = np.where(shows, reference.alpha, target.alpha)
+    shown = before.alpha > 0
+    both = shown & (layer.alpha > 0)
+    alpha = np.where(shown, before.alpha, layer.alpha)
     # what one picture shows whole is not seen through, however soft the other's edge
-    np.maximum(alpha, target.alpha, out=alpha, where=both)
-    return Layer(Mixed(reference, target, share), alpha)
+    np.maximum(alpha, layer.alpha, out=alpha, where=both)
+    return Layer(Mixed(before, layer, share), alpha)
 
 
 @dataclass(frozen=True, eq=False)
 class Mixed(LazyImage):
-    """Two layers by the share (H, W) of the first (see `mixed`)."""
+    """Two layers by the share (H, W) of the one before (see `mixed`)."""
 
-    first: Layer
-    second: Layer
+    before: Layer
+    layer: Layer
     share: NDArray[np.float32]
 
     @property
     def shape(self) -> tuple[int, ...]:
         """(H, W, C)."""
-        return self.first.light.shape
+        return self.before.light.shape
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
-        alpha, alpha_too = self.first.alpha[part], self.second.alpha[part]
-        shows, both = alpha > 0, (alpha > 0) & (alpha_too > 0)
-        light = self.first.light[part]
-        pixels = self.second.light[part].copy()
-        copied_where(shows, light, pixels)
+        layers = self.before, self.layer
+        alphas = [one.alpha[part] for one in layers]
+        shown, both = alphas[0] > 0, (alphas[0] > 0) & (alphas[1] > 0)
+        light = self.before.light[part]
+        pixels = self.layer.light[part].copy()
+        copied_where(shown, light, pixels)
         box = bounds(both)
         if box is not None:
             share = self.share[part][box]
-            weight, weight_too = share * alpha[box], (1 - share) * alpha_too[box]
-            total = np.maximum(weight + weight_too, np.float32(1e-12))
-            first, second = (for_each_channel(w / total, light.shape[2]) for w in (weight, weight_too))
-            mix = light[box] * first + self.second.light[part][box] * second
+            weights = share * alphas[0][box], (1 - share) * alphas[1][box]
+            total = np.maximum(weights[0] + weights[1], np.float32(1e-12))
+            shares = [for_each_channel(weight / total, light.shape[2]) for weight in weights]
+            mix = light[box] * shares[0] + self.layer.light[part][box] * shares[1]
             copied_where(both[box], mix, pixels[box])
         return pixels
 
 
-def cut_hard(reference: Layer, target: Layer, from_target: NDArray[np.bool_]) -> Layer:
-    """Each pixel from the picture that from_target (H, W) names, bit for bit; what one shows whole is not seen
-    through."""
-    return Layer(Cut(reference.light, target.light, from_target), np.maximum(reference.alpha, target.alpha))
+def cut_hard(before: Layer, layer: Layer, chosen: NDArray[np.bool_]) -> Layer:
+    """Each pixel bit for bit from the added layer where it is chosen (H, W), else as it was before; what one shows
+    whole is not seen through."""
+    return Layer(Cut(before.light, layer.light, chosen), np.maximum(before.alpha, layer.alpha))
 
 
 @dataclass(frozen=True, eq=False)
 class Cut(LazyImage):
-    """Light of the second where from_second (H, W) says so, else of the first."""
+    """Light of the added layer where it is chosen (H, W), else that of before."""
 
-    first: AnyImage
-    second: AnyImage
-    from_second: NDArray[np.bool_]
+    before: AnyImage
+    added: AnyImage
+    chosen: NDArray[np.bool_]
 
     @property
     def shape(self) -> tuple[int, ...]:
         """(H, W, C)."""
-        return self.first.shape
+        return self.before.shape
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
-        second = self.from_second[part]
-        box = bounds(second)
-        out = self.first[part]
+        chosen = self.chosen[part]
+        box = bounds(chosen)
+        out = self.before[part]
         if box is None:
             return out
         out = out.copy()
@@ -124,22 +128,22 @@ class Cut(LazyImage):
             slice(one.start + inner.start, one.start + inner.stop)
             for one, inner in zip(within(part, self.shape), box, strict=True)
         )
-        copied_where(second[box], self.second[rows, columns], out[box])
+        copied_where(chosen[box], self.added[rows, columns], out[box])
         return out
 
 
-def in_bands(reference: Layer, target: Layer, from_target: NDArray[np.bool_], overlap: Overlap | None) -> Layer:
+def in_bands(before: Layer, layer: Layer, chosen: NDArray[np.bool_], overlap: Overlap | None) -> Layer:
     """Cut hard along the seam, and the light of the two evened out across it (see `multiband`)."""
-    out = cut_hard(reference, target, from_target)
+    out = cut_hard(before, layer, chosen)
     bands = bands_for(out.alpha)
-    region = seam_region(from_target, out.alpha > 0, 4 << bands)
+    region = seam_region(chosen, out.alpha > 0, 4 << bands)
     if region is None or overlap is None:
         return out
     shown = out.alpha[region] > 0
     parts = [_on_region(values, overlap.box, region) for values in (overlap.difference, overlap.same)]
     del overlap  # as large as they are: the peak of memory is ahead
     same = parts.pop()
-    change = correction(parts.pop(), same, from_target[region], shown, bands)
+    change = correction(parts.pop(), same, chosen[region], shown, bands)
     touched = in_any_channel(change != 0) & shown
     return Layer(Evened(out.light, (region[0].start, region[1].start), touched, change), out.alpha)
 
@@ -160,18 +164,18 @@ class Evened(Retouched):
 
 
 def seam_region(
-    from_target: NDArray[np.bool_], shown: NDArray[np.bool_], margin: int
+    chosen: NDArray[np.bool_], shown: NDArray[np.bool_], margin: int
 ) -> tuple[slice, slice] | None:
-    """Rows and columns that hold all borders between the two pictures and a margin (px); None where there are none."""
-    borders = np.zeros(from_target.shape, bool)
-    for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        borders[first] |= (from_target[first] != from_target[second]) & shown[first] & shown[second]
+    """Rows and columns that hold all borders of what is chosen and a margin (px); None where there are none."""
+    borders = np.zeros(chosen.shape, bool)
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        borders[here] |= (chosen[here] != chosen[there]) & shown[here] & shown[there]
     box = bounds(borders)
     if box is None:
         return None
     rows, columns = (
         slice(max(0, part.start - margin), min(side, part.stop + 1 + margin))
-        for part, side in zip(box, from_target.shape, strict=True)
+        for part, side in zip(box, chosen.shape, strict=True)
     )
     return rows, columns
 

@@ -1,6 +1,7 @@
-"""Exposure and white balance: one gain per channel, in scene-linear light, that makes the target match the reference.
+"""Exposure and white balance: one gain per channel, in scene-linear light, that makes a picture match the panorama
+before it was added.
 
-The reference keeps its values. Measured on means over small blocks, which forgive an alignment that is a pixel off,
+That keeps its values. Measured on means over small blocks, which forgive an alignment that is a pixel off,
 and by a median, which forgives what moved.
 """
 
@@ -13,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import STRIP, Part, bounds
+from ..raster.arrays import Part, bounds
 from ..raster.lazy import AnyImage, LazyImage
+from ..raster.options import PARTS
 from ..system.threads import in_order
 
 BLOCK = 8
@@ -30,18 +32,18 @@ LARGEST = 16.0
 
 @dataclass(frozen=True)
 class Exposure:
-    """gain (C,): the target's light is multiplied by it; spread (C,): half of the blocks' own ratios lie within this
+    """gain (C,): a picture's light is multiplied by it; spread (C,): half of the blocks' own ratios lie within this
     share of it; blocks: how many it was measured on, 0 where it is unknown and 1."""
 
     gain: NDArray[np.float32]
     spread: NDArray[np.float32]
     blocks: int
 
-    def applied(self, target: Layer) -> Layer:
-        """The target's layer as the reference's camera would have exposed it."""
+    def applied(self, layer: Layer) -> Layer:
+        """A picture's layer as the reference's camera would have exposed it."""
         if (self.gain == 1).all():
-            return target
-        return Layer(Exposed(target.light, self.gain), target.alpha)
+            return layer
+        return Layer(Exposed(layer.light, self.gain), layer.alpha)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,25 +71,25 @@ def unchanged(channels: int) -> Exposure:
 
 
 def match_exposure(
-    reference: Layer, target: Layer, hidden: NDArray[np.bool_], floats: tuple[bool, bool]
+    before: Layer, layer: Layer, hidden: NDArray[np.bool_], floats: tuple[bool, bool]
 ) -> Exposure:
-    """The gain per channel from what both layers show of the same.
+    """The gain per channel from what the panorama before and the layer that is added show of the same.
 
-    hidden (H, W): where the target shows something else; floats: whether reference and target come from float pictures,
-    which do not clip.
+    hidden (H, W): where the layer shows something else; floats: whether the two come from float pictures, which do not
+    clip.
     """
-    channels = reference.light.shape[2]
-    shown = (reference.alpha > 1 - 1 / 255) & (target.alpha > 1 - 1 / 255) & ~hidden
+    channels = before.light.shape[2]
+    shown = (before.alpha > 1 - 1 / 255) & (layer.alpha > 1 - 1 / 255) & ~hidden
     box = bounds(shown)
     if box is None:
         return unchanged(channels)
     # whole blocks of the canvas
     rows, columns = (slice(part.start - part.start % BLOCK, part.stop + -part.stop % BLOCK) for part in box)
-    at_once = BLOCK * max(1, STRIP // (BLOCK * (columns.stop - columns.start)))
+    at_once = BLOCK * max(1, PARTS.strip_pixels // (BLOCK * (columns.stop - columns.start)))
 
     def means_of(top: int) -> list[NDArray[np.float64]]:
         part = slice(top, min(rows.stop, top + at_once)), columns
-        pixels, counts = [layer.light[part] for layer in (reference, target)], shown[part]
+        pixels, counts = [one.light[part] for one in (before, layer)], shown[part]
         for light, unclipped in zip(pixels, floats, strict=True):
             if not unclipped:
                 for k in range(channels):
@@ -95,13 +97,13 @@ def match_exposure(
         return [_block_means(light, counts) for light in pixels]
 
     parts = list(in_order(means_of, range(rows.start, rows.stop, at_once)))
-    means, means_too = (np.concatenate(one) for one in zip(*parts, strict=True))
-    bright = _bright(means) & _bright(means_too)
+    means_before, means = (np.concatenate(one) for one in zip(*parts, strict=True))
+    bright = _bright(means_before) & _bright(means)
     if bright.sum() < LEAST_BLOCKS:
         return unchanged(channels)
-    ratios = np.log(means[bright]) - np.log(means_too[bright])
+    ratios = np.log(means_before[bright]) - np.log(means[bright])
     # what the eye would weigh: errors in tones, which grow about as the root of light
-    weights = np.sqrt(means[bright].mean(axis=1))
+    weights = np.sqrt(means_before[bright].mean(axis=1))
     middle = np.array([_weighted_median(ratios[:, k], weights) for k in range(channels)])
     spread = np.median(np.abs(ratios - middle), axis=0)
     if np.abs(middle).max() > np.log(LARGEST):

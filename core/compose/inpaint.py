@@ -1,4 +1,4 @@
-"""Filling what neither camera saw, where that is asked for: smoothly, from what lies behind; no detail is made up."""
+"""Filling what no camera saw, where that is asked for: smoothly, from what lies behind; no detail is made up."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from ..raster.pull_push import filled
 REACH, NEAR = 12, 1e-3
 
 
-def holes_of(hidden: NDArray[np.bool_], reference: Layer, target: Layer) -> NDArray[np.bool_]:
-    """Where (H, W) neither camera saw anything: what is hidden (H, W) from the target's, and the reference's did not
-    look there."""
-    return hidden & (reference.alpha == 0) & (target.alpha > 0)
+def holes_of(hidden: NDArray[np.bool_], before: Layer, layer: Layer) -> NDArray[np.bool_]:
+    """Where (H, W) no camera saw anything: what is hidden (H, W) from that of the picture that is added, where the
+    panorama before shows nothing."""
+    return hidden & (before.alpha == 0) & (layer.alpha > 0)
 
 
 def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage) -> Layer:

@@ -1,9 +1,9 @@
 """What moved between the two pictures, people above all, and at whose time it is to be seen.
 
 Things that moved look different though all round them the pictures agree, and are wider than what parallax could hide
-there. A panorama shows the reference's time on one side and the target's on the other. Nearer to what the target alone
-shows a thing belongs to the target's time, and else to the reference's: so nobody is cut in two, nor seen twice by
-walking over the seam, unless he walked past the middle of the overlap.
+there. A panorama shows the time of one picture on one side and of the other on the other. Nearer to what the added
+picture alone shows a thing belongs to its time, and else to that of the panorama before: so nobody is cut in two, nor
+seen twice by walking over the seam, unless he walked past the middle of the overlap.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..panorama.warp import Warp
-from ..raster.distance import distance_inside
+from ..raster.distance import distance_inside, distance_to_border
+from ..raster.picture_map import PictureMap
 from .overlap import Overlap
 
 # It is looked for at so many px across the overlap at most: whatever is narrower than THIN of them is none.
@@ -30,10 +30,11 @@ LARGEST = 0.25
 
 
 def times(
-    overlap: Overlap, warp: Warp, reference: Layer, target: Layer, hidden: NDArray[np.bool_]
+    overlap: Overlap, picture_map: PictureMap, before: Layer, layer: Layer, hidden: NDArray[np.bool_]
 ) -> NDArray[np.int8]:
-    """Of what moved, at whose time it is to be seen (h, w), in the overlap's box: -1 at the reference's, 1 at the
-    target's; 0 where nothing moved. hidden (H, W): what the target cannot see."""
+    """Of what moved, at whose time it is to be seen (h, w), in the overlap's box: -1 at that of the panorama before, 1
+    at that of the picture that is added; 0 where nothing moved. picture_map: the added picture's; hidden (H, W): what
+    it cannot see."""
     rows, columns = overlap.box
     step = -(-max(overlap.both.shape) // ACROSS)
     size = tuple(-(-side // step) for side in overlap.both.shape[::-1])
@@ -52,9 +53,9 @@ def times(
         cv2.morphologyEx(things, cv2.MORPH_CLOSE, np.ones((ROUND, ROUND), np.uint8)), connectivity=8
     )
     here = np.s_[rows.start : rows.stop : step, columns.start : columns.stop : step]
-    moves = [values[here] for values in (warp.map_x, warp.map_y)]
-    shows, shows_too = reference.alpha[::step, ::step] > 0, target.alpha[::step, ::step] > 0
-    reach = [distance_inside(~alone) for alone in (shows & ~shows_too, shows_too & ~shows)]
+    moves = [values[here] for values in (picture_map.x, picture_map.y)]
+    shows_before, shows = before.alpha[::step, ::step] > 0, layer.alpha[::step, ::step] > 0
+    reach = [distance_inside(~alone) for alone in (shows_before & ~shows, shows & ~shows_before)]
     near = [_in_box(values, (rows.start // step, columns.start // step), size) for values in reach]
 
     out = np.zeros(labels.shape, np.int8)
@@ -66,8 +67,8 @@ def times(
         thing = labels[part] == label
         if _moving(thing, both[part], same[part], [values[part] for values in moves], step):
             whole = cv2.dilate(thing.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-            far, far_too = (float(np.median(values[part][thing])) for values in near)
-            out[part][whole & both[part]] = 1 if far_too < far else -1
+            far_before, far = (float(np.median(values[part][thing])) for values in near)
+            out[part][whole & both[part]] = 1 if far < far_before else -1
     return cv2.resize(out, overlap.both.shape[::-1], interpolation=cv2.INTER_NEAREST) * overlap.both
 
 
@@ -87,8 +88,7 @@ def _moving(
         return False
     left_over = targets - places @ np.linalg.lstsq(places, targets, rcond=None)[0]
     parallax = np.hypot(*np.ptp(left_over, axis=0)) / step
-    inner = np.pad(thing, 1).astype(np.uint8)
-    across = 2 * float(cv2.distanceTransform(inner, cv2.DIST_L2, cv2.DIST_MASK_5).max())
+    across = 2 * float(distance_to_border(thing).max())
     return across > WIDER * parallax
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import strips
-from ..raster.pull_push import _down, _filled, _up, _weights
+from ..raster.pull_push import expanded, pulled, pulled_weights, push, reduced
 from ..system.threads import each
 
 Plane: TypeAlias = NDArray[np.float32]
@@ -33,32 +33,32 @@ def bands_for(canvas: NDArray) -> int:
 
 
 def correction(
-    difference: NDArray[np.float32], same: NDArray[np.bool_], from_target: NDArray[np.bool_],
+    difference: NDArray[np.float32], same: NDArray[np.bool_], chosen: NDArray[np.bool_],
     shown: NDArray[np.bool_], bands: int,
 ) -> NDArray[np.float32]:
     """What is to be added to the tones (h, w, C) of pictures cut hard along a seam, so that they blend.
 
-    difference (h, w, C): target's tones less the reference's, where `same`; from_target (h, w): which side of the seam
-    a pixel lies on, where anything is `shown`. The difference is written over.
+    difference (h, w, C): tones of the added layer less those of before, where `same`; chosen (h, w): what comes from
+    the added layer, where anything is `shown`. The difference is written over.
     """
     # one channel after the other: all at once would be the peak of a stitch's memory
     channels = range(difference.shape[2])
-    weights = _weights(same.astype(np.float32))
+    weights = pulled_weights(same.astype(np.float32))
     for k in channels:
         # on the far side of the seam: what the picture of this side would show there, had it the other's light
-        difference[..., k] = _filled(difference[..., k] * weights[0], weights)
+        difference[..., k] = push(pulled(difference[..., k] * weights[0], weights), weights)
     del weights
     # a pixel's width to either side, or else the finest band is cut with a pair of scissors
-    share = cv2.blur(_from_nearest(from_target, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
+    share = cv2.blur(_from_nearest(chosen, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
     shares = [share]
     while len(shares) <= bands and min(shares[-1].shape) > 2:
-        shares.append(_down(shares[-1]))
+        shares.append(reduced(shares[-1]))
     for k in channels:
         light = np.ascontiguousarray(difference[..., k])
         blended = _masked_bands(light, shares)
 
         def put(rows: slice, light: Plane = light, blended: Plane = blended, k: int = k) -> None:
-            change, whole, over = blended[rows], light[rows], from_target[rows]
+            change, whole, over = blended[rows], light[rows], chosen[rows]
             change -= over * whole
             # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
             whole = np.where(over, -whole, whole)
@@ -88,9 +88,9 @@ def _masked_bands(light: Plane, shares: list[Plane]) -> Plane:
     share, *smoother = shares
     if not smoother:
         return light * share
-    coarser = _down(light)
-    band = _up(coarser, light.shape)
+    coarser = reduced(light)
+    band = expanded(coarser, light.shape)
     np.subtract(light, band, out=band)
     band *= share
-    band += _up(_masked_bands(coarser, smoother), light.shape)
+    band += expanded(_masked_bands(coarser, smoother), light.shape)
     return band

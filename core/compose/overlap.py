@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from ..panorama.layers import Layer
 from ..raster.arrays import beside, bounds, shown_only, strips
 from ..raster.log_encoding import log_encode
+from ..raster.robust import NORMAL_MEDIAN
 from ..system.threads import each
 
 WHOLE = 1 - 1 / 255
 # Tones that differ by more than the pictures' general difference and this show different things.
 SAME_TONE, SAME_SIGMAS = 0.06, 4.0
-# Pixels around what the target cannot see in which its edge may still lie.
+# Pixels around what the added picture cannot see in which its edge may still lie.
 EDGE = 3
 SAMPLES = 100_000
 
@@ -25,9 +26,9 @@ SAMPLES = 100_000
 class Overlap:
     """The part of the canvas in which both layers show something.
 
-    box: rows and columns of the canvas; both (h, w): where both show something; difference (h, w, C) float32: target's
-    tones less the reference's, 0 elsewhere; same (h, w): where they also show the same thing, so that what remains of
-    the difference is light, which may be blended, and not content, which must not.
+    box: rows and columns of the canvas; both (h, w): where both show something; difference (h, w, C) float32: the added
+    picture's tones less those of the panorama before, 0 elsewhere; same (h, w): where they also show the same thing, so
+    that what remains of the difference is light, which may be blended, and not content, which must not.
     """
 
     box: tuple[slice, slice]
@@ -36,20 +37,20 @@ class Overlap:
     same: NDArray[np.bool_]
 
 
-def overlap_of(reference: Layer, target: Layer, hidden: NDArray[np.bool_]) -> Overlap | None:
-    """The overlap of two layers on one canvas; None where they do not meet. hidden (H, W): what the target cannot
-    see."""
-    both = (reference.alpha > 0) & (target.alpha > 0)
+def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overlap | None:
+    """The overlap of the panorama before and a layer that is added; None where they do not meet. hidden (H, W): what
+    the added picture cannot see."""
+    both = (before.alpha > 0) & (layer.alpha > 0)
     box = bounds(both)
     if box is None:
         return None
     both = both[box]
-    difference = np.empty((*both.shape, reference.light.shape[2]), np.float32)
+    difference = np.empty((*both.shape, before.light.shape[2]), np.float32)
 
     def put(rows: slice) -> None:
         part = slice(box[0].start + rows.start, box[0].start + rows.stop), box[1]
-        tones = log_encode(target.light[part])
-        tones -= log_encode(reference.light[part])
+        tones = log_encode(layer.light[part])
+        tones -= log_encode(before.light[part])
         difference[rows] = shown_only(tones, both[rows])
 
     each(put, strips(difference.shape))
@@ -65,7 +66,7 @@ def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray
         return shown
     sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // SAMPLES)]]
     middle = np.median(sample, axis=0)
-    sigma = 1.4826 * np.median(np.abs(sample - middle), axis=0)
+    sigma = np.median(np.abs(sample - middle), axis=0) / NORMAL_MEDIAN
     most = np.maximum(SAME_SIGMAS * sigma, SAME_TONE)
     alike = np.empty(shown.shape, bool)
 

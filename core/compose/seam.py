@@ -1,8 +1,8 @@
 """Which picture each pixel comes from: a minimal cut through the overlap, coarse first, then finer and finer in a band.
 
 The cut goes where the two pictures look alike, in tones and in their gradients, and keeps away from edges of depth,
-from what the target cannot see and from where the warp is uncertain. Its cost is bounded: the coarse cut has so many
-cells at any picture size, and each finer one only looks at a narrow band around what is there.
+from what the added picture cannot see and from where the warp is uncertain. Its cost is bounded: the coarse cut has so
+many cells at any picture size, and each finer one only looks at a narrow band around what is there.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..panorama.warp import Warp
 from ..raster.arrays import beside, bounds, strips, with_margin
 from ..raster.distance import distance_to_border
 from ..raster.lazy import AnyImage, Placed
+from ..raster.picture_map import PictureMap
 from ..system.threads import each, in_order
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
 from .overlap import SAME_TONE, WHOLE, Overlap
@@ -26,51 +26,58 @@ from .overlap import SAME_TONE, WHOLE, Overlap
 COARSE, BANDED = 12_000, 80_000
 # Half the width of the band, in pixels of its level.
 BAND = 3
-# A reference with less than this share of it to itself is held at its core: so far from its border (1: the middle).
+# If less than the first share of what was there before is unshared, what lies deeper than the second share of its
+# largest distance to the border stays.
 SURROUNDED, CORE = 0.1, 0.2
 # Price (of 1, for opposite tones) of length alone; what differs costs twice as much at a step in depth by a pixel of
 # parallax, and where the warp is not sure at all: a sky without a depth is as good a place as any to cut through.
 LENGTH = 0.004
-# Price of the target where both could be shown, by how far across the overlap it comes (1: from corner to corner): the
-# reference is exact, the target is fetched by an uncertain map. Dearer, and the seam keeps to the reference's border.
+# Price of the added picture where both could be shown, by how far across the overlap it comes (1: from corner to
+# corner): the reference is exact, the others are fetched by uncertain maps. Dearer, and the seam keeps to its border.
 WARPED = 0.1
-# Price of a pixel of what the target cannot see, for opposite tones: thinner than about eight, its border costs more.
+# Price of a pixel of what the added picture cannot see, for opposite tones: thinner than about eight, its border costs
+# more.
 GHOST = 0.5
 
 
 def known_labels(
-    reference: Layer, target: Layer, hidden: NDArray[np.bool_], painted: NDArray[np.int8] | None = None
+    before: Layer, layer: Layer, hidden: NDArray[np.bool_], painted: NDArray[np.int8] | None = None
 ) -> NDArray[np.int8]:
-    """What is settled before any seam (H, W): FIRST from the reference, SECOND from the target, FREE, NOWHERE.
+    """What is settled before any seam (H, W): FIRST from the panorama before, SECOND from the picture that is added,
+    FREE, NOWHERE.
 
-    What only one shows whole comes from it, what is hidden from the target from the reference where that shows it.
-    painted (H, W): -1 and 1 where the artist has decided, 0 elsewhere; it wins wherever the picture shows something.
+    What only one shows whole comes from it, what is hidden from the added picture from the panorama before where that
+    shows it. painted (H, W): -1 and 1 where the artist has decided, 0 elsewhere; it wins wherever the layer shows
+    something.
     """
-    known = np.full(reference.alpha.shape, NOWHERE, np.int8)
+    known = np.full(before.alpha.shape, NOWHERE, np.int8)
 
     def put(rows: slice) -> tuple[int, int]:
-        out, unseen, alpha, alpha_too = known[rows], hidden[rows], reference.alpha[rows], target.alpha[rows]
-        shows, shows_too = alpha > 0, alpha_too > 0
-        out[shows & shows_too] = FREE
+        out, unseen = known[rows], hidden[rows]
+        (shows_before, whole_before), (shows, whole) = (
+            (one.alpha[rows] > 0, one.alpha[rows] >= WHOLE) for one in (before, layer)
+        )
+        out[shows_before & shows] = FREE
         # a soft edge of one gives way to what the other shows whole
-        whole, whole_too = alpha >= WHOLE, alpha_too >= WHOLE
-        out[shows & (~shows_too | unseen | (whole & ~whole_too))] = FIRST
-        out[shows_too & (~shows | (whole_too & ~whole & ~unseen))] = SECOND
-        return int(shows.sum()), int((shows & ~shows_too).sum())
+        out[shows_before & (~shows | unseen | (whole_before & ~whole))] = FIRST
+        out[shows & (~shows_before | (whole & ~whole_before & ~unseen))] = SECOND
+        return int(shows_before.sum()), int((shows_before & ~shows).sum())
 
     shown, alone = np.sum(list(in_order(put, strips(known.shape))), axis=0).tolist()
     if shown and alone < SURROUNDED * shown:
-        # all round it is the target: the cheapest cut would leave nothing of the reference
-        inner = distance_to_border(reference.alpha > 0)
+        # all round it is the added picture: the cheapest cut would leave nothing of what was there before
+        inner = distance_to_border(before.alpha > 0)
         known[(known == FREE) & (inner > CORE * inner.max())] = FIRST
     if painted is not None:
-        known[(painted < 0) & (reference.alpha > 0)] = FIRST
-        known[(painted > 0) & (target.alpha > 0)] = SECOND
+        known[(painted < 0) & (before.alpha > 0)] = FIRST
+        known[(painted > 0) & (layer.alpha > 0)] = SECOND
     return known
 
 
-def seam_cost(overlap: Overlap, warp: Warp) -> NDArray[np.float32]:
+def seam_cost(overlap: Overlap, picture_map: PictureMap, confidence: AnyImage | None) -> NDArray[np.float32]:
     """What a seam costs at each pixel of the overlap's box (h, w), in [0, 1].
+
+    picture_map: of the picture that is added; confidence (H, W): of dense refinement, None without it.
 
     A difference so small that blending evens it out costs as its square, a larger one as it is: rather a longer way
     where nobody sees it than a short one through what moved.
@@ -80,22 +87,24 @@ def seam_cost(overlap: Overlap, warp: Warp) -> NDArray[np.float32]:
     def put(rows: slice) -> None:
         near, here = beside(rows, 1, len(cost))
         box = slice(overlap.box[0].start + near.start, overlap.box[0].start + near.stop), overlap.box[1]
-        cost[rows] = _cost(overlap.difference[near], warp, box)[here]
+        cost[rows] = _cost(overlap.difference[near], picture_map, confidence, box)[here]
 
     each(put, strips(cost.shape))
     return cost
 
 
-def _cost(difference: NDArray[np.float32], warp: Warp, box: tuple[slice, slice]) -> NDArray[np.float32]:
+def _cost(
+    difference: NDArray[np.float32], picture_map: PictureMap, confidence: AnyImage | None, box: tuple[slice, slice]
+) -> NDArray[np.float32]:
     """What a seam costs at the pixels of a box of the canvas, by the difference (h, w, C) there."""
     away = _mean(np.abs(difference))
     warned = np.ones(away.shape, np.float32)
     for axis in (0, 1):
         step = _mean(np.abs(np.diff(difference, axis=axis)))
         away += np.maximum(_padded(step, axis, 0, 1), _padded(step, axis, 1, 0))
-        warned += np.minimum(_jumps(warp, box, axis), np.float32(1))
-    if warp.lazy_confidence is not None:
-        warned += 1 - warp.lazy_confidence[box]
+        warned += np.minimum(_jumps(picture_map, box, axis), np.float32(1))
+    if confidence is not None:
+        warned += 1 - confidence[box]
     cost = away * away
     cost /= away + np.float32(SAME_TONE)
     cost *= warned
@@ -111,9 +120,9 @@ def _mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return total / np.float32(values.shape[2])
 
 
-def _jumps(warp: Warp, box: tuple[slice, slice], axis: int) -> NDArray[np.float32]:
+def _jumps(picture_map: PictureMap, box: tuple[slice, slice], axis: int) -> NDArray[np.float32]:
     """By how many px the map's step to the next pixel differs from the step before: at edges of depth."""
-    bends = [np.diff(values[box], n=2, axis=axis) for values in (warp.map_x, warp.map_y)]
+    bends = [np.diff(values[box], n=2, axis=axis) for values in (picture_map.x, picture_map.y)]
     return _padded(np.nan_to_num(np.hypot(*bends), nan=0.0), axis, 1, 1)
 
 
@@ -121,13 +130,14 @@ def _padded(values: NDArray[np.float32], axis: int, before: int, after: int) -> 
     return np.pad(values, [(before, after) if k == axis else (0, 0) for k in range(2)])
 
 
-def target_price(
+def added_price(
     overlap: Overlap, hidden: NDArray[np.bool_], times: NDArray[np.int8] | None = None
 ) -> NDArray[np.float32]:
-    """What each pixel of the overlap's box (h, w) costs if it comes from the target; less than nothing: if it does not.
+    """What each pixel of the overlap's box (h, w) costs if it comes from the picture that is added; less than nothing:
+    if it does not.
 
-    hidden (H, W): what the target cannot see costs by how different it looks, and so does what moved if it is not seen
-    at its own time, times (h, w): see `moving_things.times`.
+    hidden (H, W): what that picture cannot see costs by how different it looks, and so does what moved if it is not
+    seen at its own time, times (h, w): see `moving_things.times`.
     """
     misplaced = hidden[overlap.box].astype(np.int8)
     if times is not None:
@@ -142,9 +152,9 @@ def target_price(
 def find_seam(
     known: NDArray[np.int8], cost: NDArray[np.float32], price: NDArray[np.float32], box: tuple[slice, slice]
 ) -> NDArray[np.bool_]:
-    """Where (H, W) the panorama comes from the target, by the cheapest seam.
+    """Where (H, W) the panorama comes from the picture that is added, by the cheapest seam.
 
-    known (H, W): see `known_labels`; cost and price (h, w): of a seam and of the target, in the overlap's box of rows
+    known (H, W): see `known_labels`; cost and price (h, w): of a seam and of that picture, in the overlap's box of rows
     and columns.
     """
     out = known == SECOND

@@ -10,22 +10,22 @@ from numpy.typing import NDArray
 
 from ..panorama.canvas import Canvas
 from ..panorama.layers import Layer
-from ..panorama.warp import Warp
 from ..raster.arrays import Part, within
 from ..raster.lazy import AnyImage, LazyImage
+from ..raster.picture_map import PictureMap
 
 
-def roll_for(canvas: Canvas, reference: Layer, target: Layer) -> int:
+def roll_for(canvas: Canvas, before: Layer, layer: Layer) -> int:
     """By how many columns to the left a canvas that goes all round is rolled before it is composed; 0: it ends already
     where nothing is shown, or does not go round.
 
-    It ends in the middle of the widest gap: where neither picture shows anything, else (round a pole) where the two
-    have least in common.
+    It ends in the middle of the widest gap: where neither the panorama before nor the picture that is added shows
+    anything, else (round a pole) where the two have least in common.
     """
     if canvas.projection is None or canvas.projection.sphere is None or canvas.width < canvas.whole[2]:
         return 0
-    shows, shows_too = reference.alpha > 0, target.alpha > 0
-    crowd = (shows & shows_too).sum(axis=0) * (canvas.height + 1) + (shows | shows_too).sum(axis=0)
+    shown = [one.alpha > 0 for one in (before, layer)]
+    crowd = np.logical_and(*shown).sum(axis=0) * (canvas.height + 1) + np.logical_or(*shown).sum(axis=0)
     if crowd[0] == crowd[-1] == 0:
         return 0
     # the longest run of the least, round the end
@@ -49,13 +49,9 @@ def rolled_layer(layer: Layer, columns: int) -> Layer:
     return Layer(WrappedImage(layer.light, columns % layer.alpha.shape[1]), rolled(layer.alpha, columns))
 
 
-def rolled_maps(warp: Warp, columns: int) -> Warp:
-    """A warp with its values rolled. Its canvas is not: that still says what is seen where before."""
-    if not columns:
-        return warp
-    map_x, map_y, inverse_depth = (rolled(values, columns) for values in (warp.map_x, warp.map_y, warp.inverse_depth))
-    confidence = None if warp.confidence is None else rolled(warp.confidence, columns)
-    return Warp(warp.canvas, map_x, map_y, inverse_depth, confidence)
+def rolled_map(picture_map: PictureMap, columns: int) -> PictureMap:
+    """The same of a map."""
+    return PictureMap(rolled(picture_map.x, columns), rolled(picture_map.y, columns), picture_map.size)
 
 
 @dataclass(frozen=True, eq=False)

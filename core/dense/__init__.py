@@ -1,4 +1,4 @@
 """From a field and two pictures to a refined inverse depth at every pixel of the overlap.
 
-May import system, raster, pictures, cameras, field and panorama.
+Method: docs/method.md, 5. May import system, raster, pictures, cameras and field.
 """

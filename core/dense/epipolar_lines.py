@@ -1,11 +1,13 @@
-"""Where points of the reference are seen in the target by the fitted field, and where a move along their epipolar
-lines takes them: what dense refinement works on.
+"""Nodes of the reference, their target pixels by the fitted field, and moves along their epipolar lines from there.
+
+Dense refinement works on these. Inverse depth d and moves in px are related by `EpipolarLines.depth_per_px`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,32 +15,35 @@ from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
 from ..cameras.lens import distort, undistort
+from ..cameras.projective import ahead_of_camera
 from ..cameras.two_view import TwoView
 from ..field.field import Field
 from ..field.transfer import target_points
 from ..raster.arrays import Array, Box, Plane
 from ..raster.grid import Grid
+from ..raster.resizing import resized_points
 from ..system.threads import each
+from .options import LINES
 
 Places = NDArray[np.intp]
-# What is smooth is worked out at every so many-th row and column.
-EVERY = 2
-# Rows of nodes that are worked on at once.
-STRIP = 32
 
 
 def coarse_places(shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """Columns and rows of the middles of cells of EVERY × EVERY pixels (of so many rows and columns), with a cell
-    around them."""
-    rows, columns = ((np.arange(-1, -(-count // EVERY) + 1) + 0.5) * EVERY - 0.5 for count in shape[:2])
+    """x and y of the centres of cells of `coarse_step` px a side, over a picture of `shape` (rows, columns) and one
+    cell around it, in its pixels."""
+    step = LINES.coarse_step
+    rows, columns = ((np.arange(-1, -(-count // step) + 1) + 0.5) * step - 0.5 for count in shape[:2])
     return columns, rows
 
 
 def in_between(shape: tuple[int, ...], coarse: Array) -> list[Plane]:
-    """The planes (rows, columns) of a smooth function known (m, n, k) at `coarse_places`, linear between them. NaN
-    spreads by a cell."""
-    size = EVERY * coarse.shape[1], EVERY * coarse.shape[0]
-    part = slice(EVERY, EVERY + shape[0]), slice(EVERY, EVERY + shape[1])
+    """k planes (rows, columns), bilinear between the values (m, n, k) of a smooth function at `coarse_places`.
+
+    NaN spreads by one cell.
+    """
+    step = LINES.coarse_step
+    size = step * coarse.shape[1], step * coarse.shape[0]
+    part = slice(step, step + shape[0]), slice(step, step + shape[1])
     return [
         cv2.resize(coarse[..., k].astype(np.float32), size, interpolation=cv2.INTER_LINEAR)[part]
         for k in range(coarse.shape[-1])
@@ -47,8 +52,10 @@ def in_between(shape: tuple[int, ...], coarse: Array) -> list[Plane]:
 
 @dataclass(frozen=True)
 class SparseMap:
-    """A field on every `step`th raw pixel of a box around the reference, which starts at pixel `start` (x, y):
-    inverse_depth (h, w), shift (h, w, 2) px, None where there is none."""
+    """A field on every `step`th raw pixel of a box around the reference.
+
+    start (x, y): the first pixel; inverse_depth (h, w); shift (h, w, 2) target px, None if the field has none.
+    """
 
     two_view: TwoView
     camera: Camera
@@ -62,7 +69,7 @@ class SparseMap:
     def over_reference(
         field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera, margin: int, step: int = 1
     ) -> SparseMap:
-        """The field on the reference and a margin (px) around it."""
+        """The field on the reference and `margin` px around it, on every `step`th pixel."""
         width, height = camera.size
         box = (-margin, -margin, width + 2 * margin, height + 2 * margin)
         grid = Grid.over(*box)
@@ -74,15 +81,15 @@ class SparseMap:
         return SparseMap(two_view, camera, camera_prime, box[:2], step, inverse_depth, shift)
 
     def smoothed(self, sigma: float, plane: Array) -> SparseMap:
-        """The field without bends finer than sigma px; plane m (3,): its affine part, which stays."""
+        """The field without details of d finer than about sigma px; plane m (3,): the affine part of d, which stays."""
         if sigma < 1:
             return self
         height, width = self.inverse_depth.shape
         small = max(8, round(8 * width * self.step / sigma)), max(8, round(8 * height * self.step / sigma))
 
         def affine(columns: int, rows: int) -> tuple[Plane, Plane]:
-            """By x and by y, at the middles of so many cells."""
-            xs, ys = ((np.arange(n) + 0.5) * (all_of / n) - 0.5 for n, all_of in ((columns, width), (rows, height)))
+            """m·p as a part (columns,) by x and a part (rows, 1) by y, at the centres of cells over the map."""
+            xs, ys = (resized_points(np.arange(n), n, all_of) for n, all_of in ((columns, width), (rows, height)))
             xs, ys = xs * self.step + self.start[0], ys * self.step + self.start[1]
             return (plane[0] * xs + plane[2]).astype(np.float32), (plane[1] * ys).astype(np.float32)[:, None]
 
@@ -96,12 +103,11 @@ class SparseMap:
         return replace(self, inverse_depth=bend)
 
     def at(self, raw: Array) -> tuple[Plane, Plane]:
-        """Inverse depth (…) and shift (…, 2) at raw points (rows, columns, 2), between pixels by linear
-        interpolation."""
+        """Inverse depth (…) and shift (…, 2), bilinear, at raw points (rows, columns, 2) px."""
         return self.between(raw[..., 0], raw[..., 1])
 
-    def between(self, x: NDArray, y: NDArray) -> tuple[Plane, Plane]:
-        """The same at x and y (rows, columns)."""
+    def between(self, x: NDArray[Any], y: NDArray[Any]) -> tuple[Plane, Plane]:
+        """The same as `at` for x and y (rows, columns)."""
         x, y = (
             np.ascontiguousarray((at - start) / self.step, np.float32)
             for at, start in zip((x, y), self.start, strict=True)
@@ -112,7 +118,7 @@ class SparseMap:
         return inverse_depth, cv2.remap(self.shift, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
     def over(self, xs: Array, ys: Array) -> tuple[Plane, Plane]:
-        """The same where evenly spaced columns xs and lines ys of raw px cross."""
+        """The same where evenly spaced columns xs (W,) and rows ys (H,) of raw px cross."""
         places = [(at - start) / self.step for at, start in zip((xs, ys), self.start, strict=True)]
         sides = self.inverse_depth.shape[::-1]
         if all(_whole(at, side) for at, side in zip(places, sides, strict=True)):
@@ -124,7 +130,7 @@ class SparseMap:
         return self.between(x, y)
 
     def target(self, ideal: Array) -> Array:
-        """Ideal target pixels (…, 2), shift included, of ideal points (rows, columns, 2); NaN behind the target."""
+        """Ideal target px (…, 2), shift included, of ideal points (rows, columns, 2); NaN behind the target camera."""
         inverse_depth, shift = self.at(distort(ideal, self.camera))
         return target_points(self.two_view, ideal, inverse_depth.astype(np.float64)) + shift
 
@@ -133,9 +139,10 @@ class SparseMap:
 class EpipolarLines:
     """Nodes (h, w) of the reference, `step` raw px apart, each with its epipolar line in the target.
 
-    ideal (h, w, 2): where they are; inverse_depth: by the field; base (h, w, 2): where that is seen, without shift;
-    shift; depth_per_px (h, w): inverse depth that moves what is seen by one px; w_rate (h, w): by how much that changes
-    x'₃, relative; NaN where there is no line. All float32 but `ideal`.
+    ideal (h, w, 2): ideal px of the nodes, float64, the rest float32; inverse_depth (h, w): of the field; base
+    (h, w, 2): π(H_inf p + d e') at that d; shift (h, w, 2): px to be added; direction (h, w, 2): unit vector along the
+    line, towards larger d; depth_per_px (h, w): change of d that moves the target pixel by one px; w_rate (h, w): the
+    relative change of x'₃ with it. NaN behind the target camera.
     """
 
     box: Box | tuple[float, float, float, float]
@@ -151,7 +158,7 @@ class EpipolarLines:
 
     @staticmethod
     def over(sparse: SparseMap, box: Box | tuple[float, float, float, float], step: float) -> EpipolarLines:
-        """The lines of the pixels of a box (left, top, width, height), in cells of step × step."""
+        """The lines of the nodes at the centres of cells, step × step px, of a box (left, top, width, height) px."""
         rows, columns = max(1, round(box[3] / step)), max(1, round(box[2] / step))
         xs, ys = _middles(box, (rows, columns))
         ideal = np.empty((rows, columns, 2))
@@ -162,11 +169,11 @@ class EpipolarLines:
         base, direction = (np.moveaxis(np.empty((2, rows, columns), np.float32), 0, -1) for _ in range(2))
         H, e = sparse.two_view.H_inf, sparse.two_view.e_prime
 
-        def work_out(top: int) -> None:
-            part = slice(top, top + STRIP)
+        def fill_strip(top: int) -> None:
+            part = slice(top, top + LINES.strip_rows)
             u, v, d = ideal[part, :, 0], ideal[part, :, 1], inverse_depth[part].astype(np.float64)
             ray = [H[k, 0] * u + H[k, 1] * v + (H[k, 2] + e[k] * d) for k in range(3)]
-            ray[2][ray[2] <= 1e-6 * np.maximum(np.abs(ray[0]), np.abs(ray[1]))] = np.nan
+            ray[2][~ahead_of_camera(*ray)] = np.nan
             near = 1 / ray[2]
             x, y = ray[0] * near, ray[1] * near
             slope_x, slope_y = (e[0] - x * e[2]) * near, (e[1] - y * e[2]) * near
@@ -175,7 +182,7 @@ class EpipolarLines:
             direction[part, :, 0], direction[part, :, 1] = slope_x * per_px, slope_y * per_px
             depth_per_px[part], w_rate[part] = per_px, e[2] * near * per_px
 
-        each(work_out, range(0, rows, STRIP))
+        each(fill_strip, range(0, rows, LINES.strip_rows))
         return EpipolarLines(
             box, step, ideal, inverse_depth, base, shift, depth_per_px, direction, w_rate, sparse.camera_prime
         )  # fmt: skip
@@ -186,36 +193,35 @@ class EpipolarLines:
         return self.depth_per_px.shape[0], self.depth_per_px.shape[1]
 
     def at(self, field: SparseMap) -> Plane:
-        """Inverse depth (h, w) that a field has at the nodes."""
+        """Inverse depth (h, w) of a field at the nodes."""
         return field.over(*_middles(self.box, self.shape))[0]
 
     @property
     def nodes(self) -> tuple[Plane, Plane]:
-        """x and y (h, w) of the nodes, raw px of the reference."""
+        """x and y (h, w) of the nodes, raw reference px."""
         xs, ys = _middles(self.box, self.shape)
         x, y = np.meshgrid(xs.astype(np.float32), ys.astype(np.float32))
         return x, y
 
     @cached_property
     def _start(self) -> tuple[Plane, Plane]:
-        """x and y (h, w) of where nodes are seen that do not move."""
+        """x and y (h, w): ideal target px of nodes that are not moved."""
         return self.base[..., 0] + self.shift[..., 0], self.base[..., 1] + self.shift[..., 1]
 
     def target(
         self, along: Plane, across: Plane | None = None, part: slice | tuple[Places, Places] = slice(None)
     ) -> tuple[Plane, Plane]:
-        """Raw target pixels x, y (h, w) after a move of `along` px on the line, as at its start, and of `across` px to
-        its side; NaN behind the target. part: only of these rows, or of the nodes (n,) in these rows and
-        columns.
+        """Raw target px x, y (h, w) after moves (h, w) px along and across the lines; NaN behind the target camera.
 
-        A move t changes d by t · depth_per_px, and π runs through base + t direction / (1 + t w_rate).
+        A move t along a line changes d by t · depth_per_px and leads to base + t direction / (1 + t w_rate): t is in px
+        where the line starts. part: only these rows, or only the nodes (n,) with these row and column indices.
         """
         along = along[part]
-        share = along * self.w_rate[part]
-        share += 1
-        np.divide(along, share, out=share)
+        length = along * self.w_rate[part]
+        length += 1
+        np.divide(along, length, out=length)
         direction = self.direction[part]
-        x, y = direction[..., 0] * share, direction[..., 1] * share
+        x, y = direction[..., 0] * length, direction[..., 1] * length
         x += self._start[0][part]
         y += self._start[1][part]
         if across is not None:
@@ -227,12 +233,12 @@ class EpipolarLines:
         return x, y
 
     def along(self, px: Plane) -> Plane:
-        """The moves (h, w) that lead so many px along the lines: the inverse of `target`."""
+        """The moves (h, w) that lead px (h, w) pixels along the lines: the inverse of the map in `target`."""
         return px / (1 - px * self.w_rate)
 
 
 def _middles(box: Box | tuple[float, float, float, float], shape: tuple[int, int]) -> tuple[Array, Array]:
-    """x and y of the middles of so many (rows, columns) cells of a box (left, top, width, height)."""
+    """x and y of the centres of shape (rows, columns) cells that fill a box (left, top, width, height)."""
     left, top, width, height = box
     rows, columns = shape
     xs = left + (np.arange(columns) + 0.5) * (width / columns) - 0.5
@@ -240,6 +246,6 @@ def _middles(box: Box | tuple[float, float, float, float], shape: tuple[int, int
 
 
 def _whole(places: Array, count: int) -> bool:
-    """Whether places are one after the other of 0 … count − 1."""
+    """Whether places are consecutive integers within 0 … count − 1."""
     inside = 0 <= places[0] and places[-1] <= count - 1
     return bool(inside and np.array_equal(places, int(places[0]) + np.arange(places.size)))

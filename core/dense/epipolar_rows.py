@@ -1,8 +1,8 @@
-"""Rows along epipolar lines: the reference's plane resampled so that whatever moves with depth moves along a row.
+"""Polar rectification: the reference's plane resampled so that its epipolar lines are rows.
 
-Polar coordinates around the epipole (Pollefeys, Koch and Van Gool, ICCV 1999), of one picture only: the other one is
-first warped into the reference's plane, where both share their epipolar lines. It does for an epipole in the picture,
-beside it or far away what a rectifying homography does for the last alone.
+Polar coordinates around the epipole (Pollefeys, Koch and Van Gool, ICCV 1999), of the reference only: the target is
+warped into the reference's plane, where both have the same lines. Unlike a rectifying homography it works wherever the
+epipole lies: inside the picture, beside it or at infinity.
 """
 
 from __future__ import annotations
@@ -12,17 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..raster.arrays import Array
-
-# An epipole at infinity is set this many picture sides away: its lines then spread by a hundredth of a pixel.
-FAR = 1e6
+from .options import LINES
 
 
 @dataclass(frozen=True)
 class EpipolarRows:
-    """Row v, column u ↔ point p = c + r (cos θ, sin θ), r = r0 + u q, θ = θ0 + v q / r1; q px a step.
+    """Row v, column u ↔ point p = c + r (cos θ, sin θ) with r = r₀ + u q and θ = θ₀ + v q / r₁.
 
-    epipole c (2,) px of the reference's plane; start (r0, θ0); reach r1: the largest distance, where rows lie q px
-    apart; shape (rows, columns).
+    epipole: c (2,) px of the reference's plane; start: (r₀, θ₀); reach: r₁ px, the largest distance from the epipole,
+    at which rows are q px apart; step: q px; shape: (rows, columns).
     """
 
     epipole: Array
@@ -33,15 +31,15 @@ class EpipolarRows:
 
     @staticmethod
     def over(epipole: Array, box: Array, step: float, margin: float) -> EpipolarRows:
-        """Rows that cover a rectangle (left, top, right, bottom) px, with a margin (px) before and behind, along them.
+        """Rows that cover a rectangle (left, top, right, bottom) px, extended by `margin` px at either end.
 
-        epipole (3,): homogeneous, of the same plane.
+        epipole (3,): homogeneous, in the same plane.
         """
         low, high = box[:2], box[2:]
         middle, side = (low + high) / 2, float((high - low).max())
         away = epipole[:2] - epipole[2] * middle
-        if np.linalg.norm(away) >= abs(epipole[2]) * FAR * side:
-            centre = middle + FAR * side * away / np.linalg.norm(away)
+        if np.linalg.norm(away) >= abs(epipole[2]) * LINES.max_epipole_distance * side:
+            centre = middle + LINES.max_epipole_distance * side * away / np.linalg.norm(away)
         else:
             centre = epipole[:2] / epipole[2]
         u = np.linspace(0, 1, 65)
@@ -51,7 +49,7 @@ class EpipolarRows:
         first, last = max(float(r.min()) - margin, 0.0), reach + margin
         begin, end = float(theta.min()), float(theta.max())
         if ((centre >= low) & (centre <= high)).all():
-            # rows run once around and a little further: both ends need neighbours
+            # all the way around, and a little further: the first and the last row need neighbours
             first, begin, end = 0.0, -1.1 * np.pi, 1.1 * np.pi
         shape = int(np.ceil((end - begin) * reach / step)) + 1, int(np.ceil((last - first) / step)) + 1
         return EpipolarRows(centre, (first, turn + begin), reach, step, shape)
@@ -64,7 +62,8 @@ class EpipolarRows:
         """Points (…, 2) of columns u and rows v."""
         r = self.start[0] + self.step * u
         theta = self.start[1] + v * (self.step / self.reach)
-        return self.epipole + r[..., None] * np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+        result: Array = self.epipole + r[..., None] * np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+        return result
 
     def column_row(self, points: Array) -> tuple[Array, Array]:
         """u and v (…) of points (…, 2) px of the reference's plane."""

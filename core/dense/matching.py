@@ -1,13 +1,14 @@
-"""Where along their epipolar lines the pixels of the reference are found in the target: semi-global matching.
+"""Dense matching: where along their epipolar lines the pixels of the reference are found in the target.
 
-Both pictures are resampled so that epipolar lines are rows, the target by the sparse field: what is left is a small
-move along the rows. Matching: Hirschmüller, IEEE TPAMI 2008, as OpenCV has it.
+Both pictures are resampled so that epipolar lines are rows, the target through the sparse field, which leaves a small
+disparity along the rows. They are matched by semi-global matching (Hirschmüller, IEEE TPAMI 2008; OpenCV's).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,31 +19,18 @@ from ..cameras.matches import Matches
 from ..field.transfer import inverse_depths
 from ..raster.arrays import Array, Plane
 from ..system.threads import in_order
-from .epipolar_lines import EVERY, EpipolarLines, SparseMap, coarse_places, in_between
+from .epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
 from .epipolar_rows import EpipolarRows
-
-BLOCK, STEP_COST, JUMP_COST, UNIQUE = 3, 8, 48, 2
-# Costs (of a pixel at a place) that are held at once, four bytes each; more rows than that are matched band by band,
-# each with so many rows beside it.
-MOST_COSTS, NEIGHBOURS = 100_000_000, 32
-# How much more smoothly is matched at half the size what was not found at full size, and how much that counts.
-COARSE_SMOOTHER, COARSE_SHARE = 4, 0.1
-# A patch of fewer pixels (share of the rows' side, squared) than this is a speck.
-SPECK, SPECK_RANGE = 0.012, 2
-# Steps of a level in which the target is resampled before its tones are those of the reference.
-FINER = 32
-# Steps of the tone curve between the pictures.
-TONES = 64
-# Bends finer than this share of the picture's side are taken out of the field, the first that will do; how far all
-# but the furthest matches lie from it (percentile), and how much further is looked.
-BENDS = (0.2, 0.1, 0.05, 0.025, 0.0)
-FURTHEST, REACH, MORE_PX = 99.5, 1.25, 8.0
+from .options import LINES, MATCHING
 
 
 @dataclass(frozen=True)
 class View:
-    """A picture to be matched: levels (h, w, C) uint8, shown (h, w) float32 0 or 1, None where all is; full (H, W, C)
-    uint8: what they are of."""
+    """A picture to be matched, perhaps shrunk.
+
+    levels (h, w, C) uint8; shown (h, w) float32: 1 where it shows something, else 0, None if it does everywhere; full
+    (H, W, C) uint8: before shrinking.
+    """
 
     levels: NDArray[np.uint8]
     shown: Plane | None
@@ -50,7 +38,7 @@ class View:
 
     @staticmethod
     def of(view: NDArray[np.uint8], alpha: Plane | None, step: float) -> View:
-        """An 8-bit picture (H, W, C) with `step` px to each of its own."""
+        """An 8-bit picture (H, W, C), shrunk by `step` ≥ 1; alpha (H, W) 0 where it shows nothing."""
         shown = None if alpha is None else (alpha > 0).astype(np.float32)
         if step <= 1:
             return View(view, shown, view)
@@ -67,7 +55,7 @@ class View:
 
     @cached_property
     def gray(self) -> Plane:
-        """(h, w) float32, means of gray levels that are not rounded."""
+        """Gray levels (h, w) float32, averaged without rounding."""
         full, (height, width) = self.full, self.levels.shape[:2]
         gray = (cv2.cvtColor(full, cv2.COLOR_RGB2GRAY) if full.shape[2] == 3 else full[..., 0]).astype(np.float32)
         return (
@@ -75,10 +63,10 @@ class View:
         )
 
     def sample(
-        self, picture: NDArray, x: NDArray, y: NDArray, interpolation: int = cv2.INTER_LINEAR
-    ) -> tuple[NDArray, NDArray[np.bool_]]:
-        """A picture of the same shape (h, w[, C]) as `levels` at full px (…), and where (…) that lies on what is
-        shown."""
+        self, picture: NDArray[Any], x: NDArray[Any], y: NDArray[Any], interpolation: int = cv2.INTER_LINEAR
+    ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Values (…) of a picture (h, w[, C]), as large as `levels`, at px x, y (…) of the full picture, and the mask
+        (…) of points at which something is shown."""
         height, width = self.levels.shape[:2]
         x, y = (
             np.multiply(at + np.float32(0.5), np.float32(few / many), dtype=np.float32) - np.float32(0.5)
@@ -96,7 +84,7 @@ class View:
     def at_nodes(
         self, picture: NDArray[np.float32], lines: EpipolarLines
     ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        """The same at the nodes, of the reference."""
+        """The same at the nodes, where this is the reference."""
         left, top, width, height = lines.box
         if (width, height) != lines.shape[::-1] or self.levels.shape != self.full.shape:
             return self.sample(picture, *lines.nodes)
@@ -106,19 +94,20 @@ class View:
 
 
 def search_base(sparse: SparseMap, matches: Matches, plane: Array, most: float) -> tuple[SparseMap, float]:
-    """The field as it is searched around, and how many px along the lines a pixel may lie from it.
+    """The field to search around, and the px along the lines that a pixel may lie from it.
 
-    A spline that bends through every depth edge stretches the picture there, which is bad for matching: the field
-    without its finer bends is better, as long as what is left can be searched (`most` px).
-    matches: those that the field stands on; plane m (3,): its affine part.
+    A spline that bends at every depth edge stretches the picture there, which disturbs matching: the field is smoothed
+    as far as the rest stays within `most` px. matches: those that the field is fitted to; plane m (3,): its affine
+    part.
     """
     side = float(np.sqrt(np.prod(sparse.camera.size)))
     raw = distort(matches.x, sparse.camera)
     d, sensitivity = inverse_depths(sparse.two_view, matches.x, matches.y)
-    for share in BENDS:
+    for share in MATCHING.bend_sizes:
         base = sparse.smoothed(share * side, plane)
         at, _ = base.at(raw[None])
-        reach = REACH * float(np.percentile(np.abs((d - at[0]) * sensitivity), FURTHEST)) + MORE_PX
+        furthest = float(np.percentile(np.abs((d - at[0]) * sensitivity), MATCHING.reach_percentile))
+        reach = MATCHING.reach_factor * furthest + MATCHING.reach_margin_px
         if reach <= most:
             break
     return base, reach
@@ -127,57 +116,60 @@ def search_base(sparse: SparseMap, matches: Matches, plane: Array, most: float) 
 def search(
     lines: EpipolarLines, sparse: SparseMap, reference: View, target: View, step: float, reach: float
 ) -> tuple[Plane, Plane]:
-    """Moves (h, w) px along the lines to where the nodes are seen in the target, and how much (h, w) 0..1 each counts:
-    0 where nothing was found, 1 where it was at full size, COARSE_SHARE where only at half.
+    """Moves (h, w) px along the lines to where the nodes are found in the target, and confidences (h, w): 0 where
+    nothing was found, 1 where it was found at full size, little where only at half the size.
 
-    reference, target: views with `step` px to each of their own; reach: px a node may move.
+    sparse: the field to search around; reference, target: views shrunk by `step`; reach: largest move, full px.
     """
     left, top, width, height = lines.box
     box = np.array([left, top, left + width - 1, top + height - 1], float)
     epipole = np.linalg.svd(sparse.two_view.F)[2][2]
     count = 16 * max(1, int(np.ceil(2 * reach / step / 16)))
     rows = EpipolarRows.over(epipole, box, step, count * step)
-    alike = reference.levels.shape[2] == target.levels.shape[2]
-    own, other = (v.levels if alike else _levels(v.gray) for v in (reference, target))
-    finer = cv2.multiply(other, float(FINER), dtype=cv2.CV_16U)
+    both_colour = reference.levels.shape[2] == target.levels.shape[2]
+    reference_levels, target_levels = (v.levels if both_colour else _levels(v.gray) for v in (reference, target))
+    target_levels = cv2.multiply(target_levels, float(MATCHING.sublevels), dtype=cv2.CV_16U)
     points = rows.points(*coarse_places(rows.shape))
-    sent = sparse.target(points)
-    ways = ArcLengths.of(sparse.two_view.e_prime, sent, rows)
+    target_points = sparse.target(points)
+    arc_lengths = ArcLengths.of(sparse.two_view.e_prime, target_points, rows)
 
-    def of_reference() -> tuple[NDArray, NDArray[np.bool_]]:
+    def reference_rows() -> tuple[NDArray[Any], NDArray[np.bool_]]:
         x, y = in_between(rows.shape, distort(points, sparse.camera))
-        return reference.sample(own, x, y, cv2.INTER_CUBIC)
+        return reference.sample(reference_levels, x, y, cv2.INTER_CUBIC)
 
-    def of_target() -> tuple[NDArray, NDArray[np.bool_]]:
-        x, y = in_between(rows.shape, distort(sent, sparse.camera_prime))
-        return target.sample(finer, x, y, cv2.INTER_CUBIC)
+    def target_rows() -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        x, y = in_between(rows.shape, distort(target_points, sparse.camera_prime))
+        return target.sample(target_levels, x, y, cv2.INTER_CUBIC)
 
-    (a, seen), (finer_b, seen_too) = in_order(lambda rows_of: rows_of(), (of_reference, of_target))
-    b = in_tones_of(a, finer_b, seen & seen_too)
-    # where one picture shows nothing, the field is believed
-    cv2.copyTo(a, (seen & ~seen_too).view(np.uint8), b)
-    cv2.copyTo(b, (seen_too & ~seen).view(np.uint8), a)
-    neither = ~(seen | seen_too)
+    (a, in_reference), (b_sublevels, in_target) = in_order(lambda resample: resample(), (reference_rows, target_rows))
+    b = in_tones_of(a, b_sublevels, in_reference & in_target)
+    # where only one picture shows something it stands for both: a disparity of 0, the field's
+    cv2.copyTo(a, (in_reference & ~in_target).view(np.uint8), b)
+    cv2.copyTo(b, (in_target & ~in_reference).view(np.uint8), a)
+    neither = ~(in_reference | in_target)
     a[neither] = b[neither] = 128
-    (moved, found), (coarse, found_too) = in_order(lambda match: match(a, b, count), (_matched, _matched_at_half))
-    moved = np.where(found, moved, coarse)
-    counts = np.where(found, np.float32(1), found_too * np.float32(COARSE_SHARE))
-    return _on_nodes(lines, rows, ways, moved, counts * seen, seen_too)
+    results = in_order(lambda match: match(a, b, count), (_matched, _matched_at_half))
+    (disparity, found), (coarse_disparity, coarse_found) = results
+    disparity = np.where(found, disparity, coarse_disparity)
+    confidence = np.where(found, np.float32(1), coarse_found * np.float32(MATCHING.coarse_confidence))
+    return _on_nodes(lines, rows, arc_lengths, disparity, confidence * in_reference, in_target)
 
 
 def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """The second picture (h, w[, C]), levels times FINER, with the tones of the first: for each channel the monotone
-    curve that makes their histograms over `both` (h, w) one."""
-    ends = 256 * FINER
-    if not both.any():
-        return _levels(second / np.float32(FINER))
-    mask, share = both.view(np.uint8), np.linspace(0, 1, TONES + 1)
+    """The second picture (h, w[, C]), in sublevels, with the tones of the first.
 
-    def quantiles(picture: NDArray, k: int, count: int) -> Array:
-        """Levels of a channel below which such shares lie, each level's own pixels half below it."""
+    Each channel goes through the monotone curve that matches its histogram over the mask `both` (h, w) to the first's.
+    """
+    ends = 256 * MATCHING.sublevels
+    if not both.any():
+        return _levels(second / np.float32(MATCHING.sublevels))
+    mask, share = both.view(np.uint8), np.linspace(0, 1, MATCHING.tone_quantiles + 1)
+
+    def quantiles(picture: NDArray[Any], k: int, count: int) -> Array:
+        """Quantiles of channel k, of `count` levels; a level's own pixels count half below it, half above."""
         n = cv2.calcHist([picture], [k], mask, [count], [0, count]).ravel().astype(np.float64)
-        held = np.flatnonzero(n)
-        return np.interp(share * n.sum(), (np.cumsum(n) - n / 2)[held], held)
+        occupied = np.flatnonzero(n)
+        return np.interp(share * n.sum(), (np.cumsum(n) - n / 2)[occupied], occupied)
 
     out = np.empty(second.shape, np.uint8)
     for k in range(second.shape[2] if second.ndim == 3 else 1):
@@ -187,88 +179,96 @@ def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDAr
     return out
 
 
-def _levels(values: NDArray) -> NDArray[np.uint8]:
-    return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
+    result: NDArray[np.uint8] = np.clip(np.rint(values), 0, 255).astype(np.uint8)
+    return result
 
 
 def _matched(
     a: NDArray[np.uint8], b: NDArray[np.uint8], count: int, smoother: int = 1
 ) -> tuple[Plane, NDArray[np.bool_]]:
-    """Columns (h, w) by which what a (h, w[, C]) shows lies further left in b, between −count/2 and count/2, and where
-    that is sure; smoother: how many times the usual a step costs."""
-    least = -count // 2
+    """Disparities (h, w) between −count/2 and count/2, columns by which points of a (h, w[, C]) lie further left in b,
+    and the mask of pixels where one was found; smoother: factor of the costs of steps and jumps."""
+    least, block = -count // 2, MATCHING.block_px
+    speckle = MATCHING.speckle_side**2 * a.shape[0] * a.shape[1]
     matcher = cv2.StereoSGBM_create(
-        minDisparity=least, numDisparities=count, blockSize=BLOCK,
-        P1=smoother * STEP_COST * BLOCK**2, P2=smoother * JUMP_COST * BLOCK**2,
-        disp12MaxDiff=1, preFilterCap=31, uniquenessRatio=UNIQUE,
-        speckleWindowSize=int(SPECK**2 * a.shape[0] * a.shape[1]), speckleRange=SPECK_RANGE,
+        minDisparity=least, numDisparities=count, blockSize=block,
+        P1=smoother * MATCHING.step_cost * block**2, P2=smoother * MATCHING.jump_cost * block**2,
+        disp12MaxDiff=1, preFilterCap=31, uniquenessRatio=MATCHING.uniqueness_percent,
+        speckleWindowSize=int(speckle), speckleRange=MATCHING.speckle_range_px,
         mode=cv2.STEREO_SGBM_MODE_HH4,
     )  # fmt: skip
     height, width = a.shape[:2]
     found = np.empty((height, width), np.float32)
-    at_once = max(NEIGHBOURS, MOST_COSTS // (width * count))
-    for top in range(0, height, at_once):
-        low, high = max(0, top - NEIGHBOURS), min(height, top + at_once + NEIGHBOURS)
-        part = matcher.compute(a[low:high], b[low:high])[top - low :][:at_once]
-        found[top : top + at_once] = part.astype(np.float32) / 16
-    sure = found > least - 1
-    return np.where(sure, found, np.float32(0)), sure
+    rows_at_once = max(MATCHING.band_margin_rows, MATCHING.costs_at_once // (width * count))
+    for top in range(0, height, rows_at_once):
+        low, high = max(0, top - MATCHING.band_margin_rows), min(height, top + rows_at_once + MATCHING.band_margin_rows)
+        part = matcher.compute(a[low:high], b[low:high])[top - low :][:rows_at_once]
+        found[top : top + rows_at_once] = part.astype(np.float32) / 16
+    valid = found > least - 1
+    return np.where(valid, found, np.float32(0)), valid
 
 
 def _matched_at_half(a: NDArray[np.uint8], b: NDArray[np.uint8], count: int) -> tuple[Plane, NDArray[np.bool_]]:
-    """The same by pictures of half the size, and more smoothly: less exact, but more often sure."""
+    """The same from pictures of half the size, with a smoother result: less exact, but it finds more."""
     height, width = a.shape[:2]
     half = max(1, width // 2), max(1, height // 2)
     a_half, b_half = (cv2.resize(v, half, interpolation=cv2.INTER_AREA) for v in (a, b))
-    moved, sure = _matched(a_half, b_half, 16 * -(-count // 32), COARSE_SMOOTHER)
-    moved, sure_too = (
-        cv2.resize(v, (width, height), interpolation=cv2.INTER_NEAREST) for v in (moved, sure.astype(np.uint8))
+    # OpenCV wants a multiple of 16, so the range may be wider than asked for
+    half_disparity, half_found = _matched(a_half, b_half, 16 * -(-count // 32), MATCHING.coarse_smoothness)
+    disparity, found = (
+        cv2.resize(v, (width, height), interpolation=cv2.INTER_NEAREST)
+        for v in (half_disparity, half_found.astype(np.uint8))
     )
-    moved *= np.float32(width / half[0])
-    return moved, (sure_too > 0) & (np.abs(moved) <= count / 2)  # its own range is a multiple of 16, too
+    disparity *= np.float32(width / half[0])
+    return disparity, (found > 0) & (np.abs(disparity) <= count / 2)
 
 
 @dataclass(frozen=True)
 class ArcLengths:
-    """px (rows, n): how far along its line in the target each row is seen, at every EVERY-th column (`coarse_places`);
-    ideal px, from anywhere on the line."""
+    """Arc length along each row's epipolar line in the target: px (rows, n), ideal, at the columns of `coarse_places`,
+    from an arbitrary point of the line."""
 
     px: Plane
 
     @staticmethod
-    def of(e_prime: Array, sent: Array, rows: EpipolarRows) -> ArcLengths:
-        """sent (m, n, 2): where the field sends those places."""
-        direction = e_prime[:2] - sent * e_prime[2]
-        # a row's is one line, and is followed one way only
+    def of(e_prime: Array, target: Array, rows: EpipolarRows) -> ArcLengths:
+        """target (m, n, 2): ideal target pixels of the `coarse_places` of the rows."""
+        direction = e_prime[:2] - target * e_prime[2]
+        # a row has one line and one direction
         direction = np.where(np.isfinite(direction), direction, 0.0).sum(axis=1, keepdims=True)
         direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-300)
-        px = (sent * direction).sum(axis=-1).astype(np.float32)
-        px = cv2.resize(px, (px.shape[1], EVERY * px.shape[0]), interpolation=cv2.INTER_LINEAR)
-        return ArcLengths(px[EVERY : EVERY + rows.shape[0]])
+        px = (target * direction).sum(axis=-1).astype(np.float32)
+        step = LINES.coarse_step
+        px = cv2.resize(px, (px.shape[1], step * px.shape[0]), interpolation=cv2.INTER_LINEAR)
+        return ArcLengths(px[step : step + rows.shape[0]])
 
     def at(self, u: Plane, row: NDArray[np.intp]) -> Plane:
-        """At columns u of whole rows (…)."""
-        place = u * np.float32(1 / EVERY) + np.float32(0.5 + 0.5 / EVERY)
-        before = np.clip(place.astype(np.intp), 0, self.px.shape[1] - 2)
-        place -= before
+        """px (…), linear, at columns u (…) of rows with index row (…)."""
+        step = LINES.coarse_step
+        position = u * np.float32(1 / step) + np.float32(0.5 + 0.5 / step)
+        before = np.clip(position.astype(np.intp), 0, self.px.shape[1] - 2)
+        position -= before
         before += row * self.px.shape[1]
         start, end = np.take(self.px, before), np.take(self.px, before + 1)
-        return start + place * (end - start)
+        return start + position * (end - start)
 
 
 def _on_nodes(
-    lines: EpipolarLines, rows: EpipolarRows, ways: ArcLengths, moved: Plane, counts: Plane, seen: NDArray[np.bool_]
-) -> tuple[Plane, Plane]:
-    """The same at the nodes, in px along their lines; seen: what of the rows the target shows."""
+    lines: EpipolarLines, rows: EpipolarRows, arc_lengths: ArcLengths, disparity: Plane, confidence: Plane,
+    in_target: NDArray[np.bool_],
+) -> tuple[Plane, Plane]:  # fmt: skip
+    """From disparities and confidences (rows, columns) to moves (h, w) px and confidences (h, w) at the nodes;
+    in_target (rows, columns): where the target shows something."""
     u, v = rows.column_row(lines.ideal)
     column = np.clip(np.rint(u).astype(int), 0, rows.shape[1] - 1)
     row = np.clip(np.rint(v).astype(int), 0, rows.shape[0] - 1)
     first = row * rows.shape[1]
-    moved, counts = (np.take(values, first + column) for values in (moved, counts))
-    arrives = np.rint(column - moved).astype(int)
-    ends = (arrives >= 0) & (arrives < rows.shape[1])
-    ends &= np.take(seen, first + np.clip(arrives, 0, rows.shape[1] - 1))
+    disparity, confidence = (np.take(values, first + column) for values in (disparity, confidence))
+    found_at = np.rint(column - disparity).astype(int)
+    visible = (found_at >= 0) & (found_at < rows.shape[1])
+    visible &= np.take(in_target, first + np.clip(found_at, 0, rows.shape[1] - 1))
     start = u.astype(np.float32)
-    along = lines.along(ways.at(start - moved, row) - ways.at(start, row))
-    counts *= ends & np.isfinite(along)
-    return np.where(counts > 0, along, np.float32(0)), counts
+    along = lines.along(arc_lengths.at(start - disparity, row) - arc_lengths.at(start, row))
+    confidence *= visible & np.isfinite(along)
+    return np.where(confidence > 0, along, np.float32(0)), confidence

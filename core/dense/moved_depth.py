@@ -1,7 +1,7 @@
-"""From moves along and across epipolar lines to what is added to inverse depth.
+"""From moves along and across epipolar lines to corrections of inverse depth and shift.
 
-Inverse depth takes the moves up as they are, so that x' ~ H_inf p + d e' stays the whole warp. Beyond the overlap what
-both pictures agreed on goes on smoothly and fades to nothing.
+Moves along the lines become changes of d, so that x' ~ H_inf p + d e' stays the whole warp. Outside the overlap moves
+of high confidence are continued smoothly and fade to 0.
 """
 
 from __future__ import annotations
@@ -16,80 +16,78 @@ from ..raster.arrays import Plane
 from ..raster.distance import distance_inside, outside
 from ..raster.pull_push import carried_on
 from .epipolar_lines import EpipolarLines, SparseMap
-
-# Moves fade over so many times their own size (98 %) outside the overlap, as the field does, within this share of the
-# picture's side.
-FADE, LEAST_FADE, MOST_FADE = 5.0, 8.0, 0.15
-COARSE = 8
-# Confidence that counts for nothing and for all in what goes on beyond the overlap; it reaches so many nodes (a side)
-# over the rim of what it is about.
-DOUBTED, SURE, RIM = 0.2, 0.5, 9
-# Share of the fade's width over which doubtful moves give way before the border: twice their own size.
-GIVE_WAY = 2 / FADE
+from .options import BEYOND
 
 
 def build_refinement(
-    lines: EpipolarLines, sparse: SparseMap, along: Plane, across: Plane, confidence: Plane, there: NDArray[np.bool_]
+    lines: EpipolarLines, sparse: SparseMap, along: Plane, across: Plane, confidence: Plane, overlap: NDArray[np.bool_]
 ) -> RefinedDepth:
-    """The relief of moves (h, w) px along and across the lines of the nodes; there (h, w): the overlap."""
+    """The refinement that moves the nodes by along (h, w) and across (h, w) px of their lines within the overlap.
+
+    sparse: the field that the moves start from; confidence (h, w) of the moves; overlap (h, w): mask.
+    """
     left, top, width, height = lines.box
-    rows, columns = there.shape
+    rows, columns = overlap.shape
     step = width / columns, height / rows
-    near = np.abs(along[there])
-    limit = MOST_FADE * max(sparse.camera.size)
-    fade = float(np.clip(FADE * np.percentile(near, 98) if near.size else 0.0, LEAST_FADE, max(limit, LEAST_FADE)))
+    lengths = np.abs(along[overlap])
+    limit = BEYOND.max_fade * max(sparse.camera.size)
+    wanted = BEYOND.fade_length * np.percentile(lengths, 98) if lengths.size else 0.0
+    fade = float(np.clip(wanted, BEYOND.min_fade_px, max(limit, BEYOND.min_fade_px)))
     fade /= min(step)
     margin = int(np.ceil(fade)) + 1
-    inside = np.pad(there, margin)
-    share = fading(outside(inside).astype(np.float32), fade).astype(np.float32)
+    inside = np.pad(overlap, margin)
+    alpha = fading(outside(inside).astype(np.float32), fade).astype(np.float32)
 
-    def widened(values: Plane) -> Plane:
-        return cv2.copyMakeBorder(np.where(there, values, np.float32(0)), *[margin] * 4, cv2.BORDER_CONSTANT)
+    def padded(values: Plane) -> Plane:
+        result: Plane = cv2.copyMakeBorder(np.where(overlap, values, np.float32(0)), *[margin] * 4, cv2.BORDER_CONSTANT)
+        return result
 
-    sure = widened(np.clip(confidence, 0, 1))
-    weight = _trust(inside, sure, GIVE_WAY * fade)
-    to_side = across.any()
+    confidence = padded(np.clip(confidence, 0, 1))
+    weight, yielding = _trust(inside, confidence, BEYOND.yielding_share * fade)
+    leaves_lines = across.any()
     along, across = (
-        _beyond(widened(values), *weight) * share if values.any() else np.zeros(inside.shape, np.float32)
+        _continued(padded(values), weight, yielding) * alpha if values.any() else np.zeros(inside.shape, np.float32)
         for values in (along, across)
     )
-    more = margin * step[0], margin * step[1]
-    smooth = EpipolarLines.over(
-        sparse, (left - more[0], top - more[1], width + 2 * more[0], height + 2 * more[1]), COARSE * min(step)
-    )
+    margin_px = margin * step[0], margin * step[1]
+    box = left - margin_px[0], top - margin_px[1], width + 2 * margin_px[0], height + 2 * margin_px[1]
+    coarse_lines = EpipolarLines.over(sparse, box, BEYOND.coarse_step * min(step))
     per_px, *direction = (
         np.nan_to_num(_resized(np.ascontiguousarray(v), inside.shape), copy=False)
-        for v in (smooth.depth_per_px, smooth.direction[..., 0], smooth.direction[..., 1])[: 3 if to_side else 1]
+        for v in (coarse_lines.depth_per_px, *np.moveaxis(coarse_lines.direction, -1, 0))[: 3 if leaves_lines else 1]
     )
     shift = np.zeros((*inside.shape, 2), np.float32)
-    if to_side:
+    if leaves_lines:
         cv2.merge([-across * direction[1], across * direction[0]], shift)
-    start = left + (step[0] - 1) / 2 - more[0], top + (step[1] - 1) / 2 - more[1]
-    return RefinedDepth(start, step, along * per_px, shift, sure)
+    start = left + (step[0] - 1) / 2 - margin_px[0], top + (step[1] - 1) / 2 - margin_px[1]
+    return RefinedDepth(start, step, along * per_px, shift, confidence)
 
 
-def _trust(inside: NDArray[np.bool_], sure: Plane, width: float) -> tuple[Plane, Plane]:
-    """How much (h, w) 0..1 each node counts in what goes on beyond the overlap, and how far it gives way to that."""
-    held = cv2.erode(sure, np.ones((RIM, RIM), np.uint8))
-    weight = inside * np.clip((held - np.float32(DOUBTED)) / np.float32(SURE - DOUBTED), 0, 1)
-    share = np.clip(1 - distance_inside(inside).astype(np.float32) / np.float32(width), 0, 1)
-    return weight.astype(np.float32), np.where(inside, share, np.float32(1)).astype(np.float32)
+def _trust(inside: NDArray[np.bool_], confidence: Plane, width: float) -> tuple[Plane, Plane]:
+    """The weight (h, w) of each node in the continuation, and how far (h, w) it gives way to the continuation: 0 deeper
+    than `width` nodes inside the overlap, 1 at its border and outside. Both 0 to 1."""
+    eroded = cv2.erode(confidence, np.ones((BEYOND.confidence_erosion,) * 2, np.uint8))
+    ignored, trusted = BEYOND.ignored_confidence, BEYOND.trusted_confidence
+    weight = inside * np.clip((eroded - np.float32(ignored)) / np.float32(trusted - ignored), 0, 1)
+    yielding = np.clip(1 - distance_inside(inside).astype(np.float32) / np.float32(width), 0, 1)
+    return weight.astype(np.float32), np.where(inside, yielding, np.float32(1)).astype(np.float32)
 
 
-def _beyond(moved: Plane, weight: Plane, share: Plane) -> Plane:
-    """Moves (h, w) of the nodes inside, and beyond them what goes on of those that are sure; see `_trust`.
+def _continued(moves: Plane, weight: Plane, yielding: Plane) -> Plane:
+    """Moves (h, w) inside the overlap, continued outside from the nodes with weight; weight, yielding: see `_trust`.
 
-    A bare sky moves by whatever the search made of it: carried on it would bend the mast before it. The last
-    nodes before the border are doubtful too: they were sought by half a window. Within some nodes of the border what
-    is doubtful gives way to what goes on beyond, or the map would jump there.
+    A uniform sky gets arbitrary moves, which must not bend a mast in front of it beyond the border; the last nodes
+    before the border are doubtful as well, since half of their window is missing. Close to the border doubtful moves
+    give way to the continuation, so that the map does not jump there.
     """
-    gone_on = carried_on(moved, weight)
-    gone_on -= moved
-    gone_on *= share
-    gone_on += moved
-    return gone_on
+    continued = carried_on(moves, weight)
+    continued -= moves
+    continued *= yielding
+    continued += moves
+    return continued
 
 
 def _resized(values: Plane, shape: tuple[int, ...]) -> Plane:
-    """Values of cells over the same box, for so many (rows, columns), linear."""
-    return cv2.resize(values, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR)
+    """Values (m, n) of cells resampled bilinearly to shape (rows, columns) cells over the same box."""
+    result: Plane = cv2.resize(values, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR)
+    return result

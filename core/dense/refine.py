@@ -1,8 +1,9 @@
-"""Dense refinement: every pixel of the overlap found along its epipolar line, where the pictures tell.
+"""Dense refinement: every pixel of the overlap is searched for along its epipolar line.
 
-The sparse field is right at its matches and smooth between them. Here each pixel is sought along its line around the
-field (`matching`), edges of the reference guide what is filled and smoothed (`edge_aware_smoothing`), and both
-pictures' gray levels settle the last fraction of a pixel (`polish`). Where they say nothing the field stays.
+The sparse field is right at its matches and smooth between them. Here each pixel is matched along its line close to
+the field (`matching`), gaps are filled and errors smoothed along the edges of the reference (`edge_aware_smoothing`),
+and both pictures' gray levels settle the last fraction of a pixel (`polish`). Where there is no texture the field
+stays.
 """
 
 from __future__ import annotations
@@ -21,36 +22,25 @@ from ..field.slack import SlackField
 from ..field.strict import StrictField
 from ..pictures.picture import Picture
 from ..raster.arrays import Box, Plane
-from ..raster.sampling import REMAP_LIMIT, fetch
+from ..raster.options import PARTS
+from ..raster.sampling import fetch
 from ..system.threads import in_order
 from .edge_aware_smoothing import Smoother, cut_edges, edge_weights, strengthen
 from .epipolar_lines import EpipolarLines, SparseMap
 from .matching import View, search, search_base
-from .moved_depth import MOST_FADE, build_refinement
+from .moved_depth import build_refinement
+from .options import BEYOND, REFINE
 from .polish import likeness, polish
 from .unfolding import unfolded
-
-# Pixels of the overlap that are searched and polished at most: beyond, both pictures are shrunk.
-SEARCHED, POLISHED = 1.5e6, 3e6
-# Search range in px of what is searched: at least, at most.
-LEAST_REACH, MOST_REACH = 24.0, 96.0
-# Gray levels across an edge; strength of the first smoothing; what the field, or a guess, counts beside a found pixel.
-EDGE, FIRST_SMOOTHNESS, FIELD_SHARE = 4.0, 5.0, 1e-2
-# px between neighbours that are a depth edge
-JUMP = 0.3
-# Squared gradient along the line (gray levels per px) of half a texture; how much more neighbours without any hold
-# together, and how little they count, unless both pictures look alike there: noise does not, a soft surface does.
-TEXTURE, TIE, PLAIN_DOUBT = 1.0, 15.0, 0.99
-# Nodes, a side, that say where the overlap is; overlaps with fewer pixels a side are left alone.
-LOOK, LEAST_SIDE = 64, 32
 
 
 @dataclass(frozen=True)
 class Dense:
-    """What became of dense refinement: the relief, or None and why not.
+    """The result of dense refinement.
 
-    reach_px: how far along the lines was sought; found: share of the overlap where both pictures agreed on a place;
-    moved_px, across_px: RMS of the moves along the lines and across them.
+    relief: the refinement, or None, and then `why` says why not; reach_px: largest move along the lines that was
+    searched; found: share of the overlap that was matched; moved_px, across_px: RMS of the moves along the lines and
+    across them.
     """
 
     relief: RefinedDepth | None
@@ -65,54 +55,72 @@ def refine(
     field: StrictField | SlackField, two_view: TwoView, matches: Matches, pictures: tuple[Picture, Picture],
     cameras: tuple[Camera, Camera],
 ) -> Dense:  # fmt: skip
-    """Refines a strict or slack field of a pair.
+    """Refines a strict or slack field of a pair of pictures.
 
-    matches: the inliers that the field was fitted to, ideal px. A strict field keeps to its lines; a slack one may
-    leave them a little further than matches could tell.
+    Parameters
+    ----------
+    field : StrictField or SlackField
+        A strict field stays on its epipolar lines; a slack one may leave them, as it did before.
+    two_view : TwoView
+    matches : Matches
+        The matches that the field was given, ideal px.
+    pictures : (Picture, Picture)
+        Reference and target.
+    cameras : (Camera, Camera)
+        Of the same, with their lenses.
+
+    Returns
+    -------
+    Dense
+        Without refinement where there is no baseline, no overlap to speak of, or a picture is too large.
     """
     if not two_view.e_prime.any() or not np.isfinite(two_view.F).all():
         return Dense(None, f"a {two_view.model} without a baseline has no epipolar lines to search along")
     slack = isinstance(field, SlackField)
     side = max(cameras[0].size)
-    margin = int(MOST_FADE * side) + 16
-    if max(side, *cameras[1].size) + 2 * margin > REMAP_LIMIT:
+    margin = int(BEYOND.max_fade * side) + 16
+    if max(side, *cameras[1].size) + 2 * margin > PARTS.max_remap_side:
         return Dense(None, f"a picture with a side of {max(side, *cameras[1].size)} px is too long to be searched")
-    every = max(1, int(np.sqrt(np.prod(cameras[0].size) / POLISHED)))
+    every = max(1, int(np.sqrt(np.prod(cameras[0].size) / REFINE.max_refined_px)))
     sparse = SparseMap.over_reference(field, two_view, *cameras, margin, every)
     box = _overlap(sparse, cameras[1].size)
     if box is None:
         return Dense(None, "the overlap is too small")
-    step, fine = (max(1.0, float(np.sqrt(box[2] * box[3] / most))) for most in (SEARCHED, POLISHED))
-    base, reach = search_base(sparse, matches.subset(field.fit.inliers_used), field.plane, MOST_REACH * step)
-    reach = float(np.clip(reach, LEAST_REACH * step, MOST_REACH * step))
+    limits = REFINE.max_searched_px, REFINE.max_refined_px
+    step, fine = (max(1.0, float(np.sqrt(box[2] * box[3] / most))) for most in limits)
+    min_reach, max_reach = REFINE.min_reach_px * step, REFINE.max_reach_px * step
+    base, reach = search_base(sparse, matches.subset(field.fit.inliers_used), field.plane, max_reach)
+    reach = float(np.clip(reach, min_reach, max_reach))
     lines = EpipolarLines.over(base, box, fine)
     field_at = (lines.at(sparse) - lines.inverse_depth) / lines.depth_per_px
     coarse_views = _views(pictures, step)
     views = coarse_views if fine == step else _views(pictures, fine)
     along, found = search(lines, base, coarse_views[0], coarse_views[1], step, reach)
     along = np.where(found > 0, along, field_at)
-    alike = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
-    plain = _plain(lines, sparse, views[0]) * (1 - alike)
-    weights = edge_weights(_guide(pictures[0].view, lines), EDGE)
-    weights = strengthen(cut_edges(weights, along, found > 0, JUMP), plain, TIE)
-    share = np.maximum(found * (1 - np.float32(PLAIN_DOUBT) * plain), np.float32(FIELD_SHARE))
-    along = Smoother.of(weights, FIRST_SMOOTHNESS).smoothed(along, share)
-    polished = polish(lines, views[0], views[1], along, np.maximum(found, np.float32(FIELD_SHARE)), weights, slack)
+    # smooth surfaces that look alike in both pictures are matched well without texture, noise is not
+    similar = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
+    plain = _plain(lines, sparse, views[0]) * (1 - similar)
+    weights = edge_weights(_guide(pictures[0].view, lines), REFINE.edge_levels)
+    weights = strengthen(cut_edges(weights, along, found > 0, REFINE.depth_edge_px), plain, REFINE.plain_strength)
+    weight = np.maximum(found * (1 - np.float32(REFINE.plain_doubt) * plain), np.float32(REFINE.field_confidence))
+    along = Smoother.of(weights, REFINE.smoothness).smoothed(along, weight)
+    known = np.maximum(found, np.float32(REFINE.field_confidence))
+    polished = polish(lines, views[0], views[1], along, known, weights, slack)
     confidence = np.clip(polished.likeness, 0, 1) * cv2.blur(found, (9, 9))
-    there = _there(lines, polished.along, polished.across, pictures)
-    if not there.any():
+    overlap = _in_both(lines, polished.along, polished.across, pictures)
+    if not overlap.any():
         return Dense(None, "the overlap is too small")
     along = unfolded(lines, two_view, cameras[1].size, polished.along, polished.across) - field_at
-    relief = build_refinement(lines, base, along, polished.across, confidence, there)
-    moved, across = (float(np.sqrt(np.square(v[there]).mean())) for v in (along, polished.across))
-    return Dense(relief, "", reach, float((found[there] > 0).mean()), moved, across)
+    refinement = build_refinement(lines, base, along, polished.across, confidence, overlap)
+    along_rms, across_rms = (float(np.sqrt(np.square(v[overlap]).mean())) for v in (along, polished.across))
+    return Dense(refinement, "", reach, float((found[overlap] > 0).mean()), along_rms, across_rms)
 
 
 def _overlap(sparse: SparseMap, target_size: tuple[int, int]) -> Box | None:
-    """The part of the reference (left, top, width, height) that the field shows in the target, with a little around
-    it."""
+    """The box (left, top, width, height) px around the part of the reference that the field maps into the target, with
+    one node of margin; None if it is too small."""
     width, height = sparse.camera.size
-    lines = EpipolarLines.over(sparse, (0, 0, width, height), max(1.0, max(width, height) / LOOK))
+    lines = EpipolarLines.over(sparse, (0, 0, width, height), max(1.0, max(width, height) / REFINE.overlap_nodes))
     x, y = lines.target(np.zeros(lines.shape, np.float32))
     with np.errstate(invalid="ignore"):
         inside = (x >= 0) & (y >= 0) & (x <= target_size[0] - 1) & (y <= target_size[1] - 1)
@@ -123,51 +131,54 @@ def _overlap(sparse: SparseMap, target_size: tuple[int, int]) -> Box | None:
     low = np.maximum(np.floor(np.array([columns[0] - 1, rows[0] - 1]) * cell), 0).astype(int)
     high = np.minimum(np.ceil(np.array([columns[-1] + 2, rows[-1] + 2]) * cell), [width, height]).astype(int)
     across, down = (high - low).tolist()
-    return (int(low[0]), int(low[1]), across, down) if min(across, down) >= LEAST_SIDE else None
+    return (int(low[0]), int(low[1]), across, down) if min(across, down) >= REFINE.min_overlap_px else None
 
 
 def _views(pictures: tuple[Picture, Picture], step: float) -> tuple[View, View]:
-    """Both pictures with `step` px to each of their own."""
+    """Reference and target, shrunk by `step`."""
     reference, target = in_order(lambda picture: View.of(picture.view, picture.alpha, step), pictures)
     return reference, target
 
 
 def _guide(view: NDArray[np.uint8], lines: EpipolarLines) -> NDArray[np.float32]:
-    """The reference's colours at the nodes, a little smoothed: noise is no edge."""
+    """The reference's colours (h, w, C) at the nodes, slightly blurred so that noise makes no edges."""
     left, top, width, height = lines.box
     part = view[top : top + height, left : left + width]
     rows, columns = lines.shape
     if (rows, columns) != part.shape[:2]:
         part = cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
-    return cv2.GaussianBlur(part, (0, 0), 1.0).astype(np.float32)
+    result: Plane = cv2.GaussianBlur(part, (0, 0), 1.0).astype(np.float32)
+    return result
 
 
 def _plain(lines: EpipolarLines, sparse: SparseMap, reference: View) -> Plane:
-    """How little (h, w) 0..1 the reference shows around the nodes that a move along their lines would change."""
+    """Lack of texture (h, w) around the nodes, by the gradient along their epipolar lines: 0 for much, 1 for none."""
     epipole = np.linalg.svd(sparse.two_view.F)[2][2]
     gray = cv2.GaussianBlur(reference.gray, (0, 0), 1.0)
     slope, length = np.zeros((2, *lines.shape), np.float32)
     for k in (0, 1):
-        away = (lines.ideal[..., k] * epipole[2] - epipole[k]).astype(np.float32)
+        # the line through a node leads to the epipole
+        to_epipole = (lines.ideal[..., k] * epipole[2] - epipole[k]).astype(np.float32)
         gradient = cv2.Scharr(gray, cv2.CV_32F, 1 - k, k, scale=1 / 32)
-        slope += reference.at_nodes(gradient, lines)[0] * away
-        away *= away
-        length += away
+        slope += reference.at_nodes(gradient, lines)[0] * to_epipole
+        to_epipole *= to_epipole
+        length += to_epipole
     slope *= slope
     slope /= np.maximum(length, np.float32(1e-24))
-    return TEXTURE / (TEXTURE + cv2.blur(slope, (7, 7)))
+    result: Plane = REFINE.half_texture / (REFINE.half_texture + cv2.blur(slope, (7, 7)))
+    return result
 
 
-def _there(lines: EpipolarLines, along: Plane, across: Plane, pictures: tuple[Picture, Picture]) -> NDArray[np.bool_]:
-    """Where the nodes show both pictures."""
+def _in_both(lines: EpipolarLines, along: Plane, across: Plane, pictures: tuple[Picture, Picture]) -> NDArray[np.bool_]:
+    """The nodes (h, w) at which, after moves (h, w) px, both pictures show something."""
     height, width = pictures[1].view.shape[:2]
     x, y = lines.target(along, across)
     with np.errstate(invalid="ignore"):
-        there = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
+        inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
     if pictures[1].alpha is not None:
-        there &= fetch(pictures[1].alpha[..., None], x, y, cv2.INTER_LINEAR)[..., 0] > 0
+        inside &= fetch(pictures[1].alpha[..., None], x, y, cv2.INTER_LINEAR)[..., 0] > 0
     if pictures[0].alpha is not None:
         left, top, across_px, down = lines.box
         part = (pictures[0].alpha[top : top + down, left : left + across_px] > 0).astype(np.uint8)
-        there &= cv2.resize(part, lines.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
-    return there
+        inside &= cv2.resize(part, lines.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+    return inside

@@ -1,4 +1,5 @@
-"""From inlier matches to inverse depth d at every point: x' ~ H_inf p + d e'.
+"""From inlier matches to inverse depth d at every point: x' ~ H_inf p + d e'; and, on arrays, what a picture
+cannot see and where its map folds.
 
-May import system, raster and cameras.
+Method: docs/method.md, 4. May import system, raster and cameras.
 """

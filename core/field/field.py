@@ -16,23 +16,26 @@ from ..raster.grid import Grid
 
 @dataclass(frozen=True)
 class FieldValues:
-    """A field at nodes: inverse_depth (rows, columns), NaN where it knows none (e' is 0 then), and shift (rows,
-    columns, 2) in target px that comes on top of π(H_inf p + d e'), None where the field keeps to its lines; far (3,):
-    the plane that inverse_depth ends in beyond the fade, None for a field that means nothing off the reference's plane.
+    """A field at the nodes of a grid.
+
+    inverse_depth (rows, columns): d, NaN for fields without depth (their e' is 0). shift (rows, columns, 2): px of
+    picture number `picture` added to π(H_inf p + d e'), None for fields that stay on the epipolar lines. far (3,): the
+    plane that d equals beyond the fade, None for fields that are defined on the reference's plane only.
     """
 
     inverse_depth: Array
     shift: Array | None = None
     far: Array | None = None
+    picture: int = 1
 
 
 @dataclass(frozen=True)
 class Fit:
-    """How a field came about.
+    """How a field was fitted.
 
-    `inliers_used` (N,): the matches (of those given) it stands on; smoothing: λ in units of W·H; fade_px: width of the
-    fade outside the overlap; residual_px: RMS along the lines; held_out_px: the same leave-one-out; negative_share:
-    share of its matches with d < 0.
+    inliers_used (N,): which of the given matches the field is fitted to; smoothing: λ in units of W·H; fade_px: width
+    of the fade outside the overlap; residual_px: RMS residual along the epipolar lines, target px; held_out_px: the
+    same, each match predicted without itself; negative_share: share of the matches with d < 0.
     """
 
     inliers_used: NDArray[np.bool_]
@@ -44,41 +47,55 @@ class Fit:
 
 
 class Field(Protocol):
-    """A displacement field: where canvas points are seen in the target, in ideal (undistorted) pixels of both."""
+    """Maps points of the reference's plane to target pixels, both ideal (undistorted)."""
 
     @property
     def name(self) -> str:
-        """What `--field` calls it."""
+        """Its name for `--field`."""
         ...
 
     @property
     def two_view(self) -> TwoView:
-        """The geometry that its values come on top of."""
+        """The geometry that its values are added to."""
         ...
 
     @property
     def plane(self) -> Array:
-        """m (3,): the affine part, which it fades to far from the overlap."""
+        """m (3,): the affine part of d, on homogeneous reference pixels, that it fades to outside the overlap."""
         ...
 
     @property
     def fit(self) -> Fit:
-        """How it came about."""
+        """How it was fitted."""
         ...
 
     def on_grid(self, grid: Grid, ideal: Array | None = None) -> FieldValues:
-        """Its values at a grid's nodes; ideal (rows, columns, 2): the nodes' ideal pixels, where they are not the
-        canvas's."""
+        """Its values at a grid's nodes.
+
+        Parameters
+        ----------
+        grid : Grid
+            Nodes on the reference's plane.
+        ideal : (rows, columns, 2) array, optional
+            The nodes' undistorted pixels; the nodes themselves if not given.
+
+        Returns
+        -------
+        FieldValues
+        """
         ...
 
     def predict(self, points: Array) -> Array:
-        """Target pixels (N, 2) of points (N, 2) of the overlap, where nothing fades, ideal pixels both; NaN behind the
+        """Target pixels (N, 2) of points (N, 2) in the overlap, where no field fades, both ideal px; NaN behind the
         target camera."""
         ...
 
     def refitted(self, matches: Matches) -> Field:
-        """The same kind of field on other matches of the pair, all of them kept, at the λ that was found before.
+        """The same kind of field fitted to other matches of the pair, none dropped, with the same λ.
 
-        Raises DegenerateGeometry.
+        Raises
+        ------
+        DegenerateGeometry
+            The matches do not determine a field.
         """
         ...

@@ -1,7 +1,7 @@
-"""Smoothing thin-plate splines in the plane, with the smoothing chosen by leave-one-out cross-validation.
+"""Smoothing thin-plate splines in the plane, and their leave-one-out cross-validation.
 
-Theory: Duchon 1977; Wahba, Spline Models for Observational Data (1990), chapters 2.4 and 4.2. The null space of the
-bending energy is the affine functions: with few or distant points the spline is a plane.
+Duchon 1977; Wahba, Spline Models for Observational Data (1990), chapters 2.4 and 4.2. Affine functions have no bending
+energy: where there are few points, or none near, the spline is a plane.
 """
 
 from __future__ import annotations
@@ -14,16 +14,15 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
-
-# Nodes are evaluated in slabs of about this many kernel values, so that memory stays bounded.
-SLAB = 2_000_000
+from .options import SPLINE
 
 
 @dataclass(frozen=True)
 class ThinPlateSpline:
     """f(p) = Σ w_i ½ r_i² ln r_i² + a·(p, 1) over centres in normalised coordinates (p − centre) / scale.
 
-    weights (N,) and affine (3,), or (N, k) and (3, k) for k functions over the same centres at once.
+    centres (N, 2), normalised; centre (2,) and scale: px; weights w (N,) and affine a (3,), or (N, k) and (3, k) for k
+    functions with the same centres.
     """
 
     centres: Array
@@ -33,19 +32,18 @@ class ThinPlateSpline:
     scale: float
 
     def at(self, points: Array) -> Array:
-        """Values (N,) or (N, k) at points (N, 2) px, float64."""
+        """Values (N,) or (N, k) at points (N, 2) px, in float64 throughout."""
         p = (np.asarray(points, np.float64) - self.centre) / self.scale
-        out = p @ self.affine[:2] + self.affine[2]
-        rows = max(1, SLAB // max(1, len(self.centres)))
+        out: Array = p @ self.affine[:2] + self.affine[2]
+        rows = max(1, SPLINE.kernel_values_at_once // max(1, len(self.centres)))
         for start in range(0, len(p), rows):
             out[start : start + rows] += kernel(p[start : start + rows], self.centres) @ self.weights
         return out
 
     def on_axes(self, xs: Array, ys: Array) -> Array:
-        """Values (len(ys), len(xs)), or with k behind, on the grid of two axes in px: the kernel in float32, squared
-        distances added from the axes.
+        """Values (H, W[, k]) where columns xs (W,) and rows ys (H,) in px cross; the kernel in float32.
 
-        Adding dx² + dy² instead of expanding |p|² + |c|² − 2p·c keeps full relative precision close to a centre.
+        Squared distances are sums dx² + dy² and not |p|² + |c|² − 2p·c, which would cancel close to a centre.
         """
         x = (np.asarray(xs, np.float64) - self.centre[0]) / self.scale
         y = (np.asarray(ys, np.float64) - self.centre[1]) / self.scale
@@ -53,10 +51,10 @@ class ThinPlateSpline:
         dy2 = ((y[:, None] - self.centres[:, 1]) ** 2).astype(np.float32)
         weights = (0.5 * self.weights).astype(np.float32)
         across, down = np.multiply.outer(x, self.affine[0]), np.multiply.outer(y, self.affine[1]) + self.affine[2]
-        out = across[None] + down[:, None]
+        out: Array = across[None] + down[:, None]
         if not len(self.centres):
             return out
-        rows = max(1, SLAB // max(1, dx2.size))
+        rows = max(1, SPLINE.kernel_values_at_once // max(1, dx2.size))
         for start in range(0, len(y), rows):
             r2 = dy2[start : start + rows, None, :] + dx2[None, :, :]
             np.maximum(r2, np.float32(1e-20), out=r2)
@@ -69,13 +67,17 @@ class ThinPlateSpline:
 def kernel(points: Array, centres: Array) -> Array:
     """½ r² ln r² between points (N, 2) and centres (M, 2), zero at r = 0."""
     r2 = np.subtract.outer(points[:, 0], centres[:, 0]) ** 2 + np.subtract.outer(points[:, 1], centres[:, 1]) ** 2
-    return 0.5 * r2 * np.log(np.maximum(r2, 1e-300))
+    result: Array = 0.5 * r2 * np.log(np.maximum(r2, 1e-300))
+    return result
 
 
 @dataclass(frozen=True)
 class SmoothingProblem:
-    """(Φ + 8πλ D) w + M a = g with Mᵀ w = 0 for points (N, 2) px and relative noise √D (N,); lengths in units of
-    `scale` px."""
+    """The linear system of a smoothing spline: (Φ + 8πλ D) w + M a = g with Mᵀ w = 0.
+
+    centres (N, 2): points (p − centre) / scale; noise (N,): √D, relative; phi (N, N): Φ, the kernel between points; M
+    (N, 3): the points, homogeneous. λ is in units of scale² px².
+    """
 
     centres: Array
     noise: Array
@@ -85,13 +87,13 @@ class SmoothingProblem:
 
     @staticmethod
     def build(points: Array, noise: Array, scale: float, centre: Array | None = None) -> SmoothingProblem:
-        """Points moved to `centre`, their centroid if none is given, and divided by `scale`, the unit of λ."""
+        """The problem of points (N, 2) px with relative noise (N,); centre (2,) px: their centroid if not given."""
         centre = points.mean(axis=0) if centre is None else centre
         centres = (points - centre) / scale
         return SmoothingProblem(centres, noise, centre, scale, kernel(centres, centres))
 
     def subset(self, keep: NDArray[np.bool_]) -> SmoothingProblem:
-        """The same problem without some of its points."""
+        """The problem of the points that the mask `keep` (N,) selects."""
         phi = self.phi[np.ix_(keep, keep)]
         return SmoothingProblem(self.centres[keep], self.noise[keep], self.centre, self.scale, phi)
 
@@ -106,7 +108,7 @@ class SmoothingProblem:
         return system
 
     def solve(self, values: Array, smoothing: float) -> tuple[ThinPlateSpline, Array]:
-        """The spline of values (N,) or (N, k) at λ = smoothing, and its residuals g − f = 8πλ D w of the same shape."""
+        """The spline of values g (N,) or (N, k) at λ = smoothing, and its residuals g − f = 8πλ D w, shaped as g."""
         n = len(values)
         solution = scipy.linalg.solve(
             self.system(smoothing), np.concatenate([values, np.zeros((3, *values.shape[1:]))])
@@ -115,32 +117,41 @@ class SmoothingProblem:
         return spline, ((8 * np.pi * smoothing * self.noise**2) * solution[:n].T).T
 
     def inverse(self, smoothing: float) -> Inverse:
-        """What makes weights of values at λ = smoothing."""
-        projected, out_of = self._projected()
+        """The matrix that turns values into weights, at λ = smoothing."""
+        projected, affine = self._projected()
         n = len(self.noise)
-        # any size will do for what is taken out; the matrix's own keeps all digits
+        # the affine directions get an eigenvalue of the matrix's own size, which keeps it well conditioned
         size = float(np.trace(projected)) / n
-        projected += size * (out_of @ out_of.T)
+        projected += size * (affine @ affine.T)
         projected[np.arange(n), np.arange(n)] += 8 * np.pi * smoothing
-        # symmetric, so its transpose is the column-major matrix that LAPACK wants: nothing is copied
+        # symmetric, so its transpose is the column-major matrix that LAPACK expects: no copy
         factor, failed = scipy.linalg.lapack.dpotrf(projected.T, lower=1, clean=0, overwrite_a=1)
         if failed:
             raise np.linalg.LinAlgError(f"the matrix of a spline is not positive definite at λ = {smoothing:g}")
         matrix = cv2.completeSymm(scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)[0].T)
-        matrix -= (out_of @ out_of.T) / (size + 8 * np.pi * smoothing)
+        matrix -= (affine @ affine.T) / (size + 8 * np.pi * smoothing)
         matrix /= np.outer(self.noise, self.noise)
         return Inverse(matrix, 8 * np.pi * smoothing * self.noise**2)
 
     def held_out(self, values: Array, ladder: Array) -> Array:
-        """Leave-one-out residuals (len(ladder), N) of values (N,), or (len(ladder), N, k) of (N, k), one row for
-        each λ.
+        """Leave-one-out residuals for each λ of a ladder.
 
-        One eigen-decomposition serves every λ: with v = √D w the residual at a point the spline never saw is √D_i v_i /
+        One eigen-decomposition serves every λ: with v = √D w the residual at a point that is left out is √D_i v_i /
         G_ii, where G = Q (…)⁻¹ Qᵀ (see `_projected`; Wahba eq. 4.2.8 in these coordinates).
+
+        Parameters
+        ----------
+        values : (N,) or (N, k) array
+        ladder : (n,) array
+            The λ to try.
+
+        Returns
+        -------
+        (n, N) or (n, N, k) array
         """
-        matrix, out_of = self._projected()
-        # the three directions taken out get the lowest eigenvalues, to be dropped
-        matrix -= (1 + np.abs(matrix).sum(axis=1).max()) * (out_of @ out_of.T)
+        matrix, affine = self._projected()
+        # the three affine directions get the lowest eigenvalues, and are dropped
+        matrix -= (1 + np.abs(matrix).sum(axis=1).max()) * (affine @ affine.T)
         eigenvalues, basis = scipy.linalg.eigh(matrix, driver="evd", overwrite_a=True, check_finite=False)
         eigenvalues, basis = eigenvalues[3:], basis[:, 3:]
         squared = basis**2
@@ -153,56 +164,56 @@ class SmoothingProblem:
         return out
 
     def _projected(self) -> tuple[Array, Array]:
-        """D^-½ Φ D^-½ on the complement Q of D^-½ M, as (N, N), zero on the three directions (N, 3) of the rest.
+        """D^-½ Φ D^-½ projected onto the orthogonal complement Q of D^-½ M, as (N, N), and a basis (N, 3) of D^-½ M.
 
-        There the system is (Qᵀ D^-½ Φ D^-½ Q + 8πλ I) z = … with v = √D w, positive definite. Q is not formed:
-        projecting takes rank-3 updates only.
+        On Q the system is (Qᵀ D^-½ Φ D^-½ Q + 8πλ I) z = … with v = √D w, positive definite. Q itself is never formed:
+        projections are rank-3 updates.
         """
         root = self.noise
         polynomial = np.column_stack([self.centres, np.ones(len(root))]) / root[:, None]
-        out_of = np.linalg.qr(polynomial)[0]
+        affine = np.linalg.qr(polynomial)[0]
         matrix = self.phi / np.outer(root, root)
         for _ in range(2):  # from the left, then from the right
-            matrix -= out_of @ (out_of.T @ matrix)
+            matrix -= affine @ (affine.T @ matrix)
             matrix = matrix.T
-        return matrix, out_of
+        return matrix, affine
 
 
 @dataclass(frozen=True)
 class Inverse:
-    """The first N rows and columns P of the inverse of a problem's system at one λ: weights are P values.
+    """The first N rows and columns P of the inverse of a problem's system at one λ: w = P g.
 
-    matrix (N, N); pull (N,): 8πλ D.
+    matrix (N, N): P; penalty (N,): 8πλ D.
     """
 
     matrix: Array
-    pull: Array
+    penalty: Array
 
     def residual(self, values: Array) -> Array:
-        """Residuals g − f (N,) of the spline of values (N,)."""
-        return self.pull * (self.matrix @ values)
+        """Residuals g − f (N,) of the spline of values g (N,)."""
+        return self.penalty * (self.matrix @ values)
 
     def held_out(self, values: Array) -> Array:
-        """Leave-one-out residuals (N,) of values (N,): w_i / P_ii (Dubrule 1983 for kriging, the same equations)."""
+        """Leave-one-out residuals (N,) of values g (N,): w_i / P_ii (Dubrule 1983, for kriging: the same equations)."""
         return (self.matrix @ values) / np.diag(self.matrix)
 
     def subset(self, keep: NDArray[np.bool_]) -> Inverse:
-        """The same without some of the points, from what is there: a Schur complement."""
-        gone = ~keep
+        """The inverse for the points that the mask `keep` (N,) selects, by a Schur complement."""
+        dropped = ~keep
         rows = self.matrix[keep]
-        across = rows[:, gone]
+        mixed = rows[:, dropped]
         matrix = rows[:, keep]
-        matrix -= across @ np.linalg.solve(self.matrix[np.ix_(gone, gone)], across.T)
-        return Inverse(matrix, self.pull[keep])
+        matrix -= mixed @ np.linalg.solve(self.matrix[np.ix_(dropped, dropped)], mixed.T)
+        return Inverse(matrix, self.penalty[keep])
 
 
-def spread_points(points: Array, quality: Array, budget: int, spacing: float) -> NDArray[np.intp]:
-    """Indices of at most `budget` points (N, 2), no two in one cell of `spacing` px, the best (smallest quality) of
-    each cell."""
+def spread_points(points: Array, cost: Array, budget: int, spacing: float) -> NDArray[np.intp]:
+    """Indices of at most `budget` of the points (N, 2) px: of each cell of `spacing` px the one with the least `cost`
+    (N,)."""
     cells = np.floor(points / spacing).astype(np.int64)
-    order = np.lexsort((quality, cells[:, 0], cells[:, 1]))
+    order = np.lexsort((cost, cells[:, 0], cells[:, 1]))
     first = np.r_[True, np.any(np.diff(cells[order], axis=0) != 0, axis=1)]
     chosen = order[first]
-    if len(chosen) > budget:  # coarser cells until the budget holds them: about the square root of the excess
-        return spread_points(points, quality, budget, spacing * max(1.05, float(np.sqrt(len(chosen) / budget))))
+    if len(chosen) > budget:  # larger cells, by the square root of the excess, until they are few enough
+        return spread_points(points, cost, budget, spacing * max(1.05, float(np.sqrt(len(chosen) / budget))))
     return np.sort(chosen)

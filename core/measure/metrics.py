@@ -1,10 +1,11 @@
-"""How well a stitch holds: alignment and epipolar exactness in px, folds, and the overlap's PSNR and SSIM."""
+"""Figures of a stitch: alignment and distance from epipolar lines in px, PSNR and SSIM of the overlap, its seam."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -21,17 +22,14 @@ from ..raster.arrays import Array, Part, beside, bounds, strips
 from ..raster.colour import encode
 from ..raster.lazy import AnyImage
 from ..raster.log_encoding import log_encode
+from ..raster.picture_map import falls_inside
 from ..raster.sampling import fetch
 from ..system.threads import each, in_order
-
-# Constants of the structural similarity index for 8 bit (Wang et al., IEEE TIP 2004, section III-B).
-SSIM_C1, SSIM_C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
-# A field is smooth: about this many canvas pixels, evenly spread, say how far a map leaves the epipolar lines.
-SAMPLES = 20_000
+from .options import QUALITY
 
 
 def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
-    """Peak signal-to-noise ratio in dB of two 8-bit pictures (H, W, C) over a mask (H, W); inf where they are equal."""
+    """Peak signal-to-noise ratio in dB of two 8-bit pictures (H, W, C) over a mask (H, W), not empty; inf if equal."""
 
     def total(rows: slice) -> float:
         first, second = (picture[rows][mask[rows]].astype(np.float32) for picture in (a, b))
@@ -42,17 +40,27 @@ def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) ->
 
 
 def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) -> float:
-    """Mean structural similarity of two 8-bit pictures (H, W, C) as gray, 11×11 Gaussian of σ 1.5, where the whole
-    window lies in the mask.
+    """Mean structural similarity (Wang et al., IEEE TIP 2004) of two 8-bit pictures.
 
-    NaN where no window fits (Wang et al. 2004).
+    Parameters
+    ----------
+    a, b : (H, W, C) uint8 array
+        Compared as gray, in 11×11 Gaussian windows of σ 1.5.
+    mask : (H, W) bool array
+        Only windows that lie in it entirely count.
+
+    Returns
+    -------
+    float
+        NaN if no window fits.
     """
     inner = cv2.erode(np.pad(mask.astype(np.uint8), 5), np.ones((11, 11), np.uint8))[5:-5, 5:-5] > 0
     if not inner.any():
         return float("nan")
 
     def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
-        return cv2.GaussianBlur(values, (11, 11), 1.5)
+        result: NDArray[np.float32] = cv2.GaussianBlur(values, (11, 11), 1.5)
+        return result
 
     def total(rows: slice) -> float:
         near, here = beside(rows, 5, len(mask))
@@ -62,35 +70,41 @@ def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) ->
     return sum(in_order(total, strips(mask.shape))) / int(inner.sum())
 
 
-def _gray(picture: NDArray) -> NDArray:
+def _gray(picture: NDArray[Any]) -> NDArray[Any]:
+    """Gray levels (H, W) of a picture (H, W, 1 or 3)."""
     return picture[..., 0] if picture.shape[2] == 1 else cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
 
 
 def overlap_views(
-    reference: Picture, target: Picture, warp: Warp
+    pictures: Sequence[Picture], warp: Warp, number: int = 1
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.bool_]]:
-    """The 8-bit views (H, W, C) of the reference and, on its pixels, of the warped target; and where (H, W) both show
-    something whole; by a flat warp."""
+    """Views (H, W, C) uint8 of the reference and of picture `number` warped onto its pixels, and the mask (H, W) of
+    pixels where both are opaque; for a flat warp."""
+    reference, picture = pictures[0], pictures[number]
     height, width = reference.view.shape[:2]
     x, y = warp.canvas.offset
     box = (slice(y, y + height), slice(x, x + width))
-    inside = warp.inside((target.view.shape[1], target.view.shape[0]))[box]
+    picture_map = warp.maps[number].arrays()
+    map_x, map_y = picture_map.x[box], picture_map.y[box]
+    inside = falls_inside(map_x, map_y, (picture.view.shape[1], picture.view.shape[0]))
     if reference.alpha is not None:
         inside = inside & (reference.alpha > 0)
-    if target.alpha is not None:
-        # whole, where the colours are fetched from: what is hidden has no colour to compare
-        alpha = fetch(target.alpha[..., None], warp.map_x[box], warp.map_y[box], cv2.INTER_LINEAR)
+    if picture.alpha is not None:
+        # opaque where the colours are interpolated from: a transparent pixel has no colour to compare
+        alpha = fetch(picture.alpha[..., None], map_x, map_y, cv2.INTER_LINEAR)
         inside = inside & (alpha[..., 0] > 1 - 1 / 255)
-    map_x, map_y = (np.where(inside, m[box], -1).astype(np.float32) for m in (warp.map_x, warp.map_y))
-    return reference.view, fetch(target.view, map_x, map_y, cv2.INTER_LINEAR), inside
+    map_x, map_y = (np.where(inside, values, -1).astype(np.float32) for values in (map_x, map_y))
+    return reference.view, fetch(picture.view, map_x, map_y, cv2.INTER_LINEAR), inside
 
 
-def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
-    """PSNR (dB), SSIM and size of the overlap, between the 8-bit views of the reference and of the warped target.
+def overlap_quality(pictures: Sequence[Picture], warp: Warp, number: int = 1) -> dict[str, float]:
+    """PSNR (dB), SSIM and pixels of the overlap, between the 8-bit views of the reference and of warped picture
+    `number`.
 
-    Exposure differences are in it; it is what a reader of the literature calls alignment quality on the overlap.
+
+    Differences in exposure lower it. The literature calls it alignment quality on the overlap.
     """
-    view, fetched, inside = overlap_views(reference, target, warp)
+    view, fetched, inside = overlap_views(pictures, warp, number)
     if not inside.any():
         return {"overlap_px": 0, "overlap_psnr_db": float("nan"), "overlap_ssim": float("nan")}
     return {
@@ -100,17 +114,18 @@ def overlap_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str
     }
 
 
-def canvas_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str, float]:
-    """The same as published tables have it: both pictures black outside the overlap, averaged over the whole canvas.
+def canvas_quality(pictures: Sequence[Picture], warp: Warp, number: int = 1) -> dict[str, float]:
+    """The same as in published tables: both pictures black outside the overlap, averaged over the whole canvas.
 
-    For comparison with them only: black counts as perfect, so a larger canvas looks better.
+
+    Only for comparison with them: black counts as perfect, so a larger canvas scores higher.
     """
-    view, fetched, inside = overlap_views(reference, target, warp)
+    view, fetched, inside = overlap_views(pictures, warp, number)
     if not inside.any():
         return {"canvas_psnr_db": float("nan"), "canvas_ssim": float("nan")}
     share = float(inside.sum()) / (warp.canvas.width * warp.canvas.height)
     bare = [np.where(inside[..., None], part, 0).astype(np.uint8) for part in (view, fetched)]
-    # a window's width of black around it holds all that is not perfect
+    # black around the pictures, so that every window that touches them counts
     first, second = (np.pad(part, ((6, 6), (6, 6), (0, 0))) for part in bare)
     similar = ssim(first, second, np.ones(first.shape[:2], bool))
     pixels = (first.shape[0] - 10) * (first.shape[1] - 10)
@@ -121,40 +136,57 @@ def canvas_quality(reference: Picture, target: Picture, warp: Warp) -> dict[str,
 
 
 def appearance(
-    panorama: Layer, reference: Layer, target: Layer, from_target: NDArray[np.bool_] | None, floats: tuple[bool, bool]
+    panorama: Layer, layers: Sequence[Layer], labels: NDArray[np.int16] | None, floats: bool
 ) -> dict[str, float]:
-    """How much of a panorama's overlap looks as one of its pictures does, and how much its seam shows.
+    """Whether the panorama's overlaps look like one of its pictures, and how visible its seams are.
 
-    source_fidelity_mean, source_fidelity_p5: for every pixel of the overlap the better of the structural similarities
-    (gray, 7×7) to the reference and to the target, which is exposed as it is in the panorama: mean and 5th percentile;
-    a ghost looks like neither. seam_visibility: by how many levels (of 255) the step from pixel to pixel across the
-    seam differs from the same step in the picture that is nearer to it, mean over the seam. NaN where there is none.
+    Parameters
+    ----------
+    panorama : Layer
+        On the canvas.
+    layers : sequence of Layer
+        The pictures on the canvas, with the exposure they have in the panorama.
+    labels : (H, W) int array, optional
+        The layer that each pixel of the panorama comes from; None if there is no seam.
+    floats : bool
+        Whether any picture is float, and so may be brighter than white.
+
+    Returns
+    -------
+    dict
+        source_fidelity_mean and source_fidelity_p5: mean and 5th percentile, over all that several layers show, of the
+        best structural similarity (gray, 7×7) to one of them: a ghost looks like none. seam_visibility: levels of 255
+        by which the step between neighbours across a seam differs from the same step in the picture where it differs
+        least, mean over the seams. NaN where undefined.
     """
-    box = bounds((reference.alpha > 0) & (target.alpha > 0))
+    several = np.sum([layer.alpha > 0 for layer in layers], axis=0, dtype=np.int16) > 1
+    box = bounds(several)
     if box is None:
         return {"source_fidelity_mean": math.nan, "source_fidelity_p5": math.nan, "seam_visibility": math.nan}
-    # what else is there may be missing for want of room in 8 bit: light beyond white is looked at as tones
-    levels = [_levels(part.light, box, any(floats)) for part in (panorama, reference, target)]
-    both = ((reference.alpha > 0) & (target.alpha > 0))[box]
+    # with floats there may be light brighter than white, which 8 bits cannot hold: compared in log encoding
+    levels = [_levels(part.light, box, floats) for part in (panorama, *layers)]
+    several = several[box]
 
     def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
-        return cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
+        result: NDArray[np.float32] = cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
+        return result
 
-    def better(rows: slice) -> NDArray[np.float32]:
-        near, here = beside(rows, 3, len(both))
-        whole, first, second = (_gray(part[near].astype(np.float32)) for part in levels)
-        return np.maximum(*(_similarity(whole, part, smooth)[here][both[rows]] for part in (first, second)))
+    def best(rows: slice) -> NDArray[np.float32]:
+        with_margin, own = beside(rows, 3, len(several))
+        stitched, *others = (_gray(part[with_margin].astype(np.float32)) for part in levels)
+        similarities = [_similarity(stitched, part, smooth)[own][several[rows]] for part in others]
+        return np.asarray(np.max(similarities, axis=0))
 
-    fidelity = np.concatenate(list(in_order(better, strips(both.shape))))
-    seam = math.nan if from_target is None else _seam_visibility(levels, from_target[box], both)
+    fidelity = np.concatenate(list(in_order(best, strips(several.shape))))
+    seam = math.nan if labels is None else _seam_visibility(levels, labels[box], several)
     return {
         "source_fidelity_mean": float(fidelity.mean(dtype=np.float64)),
         "source_fidelity_p5": float(np.percentile(fidelity, 5)), "seam_visibility": seam,
     }  # fmt: skip
 
 
-def _levels(light: AnyImage, box: Part, floats: bool) -> NDArray:
-    """Levels (h, w, C) of a part: uint8, or float32 on the same scale."""
+def _levels(light: AnyImage, box: Part, floats: bool) -> NDArray[Any]:
+    """Levels (h, w, C), 0 to 255, of a part of linear light: uint8, or log-encoded float32."""
     rows, columns = box
     shape = (rows.stop - rows.start, columns.stop - columns.start, light.shape[2])
     out = np.empty(shape, np.float32 if floats else np.uint8)
@@ -169,28 +201,46 @@ def _levels(light: AnyImage, box: Part, floats: bool) -> NDArray:
 
 def _similarity(
     x: NDArray[np.float32], y: NDArray[np.float32], smooth: Callable[[NDArray[np.float32]], NDArray[np.float32]]
-) -> NDArray:
-    """The structural similarity (H, W) of two gray pictures in windows that `smooth` takes means over."""
+) -> NDArray[Any]:
+    """The structural similarity (H, W) of gray pictures x, y (H, W); `smooth` averages over a window."""
     mx, my = smooth(x), smooth(y)
     vx, vy, vxy = smooth(x * x) - mx * mx, smooth(y * y) - my * my, smooth(x * y) - mx * my
-    return (2 * mx * my + SSIM_C1) * (2 * vxy + SSIM_C2) / ((mx * mx + my * my + SSIM_C1) * (vx + vy + SSIM_C2))
+    c1, c2 = QUALITY.ssim_c1, QUALITY.ssim_c2
+    return (2 * mx * my + c1) * (2 * vxy + c2) / ((mx * mx + my * my + c1) * (vx + vy + c2))
 
 
 def _seam_visibility(
-    levels: list[NDArray], from_target: NDArray[np.bool_], both: NDArray[np.bool_]
+    levels: list[NDArray[Any]], labels: NDArray[np.int16], several: NDArray[np.bool_]
 ) -> float:
-    beyond = []
+    """See `appearance`; levels (h, w, C) of panorama, reference and target; both (h, w): the overlap."""
+    excess = []
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        across = (from_target[here] != from_target[there]) & both[here] & both[there]
+        across = (labels[here] != labels[there]) & several[here] & several[there]
         steps = [part[here][across].astype(np.float32) - part[there][across] for part in levels]
-        beyond.append(np.minimum(*(np.abs(steps[0] - step).mean(axis=1) for step in steps[1:])))
-    every = np.concatenate(beyond)
+        excess.append(np.min([np.abs(steps[0] - step).mean(axis=1) for step in steps[1:]], axis=0))
+    every = np.concatenate(excess)
     return float(every.mean(dtype=np.float64)) if every.size else math.nan
 
 
-def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
-    """The map (N, 2) at raw points (N, 2) of the reference, bilinear between canvas pixels; NaN outside.
-    camera: the reference's, if its lens matters."""
+def look_up(warp: Warp, x: Array, camera: Camera | None = None, number: int = 1) -> Array:
+    """The map of picture `number` at points of the reference, bilinear between canvas pixels.
+
+    Parameters
+    ----------
+    warp : Warp
+    x : (N, 2) array
+        Raw (distorted) reference px.
+    camera : Camera, optional
+        The reference's, where its lens matters.
+    number : int
+        The picture whose map it is.
+
+    Returns
+    -------
+    (N, 2) array
+        Raw px of that picture; NaN outside the canvas.
+    """
+    picture_map = warp.maps[number].arrays()
     at = warp.canvas.of_reference(x, camera)
     limit = np.array([warp.canvas.width, warp.canvas.height]) - 1
     outside = ((at < 0) | (at > limit)).any(axis=1)
@@ -198,7 +248,7 @@ def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
     (u, v), (column, row) = (at - corner).T, corner.T
     next_column, next_row = np.minimum(column + 1, limit[0]), np.minimum(row + 1, limit[1])
     out = []
-    for values in (warp.map_x, warp.map_y):
+    for values in (picture_map.x, picture_map.y):
         upper = values[row, column] * (1 - u) + values[row, next_column] * u
         lower = values[next_row, column] * (1 - u) + values[next_row, next_column] * u
         out.append(np.where(outside, np.nan, upper * (1 - v) + lower * v))
@@ -207,9 +257,9 @@ def look_up(warp: Warp, x: Array, camera: Camera | None = None) -> Array:
 
 @dataclass(frozen=True)
 class CoverageSamples:
-    """Canvas pixels that show the target, evenly spread, and where they show it, in ideal (undistorted) px of both.
+    """An even sample of the canvas pixels that show the target, in ideal (undistorted) px.
 
-    points (N, 2) of the reference's plane; target (N, 2); overlap (N,): which of them lie in the reference.
+    points (N, 2): on the reference's plane; target (N, 2): what they show; overlap (N,): which lie in the reference.
     """
 
     points: Array
@@ -217,30 +267,46 @@ class CoverageSamples:
     overlap: NDArray[np.bool_]
 
 
-def coverage_samples(warp: Warp, cameras: tuple[Camera, Camera], samples: int = SAMPLES) -> CoverageSamples:
-    """What a warp shows of the target at about `samples` pixels of the whole canvas, on an even grid.
+def coverage_samples(
+    warp: Warp, cameras: Sequence[Camera], number: int = 1, samples: int = QUALITY.map_samples
+) -> CoverageSamples:
+    """Samples what a warp shows of picture `number` on an even grid of about `samples` pixels over the whole canvas.
 
-    Of a round panorama no more than a flat one would show: beyond, pixels of the reference's plane mean nothing.
+    Parameters
+    ----------
+    warp : Warp
+    cameras : (Camera, Camera)
+        Of reference and target.
+    samples : int
+
+    Returns
+    -------
+    CoverageSamples
+        Of a cylindrical or spherical panorama only what a flat one would show: elsewhere the reference's plane has no
+        pixels.
     """
     canvas = warp.canvas
     step = max(1, int(np.sqrt(canvas.width * canvas.height / samples)))
     nodes = np.s_[step // 2 :: step, step // 2 :: step]
-    shows = warp.inside(cameras[1].size)[nodes]
-    raw = np.stack([warp.map_x[nodes][shows], warp.map_y[nodes][shows]], axis=-1).astype(np.float64)
+    picture_map = warp.maps[number].arrays()
+    x, y = picture_map.x[nodes], picture_map.y[nodes]
+    reference, camera = cameras[0], cameras[number]
+    shows = falls_inside(x, y, camera.size)
+    raw = np.stack([x[shows], y[shows]], axis=-1).astype(np.float64)
     if canvas.projection is None:
         points = np.argwhere(shows)[:, ::-1] * float(step) + step // 2 - np.array(canvas.offset)
     else:
-        points = canvas.on_reference(canvas.xs[nodes[1]], canvas.ys[nodes[0]], cameras[0])[0][shows]
-        far = MAX_REACH * max(*cameras[0].size, *cameras[1].size)
+        points = canvas.on_reference(canvas.xs[nodes[1]], canvas.ys[nodes[0]], reference)[0][shows]
+        far = MAX_REACH * max(*reference.size, *camera.size)
         with np.errstate(invalid="ignore"):
-            flat = ((points >= -far) & (points <= np.array(cameras[0].size) + far)).all(axis=1)
+            flat = ((points >= -far) & (points <= np.array(reference.size) + far)).all(axis=1)
         points, raw = points[flat], raw[flat]
-    overlap = (points >= 0).all(axis=1) & (points <= np.array(cameras[0].size) - 1).all(axis=1)
-    return CoverageSamples(undistort(points, cameras[0]), undistort(raw, cameras[1]), overlap)
+    overlap = (points >= 0).all(axis=1) & (points <= np.array(reference.size) - 1).all(axis=1)
+    return CoverageSamples(undistort(points, reference), undistort(raw, camera), overlap)
 
 
 def off_line_mean(F: Array, shown: CoverageSamples) -> float:
-    """Mean distance in target px of the map from its epipolar lines over the overlap; NaN without overlap or F."""
+    """Mean distance (target px) of the map from the epipolar lines of F over the overlap; NaN without overlap or F."""
     if not (np.isfinite(F).all() and shown.overlap.any()):
         return float("nan")
     return float(distance_to_line(F, shown.points[shown.overlap], shown.target[shown.overlap]).mean())

@@ -1,20 +1,21 @@
-"""The report: everything that was measured and decided, as plain JSON-ready values."""
+"""The report: everything that was measured and decided, as JSON-ready values."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cameras.lens import undistort
 from ..field.slack import SlackField
 from ..panorama.canvas import Canvas
 from ..panorama.levelling import angles_of
 from ..panorama.warp import build_map
+from ..raster.arrays import Array
 from .held_out import held_out
 from .metrics import coverage_samples, look_up, off_line_mean, overlap_quality
+from .options import WARNING
 from .projectivity import independent_fundamental, projectivity
 
 if TYPE_CHECKING:
@@ -27,25 +28,38 @@ if TYPE_CHECKING:
     from ..pictures.picture import Picture
 
 SCHEMA = 1
-# More inliers than this behind infinity means that the focal length, hence H_inf, is doubtful.
-NEGATIVE_SHARE = 0.02
-# Holes that take up more of the canvas than this can be seen in the panorama as a whole.
-HOLES = 1e-4
 
 
 def make_report(
-    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment, canvas: Canvas, decided: Decided,
-    appearance: dict[str, float],
+    options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment, canvas: Canvas,
+    decided: Sequence[Decided], appearance: dict[str, float],
 ) -> tuple[dict[str, Any], list[str]]:
-    """The report of a stitch that shows `canvas`, and warnings in plain words drawn from it.
+    """The report of a stitch. It holds no times and no dates: the same input gives the same report.
 
-    decided: about its composition (hole_px: pixels that neither picture sees, beyond the reference and behind something
-    near; inpainted_px: how many of them were filled); appearance: of the panorama (see `metrics.appearance`).
-    No seconds, no dates: the same input gives the same report.
+    Parameters
+    ----------
+    options : StitchOptions
+    pictures : sequence of Picture
+        The reference first.
+    alignment : Alignment
+    canvas : Canvas
+        What the panorama shows.
+    decided : sequence of Decided
+        About the composition of each picture: what is hidden, holes, exposure, folds.
+    appearance : dict
+        See `metrics.appearance`.
+
+    Returns
+    -------
+    report : dict
+        JSON-ready values.
+    warnings : list of str
+        In plain words, for the user.
     """
-    cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
-    field = alignment.field
-    measured = _measured(options, pictures, alignment) | {"folds": decided.folds} | appearance
+    cameras, edge, field = alignment.cameras, alignment.edges[0], alignment.field
+    matches, two_view, further = edge.matches, edge.two_view, decided[edge.j]
+    holes = sum(one.holes for one in decided)
+    measured = _measured(options, pictures, alignment) | {"folds": max(one.folds for one in decided)} | appearance
     report = {
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
@@ -76,35 +90,35 @@ def make_report(
             "projection": _projection_entry(canvas, two_view),
         },
         "composition": {
-            "exposure_gain": decided.exposure.gain, "exposure_spread": decided.exposure.spread,
-            "exposure_blocks": decided.exposure.blocks, "occluded_px": int(decided.hidden.sum()),
-            "hole_px": decided.holes, "inpainted_px": decided.holes if options.holes == "inpaint" else 0,
+            "exposure_gain": further.exposure.gain, "exposure_spread": further.exposure.spread,
+            "exposure_blocks": further.exposure.blocks, "occluded_px": int(further.hidden.sum()),
+            "hole_px": holes, "inpainted_px": holes if options.holes == "inpaint" else 0,
         },
         "measured": measured,
     }  # fmt: skip
     warnings = _warnings(alignment, measured["folds"])
-    if decided.holes > HOLES * alignment.warp.map_x.size:
+    if holes > WARNING.hole_share * further.hidden.size:
         shown = (
             "filled smoothly from around there" if options.holes == "inpaint" else
             "transparent there (black in a JPEG); --holes inpaint fills them"
         )  # fmt: skip
         warnings.append(
-            f"{decided.holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
+            f"{holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
             f"{shown}; --crop reference shows none of them"
         )
     return plain(report), warnings
 
 
 def _measured(
-    options: StitchOptions, pictures: tuple[Picture, Picture], alignment: Alignment
+    options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment
 ) -> dict[str, float]:
-    """The figures of an alignment; those that cost time only where options.measure asks for them. NaN: undefined."""
-    cameras, matches, two_view = alignment.cameras, alignment.matches, alignment.two_view
-    field, warp = alignment.field, alignment.warp
-    inliers = matches.subset(two_view.inliers)
-    error = np.linalg.norm(look_up(warp, inliers.x, cameras[0]) - inliers.y, axis=1)
+    """The figures of an alignment, NaN where undefined; expensive ones only if options.measure asks for them."""
+    cameras, edge = alignment.cameras, alignment.edges[0]
+    field, warp, two_view = alignment.field, alignment.warp, edge.two_view
+    inliers = edge.matches.subset(two_view.inliers)
+    error = np.linalg.norm(look_up(warp, inliers.x, cameras[0], edge.j) - inliers.y, axis=1)
     error = error[np.isfinite(error)]
-    shown = coverage_samples(warp, cameras)
+    shown = coverage_samples(warp, cameras, edge.j)
     measured = {
         "alignment_median_px": _median(error),
         "alignment_p95_px": float(np.percentile(error, 95)) if error.size else math.nan,
@@ -113,16 +127,15 @@ def _measured(
     }
     if not options.measure:
         return measured
-    ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
-    # where the pair has no F of its own, none that matches give means anything
-    independent = independent_fundamental(ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
-    unseen = held_out(field, ideal.subset(two_view.inliers), shown, options.seed)
+    # a pair without a baseline has no F: whatever matches give would mean nothing
+    independent = independent_fundamental(edge.ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
+    unseen = held_out(field, edge.inliers, shown, options.seed)
     # pixels are compared in the reference's own frame, where only one of the two pictures is resampled
-    framed = warp
+    flat = warp
     if warp.canvas.projection is not None:
-        relief = None if alignment.dense is None else alignment.dense.relief
-        framed = build_map(field, two_view, Canvas(*cameras[0].size, (0, 0)), *cameras, relief)
-    return measured | overlap_quality(*pictures, framed) | {
+        refinement = None if alignment.dense is None else alignment.dense.relief
+        flat = build_map(field, alignment.views, Canvas(*cameras[0].size, (0, 0)), refinement)
+    return measured | overlap_quality(pictures, flat, edge.j) | {
         "projectivity_own_px": projectivity(two_view.F, shown),
         "projectivity_independent_px": projectivity(independent, shown),
         "projectivity_points": int((~shown.overlap).sum()),
@@ -133,9 +146,9 @@ def _measured(
 
 
 def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
-    two_view, field, warp = alignment.two_view, alignment.field, alignment.warp
+    two_view, field, warp = alignment.edges[0].two_view, alignment.field, alignment.warp
     out = []
-    if field.fit.negative_share > NEGATIVE_SHARE:
+    if field.fit.negative_share > WARNING.behind_infinity_share:
         out.append(
             f"{field.fit.negative_share:.0%} of the points lie beyond infinity: the focal length "
             f"({two_view.K[0, 0]:.0f} px) is doubtful, and with it depth and H_inf; the picture itself hardly "
@@ -151,14 +164,14 @@ def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
             else "the target reaches too far to the side to be shown whole in a flat picture: its far end was cropped; "
             "--projection cylindrical or equirectangular shows it"
         )
-    if fold_share > 0.005:
+    if fold_share > WARNING.fold_share:
         out.append(f"the warp folds over in {fold_share:.1%} of the target: look for doubled or torn things there")
     return out
 
 
 def _projection_entry(canvas: Canvas, two_view: TwoView) -> dict[str, Any]:
-    """How canvas pixels become rays in the reference camera's frame (see `projection`); level: yaw, pitch and roll of
-    the reference in degrees, as --level takes them."""
+    """How canvas pixels map to rays in the reference camera's frame (see `projection`); level: yaw, pitch and roll of
+    the reference in degrees, as for --level."""
     if canvas.projection is None:
         focal = float(np.sqrt(two_view.K[0, 0] * two_view.K[1, 1]))
         kind, centre, rotation = "perspective", two_view.K[:2, 2], np.eye(3)
@@ -190,13 +203,12 @@ def _dense_entry(dense: Dense | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _median(values: np.ndarray) -> float:
+def _median(values: Array) -> float:
     return float(np.median(values)) if values.size else math.nan
 
 
 def plain(value: Any) -> Any:
-    """The same with lists for arrays, Python numbers for NumPy's, and None for what JSON has no word for (NaN,
-    infinity)."""
+    """A value with what JSON lacks replaced: arrays by lists, NumPy's numbers by Python's, NaN and infinity by None."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

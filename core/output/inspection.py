@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from ..cameras.lens import distort
 from ..cameras.projective import homogeneous
-from ..cameras.two_view import TwoView
 from ..field.transfer import transfer
 from ..measure.metrics import look_up
 from ..pipeline import StitchResult
 from ..raster.arrays import Array
 from ..raster.colour import encode
+from ..raster.resizing import size_change
 
 # Pixels along the longer side of the pictures that lie over the panorama, and nodes along that of the depth grid.
 LONGEST_SIDE = 1600
@@ -27,15 +27,15 @@ LONGEST_GRID = 160
 USED, LEFT_OUT = "USED", "LEFT_OUT"
 
 
-def scales(result: StitchResult) -> tuple[Array, Array]:
-    """Matrices S, S' (3, 3) that bring px of the full pictures to px of those that were worked on."""
+def scales(result: StitchResult) -> list[Array]:
+    """For each picture the matrix S (3, 3) that brings px of the full picture to px of the one that was worked on."""
     out = []
     for full, camera in zip(result.full_sizes, result.cameras, strict=True):
-        factor = np.array(camera.size) / np.array(full)
+        factor, shift = size_change(full, camera.size)
         S = np.diag([*factor, 1.0])
-        S[:2, 2] = (factor - 1) / 2  # pixel centres are integers: the corner lies at −½
+        S[:2, 2] = shift
         out.append(S)
-    return out[0], out[1]
+    return out
 
 
 def full_geometry(result: StitchResult) -> dict[str, Any]:
@@ -43,14 +43,15 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
     `distortion_prime` (5,) in px of the full upright pictures; `S` (3, 3): from those of the reference to the canvas;
     `canvas` (W, H) px; `K_canvas` (3, 3). The canvas of a round panorama is none of a pinhole camera: S and K_canvas
     are NaN there, and the report's `canvas.projection` says what it shows."""
-    view, canvas = result.two_view, result.canvas
-    S, S_prime = scales(result)
+    edge, canvas = result.edges[0], result.canvas
+    view, scale = edge.two_view, scales(result)
+    S, S_prime = scale[edge.i], scale[edge.j]
     shift = np.eye(3) if canvas.projection is None else np.full((3, 3), np.nan)
     shift[:2, 2] += canvas.offset
     return {
         "full_sizes": result.full_sizes, "F": S_prime.T @ view.F @ S, "K": np.linalg.inv(S) @ view.K,
         "K_prime": np.linalg.inv(S_prime) @ view.K_prime, "R": view.R, "t": view.t, "model": view.model,
-        "distortion": result.cameras[0].distortion, "distortion_prime": result.cameras[1].distortion,
+        "distortion": result.cameras[edge.i].distortion, "distortion_prime": result.cameras[edge.j].distortion,
         "S": shift @ S, "canvas": (canvas.width, canvas.height), "K_canvas": shift @ view.K,
     }  # fmt: skip
 
@@ -58,22 +59,21 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
 def match_errors(result: StitchResult, rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """How far (N,) in full target px the map leads from x', for rows (N, ≥ 4) x, y, x', y' of full px; NaN where the
     panorama does not show x."""
-    S, S_prime = scales(result)
-    x, y = homogeneous(rows[:, :2]) @ S.T, homogeneous(rows[:, 2:4]) @ S_prime.T
-    error = look_up(result.warp, x[:, :2], result.cameras[0]) - y[:, :2]
-    return np.linalg.norm(error / np.diag(S_prime)[:2], axis=1)
+    edge, scale = result.edges[0], scales(result)
+    x, y = homogeneous(rows[:, :2]) @ scale[edge.i].T, homogeneous(rows[:, 2:4]) @ scale[edge.j].T
+    error = look_up(result.warp, x[:, :2], result.cameras[edge.i], edge.j) - y[:, :2]
+    return np.linalg.norm(error / np.diag(scale[edge.j])[:2], axis=1)
 
 
 def match_rows(result: StitchResult) -> dict[str, Any]:
     """All matches that were found: `rows` (N, 4) full px to a thousandth, `weights`, `states` (USED: the field stands
     on it, LEFT_OUT: it contradicts the others), `errors` as `match_errors`."""
-    S, S_prime = scales(result)
-    back, back_prime = np.linalg.inv(S), np.linalg.inv(S_prime)
-    found = result.matches
-    x, y = homogeneous(found.x) @ back.T, homogeneous(found.y) @ back_prime.T
+    edge, back = result.edges[0], [np.linalg.inv(S) for S in scales(result)]
+    found = edge.matches
+    x, y = homogeneous(found.x) @ back[edge.i].T, homogeneous(found.y) @ back[edge.j].T
     rows = np.column_stack([x[:, :2], y[:, :2]])
     used = np.zeros(len(found), bool)
-    used[np.flatnonzero(result.two_view.inliers)[result.field.fit.inliers_used]] = True
+    used[np.flatnonzero(edge.two_view.inliers)[result.field.fit.inliers_used]] = True
     return {
         "rows": rows.round(3), "weights": np.ones(len(found)) if found.weights is None else found.weights,
         "states": _states(used), "errors": match_errors(result, rows).round(3),
@@ -100,22 +100,23 @@ def _states(used: NDArray[np.bool_]) -> list[str]:
 
 
 def displacement_px(result: StitchResult) -> NDArray[np.float32]:
-    """How far (H, W) in full target px each canvas pixel lies from where it would be seen if it were infinitely far;
-    0 where the model knows no depth, NaN behind the target camera."""
-    warp, view = result.warp, result.two_view
+    """How far (H, W) in full px of a further picture each canvas pixel lies from where it would be seen if it were
+    infinitely far; 0 where the model knows no depth, NaN behind its camera."""
+    warp, number = result.warp, result.edges[0].j
+    view, picture_map = result.views[number], warp.maps[number].arrays()
     if not view.e_prime.any():
-        return np.zeros(warp.map_x.shape, np.float32)
-    reference, target = result.cameras
-    infinite = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, reference)
-    far = distort(np.stack(transfer(view, infinite, np.zeros(1)), axis=-1), target)
-    moved = np.hypot(warp.map_x - far[..., 0], warp.map_y - far[..., 1])
-    return (moved / scales(result)[1][0, 0]).astype(np.float32)
+        return np.zeros(picture_map.shape, np.float32)
+    infinite = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, result.cameras[0])
+    far = distort(np.stack(transfer(view, infinite, np.zeros(1)), axis=-1), view.camera)
+    moved = np.hypot(picture_map.x - far[..., 0], picture_map.y - far[..., 1])
+    return (moved / scales(result)[number][0, 0]).astype(np.float32)
 
 
 def heat_map(result: StitchResult) -> tuple[NDArray[np.uint8], tuple[float, float]]:
     """The slide as a picture (h, w, 4) uint8 RGBA, reduced, transparent where the target shows nothing; and the px that
     its blue and its red end stand for."""
-    far, shows = _reduced(displacement_px(result)), _reduced((result.target_layer.alpha > 0).astype(np.float32)) > 0.5
+    layer = result.layers[result.edges[0].j]
+    far, shows = _reduced(displacement_px(result)), _reduced((layer.alpha > 0).astype(np.float32)) > 0.5
     shows &= np.isfinite(far)
     if not shows.any():
         return np.zeros((*far.shape, 4), np.uint8), (0.0, 0.0)
@@ -128,8 +129,10 @@ def heat_map(result: StitchResult) -> tuple[NDArray[np.uint8], tuple[float, floa
 def difference(result: StitchResult) -> NDArray[np.uint8]:
     """|reference − warped target| of the display-encoded layers, (h, w, 4) uint8 RGBA, reduced; opaque where both
     show."""
-    layers = [encode(_reduced(layer.pixels), 8) for layer in (result.reference_layer, result.target_layer)]
-    both = (result.reference_layer.alpha > 0.5) & (result.target_layer.alpha > 0.5)
+    edge = result.edges[0]
+    pair = result.layers[edge.i], result.layers[edge.j]
+    layers = [encode(_reduced(layer.pixels), 8) for layer in pair]
+    both = (pair[0].alpha > 0.5) & (pair[1].alpha > 0.5)
     shows = _reduced(both.astype(np.float32)) > 0.999
     apart = cv2.absdiff(*layers).reshape(*shows.shape, -1)
     return np.dstack([np.repeat(apart, 3 // apart.shape[2], axis=2), np.where(shows, 255, 0).astype(np.uint8)])
@@ -149,9 +152,10 @@ def depth_grid(result: StitchResult) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def has_depth(two_view: TwoView) -> bool:
-    """Whether the model says where things stand: both cameras' places are known and differ."""
-    return bool(np.isfinite(two_view.t).all() and np.linalg.norm(two_view.t) > 0)
+def has_depth(result: StitchResult) -> bool:
+    """Whether the model says where things stand: the cameras' places are known and differ."""
+    t = np.stack([view.t for view in result.views])
+    return bool(np.isfinite(t).all() and t.any())
 
 
 def _reduced(values: NDArray) -> NDArray:

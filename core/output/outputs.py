@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from ..measure.report import plain
@@ -21,12 +24,14 @@ from ..raster.colour import decode
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
 
-# What lies beside the layers, by its name in the result: masks, white where they hold, and shares 0..1.
-MASKS = ("occluded", "confidence")
-# Where the pictures meet, in the form that --mask takes; only where there is a seam.
-SEAM = "seam"
+# What the layers' folder and the warp's file are to be read as (docs/formats.md).
+LAYERS_FORMAT, WARP_FORMAT = 2, 2
+# Which picture each pixel comes from, and the same in the form that --mask takes; only where there is a seam.
+LABELS, SEAM = "labels", "seam"
 # What was filled though neither picture saw it; only where that is asked for.
 INPAINTED = "inpainted"
+CONFIDENCE, CANVAS = "confidence", "canvas.json"
+_NOT_IN_NAMES = re.compile(r"[^\w.() +-]")
 
 
 @dataclass(frozen=True)
@@ -49,8 +54,9 @@ class OutputRequest:
         return None if self.report is None else self.report.with_name(self.report.stem + ".matches.csv")
 
 
-def check(request: OutputRequest, files: OutputFiles) -> None:
-    """Asks before the work whether everything could be written. Raises BadRequest or UnwritableOutput."""
+def check(request: OutputRequest, files: OutputFiles, pictures: Sequence[str]) -> None:
+    """Asks before the work on pictures of these names whether everything could be written. Raises BadRequest or
+    UnwritableOutput."""
     output_bits((8,), request.panorama.suffix)
     if request.warp is not None and request.warp.suffix.lower() != ".npz":
         raise BadRequest(f"the warp is written as .npz, not {request.warp.suffix or 'a file of no kind'}")
@@ -58,35 +64,58 @@ def check(request: OutputRequest, files: OutputFiles) -> None:
     single = [path for path in named if path is not None]
     files.check(*single)
     if request.layers is not None:
-        names = [f"{layer}{suffix}" for layer in ("reference", "target") for suffix in (".png", ".exr")]
-        names += [f"{mask}.png" for mask in (*MASKS, SEAM, INPAINTED)]
+        names = layer_files(pictures, (".png", ".exr"))
         files.check_folder(request.layers, names)
+        _refuse_other_layers(request.layers, names)
         taken = {(request.layers / name).resolve() for name in names}
         for path in single:
             if path.resolve() in taken:
                 raise BadRequest(f"{path}: named for two outputs, a layer is one; give each its own name")
 
 
+def _refuse_other_layers(folder: Path, names: Sequence[str]) -> None:
+    """Layers of other pictures would be taken for some of these: one number, one picture."""
+    others = sorted(path.name for path in folder.glob("[0-9][0-9]_*.*") if path.suffix in (".png", ".exr"))
+    strange = [name for name in others if name not in names]
+    if strange:
+        raise BadRequest(
+            f"{folder}: holds layers of other pictures ({', '.join(strange[:3])}{', …' if strange[3:] else ''}); name "
+            "another folder, or remove them"
+        )
+
+
+def layer_stem(number: int, name: str) -> str:
+    """What a picture's layer is called: its number, and its own name as far as every file system takes it."""
+    return f"{number:02d}_{_NOT_IN_NAMES.sub('_', Path(name).stem)}"
+
+
+def layer_files(
+    pictures: Sequence[str], suffixes: Sequence[str] = (".png",), seam: bool = True, inpainted: bool = True
+) -> list[str]:
+    """The files of a layers' folder, by the names of the pictures; without those that only a seam has, or only filled
+    holes."""
+    out = [layer_stem(number, name) + suffix for number, name in enumerate(pictures) for suffix in suffixes]
+    masks = [_occluded(number) for number in range(1, len(pictures))] + [CONFIDENCE]
+    masks += [LABELS, SEAM] if seam else []
+    masks += [INPAINTED] if inpainted else []
+    return out + [f"{mask}.png" for mask in masks] + [CANVAS]
+
+
+def _occluded(number: int) -> str:
+    return f"occluded_{number:02d}"
+
+
 def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> list[str]:
     """Stages every requested file; returns warnings about what a file kind could not hold."""
-    exif = result.reference.exif
-    icc = result.reference.icc
+    reference = result.pictures[0]
     alpha = None if result.panorama.alpha.min() >= 1.0 else result.panorama.alpha
-    data, warned = encode_picture(result.panorama.light, alpha, result.bits, request.panorama.suffix, icc, exif)
+    data, warned = encode_picture(
+        result.panorama.light, alpha, result.bits, request.panorama.suffix, reference.icc, reference.exif
+    )
     files.add(request.panorama, data)
     warnings = list(warned)
     if request.layers is not None:
-        for name, layer in (("reference", result.reference_layer), ("target", result.target_layer)):
-            _add_layer(files, request.layers, name, layer.within(result.spread), result)
-        for name in MASKS:
-            mask = cut(getattr(result, name), result.spread)
-            files.add_to_folder(request.layers, f"{name}.png", _mask_bytes(mask))
-        if result.report["options"]["holes"] == "inpaint":
-            filled = _mask_bytes(cut(result.inpainted, result.spread))
-            files.add_to_folder(request.layers, f"{INPAINTED}.png", filled)
-        if result.from_target is not None:
-            seam = _mask_bytes(cut(result.from_target, result.spread), result.panorama.alpha > 0)
-            files.add_to_folder(request.layers, f"{SEAM}.png", seam)
+        _add_layers(result, request.layers, files)
     if request.warp is not None:
         files.add(request.warp, warp_bytes(result))
     if request.report is not None and request.timing is not None and request.matches is not None:
@@ -103,13 +132,40 @@ def add_report(
     files.add(timing, json_bytes({"seconds": result.seconds}))
 
 
+def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
+    """Stages everything of a layers' folder."""
+    place = result.spread
+    for number, (picture, layer) in enumerate(zip(result.pictures, result.layers, strict=True)):
+        _add_layer(files, folder, layer_stem(number, picture.name), layer.within(place), result)
+    masks = {_occluded(number): _mask_bytes(cut(mask, place)) for number, mask in enumerate(result.occluded) if number}
+    masks[CONFIDENCE] = _mask_bytes(cut(result.confidence, place))
+    if result.report["options"]["holes"] == "inpaint":
+        masks[INPAINTED] = _mask_bytes(cut(result.inpainted, place))
+    if result.labels is not None:
+        labels = cut(result.labels, place, -1)
+        masks[LABELS] = _label_bytes(labels, len(result.pictures))
+        masks[SEAM] = _mask_bytes(labels > 0, result.panorama.alpha > 0)
+    for name, data in masks.items():
+        files.add_to_folder(folder, f"{name}.png", data)
+    about = {
+        "format": LAYERS_FORMAT, "size": [result.canvas.width, result.canvas.height],
+        "names": [picture.name for picture in result.pictures], "projection": result.report["canvas"]["projection"],
+    }  # fmt: skip
+    files.add_to_folder(folder, CANVAS, json_bytes(about))
+
+
 def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result: StitchResult) -> None:
-    icc, exif = result.reference.icc, result.reference.exif
-    files.add_to_folder(
-        folder, f"{name}.png", encode_picture(layer.light, layer.alpha, result.bits, ".png", icc, exif)[0]
-    )
-    if result.bits == 32:
-        files.add_to_folder(folder, f"{name}.exr", encode_picture(layer.light, layer.alpha, 32, ".exr", icc, exif)[0])
+    icc, exif = result.pictures[0].icc, result.pictures[0].exif
+    for bits, suffix in ((result.bits, ".png"), (32, ".exr"))[: 2 if result.bits == 32 else 1]:
+        files.add_to_folder(
+            folder, name + suffix, encode_picture(layer.light, layer.alpha, bits, suffix, icc, exif)[0]
+        )
+
+
+def _label_bytes(labels: np.ndarray, count: int) -> bytes:
+    """A gray PNG of each pixel's picture (H, W), its number + 1, 0 for none: of 16 bits for more than 254 pictures."""
+    values = (labels + 1).astype(np.uint8 if count < 255 else np.uint16)
+    return cv2.imencode(".png", values)[1].tobytes()
 
 
 def _mask_bytes(mask: np.ndarray, shown: np.ndarray | None = None) -> bytes:
@@ -121,25 +177,38 @@ def _mask_bytes(mask: np.ndarray, shown: np.ndarray | None = None) -> bytes:
 
 
 def warp_bytes(result: StitchResult) -> bytes:
-    """The .npz of DESIGN 5: x' ~ H_inf p + inverse_depth e' for canvas pixels p + offset; NaN for what a model lacks.
+    """The .npz of docs/formats.md: x ~ H_inf p + inverse_depth e_prime for canvas pixels p + offset; NaN for what a
+    model lacks.
 
     A round panorama has p = K r for unit rays r (see `projection`) and no offset, but projection (its name), focal (px
     per radian), centre (canvas px of the direction ahead) and rotation (from its axes to the reference camera's).
     """
-    view, warp = result.two_view, result.warp.within(result.spread)
-    # a field without depth slides nothing: inside, its e' is 0
-    e_prime = view.e_prime if np.isfinite(warp.inverse_depth).any() else np.full(3, np.nan)
+    views, warp = result.views, result.warp.within(result.spread)
+    canvas = warp.canvas
+    e_prime = np.stack([view.e_prime for view in views])
+    if not np.isfinite(warp.inverse_depth).any():
+        e_prime[1:] = np.nan  # a field without depth slides nothing: inside, its e' is 0
     arrays: dict[str, np.ndarray] = {
-        "map_x": warp.map_x, "map_y": warp.map_y, "offset": np.array(warp.canvas.offset, np.int64),
-        "F": view.F, "H_inf": view.H_inf, "e_prime": e_prime, "inverse_depth": warp.inverse_depth,
-        "K": view.K, "K_prime": view.K_prime, "R": view.R, "t": view.t,
-        "dist": result.cameras[0].distortion, "dist_prime": result.cameras[1].distortion,
+        "format": np.array(WARP_FORMAT), "canvas": np.array([canvas.width, canvas.height]),
+        "offset": np.array(canvas.offset, np.int64), "inverse_depth": warp.inverse_depth,
+        "K": np.stack([view.K for view in views]), "R": np.stack([view.R for view in views]),
+        "t": np.stack([view.t for view in views]), "dist": np.stack([view.camera.distortion for view in views]),
+        "H_inf": np.stack([view.H_inf for view in views]), "e_prime": e_prime,
+        "F": np.stack([edge.two_view.F for edge in result.edges]),
+        "edges": np.array([(edge.i, edge.j) for edge in result.edges]),
     }  # fmt: skip
-    projection = warp.canvas.projection
+    for number, one in enumerate(warp.maps):
+        if number or canvas.projection is not None:  # on its own plane the reference lies where offset says
+            picture_map = one.arrays()
+            arrays |= {
+                f"map_x_{number:02d}": picture_map.x, f"map_y_{number:02d}": picture_map.y,
+                f"box_{number:02d}": np.array([0, 0, canvas.width, canvas.height]),
+            }  # fmt: skip
+    projection = canvas.projection
     if projection is not None:
         arrays |= {
             "offset": np.full(2, np.nan), "projection": np.array(projection.kind), "focal": np.array(projection.focal),
-            "centre": np.array(projection.centre) + warp.canvas.offset, "rotation": projection.rotation,
+            "centre": np.array(projection.centre) + canvas.offset, "rotation": projection.rotation,
         }  # fmt: skip
     return npz_bytes(arrays)
 

@@ -6,21 +6,22 @@ is pasted exactly, or that of a round panorama (see `projection`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
 from ..cameras.lens import distort, undistort
-from ..cameras.projective import homogeneous, inverse_intrinsics
+from ..cameras.projective import ahead_of_camera, homogeneous, inverse_intrinsics
 from ..raster.arrays import Array, Box
-from ..raster.grid import NODES, Grid
+from ..raster.grid import Grid
+from ..raster.options import GRID
+from ..raster.picture_map import falls_inside
 from ..system.errors import OutputTooLarge
 from .projection import Projection, extent
 
-# Limits of what is worth showing: the target stretched more than 4× in length, or reaching further than three pictures
+# Limits of what is worth showing: a picture stretched more than 4× in length, or reaching further than three pictures
 # away.
 MAX_STRETCH = 4.0
 MAX_REACH = 3.0
@@ -85,20 +86,20 @@ class Canvas:
         """Raw pixels (len(ys), len(xs), 2) of the reference at columns xs and lines ys in px of the plane, NaN behind
         its camera; and p_3 there."""
         a, b, c = self.project_rows(np.eye(3), xs, ys, camera)
-        c = np.where(c > 1e-6 * np.maximum(np.abs(a), np.abs(b)), c, np.nan)
+        c = np.where(ahead_of_camera(a, b, c), c, np.nan)
         ideal = np.stack([a / c, b / c], axis=-1)
         return ideal if camera is None else distort(ideal, camera), c
 
 
 def bounding_canvas(
-    target_at: Callable[[Grid], Array], reference: Box, target_size: tuple[int, int], reach: Array,
+    pictures_at: Callable[[Grid], Sequence[Array]], reference: Box, sizes: Sequence[tuple[int, int]], reach: Array,
     projection: Projection | None = None,
 ) -> Canvas:  # fmt: skip
-    """A canvas, small to within a cell, that holds the reference and every well-behaved part of the target.
+    """A canvas, small to within a cell, that holds the reference and every well-behaved part of the further pictures.
 
-    target_at(grid) gives target pixels (rows, columns, 2), NaN behind the camera; reference: where it lies,
-    target_size: (W, H), reach (4,): left, top, right, bottom that the target is expected to reach (see
-    `expected_reach`), all in px of the plane. Raises OutputTooLarge.
+    pictures_at(grid) gives for each of these its pixels (rows, columns, 2), NaN behind its camera; reference: where the
+    reference lies, sizes: (W, H) of the further pictures, reach (4,): left, top, right, bottom that they are expected
+    to reach (see `expected_reach`), all in px of the plane. Raises OutputTooLarge.
     """
     left, top, right, bottom = reach
     limits = np.array([-np.inf, -np.inf, np.inf, np.inf]) if projection is None else projection.limits
@@ -106,11 +107,14 @@ def bounding_canvas(
     max_stretch = np.inf if projection is not None and projection.sphere else MAX_STRETCH
     cropped = False
     for _ in range(2):  # the second pass looks closer at what the first found
-        grid = Grid.over(int(left), int(top), max(1, int(right - left)), max(1, int(bottom - top)), nodes=NODES // 10)
-        target = target_at(grid)
-        seen = _inside(target, target_size)
-        stretched = seen & (_area_ratio(target, grid.step) < 1 / max_stretch**2)
-        useful = seen & ~stretched
+        width, height = max(1, int(right - left)), max(1, int(bottom - top))
+        grid = Grid.over(int(left), int(top), width, height, nodes=GRID.nodes // 10)
+        useful, any_stretched = np.zeros((grid.rows, grid.columns), bool), False
+        for places, size in zip(pictures_at(grid), sizes, strict=True):
+            seen = falls_inside(places[..., 0], places[..., 1], size)
+            stretched = seen & (_area_ratio(places, grid.step) < 1 / max_stretch**2)
+            useful |= seen & ~stretched
+            any_stretched |= bool(stretched.any())
         new = np.array([reference[0], reference[1], reference[0] + reference[2], reference[1] + reference[3]])
         if useful.any():
             rows, columns = np.flatnonzero(useful.any(axis=1)), np.flatnonzero(useful.any(axis=0))
@@ -120,7 +124,7 @@ def bounding_canvas(
                 [xs[columns[0]] - margin, ys[rows[0]] - margin, xs[columns[-1]] + margin, ys[rows[-1]] + margin]
             )
         left, top, right, bottom = _union(new, reference, limits)
-        cropped = cropped or bool(stretched.any())
+        cropped = cropped or any_stretched
     canvas = Canvas(right - left, bottom - top, (-left, -top), cropped, projection)
     _, _, width, height = canvas.whole
     if width * height > MAX_PIXELS:
@@ -131,16 +135,20 @@ def bounding_canvas(
     return canvas
 
 
-def expected_reach(corners: Array, size: tuple[int, int], target_size: tuple[int, int]) -> tuple[Array, bool]:
-    """A rectangle (left, top, right, bottom) that holds the reference and the target's corners, bounded; and whether it
-    was cut.
+def expected_reach(
+    outlines: Sequence[Array], size: tuple[int, int], sizes: Sequence[tuple[int, int]]
+) -> tuple[Array, bool]:
+    """A rectangle (left, top, right, bottom) that holds the reference and the further pictures' outlines, bounded; and
+    whether it was cut.
 
-    corners (N, 2): the target's outline in the reference's plane, NaN where it lies behind the reference camera.
+    outlines, each (N, 2): in the reference's plane, NaN where they lie behind the reference camera; size, sizes: (W, H)
+    of the reference and of the others.
     """
+    points = np.concatenate(outlines)
     width, height = size
-    far = MAX_REACH * max(*size, *target_size)
-    finite = corners[np.isfinite(corners).all(axis=1)]
-    cut = len(finite) < len(corners)
+    far = MAX_REACH * max(max(one) for one in (size, *sizes))
+    finite = points[np.isfinite(points).all(axis=1)]
+    cut = len(finite) < len(points)
     lowest = np.array([0.0, 0.0])
     highest = np.array([width, height], np.float64)
     if cut:  # the outline runs to infinity somewhere: look everywhere within reach
@@ -157,27 +165,31 @@ def expected_reach(corners: Array, size: tuple[int, int], target_size: tuple[int
 
 
 def round_reach(
-    projection: Projection, H_plane: Array, outline: Array, camera: Camera, camera_prime: Camera
+    projection: Projection, planes: Sequence[Array], outlines: Sequence[Array], cameras: Sequence[Camera]
 ) -> tuple[Box, Array, bool]:
-    """Where a round panorama's plane holds the reference, and both pictures (left, top, right, bottom), with a margin;
+    """Where a round panorama's plane holds the reference, and all pictures (left, top, right, bottom), with a margin;
     and whether it cuts them.
 
-    H_plane (3, 3): from the reference to the target by a plane; outline (N, 3): of the target, as canvas points p by
-    it.
+    planes (3, 3): from the reference to each further picture by a plane; outlines (N, 3): of these, as canvas points p
+    by it; cameras: of all pictures, the reference's first.
     """
     to_ray = inverse_intrinsics(projection.K)
 
     def shows(matrix: Array, picture: Camera) -> Callable[[Array], bool]:
-        return lambda ray: bool(_inside(_raw(matrix @ projection.K @ ray, picture), picture.size))
+        def shown(ray: Array) -> bool:
+            x, y = _raw(matrix @ projection.K @ ray, picture)
+            return bool(falls_inside(x, y, picture.size))
 
-    own = homogeneous(undistort(border(camera.size), camera))
+        return shown
+
+    own = homogeneous(undistort(border(cameras[0].size), cameras[0]))
     extents = [
         extent(projection, outline @ to_ray.T, shows(matrix, picture))
-        for outline, matrix, picture in ((own, np.eye(3), camera), (outline, H_plane, camera_prime))
+        for outline, matrix, picture in zip((own, *outlines), (np.eye(3), *planes), cameras, strict=True)
     ]
     limits = projection.limits
-    margin = 0.1 * max(camera.size)
-    (low, high) = np.minimum(*extents)[:2], np.maximum(*extents)[2:]
+    margin = 0.1 * max(cameras[0].size)
+    low, high = np.min(extents, axis=0)[:2], np.max(extents, axis=0)[2:]
     cut = projection.sphere is None and bool((low < limits[:2]).any() or (high > limits[2:]).any())
     reach = np.concatenate([np.maximum(low - margin, limits[:2]), np.minimum(high + margin, limits[2:])])
     left, top = np.floor(np.maximum(extents[0][:2], limits[:2])).astype(int)
@@ -195,8 +207,7 @@ def border(size: tuple[int, int]) -> Array:
 
 def _raw(point: Array, camera: Camera) -> Array:
     """The raw pixel (2,) of a canvas point's image p (3,), NaN behind the camera."""
-    ahead = point[2] > 1e-6 * np.abs(point[:2]).max()
-    return distort(point[:2] / point[2], camera) if ahead else np.full(2, np.nan)
+    return distort(point[:2] / point[2], camera) if ahead_of_camera(*point) else np.full(2, np.nan)
 
 
 def _union(box: Array, reference: Box, limits: Array) -> tuple[int, int, int, int]:
@@ -207,13 +218,8 @@ def _union(box: Array, reference: Box, limits: Array) -> tuple[int, int, int, in
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
-def _inside(target: Array, size: tuple[int, int]) -> NDArray[np.bool_]:
-    with np.errstate(invalid="ignore"):
-        return (target >= 0).all(axis=-1) & (target[..., 0] <= size[0] - 1) & (target[..., 1] <= size[1] - 1)
-
-
-def _area_ratio(target: Array, step: int) -> Array:
-    """Target pixels per canvas pixel, from differences between nodes."""
-    dx, dy = np.gradient(target, step, axis=1), np.gradient(target, step, axis=0)
+def _area_ratio(places: Array, step: int) -> Array:
+    """Picture pixels per canvas pixel, from differences between nodes."""
+    dx, dy = np.gradient(places, step, axis=1), np.gradient(places, step, axis=0)
     with np.errstate(invalid="ignore"):
         return np.nan_to_num(np.abs(dx[..., 0] * dy[..., 1] - dx[..., 1] * dy[..., 0]), nan=np.inf)

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cameras.camera import Camera
 from ..raster.arrays import Box, Part, bounds, cut, shown_only
 from ..raster.lazy import AnyImage, Held, LazyImage, Placed, Weighed, extent, part_of, whole
+from ..raster.picture_map import CanvasMap, PictureMap
 from ..raster.sampling import fetch
-from .canvas import Canvas
-from .warp import Warp, _inside, reference_map
+from .reference_map import ReferenceMap
 
 if TYPE_CHECKING:
     from ..pictures.picture import Picture
@@ -48,29 +47,30 @@ class Layer:
         return Layer(Held(self.light, (part[0].start, part[1].start), part_of(self.light, part)), self.alpha)
 
 
-def reference_layer(picture: Picture, canvas: Canvas, camera: Camera | None = None) -> Layer:
-    """The reference on the canvas: pasted pixel for pixel on a flat one, fetched like the target on a round one.
+def layer_of(picture: Picture, picture_map: CanvasMap) -> Layer:
+    """A picture on the canvas: fetched through its map, but pasted pixel for pixel where the canvas is its own plane.
 
-    camera: the reference's, if its lens matters.
+    Alpha by what it was in the picture, 0 outside it.
     """
-    if canvas.projection is not None:
-        return _fetched_layer(picture, *reference_map(canvas, camera))
+    if isinstance(picture_map, ReferenceMap) and picture_map.pasted:
+        return _pasted_layer(picture, picture_map)
+    return _fetched_layer(picture, picture_map.arrays())
+
+
+def _pasted_layer(picture: Picture, picture_map: ReferenceMap) -> Layer:
+    """The reference on a flat canvas, of which it is a part."""
     height, width, _ = picture.light.shape
+    canvas = picture_map.canvas
     x, y = canvas.offset
     alpha = np.zeros((canvas.height, canvas.width), bool if picture.alpha is None else np.float32)
     alpha[y : y + height, x : x + width] = True if picture.alpha is None else picture.alpha
     return Layer(Placed(picture.light, (y, x), (canvas.height, canvas.width)), alpha)
 
 
-def target_layer(picture: Picture, warp: Warp) -> Layer:
-    """The target fetched through the map; alpha by what it was in the picture, 0 outside it."""
-    return _fetched_layer(picture, warp.map_x, warp.map_y)
-
-
-def _fetched_layer(picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32]) -> Layer:
+def _fetched_layer(picture: Picture, picture_map: PictureMap) -> Layer:
     """A picture through a map of its raw pixels (H, W)."""
-    height, width, channels = picture.light.shape
-    inside = _inside(map_x, map_y, (width, height))
+    map_x, map_y, inside = picture_map.x, picture_map.y, picture_map.inside()
+    channels = picture.light.shape[2]
     box = bounds(inside)
     if box is None:
         return Layer(np.broadcast_to(np.float32(0), (*inside.shape, channels)), inside)

@@ -6,6 +6,8 @@ pitch above its horizon, roll clockwise, in degrees.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..choices import LEVELS, Level
@@ -38,53 +40,54 @@ def parse_level(text: str) -> Level:
     return yaw, pitch, roll
 
 
-def rotation_for(level: Level, R: Array, edges: tuple[Array, Array] | None = None) -> Array:
+def rotation_for(level: Level, rotations: Sequence[Array], edges: tuple[Array, Array] | None = None) -> Array:
     """The rotation (3, 3) from the panorama's axes to the reference camera's.
 
-    level: `auto`, `none` (the reference looks straight ahead) or yaw, pitch, roll; R (3, 3) from the reference camera
-    to the target camera, NaN where it is not known; edges: see `gravity_by_edges`.
+    level: `auto`, `none` (the reference looks straight ahead) or yaw, pitch, roll; rotations (3, 3): see
+    `gravity`; edges: see `gravity_by_edges`.
     """
     if level == "auto":
-        return upright(gravity(R) if edges is None else gravity_by_edges(R, *edges))
+        return upright(gravity(rotations) if edges is None else gravity_by_edges(rotations, *edges))
     return turned(*(0.0, 0.0, 0.0) if isinstance(level, str) else level)
 
 
-def gravity(R: Array) -> Array:
-    """The direction down (3,) in the reference camera's frame, from how both cameras were held.
+def gravity(rotations: Sequence[Array]) -> Array:
+    """The direction down (3,) in the reference camera's frame, from how the cameras were held.
+
+    rotations (3, 3): from the reference camera to each that is known, itself (I) among them; their rows are the x, y
+    and z axes of a camera in the reference's frame.
 
     Brown and Lowe (IJCV 2007, section 4) take the direction that is square to all cameras' x axes, which nobody tilts
-    on purpose. With two cameras that look almost the same way that is anything, so here each camera counts as level
-    too, far more loosely: u minimises Σ ln(1 + (x_i·u)² / σ_roll²) + (z_i·u)² / σ_pitch². The logarithm lets go of a
-    camera that was turned on its side. Without R the reference stands alone.
+    on purpose. With cameras that look almost the same way that is anything, so here each camera counts as level too,
+    far more loosely: u minimises Σ ln(1 + (x_i·u)² / σ_roll²) + (z_i·u)² / σ_pitch². The logarithm lets go of a camera
+    that was turned on its side.
     """
-    axes = [np.eye(3), R] if np.isfinite(R).all() else [np.eye(3)]  # rows: x, y, z of a camera in the reference's frame
-    mean = sum(a[1] for a in axes)
+    mean = sum(a[1] for a in rotations)
     down = mean / np.linalg.norm(mean) if mean[1] > 0.5 else np.array([0.0, 1.0, 0.0])
     roll_sigma, pitch_sigma = np.radians([ROLL_SIGMA, PITCH_SIGMA])
     for _ in range(ROUNDS):
         cost = sum(
             np.outer(a[0], a[0]) / (roll_sigma**2 + (a[0] @ down) ** 2) + np.outer(a[2], a[2]) / pitch_sigma**2
-            for a in axes
+            for a in rotations
         )
         least = np.linalg.eigh(cost)[1][:, 0]
         down = least * np.sign(least @ down)
     return down
 
 
-def gravity_by_edges(R: Array, normals: Array, lengths: Array) -> Array:
-    """The direction down (3,) in the reference camera's frame: of those near `gravity` the likeliest by how both
+def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array) -> Array:
+    """The direction down (3,) in the reference camera's frame: of those near `gravity` the likeliest by how the
     cameras were held and by the upright edges that they saw.
 
     normals (N, 3), in the reference's frame, and lengths (N,): see `upright_edges.edges`. All uprights meet in one
     point of the picture, which is where down is: that tells pitch, too, where there are some to the left and to the
     right.
     """
-    held = gravity(R)
+    held = gravity(rotations)
     if not len(normals):
         return held
     # from the camera's own axes, but where it was turned on its side
     base = np.eye(3) if held[1] > np.cos(np.radians(ON_ITS_SIDE)) else upright(held)
-    axes = [np.eye(3), R] if np.isfinite(R).all() else [np.eye(3)]
     roll_sigma, pitch_sigma = np.radians([ROLL_SIGMA, PITCH_SIGMA])
     middle, (pitch_reach, roll_reach) = (0.0, 0.0), REACH
     best = held
@@ -97,7 +100,8 @@ def gravity_by_edges(R: Array, normals: Array, lengths: Array) -> Array:
         )  # fmt: skip
         down = np.column_stack([np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch), np.sin(pitch)]) @ base.T
         unlikely = sum(
-            np.log1p(np.square(down @ a[0]) / roll_sigma**2) + np.square(down @ a[2]) / pitch_sigma**2 for a in axes
+            np.log1p(np.square(down @ a[0]) / roll_sigma**2) + np.square(down @ a[2]) / pitch_sigma**2
+            for a in rotations
         )
         speaks = agreement(down, normals, lengths, float(np.radians(off)))
         if step == STEPS[0][0] and speaks.max() - np.median(speaks) < CHANCE * np.linalg.norm(lengths):

@@ -10,6 +10,7 @@ from ..cameras.lens import undistort
 from ..cameras.projective import homogeneous
 from ..pictures.picture import Picture
 from ..raster.arrays import Array
+from ..raster.resizing import resized_points
 
 # They are looked for at so many px across, from this share of that on; the longest count.
 ACROSS, SHORTEST, MOST = 1000, 0.025, 1000
@@ -39,7 +40,7 @@ def edges(picture: Picture, camera: Camera, K: Array) -> tuple[Array, Array]:
         kept &= whole[rows, columns] > 0
     longest = np.flatnonzero(kept)[np.argsort(-lengths[kept], kind="stable")[:MOST]]
     ends, lengths = ends[longest], lengths[longest]
-    full = (ends.reshape(-1, 2) + 0.5) * (np.array([width, height]) / np.array(size)) - 0.5
+    full = resized_points(ends.reshape(-1, 2), size, (width, height))
     rays = homogeneous(undistort(full, camera)) @ np.linalg.inv(K).T
     normals = np.cross(rays[::2], rays[1::2])
     return normals / np.linalg.norm(normals, axis=1, keepdims=True), lengths

@@ -1,4 +1,4 @@
-"""The backward map: for every canvas pixel the target pixel to fetch; and fetching it.
+"""The backward maps: for every canvas pixel the pixel of each picture to fetch.
 
 Between nodes only d is interpolated (and slack, which is smoother still); H_inf p + d e' is evaluated at every pixel,
 so that a field without slack keeps every pixel on its epipolar line exactly.
@@ -6,6 +6,7 @@ so that a field without slack keeps every pixel on its epipolar line exactly.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -14,17 +15,21 @@ from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
 from ..cameras.lens import distort, undistort
-from ..cameras.projective import homogeneous, project
-from ..cameras.two_view import TwoView
+from ..cameras.projective import ahead_of_camera, homogeneous, project
+from ..cameras.view import View
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Box, Part, cut, cut_in_place, strips, within
-from ..raster.grid import NODES, Grid
-from ..raster.lazy import AnyImage, LazyImage, Placed, whole
+from ..raster.arrays import Array, Box, box_of, strips
+from ..raster.grid import Grid
+from ..raster.lazy import AnyImage, Placed, whole
+from ..raster.options import GRID
+from ..raster.picture_map import CanvasMap, PictureMap
 from ..system.errors import BadRequest, NoOverlap
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
+from .depth import Confidence, Depth, Nearness
 from .projection import Projection
+from .reference_map import ReferenceMap
 
 if TYPE_CHECKING:
     from ..field.refined_depth import RefinedDepth
@@ -35,13 +40,12 @@ MAX_FADE = 3.0
 
 @dataclass(frozen=True)
 class Warp:
-    """map_x, map_y (H, W) float32: raw target pixel of each canvas pixel, NaN behind the camera; depth (H, W) float32:
-    the inverse depth, NaN where the field knows none; lazy_confidence (H, W) float32, 0..1, of what dense refinement
-    found there, None without it. These two are worked out where they are asked for (see `raster.lazy`)."""
+    """maps: for each picture, the reference first, where it is seen; depth (H, W) float32: the inverse depth, NaN where
+    the field knows none; lazy_confidence (H, W) float32, 0..1, of what dense refinement found there, None without it.
+    These two are worked out where they are asked for (see `raster.lazy`)."""
 
     canvas: Canvas
-    map_x: NDArray[np.float32]
-    map_y: NDArray[np.float32]
+    maps: tuple[CanvasMap, ...]
     depth: AnyImage
     lazy_confidence: AnyImage | None = None
 
@@ -59,158 +63,87 @@ class Warp:
         """The part in a box (left, top, width, height) of the canvas; NaN, and no confidence, where that reaches over
         its edges. in_place: the box lies on the canvas, and the whole, whose memory the part takes, is lost."""
         left, top, width, height = box
-        map_x, map_y = (
-            cut_in_place(values, box) if in_place else cut(values, box, np.nan) for values in (self.map_x, self.map_y)
-        )
+        maps = tuple(one.within(box, in_place) for one in self.maps)
         depth = Placed(self.depth, (-top, -left), (height, width), np.nan)
         confidence = None
         if self.lazy_confidence is not None:
             confidence = Placed(self.lazy_confidence, (-top, -left), (height, width))
-        return Warp(self.canvas.within(box), map_x, map_y, depth, confidence)
+        return Warp(self.canvas.within(box), maps, depth, confidence)
 
-    def inside(self, target_size: tuple[int, int]) -> NDArray[np.bool_]:
-        """Where the map falls inside a target of (W, H) px."""
-        return _inside(self.map_x, self.map_y, target_size)
+    def nearness(self, views: Sequence[View], number: int) -> AnyImage:
+        """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
+        return Nearness(self.canvas, views[0].camera, views[number], self.depth)
 
 
 def build_warp(
-    field: Field, two_view: TwoView, camera: Camera, camera_prime: Camera, projection: Projection | None = None,
-    relief: RefinedDepth | None = None,
-) -> Warp:  # fmt: skip
-    """The canvas that holds both pictures, flat or of a round projection, and its map, refined by a relief.
+    field: Field, views: Sequence[View], projection: Projection | None = None, refined: RefinedDepth | None = None
+) -> Warp:
+    """The canvas that holds all pictures, flat or of a round projection, and their maps, refined by what dense
+    refinement found.
 
     Raises NoOverlap, OutputTooLarge, or BadRequest for a field that knows the reference's plane only.
     """
-    outline = _outline(field, two_view, camera_prime)
+    camera, further = views[0].camera, views[1:]
+    planes = [_plane_map(field, view) for view in further]
+    outlines = [_outline(plane, view) for plane, view in zip(planes, further, strict=True)]
+    sizes = [view.size for view in further]
     if projection is None:
         reference: Box = (0, 0, *camera.size)
-        reach, cropped = expected_reach(_in_plane(outline), camera.size, camera_prime.size)
+        reach, cropped = expected_reach([_in_plane(outline) for outline in outlines], camera.size, sizes)
     else:
-        reference, reach, cropped = round_reach(projection, _plane_map(field, two_view), outline, camera, camera_prime)
+        reference, reach, cropped = round_reach(projection, planes, outlines, [view.camera for view in views])
     plane = Canvas(0, 0, (0, 0), projection=projection)
 
-    def target_at(grid: Grid) -> Array:
+    def pictures_at(grid: Grid) -> list[Array]:
         values = _node_values(field, grid, plane, camera)
-        infinite = plane.project_rows(two_view.H_inf, grid.xs, grid.ys, camera)
-        target = np.stack(transfer(two_view, infinite, values.inverse_depth), axis=-1)
-        return distort(target if values.shift is None else target + values.shift, camera_prime)
+        return [_at_nodes(values, view, number, grid, plane, camera) for number, view in enumerate(further, 1)]
 
-    canvas = bounding_canvas(target_at, reference, camera_prime.size, reach, projection)
-    warp = build_map(field, two_view, replace(canvas, cropped=canvas.cropped or cropped), camera, camera_prime, relief)
-    return _trimmed(warp, camera, camera_prime.size)
+    canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
+    warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined)
+    return _trimmed(warp)
+
+
+def _at_nodes(values: FieldValues, view: View, number: int, grid: Grid, plane: Canvas, camera: Camera) -> Array:
+    """Where (rows, columns, 2) picture `number` is seen at the nodes of a grid, raw px; camera: the reference's."""
+    infinite = plane.project_rows(view.H_inf, grid.xs, grid.ys, camera)
+    ideal = np.stack(transfer(view, infinite, values.inverse_depth), axis=-1)
+    if values.shift is not None and values.picture == number:
+        ideal = ideal + values.shift
+    return distort(ideal, view.camera)
 
 
 def build_map(
-    field: Field, two_view: TwoView, canvas: Canvas, camera: Camera, camera_prime: Camera,
-    relief: RefinedDepth | None = None,
-) -> Warp:  # fmt: skip
-    """The map of a given canvas, evaluated in strips."""
+    field: Field, views: Sequence[View], canvas: Canvas, refined: RefinedDepth | None = None
+) -> Warp:
+    """The maps of a given canvas, evaluated in strips."""
     left, top = -canvas.offset[0], -canvas.offset[1]
+    camera = views[0].camera
     grid = Grid.over(left, top, canvas.width, canvas.height)
     values = _node_values(field, grid, canvas, camera)
     shape = (canvas.height, canvas.width)
-    map_x, map_y = (np.empty(shape, np.float32) for _ in range(2))
+    maps = [PictureMap(np.empty(shape, np.float32), np.empty(shape, np.float32), view.size) for view in views[1:]]
     xs, ys = canvas.xs, canvas.ys
-    depth = Depth(canvas, camera, grid, values.inverse_depth, relief)
+    depth = Depth(canvas, camera, grid, values.inverse_depth, refined)
 
     def put(part: slice) -> None:
         start, stop = part.start, part.stop
         strip = (left, top + start, canvas.width, stop - start)
         d, sideways = depth.strip(part)
-        x, y = transfer(two_view, canvas.project_rows(two_view.H_inf, xs, ys[start:stop], camera), d)
-        if values.shift is not None:
-            x += grid.to_pixels(values.shift[..., 0], *strip)
-            y += grid.to_pixels(values.shift[..., 1], *strip)
-        if sideways is not None:
-            x += sideways[..., 0]
-            y += sideways[..., 1]
-        if camera_prime.distortion.any():
-            x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), camera_prime), -1, 0)
-        map_x[part], map_y[part] = x, y
+        for number, (view, out) in enumerate(zip(views[1:], maps, strict=True), 1):
+            x, y = transfer(view, canvas.project_rows(view.H_inf, xs, ys[start:stop], camera), d)
+            if values.shift is not None and values.picture == number:
+                x += grid.to_pixels(values.shift[..., 0], *strip)
+                y += grid.to_pixels(values.shift[..., 1], *strip)
+            if refined is not None and sideways is not None and refined.picture == number:
+                x += sideways[..., 0]
+                y += sideways[..., 1]
+            if view.camera.distortion.any():
+                x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
+            out.x[part], out.y[part] = x, y
 
     each(put, strips(shape))
-    return Warp(canvas, map_x, map_y, depth, None if relief is None else Confidence(canvas, camera, relief))
-
-
-@dataclass(frozen=True, eq=False)
-class Depth(LazyImage):
-    """The inverse depth (H, W) of a canvas, from a field's at the nodes of a grid and a relief."""
-
-    canvas: Canvas
-    camera: Camera
-    grid: Grid
-    nodes: Array
-    relief: RefinedDepth | None
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(H, W)."""
-        return self.canvas.height, self.canvas.width
-
-    def __getitem__(self, part: Part) -> NDArray[np.float32]:
-        rows, columns = within(part, self.shape)
-        out = np.empty((rows.stop - rows.start, columns.stop - columns.start), np.float32)
-        # whole strips, as the map was made of: BLAS has other last bits for other shapes
-        for strip in strips(self.shape):
-            low, high = max(rows.start, strip.start), min(rows.stop, strip.stop)
-            if low < high:
-                d = self._alone(strip)
-                out[low - rows.start : high - rows.start] = d[low - strip.start : high - strip.start, columns]
-        return out
-
-    def strip(self, rows: slice) -> tuple[Array, NDArray[np.float32] | None]:
-        """Whole rows of it, and px that the relief adds in the target."""
-        canvas, d = self.canvas, self._of_field(rows)
-        if self.relief is None:
-            return d, None
-        more, sideways, _ = _relief_at(self.relief, canvas, canvas.xs, canvas.ys[rows], self.camera)
-        return d + more, sideways
-
-    def _alone(self, rows: slice) -> Array:
-        """Whole rows of it."""
-        canvas, relief = self.canvas, self.relief
-        if relief is None or canvas.projection is not None:
-            return self.strip(rows)[0]
-        return self._of_field(rows) + relief.part_over(relief.inverse_depth, canvas.xs, canvas.ys[rows])
-
-    def _of_field(self, rows: slice) -> Array:
-        left, top = -self.canvas.offset[0], rows.start - self.canvas.offset[1]
-        # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
-        values = self.grid.to_pixels(self.nodes, left, top, self.canvas.width, rows.stop - rows.start)
-        return values.astype(np.float64)
-
-
-@dataclass(frozen=True, eq=False)
-class Confidence(LazyImage):
-    """How sure (H, W) a relief is on a canvas."""
-
-    canvas: Canvas
-    camera: Camera
-    relief: RefinedDepth
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(H, W)."""
-        return self.canvas.height, self.canvas.width
-
-    def __getitem__(self, part: Part) -> NDArray[np.float32]:
-        rows, columns = within(part, self.shape)
-        xs, ys = self.canvas.xs[columns], self.canvas.ys[rows]
-        if self.canvas.projection is None:
-            return self.relief.part_over(self.relief.confidence, xs, ys)
-        return _relief_at(self.relief, self.canvas, xs, ys, self.camera)[2]
-
-
-def _relief_at(
-    relief: RefinedDepth, canvas: Canvas, xs: Array, ys: Array, camera: Camera
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """What a relief adds to inverse depth and to target pixels at canvas columns xs and lines ys, and its
-    confidence."""
-    if canvas.projection is None:  # canvas pixels are the reference's
-        return relief.over(xs, ys)
-    places, ahead = canvas.on_reference(xs, ys, camera)
-    more, sideways, confidence = relief.at(places[..., 0], places[..., 1])
-    return more * np.nan_to_num(ahead).astype(np.float32), sideways, confidence
+    confidence = None if refined is None else Confidence(canvas, camera, refined)
+    return Warp(canvas, (ReferenceMap(canvas, camera), *maps), depth, confidence)
 
 
 def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> FieldValues:
@@ -225,7 +158,7 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     margin = int(np.ceil(min(field.fit.fade_px, MAX_FADE * max(camera.size))))
     across, down = width + 2 * margin, height + 2 * margin
     share = min(4.0, max(1.0, across * down / (2 * width * height)))
-    flat = Grid.over(-margin, -margin, across, down, int(share * NODES))
+    flat = Grid.over(-margin, -margin, across, down, int(share * GRID.nodes))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)
     if values.far is None:
@@ -238,72 +171,33 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     shift = values.shift
     if shift is not None:
         shift = np.stack([flat.at(shift[..., k], places) for k in (0, 1)], axis=-1)
-    return FieldValues(base + np.nan_to_num(ahead) * left_over, shift)
+    return FieldValues(base + np.nan_to_num(ahead) * left_over, shift, picture=values.picture)
 
 
-def _plane_map(field: Field, two_view: TwoView) -> Array:
-    """The homography (3, 3) from the reference to the target of the field's own plane."""
-    return two_view.H_inf + np.outer(two_view.e_prime, field.plane)
+def _plane_map(field: Field, view: View) -> Array:
+    """The homography (3, 3) from the reference to a picture of the field's own plane."""
+    return view.H_inf + np.outer(view.e_prime, field.plane)
 
 
-def _outline(field: Field, two_view: TwoView, camera_prime: Camera) -> Array:
-    """The target's border (N, 3), in order, as canvas points p by the field's own plane."""
-    ideal = undistort(border(camera_prime.size), camera_prime)
-    return homogeneous(ideal) @ np.linalg.inv(_plane_map(field, two_view)).T
+def _outline(H_plane: Array, view: View) -> Array:
+    """A picture's border (N, 3), in order, as canvas points p by a plane."""
+    ideal = undistort(border(view.size), view.camera)
+    return homogeneous(ideal) @ np.linalg.inv(H_plane).T
 
 
 def _in_plane(points: Array) -> Array:
     """Reference pixels (N, 2) of canvas points (N, 3), NaN behind the reference camera."""
     points = points.copy()
-    points[points[:, 2] <= 1e-6 * np.abs(points[:, :2]).max(axis=1)] = np.nan
+    points[~ahead_of_camera(*points.T)] = np.nan
     return project(points)
 
 
-def _trimmed(warp: Warp, camera: Camera, target_size: tuple[int, int]) -> Warp:
-    """Without rim lines that neither picture reaches."""
-    seen = warp.inside(target_size)
+def _trimmed(warp: Warp) -> Warp:
+    """Without rim lines that no picture reaches."""
+    seen = np.zeros((warp.canvas.height, warp.canvas.width), bool)
+    for one in warp.maps[1:]:
+        seen |= one.inside()
     if not seen.any():
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
-    seen |= reference_shown(warp.canvas, camera)
-    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
-    left, top = int(columns[0]), int(rows[0])
-    box = left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top
-    return warp.within(box, in_place=True)
-
-
-def reference_map(canvas: Canvas, camera: Camera | None = None) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """x, y (H, W): the reference's raw pixel that each pixel of a round panorama shows, NaN behind its camera."""
-    map_x, map_y = (np.empty((canvas.height, canvas.width), np.float32) for _ in range(2))
-    rows = max(1, 1_000_000 // canvas.width)
-    for start in range(0, canvas.height, rows):
-        strip = slice(start, start + rows)
-        places, _ = canvas.on_reference(canvas.xs, canvas.ys[strip], camera)
-        map_x[strip], map_y[strip] = places[..., 0], places[..., 1]
-    return map_x, map_y
-
-
-def reference_box(canvas: Canvas, camera: Camera) -> Box:
-    """Where the reference lies on the canvas: left, top, width, height."""
-    if canvas.projection is None:
-        return (*canvas.offset, *camera.size)
-    seen = reference_shown(canvas, camera)
-    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
-    return int(columns[0]), int(rows[0]), int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1
-
-
-def reference_shown(canvas: Canvas, camera: Camera) -> NDArray[np.bool_]:
-    """Where (H, W) the canvas lies in the reference's frame."""
-    if canvas.projection is not None:
-        return _inside(*reference_map(canvas, camera), camera.size)
-    shown = np.zeros((canvas.height, canvas.width), bool)
-    left, top = canvas.offset
-    shown[top : top + camera.size[1], left : left + camera.size[0]] = True
-    return shown
-
-
-def _inside(
-    map_x: NDArray[np.float32], map_y: NDArray[np.float32], size: tuple[int, int]
-) -> NDArray[np.bool_]:
-    """Where a map falls inside a picture of (W, H) px."""
-    with np.errstate(invalid="ignore"):
-        return (map_x >= 0) & (map_y >= 0) & (map_x <= size[0] - 1) & (map_y <= size[1] - 1)
+    seen |= warp.maps[0].inside()
+    return warp.within(box_of(seen), in_place=True)

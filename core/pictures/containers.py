@@ -1,7 +1,7 @@
 """What a picture file says about itself before anybody decodes it: kind, size, damage, EXIF, ICC profile.
 
-Decoders are not asked, because they answer too late (a bomb has filled the memory) or not at all (OpenCV decodes half a
-JPEG without a word). Nothing here raises on damaged bytes: what cannot be read is not there.
+Decoders find damage too late (a decompression bomb has filled the memory) or not at all (OpenCV decodes half a JPEG
+without a word). Nothing here raises on damaged bytes: what cannot be read counts as absent.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import zlib
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-_MOST_ICC = 8 << 20  # bytes; real profiles have up to 2 MB, and a PNG's is compressed
+from .options import READING
+
 # The first marker after JPEG's entropy-coded data: FF not followed by a stuffed 00, a restart marker or filling FF.
 _JPEG_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
@@ -118,7 +119,7 @@ def _u32(data: bytes, at: int) -> int:
 def _bounded_inflate(packed: bytes) -> bytes | None:
     try:
         stream = zlib.decompressobj()
-        plain = stream.decompress(packed, _MOST_ICC)
+        plain = stream.decompress(packed, READING.max_icc_bytes)
     except zlib.error:
         return None
     return plain if stream.eof else None
@@ -215,7 +216,7 @@ def _webp(data: bytes) -> Structure:
         elif name == b"EXIF":
             found = replace(found, exif=body.removeprefix(b"Exif\0\0"))
         elif name == b"ICCP":
-            found = replace(found, icc=body[:_MOST_ICC])
+            found = replace(found, icc=body[:READING.max_icc_bytes])
         if width and not found.width:
             found = replace(found, width=width, height=height)
         at += 8 + length + (length & 1)
@@ -288,7 +289,7 @@ def _tiff(data: bytes) -> Structure:
         orientation=first(274, 1), samples=first(277, 1), bits=first(258, 1), photometric=first(262, 1),
         extra=first(338, 0), pages=_tiff_pages(data, directory[1]),
     )
-    icc = tiff_bytes(data, profile)[:_MOST_ICC] if profile is not None else None
+    icc = tiff_bytes(data, profile)[:READING.max_icc_bytes] if profile is not None else None
     return Structure("tiff", first(256, 0), first(257, 0), damage, data, icc, tiff=facts)
 
 

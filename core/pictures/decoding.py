@@ -5,23 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..system.errors import StitchError, UnreadableImage
 from .containers import Structure, neutral_png, neutral_tiff
 from .exr import read_exr
-
-_MOST_PIXELS = 400_000_000
-_LONGEST_SIDE = 65535
-# Channels of all the layers and parts of an EXR file together, in pixels of four
-_MOST_SAMPLES = 4 * _MOST_PIXELS
-# A file may unpack to so many pixels whatever its length; beyond, its length has to be in proportion.
-_SMALL = 2_000_000
-# Most pixels for each byte of a file. A photograph takes a tenth of a byte or more for each, and JPEG cannot write less
-# than six bits for 256; a mask may be of one colour all over, and deflate packs one bit a pixel a thousand times.
-PHOTOGRAPH, DRAWING = 400, 10_000
+from .options import READING
 
 
 def read_file(path: Path) -> bytes:
@@ -42,16 +35,16 @@ def read_file(path: Path) -> bytes:
     return data
 
 
-def check_size(width: int, height: int, stored: int, pixels_per_byte: int = PHOTOGRAPH) -> None:
+def check_size(width: int, height: int, stored: int, pixels_per_byte: int = READING.photograph_pixels_per_byte) -> None:
     """Raises UnreadableImage where a header promises no picture, one too large to hold (pixels), or more than a file of
-    `stored` bytes can mean: PHOTOGRAPH or DRAWING pixels a byte (a decompression bomb, or a damaged header)."""
+    `stored` bytes can mean: pixels_per_byte (see `ReadingOptions`) (a decompression bomb, or a damaged header)."""
     if width < 1 or height < 1:
         raise UnreadableImage("the file is damaged: its header gives no size; copy or export it again")
-    if width * height > _MOST_PIXELS or max(width, height) > _LONGEST_SIDE:
+    if width * height > READING.max_pixels or max(width, height) > READING.max_side:
         raise UnreadableImage(
-            f"{width} × {height} pixels are too many: at most {_MOST_PIXELS // 10**6} megapixels and {_LONGEST_SIDE}"
-            " pixels a side can be read; scale the picture down")
-    if width * height > max(_SMALL, pixels_per_byte * stored):
+            f"{width} × {height} pixels are too many: at most {READING.max_pixels // 10**6} megapixels and"
+            f" {READING.max_side} pixels a side can be read; scale the picture down")
+    if width * height > max(READING.small_pixels, pixels_per_byte * stored):
         raise UnreadableImage(
             f"{width} × {height} pixels cannot come out of {stored} bytes: the file is damaged or was made to fill the"
             " memory; copy or export it again")
@@ -70,7 +63,7 @@ def quiet_opencv() -> Iterator[None]:
         log.setLogLevel(level)
 
 
-def decode_file(data: bytes, structure: Structure) -> tuple[np.ndarray, list[str]]:
+def decode_file(data: bytes, structure: Structure) -> tuple[NDArray[Any], list[str]]:
     """Raw samples, and warnings.
 
     data: a whole file of the given structure (not EXR). Returns H×W×C (1 to 4) uint8, uint16 or float32 as stored, in
@@ -113,16 +106,18 @@ def decode_file(data: bytes, structure: Structure) -> tuple[np.ndarray, list[str
     return raw, warnings
 
 
-def decode_exr(data: bytes, pixels_per_byte: int = PHOTOGRAPH) -> tuple[np.ndarray, list[str]]:
+def decode_exr(
+    data: bytes, pixels_per_byte: int = READING.photograph_pixels_per_byte
+) -> tuple[NDArray[Any], list[str]]:
     """Like `decode_file` for EXR: float32, premultiplied by alpha where there is one; see `check_size`."""
 
     def check(sizes: list[tuple[int, int]], samples: int) -> None:
         for width, height in sizes:
             check_size(width, height, len(data), pixels_per_byte)
-        if samples > _MOST_SAMPLES:
+        if samples > READING.max_exr_samples:
             raise UnreadableImage(
                 f"the layers of the EXR file hold {samples // 10**6} million numbers together, at most"
-                f" {_MOST_SAMPLES // 10**6} can be read; render only the picture (Combined) into the file")
+                f" {READING.max_exr_samples // 10**6} can be read; render only the picture (Combined) into the file")
 
     try:
         pixels, alpha, warning = read_exr(data, check)
@@ -133,7 +128,7 @@ def decode_exr(data: bytes, pixels_per_byte: int = PHOTOGRAPH) -> tuple[np.ndarr
     return pixels if alpha is None else np.dstack([pixels, alpha]), [warning] if warning else []
 
 
-def turn(raw: np.ndarray, orientation: int) -> np.ndarray:
+def turn(raw: NDArray[Any], orientation: int) -> NDArray[Any]:
     """Brings stored rows and columns upright; orientation as in EXIF (1..8): where row 0 and column 0 are seen."""
     if orientation >= 5:
         raw = raw.transpose(1, 0, 2)  # now 5 is 1, 6 is 2 (mirrored), 7 is 3 (turned about), 8 is 4 (upside down)

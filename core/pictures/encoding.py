@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..raster.arrays import in_any_channel, strips
 from ..raster.colour import Curve, encode, icc_channels, parse_icc
@@ -18,7 +20,8 @@ from ..system.threads import in_order
 from .decoding import quiet_opencv
 from .exr import write_exr
 from .metadata import Exif, embed
-from .picture import _curves
+from .options import WRITING
+from .picture import curves_for
 from .png import encode_png
 
 # suffix: container, bits it can hold
@@ -27,7 +30,6 @@ _WRITABLE = {
     ".exr": ("exr", 32),
 }
 _JPEG_LONGEST_SIDE = 65500  # libjpeg's limit
-_JPEG_QUALITY = 95
 
 
 def output_bits(bits: Iterable[int], suffix: str) -> int:
@@ -47,15 +49,37 @@ def _writable(suffix: str) -> tuple[str, int]:
 
 
 def encode_picture(
-    pixels: AnyImage, alpha: np.ndarray | None, bits: int, suffix: str, icc: bytes | None = None,
+    pixels: AnyImage, alpha: NDArray[Any] | None, bits: int, suffix: str, icc: bytes | None = None,
     exif: Exif | None = None,
 ) -> tuple[bytes, tuple[str, ...]]:
-    """The bytes of a picture file, and warnings.
+    """Encode a picture as a file.
 
-    pixels: light as in Picture; alpha, icc, exif: as there; bits: the deepest input's (8, 16 or 32); suffix: .png,
-    .jpg, .jpeg, .tif, .tiff or .exr. JPEG gets black where alpha says so, the others keep alpha. EXR holds linear sRGB,
-    premultiplied. Raises BadRequest for other suffixes, UnwritableOutput where the picture does not fit into the kind
-    of file.
+    Parameters
+    ----------
+    pixels : (H, W, C) array or LazyImage
+        Light as in Picture.
+    alpha : (H, W), optional
+        float32 in [0, 1], or bool. JPEG gets black where it is 0, the others keep it.
+    bits : int
+        The deepest input's: 8, 16 or 32.
+    suffix : str
+        .png, .jpg, .jpeg, .tif, .tiff or .exr. EXR holds linear sRGB, multiplied by alpha.
+    icc, exif : optional
+        As in Picture.
+
+    Returns
+    -------
+    data : bytes
+        The file.
+    warnings : tuple of str
+        For the user.
+
+    Raises
+    ------
+    BadRequest
+        Another suffix.
+    UnwritableOutput
+        The picture does not fit into this kind of file.
     """
     kind, _ = _writable(suffix)
     depth = output_bits((bits,), suffix)
@@ -72,7 +96,7 @@ def encode_picture(
     channels = 3 if alpha is not None and kind != "jpeg" else pixels.shape[2]
     if icc is not None and icc_channels(icc) != channels:
         icc = None
-    levels = _Levels(pixels, alpha, depth, _curves(icc, channels), kind == "jpeg")
+    levels = _Levels(pixels, alpha, depth, curves_for(icc, channels), kind == "jpeg")
     if kind == "png":
         encoded, brighter = levels.as_png()
     else:
@@ -85,9 +109,9 @@ def encode_picture(
     return embed(encoded, kind, exif, icc, straight_alpha=levels.shape[2] == 4), warnings
 
 
-def _by_opencv(coded: np.ndarray, suffix: str) -> bytes:
+def _by_opencv(coded: NDArray[Any], suffix: str) -> bytes:
     """The file of levels (H, W, C) in B, G, R, A order."""
-    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if _WRITABLE[suffix.lower()][0] == "jpeg" else []
+    options = [cv2.IMWRITE_JPEG_QUALITY, WRITING.jpeg_quality] if _WRITABLE[suffix.lower()][0] == "jpeg" else []
     try:
         with quiet_opencv():
             done, encoded = cv2.imencode(suffix.lower(), coded, options)
@@ -96,7 +120,8 @@ def _by_opencv(coded: np.ndarray, suffix: str) -> bytes:
     if not done:
         height, width = coded.shape[:2]
         raise UnwritableOutput(f"{width} × {height} pixels do not fit into a {suffix} file; use .exr or a smaller size")
-    return encoded.tobytes()
+    data: bytes = encoded.tobytes()
+    return data
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +130,7 @@ class _Levels:
     alpha."""
 
     light: AnyImage
-    alpha: np.ndarray | None
+    alpha: NDArray[Any] | None
     bits: int
     curves: tuple[Curve, ...]
     flat: bool
@@ -120,14 +145,14 @@ class _Levels:
         """The file, and the share of pixels brighter than white."""
         beyond: list[int] = []
 
-        def levels(rows: slice) -> np.ndarray:
+        def levels(rows: slice) -> NDArray[Any]:
             out, brighter = self._of(rows)
             beyond.append(brighter)
             return out
 
         return encode_png(self.shape, self.bits, levels), self._share(beyond)
 
-    def as_array(self) -> tuple[np.ndarray, float]:
+    def as_array(self) -> tuple[NDArray[Any], float]:
         """All of them as OpenCV writes them, in B, G, R, A order, and the share of pixels brighter than white."""
         out = np.empty(self.shape, np.uint8 if self.bits == 8 else np.uint16)
         order = {1: [0], 3: [2, 1, 0], 4: [2, 1, 0, 3]}[self.shape[2]]
@@ -140,7 +165,7 @@ class _Levels:
 
         return out, self._share(in_order(put, strips(self.shape)))
 
-    def _of(self, rows: slice) -> tuple[np.ndarray, int]:
+    def _of(self, rows: slice) -> tuple[NDArray[Any], int]:
         """The levels of some rows, in R, G, B, A order, and how many of the pixels are brighter than white."""
         part = self.light[rows, 0 : self.light.shape[1]]
         brighter = int(in_any_channel(part > 1).sum()) if part.max(initial=0) > 1 else 0
@@ -162,7 +187,7 @@ class _Levels:
 
 
 def save_picture(
-    path: str | Path, pixels: np.ndarray, alpha: np.ndarray | None, bits: int, icc: bytes | None = None,
+    path: str | Path, pixels: NDArray[Any], alpha: NDArray[Any] | None, bits: int, icc: bytes | None = None,
     exif: Exif | None = None, overwrite: bool = False,
 ) -> tuple[str, ...]:
     """Writes a picture file, whole or not at all. Arguments, warnings returned and errors: see `encode_picture`."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..raster.arrays import strips
 from ..raster.lazy import AnyImage
@@ -19,15 +20,15 @@ from .metadata import SOFTWARE, Exif
 class ExrPixels(NamedTuple):
     """pixels: float32 H×W×C (1 or 3) as stored, premultiplied; alpha: float32 H×W as stored, or None; warning or ""."""
 
-    pixels: np.ndarray
-    alpha: np.ndarray | None
+    pixels: NDArray[Any]
+    alpha: NDArray[Any] | None
     warning: str
 
 
 class _Layer(NamedTuple):
     name: str
-    colours: list[np.ndarray]
-    alpha: np.ndarray | None
+    colours: list[NDArray[Any]]
+    alpha: NDArray[Any] | None
     part: Any
 
 
@@ -70,7 +71,7 @@ def read_exr(data: bytes, check: Callable[[list[tuple[int, int]], int], None]) -
 def _layers(parts: list[Any]) -> Iterator[_Layer]:
     for part in parts:
         # Channels of one layer share everything before the last dot; a part's name stands for a missing prefix.
-        groups: dict[str, dict[str, np.ndarray]] = {}
+        groups: dict[str, dict[str, NDArray[Any]]] = {}
         for name, channel in part.channels.items():
             layer, _, component = name.rpartition(".")
             groups.setdefault(layer, {})[component.upper()] = channel.pixels
@@ -90,11 +91,11 @@ def _layers(parts: list[Any]) -> Iterator[_Layer]:
 
 def _rank(layer: _Layer) -> int:
     """0 the unnamed layer, 1 Blender's Composite, 2 a view layer's Combined pass, 3 anything else."""
-    steps = layer.name.split(".")
+    levels = layer.name.split(".")
     if layer.name == "" or layer.name.lower() in ("rgb", "rgba"):
         return 0
-    if "Combined" in steps:
-        return 1 if steps[0] == "Composite" else 2
+    if "Combined" in levels:
+        return 1 if levels[0] == "Composite" else 2
     return 3
 
 
@@ -104,7 +105,7 @@ def _window(window: Any) -> tuple[tuple[int, int], tuple[int, int]]:
     return (left, top), (right - left + 1, bottom - top + 1)
 
 
-def _in_display_window(layer: _Layer) -> tuple[np.ndarray, np.ndarray | None]:
+def _in_display_window(layer: _Layer) -> tuple[NDArray[Any], NDArray[Any] | None]:
     pixels = np.dstack(layer.colours).astype(np.float32)
     alpha = None if layer.alpha is None else layer.alpha.astype(np.float32)
     (left, top), data_size = _window(layer.part.header["dataWindow"])
@@ -122,7 +123,7 @@ def _in_display_window(layer: _Layer) -> tuple[np.ndarray, np.ndarray | None]:
     return whole, whole_alpha
 
 
-def write_exr(pixels: AnyImage, alpha: np.ndarray | None, exif: Exif) -> bytes:
+def write_exr(pixels: AnyImage, alpha: NDArray[Any] | None, exif: Exif) -> bytes:
     """A 32-bit ZIP-compressed EXR file in memory.
 
     pixels: float32 H×W×C (1 or 3), scene-linear in Rec. 709 primaries, straight; stored premultiplied. alpha: float32

@@ -1,12 +1,13 @@
 """Masks of what is to be ignored in a picture: from a file or an array, and into the picture's alpha.
 
-What a picture does not show is in nobody's way: features, metrics, warp and blend all leave out what alpha hides.
+Features, metrics, warp and blend leave out what alpha hides, so nothing else has to know of masks.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,49 +15,72 @@ from numpy.typing import NDArray
 
 from ..raster.lazy import extent
 from ..system.errors import BadRequest
-from .decoding import DRAWING
+from .options import MASKS, READING
 from .picture import Picture, load_picture, picture_from_array
 
-# Less than this of a picture left is a mask that means something else.
-LEAST_LEFT = 0.01
-# Share of white up to which paint is black, and from the other end white.
-PAINTED = 0.25
-# Share of white by which a colour may differ and still be one: rounding, and compression that is not lossless.
-ONE_COLOUR = 8 / 255
 
+def read_mask(source: str | Path | NDArray[Any], size: tuple[int, int], name: str) -> NDArray[np.bool_]:
+    """Read an ignore mask.
 
-def read_mask(source: str | Path | np.ndarray, size: tuple[int, int], name: str) -> NDArray[np.bool_]:
-    """An ignore mask (H, W) for a picture of `size` (W, H) px, True where the picture is to be ignored.
+    Parameters
+    ----------
+    source : str, Path or array
+        Any picture file that can be read, or an array as for `picture_from_array`, or of bool. White (brighter than
+        half) is ignored. If there is alpha and what it shows has one colour, alpha decides; otherwise colour times
+        alpha does.
+    size : (int, int)
+        (W, H) px of the picture. A mask of another size but the same shape to within a pixel is stretched (nearest).
+    name : str
+        Of the picture in messages, like "the reference".
 
-    source: any picture file that can be read, or an array as for `picture_from_array`, or of bool. White (brighter than
-    half) is ignored. Where there is alpha and what it shows has one colour, alpha decides; otherwise colour times
-    alpha does. Another size is stretched (nearest) where the shape is the picture's to within a pixel. name: of the
-    picture in messages, like "the reference".
-    Raises UnreadableImage (file), BadRequest (a mask of another shape, of labels instead of white, or of everything).
+    Returns
+    -------
+    (H, W) bool
+        True where the picture is to be ignored.
+
+    Raises
+    ------
+    UnreadableImage
+        The file cannot be read.
+    BadRequest
+        The mask has another shape, holds labels instead of white, or leaves nothing.
     """
     label = f"the mask of {name}" if isinstance(source, np.ndarray) else f"{source}: the mask of {name}"
     picture = _picture(source, label)
     _refuse_labels(picture, label)
     mask = _stretched(_white(picture), size, label)
     left = 1 - float(mask.mean())
-    if left < LEAST_LEFT:
+    if left < MASKS.least_left:
         raise BadRequest(
-            f"{label} leaves {left:.1%} of the picture, at least {LEAST_LEFT:.0%} is needed: white is ignored, black "
-            "is kept; invert the mask if it was painted the other way round"
+            f"{label} leaves {left:.1%} of the picture, at least {MASKS.least_left:.0%} is needed: white is ignored, "
+            "black is kept; invert the mask if it was painted the other way round"
         )
     return mask
 
 
-def read_painted(source: str | Path | np.ndarray) -> NDArray[np.int8]:
-    """What an artist painted over a panorama (h, w), at its own size: -1 from the reference where it is black, 1 from
-    the target where it is white, 0 where it is gray or transparent and the seam decides.
+def read_painted(source: str | Path | NDArray[Any]) -> NDArray[np.int8]:
+    """Read what an artist painted over a panorama, at its own size.
 
-    source: any picture file that can be read, or an array as for `picture_from_array`. Raises UnreadableImage (file).
+    Parameters
+    ----------
+    source : str, Path or array
+        Any picture file that can be read, or an array as for `picture_from_array`.
+
+    Returns
+    -------
+    (h, w) int8
+        -1 where it is black: from the reference; 1 where it is white: from the target; 0 where it is gray or
+        transparent: the seam decides.
+
+    Raises
+    ------
+    UnreadableImage
+        The file cannot be read.
     """
     picture = _picture(source, "the mask of the seam")
     values = _gray(picture)
     painted = np.zeros(values.shape, np.int8)
-    painted[values < PAINTED], painted[values > 1 - PAINTED] = -1, 1
+    painted[values < MASKS.painted], painted[values > 1 - MASKS.painted] = -1, 1
     if picture.alpha is not None:
         painted[picture.alpha <= 0.5] = 0
     return painted
@@ -75,9 +99,9 @@ def without(picture: Picture, mask: NDArray[np.bool_]) -> Picture:
     return replace(picture, alpha=np.where(mask, np.float32(0), alpha))
 
 
-def _picture(source: str | Path | np.ndarray, label: str) -> Picture:
+def _picture(source: str | Path | NDArray[Any], label: str) -> Picture:
     if not isinstance(source, np.ndarray):
-        return load_picture(source, DRAWING)
+        return load_picture(source, READING.drawing_pixels_per_byte)
     return picture_from_array(source.astype(np.uint8) * 255 if source.dtype == bool else source, label)
 
 
@@ -93,7 +117,7 @@ def _white(picture: Picture) -> NDArray[np.bool_]:
     if picture.alpha is None:
         return gray > 0.5
     shown = _values(picture)[picture.alpha > 0.5]
-    one_colour = not len(shown) or np.ptp(shown, axis=0).max() <= ONE_COLOUR
+    one_colour = not len(shown) or np.ptp(shown, axis=0).max() <= MASKS.one_colour
     return (picture.alpha if one_colour else gray * picture.alpha) > 0.5
 
 
@@ -107,7 +131,7 @@ def _gray(picture: Picture) -> NDArray[np.float32]:
     return values[..., 0] if values.shape[2] == 1 else cv2.cvtColor(values, cv2.COLOR_RGB2GRAY)
 
 
-def _stretched(mask: NDArray, size: tuple[int, int], label: str, what: str = "the picture") -> NDArray:
+def _stretched(mask: NDArray[Any], size: tuple[int, int], label: str, what: str = "the picture") -> NDArray[Any]:
     width, height = size
     own_height, own_width = mask.shape
     if (own_width, own_height) == size:
@@ -121,4 +145,5 @@ def _stretched(mask: NDArray, size: tuple[int, int], label: str, what: str = "th
         )
     rows = (2 * np.arange(height) + 1) * own_height // (2 * height)
     columns = (2 * np.arange(width) + 1) * own_width // (2 * width)
-    return mask[np.ix_(rows, columns)]
+    stretched: NDArray[Any] = mask[np.ix_(rows, columns)]
+    return stretched

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from .containers import tiff_bytes, tiff_directory
+from .options import WRITING
 from .png import chunk
 
 SOFTWARE = "EDF Stitch"
-_LONGEST_TEXT = 2000  # bytes; the block has to fit one JPEG segment
 _JPEG_SEGMENT = 65533  # bytes a JPEG segment holds after its length
 _ASCII, _SHORT, _LONG, _RATIONAL, _UNDEFINED, _SIGNED_RATIONAL = 2, 3, 4, 5, 7, 10
 # ExifRead's name, tag number, type to write. The first group stands in the first directory, the second in the Exif one.
@@ -170,7 +170,7 @@ def _fields(exif: Exif) -> tuple[list[Field], list[Field]]:
 def _field(number: int, kind: int, value: str | int | tuple[int, int]) -> Field:
     if isinstance(value, str):
         # cut at a whole letter
-        raw = value.encode()[:_LONGEST_TEXT].decode(errors="ignore").encode() + b"\0"
+        raw = value.encode()[:WRITING.max_text_bytes].decode(errors="ignore").encode() + b"\0"
         return number, kind, len(raw), raw
     if isinstance(value, tuple):
         return number, kind, 1, struct.pack("<II" if kind == _RATIONAL else "<ii", *value)

@@ -6,21 +6,24 @@ here, once on the way in and once on the way out, so that no other room has to k
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from ..raster.lazy import AnyImage, Coded, whole
 from ..system.errors import BadRequest, UnreadableImage
 from .containers import foreign_kind, read_structure
-from .decoding import PHOTOGRAPH, check_size, decode_exr, decode_file, read_file, turn
+from .decoding import check_size, decode_exr, decode_file, read_file, turn
 from .metadata import Exif, read_exif
+from .options import READING
 
 _READABLE = "PNG, JPEG, TIFF, EXR, WebP or BMP"
-_MOST_NOT_FINITE = 0.5
 _ADVICE = {
     "camera RAW": "develop it in a RAW converter and export a 16-bit TIFF",
     "HEIC/HEIF": "export it as JPEG or TIFF", "AVIF": "export it as PNG or JPEG",
@@ -31,17 +34,30 @@ _ADVICE = {
 class Picture:
     """A picture from outside, upright (any EXIF orientation has been applied), row 0 on top.
 
-    light: float32 H×W×C, C = 1 or 3 (R, G, B), scene-linear, straight (not multiplied by alpha), in the primaries of
-    `icc` or, where that is None, of sRGB; of 8 and 16 bits it is worked out where it is asked for (see `lazy`), of all
-    pixels as `pixels`. alpha: float32 H×W in [0, 1], None when opaque everywhere. view: uint8 H×W×C,
-    the display-encoded picture that features and photometric metrics see. bits: 8, 16 or 32 (float) of the source.
-    exif: see `Exif.upright`; its orientation is the source's and is done with. icc: the embedded profile or None. name:
-    file name or "array". warnings: what the user should know.
+    Attributes
+    ----------
+    light : (H, W, C) array or LazyImage
+        float32, C = 1 or 3 (R, G, B), scene-linear, not multiplied by alpha, in the primaries of `icc` or, if that is
+        None, of sRGB. Decoded part by part from 8 and 16 bits (see `raster.lazy`).
+    alpha : (H, W) float32 in [0, 1], optional
+        None if opaque everywhere.
+    view : (H, W, C) uint8
+        The display-encoded picture that features and photometric metrics see.
+    bits : int
+        Of the source: 8, 16 or 32 (float).
+    exif : Exif
+        Upright; its orientation is the source's and was applied.
+    icc : bytes, optional
+        The embedded profile.
+    name : str
+        File name, or "array".
+    warnings : tuple of str
+        For the user.
     """
 
     light: AnyImage
-    alpha: np.ndarray | None
-    view: np.ndarray
+    alpha: NDArray[Any] | None
+    view: NDArray[Any]
     bits: int
     exif: Exif
     icc: bytes | None
@@ -49,17 +65,29 @@ class Picture:
     warnings: tuple[str, ...] = ()
 
     @property
-    def pixels(self) -> np.ndarray:
+    def pixels(self) -> NDArray[Any]:
         """All of its light as an array (H, W, C) float32."""
         return whole(self.light)
 
 
-def load_picture(path: str | Path, pixels_per_byte: int = PHOTOGRAPH) -> Picture:
-    """Reads a PNG, JPEG, TIFF, EXR, WebP or BMP file.
+def load_picture(path: str | Path, pixels_per_byte: int = READING.photograph_pixels_per_byte) -> Picture:
+    """Read a PNG, JPEG, TIFF, EXR, WebP or BMP file of 8, 16 or 32 bits (float), gray or colour, with or without alpha.
 
-    8, 16 or 32 bits (float), gray or colour, with or without alpha. pixels_per_byte: see `check_size`. Raises
-    UnreadableImage, with what was found and what to do, for everything else: missing, damaged, cut off, too large (over
-    400 megapixels or 65535 pixels a side) for memory or for its own length, HEIC and camera RAW.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    pixels_per_byte : int
+        Of a larger picture that the file may hold, at most; see `ReadingOptions`.
+
+    Returns
+    -------
+    Picture
+
+    Raises
+    ------
+    UnreadableImage
+        Missing, damaged, cut off, too large for memory or for its own length, HEIC or camera RAW, with what to do.
     """
     path = Path(path)
     try:
@@ -91,12 +119,25 @@ def _load(path: Path, pixels_per_byte: int) -> Picture:
     return _picture(turn(raw, exif.orientation), associated, exif.upright(), structure.icc, path.name, warnings)
 
 
-def picture_from_array(array: np.ndarray, name: str = "array") -> Picture:
-    """A Picture from an array (copied).
+def picture_from_array(array: NDArray[Any], name: str = "array") -> Picture:
+    """Make a Picture of an array, which is copied.
 
-    array: uint8 or uint16, display-encoded sRGB; float32 or float64, scene-linear with sRGB primaries. H×W or H×W×C
-    with C = 1 gray, 2 gray and alpha, 3 RGB, 4 RGBA; straight alpha; row 0 on top. Raises BadRequest for every other
-    array.
+    Parameters
+    ----------
+    array : (H, W) or (H, W, C)
+        uint8 or uint16: display-encoded sRGB; float32 or float64: scene-linear with sRGB primaries. C = 1 gray, 2 gray
+        and alpha, 3 RGB, 4 RGBA; colours are not multiplied by alpha; row 0 on top.
+    name : str
+        In messages.
+
+    Returns
+    -------
+    Picture
+
+    Raises
+    ------
+    BadRequest
+        The array has another shape or type.
     """
     if not isinstance(array, np.ndarray):
         raise BadRequest(f"{name}: a NumPy array is needed, not {type(array).__name__}")
@@ -106,7 +147,8 @@ def picture_from_array(array: np.ndarray, name: str = "array") -> Picture:
     if array.ndim not in (2, 3) or array.size == 0 or (array.ndim == 3 and array.shape[2] > 4):
         raise BadRequest(f"{name}: an array of the shape {array.shape}; height × width (× 1 to 4 channels) is needed")
     raw = array[..., None] if array.ndim == 2 else array
-    raw = np.array(raw, dtype=np.float32 if dtype == np.float64 else dtype, order="C")
+    with np.errstate(over="ignore"):  # what float32 cannot hold is infinite, which is told further on
+        raw = np.array(raw, dtype=np.float32 if dtype == np.float64 else dtype, order="C")
     try:
         return _picture(raw, False, Exif(), None, name, [])
     except UnreadableImage as error:
@@ -114,7 +156,7 @@ def picture_from_array(array: np.ndarray, name: str = "array") -> Picture:
 
 
 def _picture(
-    raw: np.ndarray, associated: bool, exif: Exif, icc: bytes | None, name: str, warnings: list[str]
+    raw: NDArray[Any], associated: bool, exif: Exif, icc: bytes | None, name: str, warnings: list[str]
 ) -> Picture:
     """raw: upright H×W×1..4 in R, G, B, A order; associated: the colours are multiplied by alpha as stored."""
     channels = 1 if raw.shape[2] < 3 else 3
@@ -134,13 +176,13 @@ def _picture(
         icc = None
     if raw.dtype == np.float32:
         light, alpha, share = _finite(colour, alpha)
-        if share > _MOST_NOT_FINITE:
+        if share > READING.max_not_finite:
             raise UnreadableImage(f"{share:.0%} of the pixels are not finite numbers; render or export it again")
         if share > 0:
             warnings = [*warnings, f"{share:.2%} of the pixels are not finite numbers; they are taken as transparent"]
         view = _float_view(light, _exposure(light, alpha))
     else:
-        light = Coded(colour, _curves(icc, channels))
+        light = Coded(colour, curves_for(icc, channels))
         # 65535 / 255 = 257; OpenCV rounds
         view = colour if raw.dtype == np.uint8 else cv2.convertScaleAbs(colour, alpha=1 / 257).reshape(colour.shape)
     if alpha is not None and (alpha >= 1.0).all():
@@ -149,16 +191,17 @@ def _picture(
     return Picture(light, alpha, view, raw.dtype.itemsize * 8, exif, icc, name, tuple(warnings))
 
 
-def _straight(colour: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+def _straight(colour: NDArray[Any], alpha: NDArray[Any]) -> NDArray[Any]:
     """Colours divided by alpha, in the encoding they were multiplied in; 0 where alpha is 0."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         straight = np.where(alpha[..., None] == 0, np.float32(0), colour / alpha[..., None])
     if colour.dtype == np.float32:
         return straight.astype(np.float32)
-    return np.rint(np.clip(straight, 0, np.iinfo(colour.dtype).max)).astype(colour.dtype)
+    levels: NDArray[Any] = np.rint(np.clip(straight, 0, np.iinfo(colour.dtype).max)).astype(colour.dtype)
+    return levels
 
 
-def _finite(colour: np.ndarray, alpha: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None, float]:
+def _finite(colour: NDArray[Any], alpha: NDArray[Any] | None) -> tuple[NDArray[Any], NDArray[Any] | None, float]:
     """Colours and alpha with 0 wherever one of the values is not finite, and the share of such pixels."""
     good = np.isfinite(colour).all(axis=2)
     if alpha is not None:
@@ -169,7 +212,7 @@ def _finite(colour: np.ndarray, alpha: np.ndarray | None) -> tuple[np.ndarray, n
     return np.where(good[..., None], colour, np.float32(0)), alpha, 1.0 - float(good.mean())
 
 
-def _exposure(pixels: np.ndarray, alpha: np.ndarray | None) -> float:
+def _exposure(pixels: NDArray[Any], alpha: NDArray[Any] | None) -> float:
     """The factor that brings the light of a float picture into the range of a display.
 
     Half way (in stops) between the factor that puts the median on middle gray and the one that keeps the brightest
@@ -183,12 +226,12 @@ def _exposure(pixels: np.ndarray, alpha: np.ndarray | None) -> float:
     return float(np.clip(np.sqrt(0.18 / middle * 0.9 / bright), 1e-37, 1e37))
 
 
-def _float_view(pixels: np.ndarray, exposure: float) -> np.ndarray:
+def _float_view(pixels: NDArray[Any], exposure: float) -> NDArray[Any]:
     with np.errstate(over="ignore"):
         return encode(pixels * np.float32(exposure), 8)
 
 
-def _curves(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
+def curves_for(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
     """The curves for pixels of so many channels; sRGB where the profile is missing or not understood."""
     profile = parse_icc(icc) if icc is not None else None
     if profile is None:
@@ -199,45 +242,67 @@ def _curves(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
 
 
 def resized(picture: Picture, scale: float) -> Picture:
-    """The picture made smaller by `scale` (at most 1), each new pixel the mean light of what it covers."""
+    """Shrink a picture.
+
+    Parameters
+    ----------
+    picture : Picture
+        The picture, which stays as it is.
+    scale : float
+        Of its sides, at most 1.
+
+    Returns
+    -------
+    Picture
+        Each pixel is the mean light of what it covers, weighted by alpha.
+    """
     height, width = picture.light.shape[:2]
     size = max(1, round(width * scale)), max(1, round(height * scale))
     if size == (width, height):
         return picture
 
-    def shrink(array: np.ndarray) -> np.ndarray:
-        return cv2.resize(array, size, interpolation=cv2.INTER_AREA).reshape(size[1], size[0], *array.shape[2:])
+    def shrink(array: NDArray[Any]) -> NDArray[Any]:
+        small: NDArray[Any] = cv2.resize(array, size, interpolation=cv2.INTER_AREA)
+        return small.reshape(size[1], size[0], *array.shape[2:])
 
     if picture.alpha is None:
         return replace(picture, light=shrink(picture.pixels), view=shrink(picture.view))
     weight, alpha = picture.alpha[..., None], shrink(picture.alpha)
 
-    def weighed(array: np.ndarray) -> np.ndarray:
-        """What lies under transparent pixels has no say in what is seen beside them."""
-        return shrink(array * weight) / np.maximum(alpha, 1e-6)[..., None]
+    def weighed(array: NDArray[Any]) -> NDArray[Any]:
+        """Means weighted by alpha: what lies under transparent pixels does not count."""
+        mean: NDArray[Any] = shrink(array * weight) / np.maximum(alpha, 1e-6)[..., None]
+        return mean
 
     view = np.clip(np.rint(weighed(picture.view)), 0, 255).astype(np.uint8)
     return replace(picture, light=weighed(picture.pixels), alpha=alpha, view=view)
 
 
-def in_same_colour_space(a: Picture, b: Picture) -> tuple[Picture, Picture]:
-    """Both pictures with the same primaries, the same number of channels and, for two float pictures, comparable views.
+def in_same_colour_space(pictures: Sequence[Picture]) -> tuple[Picture, ...]:
+    """Bring pictures to the same primaries and number of channels, and float pictures to comparable views.
 
-    Equal profiles are kept (light stays in their primaries); otherwise each picture with a profile is converted to
-    linear sRGB and loses it. A profile that is not understood counts as sRGB then, with a warning. Gray beside colour
-    gets three channels. Returns new pictures; the given ones stay as they are.
+    Parameters
+    ----------
+    pictures : sequence of Picture
+        The pictures, which stay as they are.
+
+    Returns
+    -------
+    tuple of Picture
+        With equal profiles their light stays in these primaries; otherwise it is converted to linear sRGB. A profile
+        that is not understood counts as sRGB, with a warning. Gray beside colour gets three channels.
     """
-    if a.icc != b.icc:
-        a, b = _to_srgb(a), _to_srgb(b)
-    if a.light.shape[2] != b.light.shape[2]:
-        a, b = _three_channels(a), _three_channels(b)
-    if a.bits == b.bits == 32:
-        ours, theirs = _exposure(a.pixels, a.alpha), _exposure(b.pixels, b.alpha)
-        # One factor keeps the same thing equally bright in both; over two stops apart, seeing anything comes first.
-        if 0.25 <= ours / theirs <= 4.0:
-            shared = float(np.sqrt(ours * theirs))
-            a, b = (replace(one, view=_float_view(one.pixels, shared)) for one in (a, b))
-    return a, b
+    if len({picture.icc for picture in pictures}) > 1:
+        pictures = [_to_srgb(picture) for picture in pictures]
+    if len({picture.light.shape[2] for picture in pictures}) > 1:
+        pictures = [_three_channels(picture) for picture in pictures]
+    if all(picture.bits == 32 for picture in pictures):
+        exposures = [_exposure(picture.pixels, picture.alpha) for picture in pictures]
+        # One factor keeps the same thing equally bright in all; over two stops apart, seeing anything comes first.
+        if max(exposures) <= 4.0 * min(exposures):
+            shared = float(np.prod(exposures) ** (1 / len(exposures)))
+            pictures = [replace(picture, view=_float_view(picture.pixels, shared)) for picture in pictures]
+    return tuple(pictures)
 
 
 def _to_srgb(picture: Picture) -> Picture:

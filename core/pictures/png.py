@@ -10,14 +10,15 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import strips
 from ..system.threads import in_order
+from .options import WRITING
 
-LEVEL = 1
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 # Colour types by channels: gray, RGB, RGBA.
 _KINDS = {1: 0, 3: 2, 4: 6}
@@ -32,14 +33,14 @@ def chunk(name: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(body, zlib.crc32(name)))
 
 
-def encode_png(shape: tuple[int, int, int], bits: int, levels_of: Callable[[slice], NDArray]) -> bytes:
+def encode_png(shape: tuple[int, int, int], bits: int, levels_of: Callable[[slice], NDArray[Any]]) -> bytes:
     """A PNG file of (H, W, C) pixels, C = 1, 3 (RGB) or 4 (RGBA); levels_of(rows): those of some rows, uint8 for 8 bits
     and uint16 for 16. It is called by several threads, and each row is asked for once."""
     height, width, channels = shape
 
     def packed(rows: slice) -> tuple[bytes, int, int]:
         lines = _filtered(levels_of(rows)).data
-        packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS, zlib.DEF_MEM_LEVEL, zlib.Z_RLE)
+        packer = zlib.compressobj(WRITING.png_level, zlib.DEFLATED, -zlib.MAX_WBITS, zlib.DEF_MEM_LEVEL, zlib.Z_RLE)
         body = packer.compress(lines) + packer.flush(zlib.Z_FINISH if rows.stop == height else zlib.Z_FULL_FLUSH)
         return (_ZLIB if rows.start == 0 else b"") + body, zlib.adler32(lines), lines.nbytes
 
@@ -58,7 +59,7 @@ def adler_of_both(first: int, second: int, length: int) -> int:
     return (b + b_too + length * (a - 1)) % _ADLER << 16 | (a + a_too - 1) % _ADLER
 
 
-def _filtered(levels: NDArray) -> NDArray[np.uint8]:
+def _filtered(levels: NDArray[Any]) -> NDArray[np.uint8]:
     """Rows (h, 1 + bytes) as a PNG file holds them before packing: the filter's number, then the differences."""
     height = len(levels)
     step = levels.shape[2] * levels.itemsize

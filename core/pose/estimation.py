@@ -1,8 +1,8 @@
-"""How the two cameras stood: robust F, then focal length, rotation and baseline direction on the Sampson distance.
+"""Relative pose and calibration of two cameras from matches.
 
-H_inf cannot come from F alone (every H_inf + e' mᵀ fits it): it needs calibration. So F is only the way in; what is
-kept is the pose, refined with a prior on the focal length that weakens as the matches' evidence grows, and F, H_inf and
-e' are made from it.
+A robust F comes first, then focal length, rotation and baseline direction are refined on the Sampson distance. H_inf
+cannot come from F alone, for every H_inf + e' mᵀ fits it: it needs calibration. So the result is the pose, refined with
+a prior on the focal length that counts less the more the matches say, and F, H_inf and e' are computed from it.
 """
 
 from __future__ import annotations
@@ -16,15 +16,13 @@ from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
 from ..cameras.matches import Matches
-from ..cameras.projective import in_front, infinite_homography, inverse_intrinsics, sampson_residuals
+from ..cameras.projective import infinite_homography, inverse_intrinsics, sampson_residuals
 from ..cameras.two_view import TwoView
 from ..raster.arrays import Array
+from ..raster.robust import sigma_of
 from ..system.errors import DegenerateGeometry, NoOverlap, TooFewMatches
 from .focal import focal_warnings, held_focal, known_focal
 from .fundamental import (
-    LEAST_PX,
-    MIN_INLIERS,
-    RANSAC_PX,
     Homography,
     explained_by,
     fit_homography,
@@ -35,36 +33,42 @@ from .fundamental import (
     shows_parallax,
     transfer_error,
 )
-from .refinement import MIN_PARALLAX, Pose, pose_of_fundamental, refine_pose, shared_focal_sigma
+from .options import ESTIMATION, FUNDAMENTAL
+from .refinement import Pose, pose_of_fundamental, refine_pose, shared_focal_sigma
 from .rotation import fit_rotation
 from .zoom import with_two_focals
 
-MIN_MATCHES = 16
-START_PX = 1.0
-INLIER_PX = 2.0
-# A second look at the matches with a threshold of so many σ, at most that share of the first.
-SHARP_SIGMAS, SHARP = 3.0, 0.4
-# A rotation may explain a homography's matches so much worse: lenses are not perfect.
-ROTATION_FACTOR, ROTATION_PX = 1.6, 0.75
-SAME_PX = 0.5
-PLANE_KEPT, GIVEN_KEPT, GIVEN_SIGMAS, GIVEN_OFF_PX = 0.8, 0.75, 1.6, 3.0
-PLANE_SHARE = 0.5
-REFINEMENTS = 8
-# Matches that choose among starts, and matches that refine: more cost time and change nothing.
-FIRST_LOOK, IN_EARNEST = 400, 1500
-# Focal lengths in units of the longer side, tried when nothing is known: 19 mm to 200 mm on a 36 mm frame.
-FOCAL_LADDER = (0.5, 0.7, 0.9, 1.2, 1.6, 2.2, 3.2, 5.0)
-
 
 def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int = 0) -> TwoView:
-    """Pose, calibration and inliers of a pair from its matches.
+    """Estimate pose, calibration and inliers of a pair from its matches.
 
-    Raises TooFewMatches, NoOverlap (the matches agree on nothing) or DegenerateGeometry (no pose has them in front).
+    Parameters
+    ----------
+    matches : Matches
+        In px of the pictures that the cameras describe, free of lens distortion.
+    camera, camera_prime : Camera
+        What is known of the reference's and the target's camera. Where both have a pose, only inliers are found.
+    seed : int
+        Of RANSAC; the same seed gives the same result.
+
+    Returns
+    -------
+    TwoView
+        Of the model that the matches support: `general`, `rotation` or `plane`.
+
+    Raises
+    ------
+    TooFewMatches
+        Fewer than `EstimationOptions.min_matches`.
+    NoOverlap
+        The matches agree on no more than chance would bring, or both pictures show the same.
+    DegenerateGeometry
+        No pose has the matches in front of both cameras, or given cameras contradict them.
     """
-    if len(matches) < MIN_MATCHES:
+    if len(matches) < ESTIMATION.min_matches:
         raise TooFewMatches(
-            f"only {len(matches)} matching points found, at least {MIN_MATCHES} needed: the pictures must show the "
-            "same things over about a quarter of their area; try pictures taken closer together, or sharper "
+            f"only {len(matches)} matching points found, at least {ESTIMATION.min_matches} needed: the pictures must "
+            "show the same things over about a quarter of their area; try pictures taken closer together, or sharper "
             "ones, or give matches by hand (--matches)"
         )
     if camera.pose is not None and camera_prime.pose is not None:
@@ -81,40 +85,29 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
             return rotated
         if camera.assumed or camera_prime.assumed:
             return _plane_without_pose(matches, homography, camera, camera_prime)
-    # on a plane, the calibration and the plane trade freely: what is known of it stays
+    # matches on a plane cannot tell its direction from the calibration: the calibration is not refined
     first, second = (
         c if parallax else replace(c.with_focal_held(), principal_sigma=0.0) for c in (camera, camera_prime)
     )
     pose, inliers, sigma, zoom = _fit_pose(matches, candidates, homography, first, second, seed)
-    if not parallax and inliers.sum() < PLANE_KEPT * homography.inliers.sum():
+    if not parallax and inliers.sum() < ESTIMATION.plane_inlier_share * homography.inliers.sum():
         return _plane_without_pose(matches, homography, camera, camera_prime)
-    if inliers.sum() < MIN_INLIERS:
+    if inliers.sum() < FUNDAMENTAL.min_inliers:
         raise DegenerateGeometry(
             f"no pair of cameras explains more than {int(inliers.sum())} of {len(matches)} matches: the pictures "
             "seem to have no content in common, or the focal length that was given is not theirs"
         )
-    front = in_front(pose.K, pose.K_prime, pose.R, pose.t, matches.x[inliers], matches.y[inliers], MIN_PARALLAX)
-    if not parallax and front.mean() < 0.5:
-        return _plane_without_pose(matches, homography, camera, camera_prime)
-    if front.mean() < 0.5:
+    front = pose.in_front(matches.subset(inliers))
+    if front.mean() < ESTIMATION.min_front_share:
+        if not parallax:
+            return _plane_without_pose(matches, homography, camera, camera_prime)
         raise DegenerateGeometry(
             f"only {front.mean():.0%} of {len(front)} consistent points lie in front of both cameras: "
             "the pictures' geometry makes no sense; give the focal length (--focal-px, --focal35) "
             "or check that neither picture is mirrored"
         )
-    why = (
-        f"{int(inliers.sum())} of {len(matches)} matches on their epipolar lines, "
-        f"{int(homography.inliers.sum())} on one homography"
-    )
-    if not parallax:
-        why += "; nothing leaves that plane along its epipolar lines beyond noise and coincidence"
-    if zoom:
-        why += "; the second focal length was freed: the matches contradict a common one"
-    on_lines = matches.subset(inliers)
-    if parallax:
-        known = known_focal(on_lines, pose, camera, camera_prime, sigma, zoom)
-    else:
-        known = held_focal(on_lines, pose, camera, camera_prime, sigma)
+    fit = matches.subset(inliers), pose, camera, camera_prime, sigma
+    known = known_focal(*fit, zoom) if parallax else held_focal(*fit)
     warnings = [*focal_warnings(pose, camera, camera_prime), *known.warnings]
     if camera.fixed and camera_prime.fixed:
         warnings += _contradiction(matches, F, inliers, sigma)
@@ -122,16 +115,29 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
     return TwoView(
         K=pose.K, K_prime=pose.K_prime, R=pose.R, t=pose.t, F=pose.F,
         H_inf=infinite_homography(pose.K, pose.K_prime, pose.R), e_prime=pose.K_prime @ pose.t,
-        inliers=inliers | matches.given, sigma=sigma, model="general" if parallax else "plane", why=why,
-        focal_source=known.source, focal_deviation=known.deviation, h_inf_spread=known.h_inf_spread,
-        warnings=tuple(warnings),
+        inliers=inliers | matches.given, sigma=sigma, model="general" if parallax else "plane",
+        why=_why(inliers, homography, parallax, zoom), focal_source=known.source, focal_deviation=known.deviation,
+        h_inf_spread=known.h_inf_spread, warnings=tuple(warnings),
     )  # fmt: skip
+
+
+def _why(inliers: NDArray[np.bool_], homography: Homography, parallax: bool, zoom: bool) -> str:
+    """In words, what the choice between the general and the plane model rests on."""
+    why = (
+        f"{int(inliers.sum())} of {len(inliers)} matches on their epipolar lines, "
+        f"{int(homography.inliers.sum())} on one homography"
+    )
+    if not parallax:
+        why += "; nothing leaves that plane along its epipolar lines beyond noise and coincidence"
+    if zoom:
+        why += "; the second focal length was freed: the matches contradict a common one"
+    return why
 
 
 def _same_viewpoint(
     matches: Matches, homography: Homography, camera: Camera, camera_prime: Camera
 ) -> TwoView | None:
-    """The rotation model, where it explains the homography's matches about as well; else None.
+    """The rotation model if it explains the homography's matches about as well, else None.
 
     Raises NoOverlap where the two pictures show the same to within half a pixel.
     """
@@ -140,17 +146,17 @@ def _same_viewpoint(
     error = transfer_error(rotation.H_inf, matches)
     with np.errstate(invalid="ignore"):  # infinitely far off where a point comes to lie behind the camera
         typical, found = (float(np.percentile(e[homography.inliers], 80)) for e in (homography.error, error))
-    allowed = max(ROTATION_FACTOR * typical, ROTATION_PX * matches.scale)
+    allowed = max(ESTIMATION.rotation_factor * typical, ESTIMATION.rotation_px * matches.scale)
     if found > allowed:
         return None
     if camera.size == camera_prime.size:
         moved = np.linalg.norm(on.x - on.y, axis=1)
-        if np.percentile(moved, 95) < SAME_PX * matches.scale + 3 * homography.sigma:
+        if np.percentile(moved, 95) < ESTIMATION.same_view_px * matches.scale + 3 * homography.sigma:
             raise NoOverlap(
                 "the two pictures show the same from the same place: there is nothing to stitch; choose two "
                 "photographs taken from different places"
             )
-    inliers = error < max(2 * allowed, INLIER_PX * matches.scale)
+    inliers = error < max(2 * allowed, ESTIMATION.inlier_px * matches.scale)
     why = (
         f"one rotation explains {int(inliers.sum())} of {len(matches)} matches, and nothing leaves it along epipolar "
         "lines beyond noise and coincidence: both pictures were taken from the same place"
@@ -192,7 +198,7 @@ def _plane_without_pose(
 def _contradiction(matches: Matches, F: Array, inliers: NDArray[np.bool_], sigma: float) -> list[str]:
     """A warning where cameras that were given explain clearly less than free ones would."""
     agree, noise = explained_by(F, matches)
-    if inliers.sum() >= GIVEN_KEPT * agree.sum() and sigma <= GIVEN_SIGMAS * noise:
+    if inliers.sum() >= ESTIMATION.given_inlier_share * agree.sum() and sigma <= ESTIMATION.given_noise_factor * noise:
         return []
     return [
         f"the matches contradict the given cameras: {int(inliers.sum())} matches lie within {sigma:.2f} px of their "
@@ -202,14 +208,14 @@ def _contradiction(matches: Matches, F: Array, inliers: NDArray[np.bool_], sigma
 
 def _about_given(matches: Matches, off: Array) -> list[str]:
     """A warning about matches that the user gave, hence all used, and that lie `off` (N,) px from where they should."""
-    wrong = off > GIVEN_OFF_PX * matches.scale
+    wrong = off > ESTIMATION.given_match_px * matches.scale
     if not matches.given or not wrong.any():
         return []
     worst = int(np.argmax(off))
     (x, y), (x2, y2) = matches.x[worst], matches.y[worst]
     return [
-        f"{int(wrong.sum())} of the given matches contradict the rest by more than {GIVEN_OFF_PX:g} px (the worst, "
-        f"{x:.1f},{y:.1f} and {x2:.1f},{y2:.1f}: {off[worst]:.1f} px); they are used all the same"
+        f"{int(wrong.sum())} of the given matches contradict the rest by more than {ESTIMATION.given_match_px:g} px "
+        f"(the worst, {x:.1f},{y:.1f} and {x2:.1f},{y2:.1f}: {off[worst]:.1f} px); they are used all the same"
     ]
 
 
@@ -220,8 +226,8 @@ def _fit_pose(
     starts = _best_starts(matches, candidates, homography, camera, camera_prime)
     refined = [_refine_with_inliers(matches, p, camera, camera_prime, False) for p in starts]
     best = _least_truncated(matches, refined)
-    # a wide threshold lets in stray matches that the pose bends to; one as sharp as the noise turns out does not
-    sharp = min(SHARP_SIGMAS * best[2], SHARP * RANSAC_PX * matches.scale)
+    # a wide threshold lets in stray matches that pull the pose; one as sharp as the noise found does not
+    sharp = min(ESTIMATION.sharp_sigmas * best[2], ESTIMATION.sharp_share * FUNDAMENTAL.inlier_px * matches.scale)
     F = robust_fundamental(matches, sharp, seed)
     again = pose_of_fundamental(matches, F, best[0].K, best[0].K_prime, sharp)
     best = _least_truncated(matches, [best, _refine_with_inliers(matches, again, camera, camera_prime, False)])
@@ -234,28 +240,28 @@ def _fit_pose(
 def _best_starts(
     matches: Matches, candidates: list[Array], homography: Homography, camera: Camera, camera_prime: Camera
 ) -> list[Pose]:
-    """The poses to refine from, best first: every F at a ladder of focal lengths, and, where most points lie on a
-    plane, which makes F meaningless, those that its homography allows.
+    """The poses to refine from, best first: every F at several focal lengths, and, if most points lie on a plane, where
+    F is unstable, those that its homography allows.
 
-    All are compared by one robust cost with a wide scale over all matches: the landscape has several valleys.
+    The cost has several minima, so all are refined a little and compared by one robust cost with a wide scale.
     """
     factors = [1.0]
-    if not (camera.fixed or camera_prime.fixed) and shared_focal_sigma(camera, camera_prime) > 0.1:
-        factors += [rung * max(camera.size) / camera.focal for rung in FOCAL_LADDER]
-    few = matches.thinned(FIRST_LOOK)
+    if not (camera.fixed or camera_prime.fixed) and shared_focal_sigma(camera, camera_prime) > ESTIMATION.ladder_sigma:
+        factors += [rung * max(camera.size) / camera.focal for rung in ESTIMATION.focal_ladder]
+    few = matches.thinned(ESTIMATION.start_matches)
     starts: list[Pose] = []
     for factor in factors:
         K, K_prime = camera.scaled(factor), camera_prime.scaled(factor)
         for F in candidates if factor == 1.0 else candidates[:1]:
-            starts.append(pose_of_fundamental(few, F, K, K_prime, 2 * RANSAC_PX * matches.scale))
-    if homography.inliers.sum() > PLANE_SHARE * len(matches):
-        on = few.subset(transfer_error(homography.H, few) < 2 * RANSAC_PX * matches.scale)
+            starts.append(pose_of_fundamental(few, F, K, K_prime, 2 * FUNDAMENTAL.inlier_px * matches.scale))
+    if homography.inliers.sum() > ESTIMATION.plane_start_share * len(matches):
+        on = few.subset(transfer_error(homography.H, few) < 2 * FUNDAMENTAL.inlier_px * matches.scale)
         starts += _poses_of_plane(on, homography.H, camera, camera_prime)
-    # a first look at all, then the best few in earnest
-    sigma = START_PX * matches.scale
-    glance = few.thinned(FIRST_LOOK // 2)
+    # a few iterations for all, many for the best three
+    sigma = ESTIMATION.start_sigma_px * matches.scale
+    fewer = few.thinned(ESTIMATION.start_matches // 2)
     rough = sorted(
-        (refine_pose(glance, p, camera, camera_prime, sigma, iterations=3) for p in starts), key=lambda item: item[1]
+        (refine_pose(fewer, p, camera, camera_prime, sigma, iterations=3) for p in starts), key=lambda item: item[1]
     )
     fine = (refine_pose(few, p, camera, camera_prime, sigma, iterations=30) for p, _ in rough[:3])
     return [pose for pose, _ in sorted(fine, key=lambda item: item[1])]
@@ -270,8 +276,7 @@ def _poses_of_plane(on: Matches, H: Array, camera: Camera, camera_prime: Camera)
         length = float(np.linalg.norm(t))
         if length > 1e-9 and np.isfinite(R).all():
             for pose in (Pose(camera.K, camera_prime.K, R, sign * t[:, 0] / length) for sign in (1, -1)):
-                front = in_front(pose.K, pose.K_prime, pose.R, pose.t, on.x, on.y, MIN_PARALLAX)
-                found.append((int(front.sum()), pose))
+                found.append((int(pose.in_front(on).sum()), pose))
     found.sort(key=lambda item: -item[0])
     return [pose for _, pose in found[:2]]
 
@@ -279,20 +284,21 @@ def _poses_of_plane(on: Matches, H: Array, camera: Camera, camera_prime: Camera)
 def _refine_with_inliers(
     matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, zoom: bool
 ) -> tuple[Pose, NDArray[np.bool_], float]:
-    """Refine on the matches near their lines, let the noise scale follow, until the inliers stand still."""
-    sigma = RANSAC_PX * matches.scale / 2
+    """Refine on the matches near their lines with σ re-estimated, until the inliers stay: pose, inliers, σ px."""
+    least, most = (px * matches.scale for px in (FUNDAMENTAL.least_noise_px, FUNDAMENTAL.inlier_px))
+    sigma, threshold = most / 2, ESTIMATION.inlier_px * matches.scale
     inliers = np.zeros(len(matches), bool)
-    for _ in range(REFINEMENTS):
+    for _ in range(ESTIMATION.rounds):
         residual = np.abs(sampson_residuals(pose.F, matches.x, matches.y))
-        new = residual < np.clip(3 * sigma, INLIER_PX * matches.scale, 1.5 * INLIER_PX * matches.scale)
-        if new.sum() < MIN_INLIERS:
+        new = residual < np.clip(3 * sigma, threshold, 1.5 * threshold)
+        if new.sum() < FUNDAMENTAL.min_inliers:
             break
         settled = np.array_equal(new, inliers)
         inliers, previous = new, sigma
-        pose, _ = refine_pose(matches.subset(inliers).thinned(IN_EARNEST), pose, camera, camera_prime, sigma, zoom=zoom)
+        some = matches.subset(inliers).thinned(ESTIMATION.refinement_matches)
+        pose, _ = refine_pose(some, pose, camera, camera_prime, sigma, zoom=zoom)
         residual = np.abs(sampson_residuals(pose.F, matches.x[inliers], matches.y[inliers]))
-        # σ from the median absolute residual of a normal distribution
-        sigma = float(np.clip(np.median(residual) / 0.6745, LEAST_PX * matches.scale, RANSAC_PX * matches.scale))
+        sigma = float(np.clip(sigma_of(residual), least, most))
         if settled and abs(sigma / previous - 1) < 0.05:
             break
     return pose, inliers, sigma
@@ -303,7 +309,7 @@ def _least_truncated(
 ) -> tuple[Pose, NDArray[np.bool_], float]:
     """The refinement with the least truncated squared residual over all matches, in the sharpest one's σ.
 
-    A point behind a camera is as wrong as one off its line: that alone tells the poses of a plane apart.
+    A point behind a camera counts as an outlier: nothing else distinguishes the two poses that a plane allows.
     """
     if len(refined) == 1:
         return refined[0]
@@ -311,8 +317,7 @@ def _least_truncated(
 
     def cost(pose: Pose) -> float:
         squared = (sampson_residuals(pose.F, matches.x, matches.y) / sharpest) ** 2
-        front = in_front(pose.K, pose.K_prime, pose.R, pose.t, matches.x, matches.y, MIN_PARALLAX)
-        return float(np.where(front, np.minimum(squared, 9.0), 9.0).sum())
+        return float(np.where(pose.in_front(matches), np.minimum(squared, 9.0), 9.0).sum())
 
     return min(refined, key=lambda item: cost(item[0]))
 
@@ -320,7 +325,7 @@ def _least_truncated(
 def _from_known_cameras(
     matches: Matches, camera: Camera, camera_prime: Camera, pose: tuple[Array, Array], pose_prime: tuple[Array, Array]
 ) -> TwoView:
-    """Both cameras given with their poses: nothing to estimate but which matches they explain."""
+    """The geometry of cameras given with their poses; only the inliers and their noise are estimated."""
     (R1, t1), (R2, t2) = pose, pose_prime
     R = R2 @ R1.T
     t = t2 - R @ t1
@@ -330,23 +335,24 @@ def _from_known_cameras(
         )
     relative = Pose(camera.K, camera_prime.K, R, t / np.linalg.norm(t))
     residual = np.abs(sampson_residuals(relative.F, matches.x, matches.y))
-    inliers = residual < 3.0 * matches.scale
+    explained = ESTIMATION.given_camera_px * matches.scale
+    inliers = residual < explained
     free = fundamental_candidates(matches, 0)[0]
-    agree = np.abs(sampson_residuals(free, matches.x, matches.y)) < 3.0 * matches.scale
-    if inliers.sum() < max(MIN_INLIERS, 0.5 * agree.sum()):
+    agree = np.abs(sampson_residuals(free, matches.x, matches.y)) < explained
+    if inliers.sum() < max(FUNDAMENTAL.min_inliers, ESTIMATION.given_camera_share * agree.sum()):
         raise DegenerateGeometry(
             f"the given cameras explain only {int(inliers.sum())} of {len(matches)} matches: check that K, R and "
             "t belong to these pictures, in this order, with R and t taking world points into the camera "
             "(x ~ K (R X + t))"
         )
-    front = in_front(camera.K, camera_prime.K, R, relative.t, matches.x[inliers], matches.y[inliers], MIN_PARALLAX)
-    if front.mean() < 0.5:
+    front = relative.in_front(matches.subset(inliers))
+    if front.mean() < ESTIMATION.min_front_share:
         raise DegenerateGeometry(
             f"by the given cameras only {front.mean():.0%} of {len(front)} matching points lie in front of both, "
             "at least half needed: R and t must take world points into the camera (x ~ K (R X + t), z ahead); check "
             "the sign of t and whether R is to be transposed"
         )
-    sigma = float(max(np.median(residual[inliers]) / 0.6745, 0.1 * matches.scale))
+    sigma = float(max(sigma_of(residual[inliers]), ESTIMATION.given_camera_noise_px * matches.scale))
     why = f"cameras given; they explain {int(inliers.sum())} of {len(matches)} matches"
     return TwoView(
         K=relative.K, K_prime=relative.K_prime, R=R, t=relative.t, F=relative.F,

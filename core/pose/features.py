@@ -1,11 +1,10 @@
-"""Points that both pictures share: SIFT with root normalisation, mutual nearest neighbours, spread evenly.
-
-SIFT: Lowe, IJCV 2004. Root normalisation (the Hellinger kernel): Arandjelović and Zisserman, CVPR 2012.
+"""SIFT features spread evenly over a picture, and matches between two sets of them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,22 +12,9 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import sgemm
 
 from ..cameras.matches import Matches
+from ..raster.resizing import resized_points, size_change
 from ..system.threads import in_order
-
-# Above this a picture is shrunk for features only: SIFT's cost and memory grow with pixels, its useful points hardly
-# do.
-FEATURE_PIXELS = 3_200_000
-FEATURE_SIDE = 16_000  # SIFT doubles it, and OpenCV's pictures end at 32767
-FEATURE_BUDGET = 8000
-# The same for a preview, which takes a third of the time; at 1 MP the map's error grows by 0.02 to 0.07 px (3 to 19 %).
-PREVIEW_PIXELS, PREVIEW_BUDGET = 400_000, 3000
-# Contrast thresholds in OpenCV's unit. Faint points (clouds, noise) mislead where there are better ones, but a small or
-# flat picture cannot do without: they are taken only until ENOUGH points are there.
-FAINT, STRONG, ENOUGH = 0.005, 0.02, 3000
-OCTAVE_LAYERS = 3
-RATIO = 0.8
-# px kept clear of transparent parts: the reach of a small SIFT descriptor
-ALPHA_MARGIN = 8
+from .options import FEATURES
 
 
 @dataclass(frozen=True)
@@ -42,26 +28,44 @@ class Features:
 
 
 def detect(
-    view: NDArray[np.uint8], alpha: NDArray[np.float32] | None = None, budget: int = FEATURE_BUDGET,
-    pixels: int = FEATURE_PIXELS,
+    view: NDArray[np.uint8], alpha: NDArray[np.float32] | None = None, budget: int = FEATURES.budget,
+    pixels: int = FEATURES.pixels,
 ) -> Features:  # fmt: skip
-    """SIFT features of an 8-bit display-encoded picture (H, W, C), C = 1 or 3, at most `budget`, spread evenly.
+    """Detect SIFT features, spread evenly over the picture, with root-normalised descriptors.
 
-    alpha (H, W): nothing is looked for where it is 0, nor so close that the edge of the shown part would be the
-    feature. pixels: a larger picture is shrunk to so many first.
+    Parameters
+    ----------
+    view : (H, W, C) uint8
+        A display-encoded picture, C = 1 or 3 (R, G, B).
+    alpha : (H, W) float32, optional
+        No features where it is 0, nor so close that the edge of the shown part would be the feature.
+    budget : int
+        The most features that are returned.
+    pixels : int
+        A picture of more pixels is shrunk to about as many first.
+
+    Returns
+    -------
+    Features
+        In px of the full picture.
+
+    References
+    ----------
+    D. Lowe, Distinctive Image Features from Scale-Invariant Keypoints, IJCV 2004. R. Arandjelović and A. Zisserman,
+    Three Things Everyone Should Know to Improve Object Retrieval, CVPR 2012 (root normalisation).
     """
     gray = cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else np.ascontiguousarray(view[..., 0])
     height, width = gray.shape
-    shrink = max(1.0, np.sqrt(height * width / pixels), max(height, width) / FEATURE_SIDE)
+    shrink = max(1.0, np.sqrt(height * width / pixels), max(height, width) / FEATURES.side)
     small = (max(1, round(width / shrink)), max(1, round(height / shrink)))
     if shrink > 1:
         gray = cv2.resize(gray, small, interpolation=cv2.INTER_AREA)
-    if min(gray.shape) < 8:  # OpenCV's pyramid has nothing to stand on
+    if min(gray.shape) < FEATURES.least_side:  # OpenCV's pyramid has nothing to stand on
         return Features(np.empty((0, 2)), np.empty((0, 128), np.float32), 1.0)
     # precise upscale: without it keypoints sit a quarter of a pixel off
     sift = cv2.SIFT_create(
-        nfeatures=2 * budget, nOctaveLayers=OCTAVE_LAYERS, contrastThreshold=FAINT, edgeThreshold=20, sigma=1.6,
-        enable_precise_upscale=True,
+        nfeatures=2 * budget, nOctaveLayers=FEATURES.octave_layers, contrastThreshold=FEATURES.contrast_threshold,
+        edgeThreshold=FEATURES.edge_threshold, sigma=FEATURES.base_sigma, enable_precise_upscale=True,
     )  # fmt: skip
     keypoints = sift.detect(gray, _shown(alpha, small))
     if not keypoints:
@@ -69,32 +73,37 @@ def detect(
     points = np.asarray(cv2.KeyPoint_convert(keypoints), np.float64)
     strength = np.array([k.response for k in keypoints])
     # OpenCV compares response × layers with its threshold
-    floor = min(STRONG / OCTAVE_LAYERS, np.partition(strength, -ENOUGH)[-ENOUGH]) if len(strength) > ENOUGH else 0.0
+    floor, enough = 0.0, FEATURES.enough_points
+    if len(strength) > enough:
+        floor = min(FEATURES.strong_contrast / FEATURES.octave_layers, np.partition(strength, -enough)[-enough])
     strong = np.flatnonzero(strength >= floor)
     chosen = strong[spread_evenly(points[strong], strength[strong], gray.shape, budget)]
-    factor = np.array([width / small[0], height / small[1]])
-    # a descriptor costs more than a point: only those that are kept get one, though that needs the pyramid once more
+    # descriptors cost more than points, so only chosen points get one, though the pyramid is built a second time
     _, descriptors = sift.compute(gray, [keypoints[i] for i in chosen])
     descriptors = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-12))
-    return Features((points[chosen] + 0.5) * factor - 0.5, descriptors, float(factor.mean()))
+    scale = float(np.mean(size_change(small, (width, height))[0]))
+    return Features(resized_points(points[chosen], small, (width, height)), descriptors, scale)
 
 
 def _shown(alpha: NDArray[np.float32] | None, size: tuple[int, int]) -> NDArray[np.uint8] | None:
     if alpha is None:
         return None
     shown = cv2.resize((alpha > 0).astype(np.uint8) * 255, size, interpolation=cv2.INTER_NEAREST)
-    return cv2.erode(shown, np.ones((2 * ALPHA_MARGIN + 1,) * 2, np.uint8))
+    clear: NDArray[np.uint8] = cv2.erode(shown, np.ones((2 * FEATURES.alpha_margin + 1,) * 2, np.uint8))
+    return clear
 
 
-def spread_evenly(points: NDArray, strength: NDArray, shape: tuple[int, ...], budget: int) -> NDArray[np.intp]:
+def spread_evenly(
+    points: NDArray[Any], strength: NDArray[Any], shape: tuple[int, ...], budget: int
+) -> NDArray[np.intp]:
     """Indices of at most `budget` points (N, 2), the strongest of each cell of an even grid first, in rising order.
 
-    Round by round every cell gives its next strongest point until the budget is spent: a busy tree cannot starve the
-    quiet wall beside it. Ties fall by index, so the choice is the same on every machine.
+    In every round each cell gives its next strongest point until the budget is spent, so that a textured part does not
+    take the whole of it. Ties are decided by index: the choice is the same on every machine.
     """
     if len(points) <= budget:
         return np.arange(len(points))
-    side = np.sqrt(shape[0] * shape[1] / (budget / 8))
+    side = np.sqrt(shape[0] * shape[1] / (budget / FEATURES.points_per_cell))
     cell = (points[:, 1] // side).astype(np.int64) * (int(shape[1] // side) + 1) + (points[:, 0] // side).astype(
         np.int64
     )
@@ -105,8 +114,21 @@ def spread_evenly(points: NDArray, strength: NDArray, shape: tuple[int, ...], bu
     return np.sort(by_round[:budget])
 
 
-def match(a: Features, b: Features, ratio: float = RATIO) -> Matches:
-    """Mutual nearest neighbours of two feature sets that also pass Lowe's ratio test, each pair of places once."""
+def match(a: Features, b: Features, ratio: float = FEATURES.ratio) -> Matches:
+    """Match two sets of features: mutual nearest neighbours that pass Lowe's ratio test.
+
+    Parameters
+    ----------
+    a, b : Features
+        Of the reference and of the target.
+    ratio : float
+        The most that the distance to the nearest neighbour may be of that to the second nearest.
+
+    Returns
+    -------
+    Matches
+        In px of the full pictures, each pair of places (to 0.1 px) once; `scale` is the larger one of a and b.
+    """
     scale = max(a.scale, b.scale)
     if len(a.points) < 2 or len(b.points) < 2:
         return Matches(np.empty((0, 2)), np.empty((0, 2)), scale)
@@ -116,7 +138,7 @@ def match(a: Features, b: Features, ratio: float = RATIO) -> Matches:
 
     def best_of(start: int) -> tuple[int, NDArray[np.intp], NDArray[np.float32]]:
         """Fills in what is nearest to some of a; which of them is nearest to each of b, and how near."""
-        rows = slice(start, start + 1024)
+        rows = slice(start, start + FEATURES.rows_at_once)
         score = _products(a.descriptors[rows], b.descriptors)
         best_row = score.argmax(axis=0)
         best = score[best_row, np.arange(score.shape[1])]
@@ -128,7 +150,7 @@ def match(a: Features, b: Features, ratio: float = RATIO) -> Matches:
         return start, best_row, best
 
     # in slabs, so that memory stays bounded
-    for start, best_row, best in in_order(best_of, range(0, len(a.points), 1024)):
+    for start, best_row, best in in_order(best_of, range(0, len(a.points), FEATURES.rows_at_once)):
         better = best > back_score
         back[better], back_score[better] = best_row[better] + start, best[better]
     # unit vectors: |a − b|² = 2 − 2 a·b
@@ -146,4 +168,5 @@ def _products(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.floa
 
     Transposed views of row-major arrays are column-major, as BLAS wants them: nothing is copied.
     """
-    return sgemm(1.0, b.T, a.T, trans_a=True).T
+    products: NDArray[np.float32] = sgemm(1.0, b.T, a.T, trans_a=True).T
+    return products

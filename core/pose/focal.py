@@ -1,4 +1,4 @@
-"""What the matches tell of the focal length, and what to say about it."""
+"""How well the matches determine the focal length, and warnings about it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ import numpy as np
 from ..cameras.camera import Camera, zoomed
 from ..cameras.matches import Matches
 from ..cameras.projective import homogeneous, infinite_homography, project
+from .options import FOCAL
 from .refinement import Pose, focal_deviations, refine_pose
-
-# Matches alone leave more than this (log f) open: they do not determine it.
-UNDETERMINED = 0.1
-SPREAD_MATCHES = 200
 
 
 @dataclass(frozen=True)
@@ -31,12 +28,12 @@ class KnownFocal:
 def known_focal(
     matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, sigma: float, zoom: bool
 ) -> KnownFocal:
-    """How sure the focal length of a refined pose is, from its inlier matches."""
+    """The uncertainty of the focal length of a refined pose, from its inlier matches; sigma: their noise in px."""
     if camera.fixed or camera_prime.fixed:
         return KnownFocal(camera.source, 0.0, 0.0)
     with_prior, alone = focal_deviations(matches, pose, camera, camera_prime, sigma, zoom)
-    spread = _spread(matches.thinned(SPREAD_MATCHES), pose, camera, camera_prime, sigma, 2 * with_prior)
-    if alone <= UNDETERMINED:
+    spread = _spread(matches.thinned(FOCAL.spread_matches), pose, camera, camera_prime, sigma, 2 * with_prior)
+    if alone <= FOCAL.undetermined:
         source = f"the matches, from {camera.source}" if camera.assumed else camera.source
         return KnownFocal(source, with_prior, spread)
     if not camera.assumed:
@@ -52,9 +49,9 @@ def known_focal(
 
 
 def held_focal(matches: Matches, pose: Pose, camera: Camera, camera_prime: Camera, sigma: float) -> KnownFocal:
-    """How sure a focal length is that the matches had no say in: as sure as what is known of the camera."""
+    """The same for a focal length that was not refined: its uncertainty is the prior's."""
     deviation = max(camera.log_sigma, camera_prime.log_sigma)
-    few = matches.thinned(SPREAD_MATCHES)
+    few = matches.thinned(FOCAL.spread_matches)
     spread = _spread(few, pose, camera, camera_prime, sigma, 2 * deviation) if deviation else 0.0
     return KnownFocal(camera.source, deviation, spread)
 
@@ -78,11 +75,11 @@ def _spread(
 
 
 def focal_warnings(pose: Pose, camera: Camera, camera_prime: Camera) -> list[str]:
-    """Say when the matches moved a focal length far from what the file claims."""
+    """Warnings where the matches moved a focal length far from what the file claims."""
     out = []
     for name, K, cam in (("reference", pose.K, camera), ("target", pose.K_prime, camera_prime)):
         moved = K[0, 0] / cam.focal - 1
-        if not cam.assumed and not cam.fixed and abs(moved) > 2 * cam.log_sigma:
+        if not cam.assumed and not cam.fixed and abs(moved) > FOCAL.contradiction_sigmas * cam.log_sigma:
             out.append(
                 f"the matches contradict the {name}'s focal length: {cam.focal:.0f} px from {cam.source}, "
                 f"{K[0, 0]:.0f} px ({moved:+.0%}) from the matches; was the picture cropped? "

@@ -1,4 +1,4 @@
-"""What the matches agree on before any camera is known: a fundamental matrix and a homography, against chance."""
+"""Robust fundamental matrix and homography from matches alone, and tests whether their support is more than chance."""
 
 from __future__ import annotations
 
@@ -13,21 +13,9 @@ from numpy.typing import NDArray
 from ..cameras.matches import Matches
 from ..cameras.projective import homogeneous, project, sampson_residuals
 from ..raster.arrays import Array
+from ..raster.robust import sigma_of, sigma_of_lengths
 from ..system.errors import DegenerateGeometry, NoOverlap
-
-# A chance F gathers its 7 points and whatever lies within the threshold of its lines; this many is beyond chance.
-MIN_INLIERS = 15
-RANSAC_PX = 1.5
-LEAST_PX = 0.05  # no keypoint is placed better
-# Points that stray less than this share of the picture's shorter side from a line tell no geometry.
-LEAST_SPREAD = 0.008
-# Off the homography: so many σ, at least so many px. On a line: so many σ.
-OFF_SIGMAS, OFF_PX, ON_SIGMAS = 5.0, 0.75, 3.5
-# Matches off the homography along their lines that are beyond coincidence: so many, such a share of all that lie on
-# lines (feature positions have heavy tails), and so many times those across.
-LEAST_OFF, LEAST_SHARE, ALONG_TO_ACROSS = 8, 0.025, 3.0
-# log of the number of coincidences as good that random matches would bring: noise is not as random as that
-COINCIDENCE = -25.0
+from .options import FUNDAMENTAL
 
 
 def fundamental_candidates(matches: Matches, seed: int) -> list[Array]:
@@ -37,17 +25,19 @@ def fundamental_candidates(matches: Matches, seed: int) -> list[Array]:
     one locks on to a part of the picture. Raises NoOverlap when no more agree than chance would bring.
     """
     found: list[Array] = []
-    for factor in (1.0, 2.0):
-        threshold = factor * RANSAC_PX * matches.scale
+    for factor in FUNDAMENTAL.threshold_factors:
+        threshold = factor * FUNDAMENTAL.inlier_px * matches.scale
         found.append(robust_fundamental(matches, threshold, seed))
         cv2.setRNGSeed(seed)
         try:
-            F, _ = cv2.findFundamentalMat(matches.x, matches.y, cv2.USAC_MAGSAC, threshold, 0.9999, 20000)
+            F, _ = cv2.findFundamentalMat(
+                matches.x, matches.y, cv2.USAC_MAGSAC, threshold, FUNDAMENTAL.confidence, FUNDAMENTAL.iterations
+            )
         except cv2.error:  # an assertion of its own about points that determine nothing
             continue
         if F is not None and F.shape == (3, 3):
             found.append(F)
-    threshold = RANSAC_PX * matches.scale
+    threshold = FUNDAMENTAL.inlier_px * matches.scale
     ranked = []
     for F in found:
         if np.isfinite(F).all() and F.any():
@@ -56,7 +46,7 @@ def fundamental_candidates(matches: Matches, seed: int) -> list[Array]:
             ranked.append((np.minimum(residual / threshold, 1.0).sum(), F, int((residual < threshold).sum())))
     ranked.sort(key=lambda item: item[0])
     agree = ranked[0][2] if ranked else 0
-    needed = max(MIN_INLIERS, int(np.ceil(0.08 * len(matches))))
+    needed = max(FUNDAMENTAL.min_inliers, int(np.ceil(FUNDAMENTAL.min_inlier_share * len(matches))))
     if agree < needed:
         raise NoOverlap(
             f"{len(matches)} points look alike but only {agree} agree on a camera motion, at least {needed} needed: "
@@ -68,15 +58,14 @@ def fundamental_candidates(matches: Matches, seed: int) -> list[Array]:
 def explained_by(F: Array, matches: Matches) -> tuple[NDArray[np.bool_], float]:
     """Which matches (N,) lie on the lines of F, and the noise of a Sampson distance among them in px."""
     residual = np.abs(sampson_residuals(F, matches.x, matches.y))
-    on = residual < RANSAC_PX * matches.scale
-    # σ from the median absolute residual of a normal distribution
-    sigma = float(np.median(residual[on])) / 0.6745 if on.any() else 0.0
-    return on, max(sigma, LEAST_PX * matches.scale)
+    on = residual < FUNDAMENTAL.inlier_px * matches.scale
+    sigma = sigma_of(residual[on]) if on.any() else 0.0
+    return on, max(sigma, FUNDAMENTAL.least_noise_px * matches.scale)
 
 
 def robust_fundamental(matches: Matches, threshold: float, seed: int) -> Array:
     """The fundamental matrix (3, 3) with most matches within `threshold` px, by PoseLib's LO-RANSAC."""
-    options = {"max_epipolar_error": threshold, "seed": seed, "max_iterations": 20000}
+    options = {"max_epipolar_error": threshold, "seed": seed, "max_iterations": FUNDAMENTAL.iterations}
     return np.asarray(poselib.estimate_fundamental(matches.x, matches.y, options, {})[0])
 
 
@@ -86,7 +75,7 @@ def refuse_chance(matches: Matches, F: Array, size: tuple[int, int]) -> None:
     The expected number of such findings, a contrario (Moisan and Stival, IJCV 2004, eq. 10): (n − 7) C(n, k) C(k, 7)
     α^(k − 7) with α the chance of a point lying within the threshold of a line.
     """
-    threshold = RANSAC_PX * matches.scale
+    threshold = FUNDAMENTAL.inlier_px * matches.scale
     n, k = len(matches), int(explained_by(F, matches)[0].sum())
     alpha = min(1.0, 2 * threshold * math.hypot(*size) / (size[0] * size[1]))
     findings = math.log(n - 7) + _log_choose(n, k) + _log_choose(k, 7) + (k - 7) * math.log(alpha)
@@ -113,8 +102,25 @@ class Homography:
 
 
 def fit_homography(matches: Matches, seed: int) -> Homography:
-    """The homography that explains most matches, by PoseLib's LO-RANSAC."""
-    options = {"max_reproj_error": 2 * RANSAC_PX * matches.scale, "seed": seed, "max_iterations": 10000}
+    """Fit the homography that explains most matches, by PoseLib's LO-RANSAC.
+
+    Parameters
+    ----------
+    matches : Matches
+        At least four.
+    seed : int
+        Of RANSAC.
+
+    Returns
+    -------
+    Homography
+        The identity without inliers if none is found.
+    """
+    options = {
+        "max_reproj_error": 2 * FUNDAMENTAL.inlier_px * matches.scale,
+        "seed": seed,
+        "max_iterations": FUNDAMENTAL.homography_iterations,
+    }
     H, info = poselib.estimate_homography(matches.x, matches.y, options, {})
     inliers = np.asarray(info["inliers"], bool)
     H = np.asarray(H, np.float64)
@@ -123,8 +129,8 @@ def fit_homography(matches: Matches, seed: int) -> Homography:
     # the sign that has the inliers in front
     H = H * np.sign(np.median(homogeneous(matches.x[inliers]) @ H[2])) / np.linalg.norm(H)
     error = transfer_error(H, matches)
-    # the median length of a normal vector of two components is 1.1774 σ; both pictures contribute
-    sigma = max(float(np.median(error[inliers])) / 1.1774 / math.sqrt(2), LEAST_PX * matches.scale)
+    # the noise of both pictures
+    sigma = max(sigma_of_lengths(error[inliers]) / math.sqrt(2), FUNDAMENTAL.least_noise_px * matches.scale)
     return Homography(H, error, inliers, sigma)
 
 
@@ -148,7 +154,7 @@ def refuse_without_spread(matches: Matches, F: Array, size: tuple[int, int], tar
             distance = np.abs(centred @ direction)
             weight = 1 / np.maximum(distance, matches.scale)
         across = float(np.percentile(distance, 90))
-        if across < max(LEAST_SPREAD * min(picture_size), 2 * matches.scale):
+        if across < max(FUNDAMENTAL.min_spread * min(picture_size), 2 * matches.scale):
             raise DegenerateGeometry(
                 f"the {int(agree.sum())} matching points all lie in one spot or on one line: that tells nothing about "
                 "how the cameras stood; pictures are needed that share an area, with detail all over it"
@@ -169,7 +175,8 @@ def shows_parallax(matches: Matches, F: Array, homography: Homography, target_si
     with np.errstate(divide="ignore", invalid="ignore"):
         moved = np.where(front[:, None], matches.y - project(ray), np.inf)
     explained, sigma = explained_by(F, matches)
-    on, off = ON_SIGMAS * sigma, max(OFF_SIGMAS * sigma, OFF_PX * matches.scale)
+    on = FUNDAMENTAL.on_line_sigmas * sigma
+    off = max(FUNDAMENTAL.off_plane_sigmas * sigma, FUNDAMENTAL.off_plane_px * matches.scale)
     with np.errstate(invalid="ignore"):
         along = np.abs(moved[:, 1] * normal[:, 0] - moved[:, 0] * normal[:, 1])
         across = np.abs(np.sum(moved * normal, axis=1))
@@ -180,5 +187,6 @@ def shows_parallax(matches: Matches, F: Array, homography: Homography, target_si
     # a band of the picture's diagonal times twice the tolerance
     alpha = min(1.0, 2 * on * math.hypot(*target_size) / (target_size[0] * target_size[1]))
     coincidences = 2 * math.log(max(astray, 2)) + _log_choose(astray, parallax) + parallax * math.log(alpha)
-    enough = parallax >= max(LEAST_OFF, LEAST_SHARE * explained.sum()) and parallax > ALONG_TO_ACROSS * scatter
-    return bool(enough and coincidences < COINCIDENCE)
+    needed = max(FUNDAMENTAL.min_off_plane, FUNDAMENTAL.min_off_plane_share * explained.sum())
+    enough = parallax >= needed and parallax > FUNDAMENTAL.along_to_across * scatter
+    return bool(enough and coincidences < FUNDAMENTAL.max_log_coincidences)

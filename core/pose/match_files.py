@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ WEIGHT = "weight"
 _LAYOUT = "each line holds x,y,x2,y2 or x,y,x2,y2,weight"
 
 
-def read_matches(source: str | Path | np.ndarray, size: tuple[int, int], size_prime: tuple[int, int]) -> Matches:
+def read_matches(source: str | Path | NDArray[Any], size: tuple[int, int], size_prime: tuple[int, int]) -> Matches:
     """The user's matches, with `weight` (N,) float64 above 0 and `given` True.
 
     source: a CSV file in UTF-8, x,y in the reference ↔ x2,y2 in the target in px of the upright pictures, pixel centres
@@ -50,11 +50,11 @@ def matches_csv(matches: Matches) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _whole(source: str | Path | np.ndarray) -> str:
+def _whole(source: str | Path | NDArray[Any]) -> str:
     return "the array of matches" if isinstance(source, np.ndarray) else str(source)
 
 
-def _from_array(array: np.ndarray) -> tuple[NDArray[np.float64], list[str]]:
+def _from_array(array: NDArray[Any]) -> tuple[NDArray[np.float64], list[str]]:
     """Rows (N, 5) with weights, and what to call each of them."""
     if array.ndim != 2 or array.shape[1] not in (4, 5) or not len(array) or array.dtype.kind not in "iuf":
         raise BadRequest(

@@ -26,18 +26,8 @@ from ..cameras.projective import (
     skew,
 )
 from ..raster.arrays import Array
+from .options import REFINEMENT
 
-# Errors of neighbouring matches go together (lens distortion, rolling shutter): more than this many are not more
-# evidence against a prior, however many there are.
-EFFECTIVE_MATCHES = 300
-# What a lens leaves in residuals (px), where they speak against a known focal length, and against a mere guess.
-SYSTEMATIC_PX, SYSTEMATIC_GUESS_PX = 0.5, 0.15
-# Where infinity is seen depends on the whole calibration: distortion moves it by this much.
-BEYOND_PX = 2.0
-TAILS = 3.0
-# Parallax below this angle (radians) is rounding and keypoint noise: such a point may lie behind by accident.
-MIN_PARALLAX = 2e-3
-NEGLIGIBLE = 1e-3
 # [e_i]ₓ of the three axes: where a small rotation takes a vector.
 _TURNS = np.array([skew(axis) for axis in np.eye(3)])
 
@@ -56,13 +46,16 @@ class Pose:
         """The fundamental matrix of the pose, x'ᵀ F x = 0."""
         return fundamental_from_pose(self.K, self.K_prime, self.R, self.t)
 
+    def in_front(self, matches: Matches) -> NDArray[np.bool_]:
+        """Which matches (N,) triangulate in front of both cameras, or have too little parallax to say."""
+        return in_front(self.K, self.K_prime, self.R, self.t, matches.x, matches.y, REFINEMENT.min_parallax)
+
 
 def pose_of_fundamental(matches: Matches, F: Array, K: Array, K_prime: Array, threshold: float) -> Pose:
     """The pose of F that has most of the matches within `threshold` px of their lines in front of both cameras."""
     near = matches.subset(np.abs(sampson_residuals(F, matches.x, matches.y)) < threshold)
     poses = poses_from_fundamental(F, K, K_prime)
-    front = [in_front(K, K_prime, R, t, near.x, near.y, MIN_PARALLAX).sum() for R, t in poses]
-    return Pose(K, K_prime, *poses[int(np.argmax(front))])
+    return max((Pose(K, K_prime, R, t) for R, t in poses), key=lambda pose: pose.in_front(near).sum())
 
 
 def refine_pose(
@@ -74,12 +67,10 @@ def refine_pose(
     zoom: bool = False,
     iterations: int = 100,
 ) -> tuple[Pose, float]:
-    """The pose that minimises Σ log(1 + (r/σ)² + (c/σ')²) + priors of the calibration; and that cost.
+    """The pose that minimises Σ log(1 + (r/σ)² + (c/σ')²) + priors of the calibration, and that cost.
 
-    r: Sampson distances, c: distances beyond infinity, px.
-
-    sigma: noise of a Sampson distance in px. zoom: let the second focal length go its own way. A camera with a fixed
-    focal length keeps it.
+    r: Sampson distances, c: `cheirality_residual`, px. sigma: noise of a Sampson distance in px. zoom: the second focal
+    length is an unknown of its own. A fixed focal length stays.
     """
     problem = _Problem(matches, camera, camera_prime, sigma, zoom)
     cost, damping = problem.cost(pose), 1e-3
@@ -125,11 +116,10 @@ def _left_of_first(normal: Array) -> float:
 
 
 def cheirality_residual(pose: Pose, x: Array, y: Array) -> Array:
-    """How far (N,) (px, along its line, negative) each match lies on the wrong side of its point at infinity; 0 for
-    those in front.
+    """How far (N,) px, negative, each match lies along its line on the wrong side of its point at infinity; 0 in front.
 
-    F alone trades focal length against rotation almost freely; that the world lies in front of the cameras decides it.
-    Without this term a pair of parallel-looking cameras can end with most of its points behind them.
+    F alone hardly distinguishes a change of focal length from one of rotation. Without this term a pair of cameras with
+    nearly parallel axes can end with most of its points behind them.
     """
     return _beyond(pose, homogeneous(x).T, np.asarray(y).T)
 
@@ -141,14 +131,15 @@ def _beyond(pose: Pose, x: Array, y: Array) -> Array:
     direction = (e[:2, None] * q[2] - q[:2] * e[2]) * np.sign(q[2])
     length = np.maximum(np.hypot(direction[0], direction[1]), 1e-12)
     along = ((y[:2] - q[:2] / q[2]) * direction).sum(axis=0) / length
-    return np.minimum(along, 0.0)
+    behind: Array = np.minimum(along, 0.0)
+    return behind
 
 
 def shared_focal_sigma(camera: Camera, camera_prime: Camera) -> float:
     """Standard deviation of the log of the factor that both focal lengths share, by what is known of each.
 
-    Each camera counts by its precision. Where both are known in the same way they are one piece of knowledge, told
-    twice (one lens, one maker's rounding): the sharper one counts alone.
+    Each camera counts by its precision. Two that are known in the same way are not independent (one lens, one maker's
+    rounding): the more precise one counts alone.
     """
     first, second = camera.log_sigma, camera_prime.log_sigma
     if camera.knowledge == camera_prime.knowledge or not first * second:
@@ -163,7 +154,7 @@ class _Problem:
     def __init__(self, matches: Matches, camera: Camera, camera_prime: Camera, sigma: float, zoom: bool) -> None:
         self.matches, self.camera, self.camera_prime = matches, camera, camera_prime
         self.sigma = sigma
-        self.sigma_beyond = BEYOND_PX * matches.scale
+        self.sigma_beyond = REFINEMENT.cheirality_sigma_px * matches.scale
         self.focal_free = not (camera.fixed or camera_prime.fixed)
         self.zoom = zoom and self.focal_free
         self.assumed = camera.assumed and camera_prime.assumed
@@ -173,9 +164,10 @@ class _Problem:
         self.principal_free = believed_off > 0 and camera.size == camera_prime.size
         self.principal_sigma = believed_off * max(camera.size)
         self.size = 5 + self.focal_free + self.zoom + 2 * self.principal_free
-        # against the prior, residuals count as if none were smaller than what a lens leaves in them
-        believed = max(sigma, (SYSTEMATIC_GUESS_PX if self.assumed else SYSTEMATIC_PX) * matches.scale)
-        tempered = min(1.0, EFFECTIVE_MATCHES / max(1, len(matches))) * (sigma / believed) ** 2
+        # against the prior, residuals never count as more precise than lens distortion leaves them
+        systematic_px = REFINEMENT.systematic_guess_px if self.assumed else REFINEMENT.systematic_px
+        believed = max(sigma, systematic_px * matches.scale)
+        tempered = min(1.0, REFINEMENT.effective_matches / max(1, len(matches))) * (sigma / believed) ** 2
         self.weight = tempered * matches.weights / max(float(matches.weights.mean()), 1e-300)
         # (3, N): long rows are what NumPy is quick with
         self.x, self.y = (np.ascontiguousarray(homogeneous(points).T) for points in (matches.x, matches.y))
@@ -184,9 +176,10 @@ class _Problem:
         """The pose after a step in the unknowns."""
         K, K_prime = pose.K, pose.K_prime
         if self.focal_free:
-            K = zoomed(K, np.exp(np.clip(step[0], -0.3, 0.3)))
+            most = REFINEMENT.max_focal_step
+            K = zoomed(K, np.exp(np.clip(step[0], -most, most)))
             factor = step[1] if self.zoom else step[0]
-            K_prime = zoomed(K_prime, np.exp(np.clip(factor, -0.3, 0.3)))
+            K_prime = zoomed(K_prime, np.exp(np.clip(factor, -most, most)))
         if self.principal_free:
             aside = np.zeros((3, 3))
             aside[:2, 2] = self.principal_sigma * step[-7:-5]
@@ -196,26 +189,28 @@ class _Problem:
         return Pose(K, K_prime, rotation_from_vector(omega) @ pose.R, t / np.linalg.norm(t))
 
     def cost(self, pose: Pose) -> float:
+        """What is minimised."""
         r = self._sampson(pose.F)[0] / self.sigma
         c = _beyond(pose, self.x, self.y) / self.sigma_beyond
-        # one loss for both: what is off its line anyway has no say about infinity
+        # one loss for both: an outlier of the Sampson distance does not count for cheirality either
         return float(self.weight @ np.log1p(r * r + c * c) + sum(e * e for e, _ in self.priors(pose)))
 
     def _focal_prior(self, off: float) -> tuple[float, float]:
-        """Residual of log f, `off` from what is known, and its derivative.
+        """Residual of log f, `off` from its prior, and its derivative.
 
-        A guess is no measurement: far from it, what is left of the pull is that of Student's tails (3 degrees of
-        freedom), so that matches that know better are not drawn back.
+        An assumed focal length has the prior of a Student distribution, which pulls less the further away f is: it must
+        not override matches that determine f.
         """
         z = off / self.focal_sigma
         if not self.assumed or z == 0:
             return z, 1 / self.focal_sigma
-        value = np.sign(z) * np.sqrt(TAILS * np.log1p(z * z / TAILS))
-        return float(value), float(z / (1 + z * z / TAILS) / value / self.focal_sigma)
+        freedom = REFINEMENT.prior_freedom
+        value = np.sign(z) * np.sqrt(freedom * np.log1p(z * z / freedom))
+        return float(value), float(z / (1 + z * z / freedom) / value / self.focal_sigma)
 
     def priors(self, pose: Pose) -> list[tuple[float, Array]]:
-        """Residuals of the prior with their derivatives by the unknowns; the second focal's ratio to the first is kept
-        near what the files say."""
+        """Residuals of the priors with their derivatives by the unknowns; a second focal length has one on its ratio
+        to the first."""
         size, out = self.size, []
         off = np.log(pose.K[0, 0] / self.camera.focal)
         if self.focal_free:
@@ -226,15 +221,15 @@ class _Problem:
         if self.zoom:
             ratio = np.log(pose.K_prime[0, 0] / self.camera_prime.focal) - off
             d_ratio = np.zeros(size)
-            d_ratio[:2] = (-1 / 0.3, 1 / 0.3)
-            out.append((ratio / 0.3, d_ratio))
+            d_ratio[:2] = (-1 / REFINEMENT.zoom_sigma, 1 / REFINEMENT.zoom_sigma)
+            out.append((ratio / REFINEMENT.zoom_sigma, d_ratio))
             if self.camera.knowledge != self.camera_prime.knowledge:
                 d_second = np.zeros(size)
                 d_second[1] = 1 / self.camera_prime.log_sigma
                 out.append((np.log(pose.K_prime[0, 0] / self.camera_prime.focal) * d_second[1], d_second))
         if self.principal_free:
-            moved = (pose.K - self.camera.K)[:2, 2] / self.principal_sigma
-            out += [(float(moved[i]), np.eye(size)[size - 7 + i]) for i in (0, 1)]
+            shift = (pose.K - self.camera.K)[:2, 2] / self.principal_sigma
+            out += [(float(shift[i]), np.eye(size)[size - 7 + i]) for i in (0, 1)]
         return out
 
     def normal_equations(self, pose: Pose) -> tuple[Array, Array]:
@@ -247,10 +242,11 @@ class _Problem:
         far = (beyond / self.sigma_beyond) ** 2
         loss = self.weight / (1 + (residual / self.sigma) ** 2 + far)
         _add(normal, gradient, residual, by_unknowns.T @ by_F, loss / self.sigma**2)
-        wrong = far * loss > NEGLIGIBLE * self.weight  # not those that are far off their lines anyway
-        if wrong.any():
-            derivative = self._beyond_derivative(pose, wrong)
-            _add(normal, gradient, beyond[wrong], derivative, loss[wrong] / self.sigma_beyond**2)
+        # those far off their lines are left out: their weight is negligible
+        behind = far * loss > REFINEMENT.negligible_cheirality * self.weight
+        if behind.any():
+            derivative = self._beyond_derivative(pose, behind)
+            _add(normal, gradient, beyond[behind], derivative, loss[behind] / self.sigma_beyond**2)
         for e, d in self.priors(pose):
             normal += np.outer(d, d)
             gradient += e * d
@@ -272,7 +268,8 @@ class _Problem:
         d_direction = e[:2, None] * dq[:, 2:] + de[:, :2] * q[2] - dq[:, :2] * e[2] - q[:2] * de[:, 2:]
         d_direction *= side
         moved = (away * d_direction - d_point * direction).sum(axis=1) / length
-        return moved - along * (direction * d_direction).sum(axis=1) / length**2
+        derivative: Array = moved - along * (direction * d_direction).sum(axis=1) / length**2
+        return derivative
 
     def _infinity_derivatives(self, pose: Pose) -> tuple[Array, Array]:
         """Derivatives of H_inf (size, 3, 3) and e' (size, 3) by the unknowns."""

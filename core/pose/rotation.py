@@ -1,4 +1,4 @@
-"""The same viewpoint: two pictures that differ by a rotation, and perhaps a zoom, of the camera."""
+"""Two pictures from the same viewpoint: the camera was rotated, and perhaps zoomed, between them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,7 @@ from ..cameras.camera import Camera
 from ..cameras.matches import Matches
 from ..cameras.projective import homogeneous, infinite_homography, inverse_intrinsics, project, rotation_from_vector
 from ..raster.arrays import Array
-
-# Focal lengths in units of the longer side to start from when nothing is known, and how alike two are.
-FOCAL_STARTS = (0.6, 0.9, 1.4, 2.2, 4.0)
-ALIKE_SIGMA = 0.05
-ENOUGH = 300
-FAR_OFF = 1e4  # σ
+from .options import ROTATION
 
 
 @dataclass(frozen=True)
@@ -33,15 +28,15 @@ class Rotation:
 
 
 def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camera, sigma: float) -> Rotation:
-    """The rotation, and the focal lengths where they are not fixed, that explain matches of a homography H best.
+    """The rotation, and the focal lengths that are not fixed, which explain the matches of a homography H best.
 
-    Minimises the transfer error in units of `sigma` px, robustly, and the priors of the focal lengths; two that are not
-    fixed are expected to change in step.
+    Minimises the transfer error in units of `sigma` px with a Cauchy loss, and the priors of the focal lengths;
+    two that are not fixed are expected to be off by the same factor.
     """
     from scipy.optimize import least_squares  # takes long to load, and few pairs come here
 
-    few = matches.thinned(ENOUGH)
-    x = homogeneous(few.x)
+    few = matches.thinned(ROTATION.matches)
+    x, most = homogeneous(few.x), ROTATION.max_residual
     free, free_prime = not camera.fixed, not camera_prime.fixed
 
     def unpack(p: Array) -> Rotation:
@@ -53,25 +48,25 @@ def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camer
         ray = x @ unpack(p).H_inf.T
         with np.errstate(divide="ignore", invalid="ignore"):
             away = (project(ray) - few.y) / sigma
-        # behind the camera everything is equally wrong
-        away = np.where((ray[:, 2:] > 0) & np.isfinite(away), np.clip(away, -FAR_OFF, FAR_OFF), FAR_OFF)
+        # behind the camera the error has no meaning: the largest
+        away = np.where((ray[:, 2:] > 0) & np.isfinite(away), np.clip(away, -most, most), most)
         prior = [p[3] / camera.log_sigma] if free else []
         if free_prime:
             prior.append(p[-1] / camera_prime.log_sigma)
         if free and free_prime:
-            prior.append((p[3] - p[-1]) / ALIKE_SIGMA)
+            prior.append((p[3] - p[-1]) / ROTATION.common_focal_sigma)
         return np.concatenate([away.ravel(), prior])
 
     factors = [1.0]
     if free and camera.assumed:
-        factors += [share * max(camera.size) / camera.focal for share in FOCAL_STARTS]
+        factors += [share * max(camera.size) / camera.focal for share in ROTATION.focal_starts]
     found: list[tuple[float, Rotation]] = []
     for factor in factors:
         K, K_prime = camera.scaled(factor if free else 1.0), camera_prime.scaled(factor if free_prime else 1.0)
         start = nearest_rotation(inverse_intrinsics(K_prime) @ H @ K)
         p = np.zeros(3 + free + free_prime)
         p[3:] = np.log(factor)
-        solution = least_squares(residuals, p, loss="cauchy", max_nfev=100)
+        solution = least_squares(residuals, p, loss="cauchy", max_nfev=ROTATION.evaluations)
         found.append((float(solution.cost), unpack(solution.x)))
     return min(found, key=lambda item: item[0])[1]
 
@@ -79,4 +74,5 @@ def fit_rotation(matches: Matches, H: Array, camera: Camera, camera_prime: Camer
 def nearest_rotation(M: Array) -> Array:
     """The rotation nearest to a multiple of M (orthogonal Procrustes)."""
     U, _, Vt = np.linalg.svd(M)
-    return U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt
+    R: Array = U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt
+    return R

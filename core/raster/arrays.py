@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .options import MASKS, PARTS
+
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
 # Rows and columns, with bounds that lie in the picture.
 Part: TypeAlias = tuple[slice, slice]
-# Pixels that are worked out at a time.
-STRIP = 1_000_000
 # left, top, width, height in px
 Box = tuple[int, int, int, int]
-# Narrower than this, px, is a speck.
-SPECK = 7
 
 
 def common(box: Box, other: Box) -> Box:
@@ -30,7 +28,7 @@ def common(box: Box, other: Box) -> Box:
 
 def strips(shape: tuple[int, ...]) -> Iterator[slice]:
     """The rows of a picture (H, W, …), some at a time."""
-    rows = max(1, STRIP // max(1, shape[1]))
+    rows = max(1, PARTS.strip_pixels // max(1, shape[1]))
     for top in range(0, shape[0], rows):
         yield slice(top, min(shape[0], top + rows))
 
@@ -47,6 +45,15 @@ def bounds(mask: NDArray[np.bool_]) -> Part | None:
     if not rows.size:
         return None
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def box_of(mask: NDArray[np.bool_]) -> Box:
+    """The smallest box that holds all of a mask (H, W), which is not empty."""
+    part = bounds(mask)
+    if part is None:
+        raise ValueError("a mask that holds nothing has no box")
+    rows, columns = part
+    return columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start
 
 
 def within(part: Part, shape: tuple[int, ...]) -> Part:
@@ -79,26 +86,31 @@ def meet(
 
 def shown_only(pixels: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Pixels (H, W, C) where a mask (H, W) says so, 0 elsewhere; NumPy's products of the two take twice as long."""
-    return cv2.copyTo(pixels, np.ascontiguousarray(mask).view(np.uint8)).reshape(pixels.shape)
+    shown: NDArray[np.float32] = cv2.copyTo(pixels, np.ascontiguousarray(mask).view(np.uint8)).reshape(pixels.shape)
+    return shown
 
 
-def for_each_channel(values: NDArray, channels: int) -> NDArray[np.float32]:
+def for_each_channel(values: NDArray[Any], channels: int) -> NDArray[np.float32]:
     """Values (H, W) once for each channel (H, W, C): what NumPy spreads by itself takes four times as long."""
-    return cv2.merge([values] * channels).reshape(*values.shape, channels)
+    spread: NDArray[np.float32] = cv2.merge([values] * channels).reshape(*values.shape, channels)
+    return spread
 
 
 def in_any_channel(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Where (H, W) something holds in any channel (H, W, C); NumPy's own `any` takes several times as long over so few.
     """
-    return np.logical_or.reduce([holds[..., k] for k in range(holds.shape[2])])
+    anywhere: NDArray[np.bool_] = np.logical_or.reduce([holds[..., k] for k in range(holds.shape[2])])
+    return anywhere
 
 
 def without_specks(hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Of what the target cannot see (H, W) that which is more than a speck."""
-    return cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8)) > 0
+    square = np.ones((MASKS.speck_side,) * 2, np.uint8)
+    opened: NDArray[np.uint8] = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_OPEN, square)
+    return opened > 0
 
 
-def cut(array: NDArray, box: Box, beyond: float = 0.0) -> NDArray:
+def cut(array: NDArray[Any], box: Box, beyond: float = 0.0) -> NDArray[Any]:
     """The part of an array (H, W, …) in a box (left, top, width, height); `beyond` where that reaches over its edges.
     """
     left, top, width, height = box
@@ -124,6 +136,6 @@ def cut_in_place(array: NDArray[np.float32], box: Box) -> NDArray[np.float32]:
     return flat[: width * height].reshape(height, width)
 
 
-def copied_where(mask: NDArray[np.bool_], source: NDArray, out: NDArray) -> None:
+def copied_where(mask: NDArray[np.bool_], source: NDArray[Any], out: NDArray[Any]) -> None:
     """Puts the pixels (H, W, C) of a source where a mask (H, W) says so; `np.copyto` takes several times as long."""
     cv2.copyTo(source, np.ascontiguousarray(mask).view(np.uint8), out)

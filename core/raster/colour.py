@@ -9,6 +9,9 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
+
+from .options import PARTS
 
 # Primaries of sRGB (IEC 61966-2-1), adapted to D50 by the Bradford matrix, as columns of XYZ: the connection space of
 # ICC profiles is D50. Values: B. Lindbloom, "RGB/XYZ Matrices", sRGB, reference white D50.
@@ -18,7 +21,6 @@ _SRGB_TO_XYZ_D50 = np.array([
     [0.0139322, 0.0971045, 0.7141733],
 ])
 _LEVELS = 65536
-_BLOCK = 1 << 20  # values encoded at a time: the index arrays stay small beside a 400 megapixel picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +30,10 @@ class Curve:
     An 8-bit level k stands at 257 k, so one table serves both depths and any kind of profile.
     """
 
-    table: np.ndarray
+    table: NDArray[Any]
 
     @cached_property
-    def levels_by_root(self) -> np.ndarray:
+    def levels_by_root(self) -> NDArray[Any]:
         """16-bit level (float32) of light s², for s = 0 .. 1 in 65536 steps.
 
         The square root spreads the darks: with a plain grid over light the first levels of a gamma curve collide.
@@ -40,9 +42,10 @@ class Curve:
         return np.interp(root * root, self.table.astype(np.float64), np.arange(_LEVELS)).astype(np.float32)
 
     @cached_property
-    def bytes_by_root(self) -> np.ndarray:
+    def bytes_by_root(self) -> NDArray[Any]:
         """8-bit level (uint8, rounded) of light s², for s = 0 .. 1 in 65536 steps."""
-        return np.rint(self.levels_by_root / 257.0).astype(np.uint8)
+        levels: NDArray[Any] = np.rint(self.levels_by_root / 257.0).astype(np.uint8)
+        return levels
 
 
 @lru_cache(maxsize=1)
@@ -53,7 +56,7 @@ def srgb_curve() -> Curve:
     return Curve(light.astype(np.float32))
 
 
-def decode(coded: np.ndarray, curves: tuple[Curve, ...] | None = None) -> np.ndarray:
+def decode(coded: NDArray[Any], curves: tuple[Curve, ...] | None = None) -> NDArray[Any]:
     """Display-encoded levels to light.
 
     coded: H×W×C uint8 or uint16; curves: one for all channels or one a channel, sRGB when None. Returns H×W×C float32
@@ -70,7 +73,7 @@ def decode(coded: np.ndarray, curves: tuple[Curve, ...] | None = None) -> np.nda
     return light
 
 
-def encode(light: np.ndarray, bits: int, curves: tuple[Curve, ...] | None = None) -> np.ndarray:
+def encode(light: NDArray[Any], bits: int, curves: tuple[Curve, ...] | None = None) -> NDArray[Any]:
     """Light to display-encoded levels, the inverse of `decode`: every level survives the round trip.
 
     light: H×W×C float32; below 0 and NaN become 0, above 1 the highest level. bits: 8 or 16. curves: one for all
@@ -90,19 +93,20 @@ def _parts(curves: tuple[Curve, ...]) -> list[tuple[Any, Curve]]:
     return [((..., channel), curve) for channel, curve in enumerate(curves)]
 
 
-def _encode(light: np.ndarray, bits: int, curve: Curve) -> np.ndarray:
+def _encode(light: NDArray[Any], bits: int, curve: Curve) -> NDArray[Any]:
     flat = light.reshape(-1)
     levels = np.empty(flat.size, np.uint8 if bits == 8 else np.uint16)
-    for start in range(0, flat.size, _BLOCK):
-        block = flat[start : start + _BLOCK]
+    for start in range(0, flat.size, PARTS.values_at_once):
+        part = slice(start, start + PARTS.values_at_once)
+        block = flat[part]
         # fmax and fmin take the number when the other is NaN
         place = np.sqrt(np.fmin(np.fmax(block, np.float32(0)), np.float32(1))) * np.float32(_LEVELS - 1)
         if bits == 8:
-            levels[start : start + _BLOCK] = curve.bytes_by_root[(place + np.float32(0.5)).astype(np.intp)]
+            levels[part] = curve.bytes_by_root[(place + np.float32(0.5)).astype(np.intp)]
         else:
             below = np.minimum(place.astype(np.intp), _LEVELS - 2)
             low, high = curve.levels_by_root[below], curve.levels_by_root[below + 1]
-            levels[start : start + _BLOCK] = low + (high - low) * (place - below.astype(np.float32)) + np.float32(0.5)
+            levels[part] = low + (high - low) * (place - below.astype(np.float32)) + np.float32(0.5)
     return levels.reshape(light.shape)
 
 
@@ -116,7 +120,7 @@ class IccProfile:
 
     gray: bool
     curves: tuple[Curve, ...]
-    to_srgb: np.ndarray
+    to_srgb: NDArray[Any]
 
 
 def icc_channels(icc: bytes) -> int:
@@ -158,7 +162,7 @@ def _icc_tags(icc: bytes) -> dict[bytes, bytes]:
     return tags
 
 
-def _xyz(tag: bytes) -> np.ndarray:
+def _xyz(tag: bytes) -> NDArray[Any]:
     if tag[:4] != b"XYZ ":
         raise ValueError("not an XYZ tag")
     return np.array(struct.unpack_from(">3i", tag, 8)) / 65536.0
@@ -186,7 +190,7 @@ def _curve(tag: bytes) -> Curve | None:
     return Curve(light.astype(np.float32))
 
 
-def _parametric(tag: bytes, coded: np.ndarray) -> np.ndarray:
+def _parametric(tag: bytes, coded: NDArray[Any]) -> NDArray[Any]:
     (kind,) = struct.unpack_from(">H", tag, 8)
     if kind > 4:
         raise ValueError("unknown parametric curve")

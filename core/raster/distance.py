@@ -10,23 +10,25 @@ from .arrays import Array
 
 
 def outside(inside: NDArray[np.bool_], step: int = 1) -> Array:
-    """How many px the cells of a mask (h, w) lie outside it, inf where it is empty; step: px from cell to cell.
+    """Distance in px (h, w) of cells to a mask of cells, 0 inside and inf if it is empty; step: px of a cell's side.
 
-    A cell beside the last inside one may still touch what is meant: distances count from one cell on.
+    A cell beside the mask may touch what the mask stands for, so one cell is subtracted.
     """
     if not inside.any():
         return np.full(inside.shape, np.inf)
-    steps = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    cells = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # OpenCV's root has other last bits from call to call; squared distances are whole numbers
-    steps = np.sqrt(np.rint(np.square(steps, dtype=np.float64)))
-    return np.maximum(steps - 1, 0.0) * step
+    cells = np.sqrt(np.rint(np.square(cells, dtype=np.float64)))
+    distance: Array = np.maximum(cells - 1, 0.0) * step
+    return distance
 
 
 def distance_to_border(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Distance in px (H, W) to the nearest pixel outside a mask; what lies beyond the canvas is outside."""
+    """Distance in px (H, W) to the nearest pixel outside a mask; beyond the picture's edges is outside too."""
     return distance_inside(np.pad(mask, 1))[1:-1, 1:-1]
 
 
 def distance_inside(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Distance in px (H, W) to the nearest pixel outside a mask, however far."""
-    return cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    """Distance in px (H, W) to the nearest pixel of the picture outside a mask; very large if there is none."""
+    distance: NDArray[np.float32] = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return distance

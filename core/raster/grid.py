@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array
-
-# Fields are smooth: about this many nodes carry them at any picture size.
-NODES = 20_000
-MIN_STEP = 4
-# Cells of one axis whose pixels are interpolated at once.
-CELLS = 8
+from .options import GRID
 
 
 @dataclass(frozen=True)
@@ -31,10 +27,10 @@ class Grid:
     rows: int
 
     @staticmethod
-    def over(left: int, top: int, width: int, height: int, nodes: int = NODES) -> Grid:
+    def over(left: int, top: int, width: int, height: int, nodes: int = GRID.nodes) -> Grid:
         """The grid that covers a rectangle of pixels of the reference's plane with two cells of margin (bicubic needs
         them)."""
-        step = max(MIN_STEP, int(np.sqrt(width * height / nodes)))
+        step = max(GRID.least_step, int(np.sqrt(width * height / nodes)))
         columns, rows = -(-width // step) + 4, -(-height // step) + 4
         return Grid((left - 2 * step, top - 2 * step), step, columns, rows)
 
@@ -54,7 +50,7 @@ class Grid:
         return np.stack(np.meshgrid(self.xs, self.ys), axis=-1)
 
     def to_pixels(
-        self, values: NDArray, left: int, top: int, width: int, height: int, every: int = 1
+        self, values: NDArray[Any], left: int, top: int, width: int, height: int, every: int = 1
     ) -> NDArray[np.float32]:
         """Node values (rows, columns) as float32 pixels of a rectangle, by cubic convolution; every: of so many a side
         only the first.
@@ -69,7 +65,7 @@ class Grid:
             np.matmul(lines[:, near], across, out=out[:, part])
         return out
 
-    def at(self, values: NDArray, points: Array) -> Array:
+    def at(self, values: NDArray[Any], points: Array) -> Array:
         """Node values (rows, columns) at points (…, 2), by the same convolution; 0 where a point is NaN or lies beyond
         the cells that have neighbours."""
         place = (points - np.array(self.start) - (self.step - 1) / 2) / self.step
@@ -89,7 +85,7 @@ class Grid:
 def _across(start: int, step: int, nodes: int, pixels: range) -> list[tuple[slice, slice, NDArray[np.float32]]]:
     """Some pixels of one axis after the other, the nodes that count for them, and their weights (n, pixels): so that
     what is not near is not multiplied."""
-    some = max(1, CELLS * step // pixels.step)
+    some = max(1, GRID.cells_at_once * step // pixels.step)
     out = []
     for first in range(0, len(pixels), some):
         part = slice(first, first + some)

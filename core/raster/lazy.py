@@ -1,15 +1,15 @@
-"""Light that is worked out where it is asked for, so that no canvas is ever held in float.
+"""Lazy images: light computed for the rows and columns that are asked for, so that no canvas is held in float.
 
-Whatever has a shape (H, W, C) and gives float32 scene-linear light for slices of rows and columns will do: an array,
-or one of the kinds below, which are made of others. They give the same bits however the picture is cut up. Planes
-(H, W) of numbers are treated alike.
+An image has a shape (H, W, C) and returns float32 scene-linear light for slices of rows and columns: an array does, and
+so do the classes below, which wrap others. They return the same bits however the picture is cut up. Planes (H, W) of
+numbers are treated alike.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +73,7 @@ def extent(light: AnyImage) -> tuple[float, float]:
 class Coded(LazyImage):
     """Display-encoded levels (H, W, C) uint8 or uint16, and the curves that make light of them (see `decode`)."""
 
-    levels: NDArray
+    levels: NDArray[Any]
     curves: tuple[Curve, ...]
 
     @property

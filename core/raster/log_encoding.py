@@ -1,7 +1,7 @@
-"""Light as the eye takes differences in it: logarithmic, without losing black, without an end at white.
+"""Logarithmic encoding of light: about equal steps to the eye, linear near black, unbounded above white.
 
-Blending and comparing happen on these tones: a lamp of a thousand times white weighs a few tones, not a thousand, so
-that neither seams nor bands of a pyramid follow highlights alone. Tones of 0 to 1 run close to those of sRGB.
+Pictures are compared and blended in it, so that very bright pixels do not dominate seams and pyramids: a lamp of a
+thousand times white is encoded as about 3. Between 0 and 1 the encoding is close to that of sRGB.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Light (of white 1) below which tones run linear.
+# Light, in units of white, below which the encoding is about linear.
 TOE = 0.05
 _WHITE = float(np.log1p(1 / TOE))
 

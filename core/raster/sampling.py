@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -9,29 +11,42 @@ from numpy.typing import NDArray
 from ..system.threads import each
 from .arrays import copied_where
 from .lazy import LazyImage
-
-# cv2.remap wants every side below 32767; tiles also keep its working memory small.
-TILE = 1024
-REMAP_LIMIT = 32000
+from .options import PARTS
 
 
 def fetch(
-    source: NDArray | LazyImage, map_x: NDArray[np.float32], map_y: NDArray[np.float32],
+    source: NDArray[Any] | LazyImage, map_x: NDArray[np.float32], map_y: NDArray[np.float32],
     interpolation: int = cv2.INTER_CUBIC,
-) -> NDArray:
-    """Samples (H, W, C) of a source (h, w, C) at map positions, in tiles, of the source's type; 0 where the map leaves
-    the picture."""
+) -> NDArray[Any]:
+    """Sample a picture at the positions of a map, in tiles.
+
+    Parameters
+    ----------
+    source : (h, w, C) array or LazyImage
+        The picture.
+    map_x, map_y : (H, W) float32
+        px of the source for each sample, NaN for none.
+    interpolation : int
+        OpenCV's flag.
+
+    Returns
+    -------
+    (H, W, C)
+        Of the source's type; 0 where the map leaves the picture.
+    """
     out = np.zeros((*map_x.shape, source.shape[2]), source.dtype)
-    tops, lefts = (range(0, side, TILE) for side in map_x.shape)
+    step = PARTS.tile_side
+    tops, lefts = (range(0, side, step) for side in map_x.shape)
     each(
         lambda tile: _fetch_tile(source, map_x[tile], map_y[tile], out[tile], interpolation),
-        [(slice(top, top + TILE), slice(left, left + TILE)) for top in tops for left in lefts],
+        [(slice(top, top + step), slice(left, left + step)) for top in tops for left in lefts],
     )
     return out
 
 
 def _fetch_tile(
-    source: NDArray | LazyImage, x: NDArray[np.float32], y: NDArray[np.float32], out: NDArray, interpolation: int
+    source: NDArray[Any] | LazyImage, x: NDArray[np.float32], y: NDArray[np.float32], out: NDArray[Any],
+    interpolation: int,
 ) -> None:
     height, width = source.shape[:2]
     with np.errstate(invalid="ignore"):
@@ -40,7 +55,8 @@ def _fetch_tile(
         return
     x0, x1 = max(0, int(x[inside].min()) - 2), min(width, int(x[inside].max()) + 4)
     y0, y1 = max(0, int(y[inside].min()) - 2), min(height, int(y[inside].max()) + 4)
-    if max(x1 - x0, y1 - y0) > REMAP_LIMIT and max(out.shape[:2]) > 1:  # a tile that shrinks a huge picture: quarter it
+    # a tile that shrinks a huge picture is quartered
+    if max(x1 - x0, y1 - y0) > PARTS.max_remap_side and max(out.shape[:2]) > 1:
         half = (max(1, out.shape[0] // 2), max(1, out.shape[1] // 2))
         for rows in (slice(None, half[0]), slice(half[0], None)):
             for columns in (slice(None, half[1]), slice(half[1], None)):

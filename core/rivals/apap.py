@@ -1,7 +1,7 @@
 """APAP, as-projective-as-possible stitching with moving direct linear transformation (Zaragoza et al., CVPR 2013).
 
-Every point p has a homography of its own, that of all matches with weights max(exp(−|p − x_i|²/σ²), γ): near matches
-decide, and where there are none γ leaves what all of them agree on (eq. 9 to 13).
+Every point p has its own homography, fitted to all matches with weights max(exp(−|p − x_i|²/σ²), γ): near matches
+dominate, and far from all of them γ leaves the global homography (eq. 9 to 13).
 """
 
 from __future__ import annotations
@@ -12,25 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.matches import Matches
-from ..cameras.projective import homogeneous
+from ..cameras.projective import LEAST_AHEAD, homogeneous
 from ..cameras.two_view import TwoView
 from ..field.field import FieldValues, Fit
+from ..field.options import FADE
 from ..field.strict import StrictField
 from ..raster.arrays import Array
 from ..raster.grid import Grid
 from .homography import LinearEquations, direct_linear, knowing_only
-
-# σ in units of √(W·H) of the reference: the paper's code has 50 to 140 px on pictures of 1 to 3 MP. γ: as there.
-SIGMA, GAMMA = 0.05, 0.0025
-# Points are solved in slabs of about this many weights, so that memory stays bounded.
-SLAB = 4_000_000
-# Nothing is shown of what lies less than this in front of the target camera, relative to its lengths.
-LEAST_AHEAD = 1e-6
+from .options import APAP
 
 
 @dataclass(frozen=True)
 class ApapField:
-    """x' = π(H(p) p); two_view: the homography of all matches alike in the place of H_inf; sigma: σ in px."""
+    """x' = π(H(p) p).
+
+    two_view: with the global homography in place of H_inf; equations: of the matches; sigma, gamma: σ px and γ.
+    """
 
     two_view: TwoView
     equations: LinearEquations
@@ -42,20 +40,20 @@ class ApapField:
 
     @property
     def plane(self) -> Array:
-        """It ends in the homography of all matches."""
+        """0 (3,): it ends in the global homography."""
         return np.zeros(3)
 
     def on_grid(self, grid: Grid, ideal: Array | None = None) -> FieldValues:
-        """Shift from π(H p), finite everywhere, at a grid's nodes; no depth."""
+        """Shift from π(H p), finite everywhere, at a grid's nodes; d is NaN."""
         points = (grid.points if ideal is None else ideal).reshape(-1, 2)
         start = _in_front(homogeneous(points) @ self.two_view.H_inf.T)
         shape = grid.points.shape
         return FieldValues(np.full(shape[:2], np.nan), (self.predict(points) - start).reshape(shape))
 
     def predict(self, points: Array) -> Array:
-        """Target pixels (N, 2) of points (N, 2)."""
+        """Target pixels (N, 2) of points (N, 2) px."""
         out = np.empty((len(points), 2))
-        rows = max(1, SLAB // len(self.equations.x))
+        rows = max(1, APAP.weights_at_once // len(self.equations.x))
         for start in range(0, len(points), rows):
             p = points[start : start + rows]
             H = self.equations.solutions(self._weights(p) ** 2)
@@ -63,34 +61,56 @@ class ApapField:
         return out
 
     def refitted(self, matches: Matches) -> ApapField:
-        """The field on other matches, all kept. Raises DegenerateGeometry."""
+        """The field fitted to other matches, none dropped. Raises DegenerateGeometry."""
         return _field(self.two_view, matches, self.sigma, self.gamma, np.full(len(matches), True))
 
     def _weights(self, points: Array) -> Array:
+        """Weights (N, M) of the M matches at points (N, 2) px."""
         x = self.equations.x
-        apart = np.subtract.outer(points[:, 0], x[:, 0]) ** 2 + np.subtract.outer(points[:, 1], x[:, 1]) ** 2
-        return np.maximum(np.exp(-apart / self.sigma**2), self.gamma)
+        distance2 = np.subtract.outer(points[:, 0], x[:, 0]) ** 2 + np.subtract.outer(points[:, 1], x[:, 1]) ** 2
+        return np.asarray(np.maximum(np.exp(-distance2 / self.sigma**2), self.gamma))
 
 
-def fit_apap(strict: StrictField, matches: Matches, sigma: float | None = None, gamma: float = GAMMA) -> ApapField:
-    """APAP on the matches that the strict field stands on: outliers would each have their own place in the picture.
+def fit_apap(strict: StrictField, matches: Matches, sigma: float | None = None, gamma: float = APAP.gamma) -> ApapField:
+    """Fits APAP to the matches of the strict field: it has no defence of its own against outliers.
 
-    sigma in px, from the picture's size where it is not given. Raises DegenerateGeometry.
+    Parameters
+    ----------
+    strict : StrictField
+    matches : Matches
+        The matches that `strict` was given, ideal px.
+    sigma : float, optional
+        σ in px; from the picture's size if not given.
+    gamma : float
+
+    Returns
+    -------
+    ApapField
+
+    Raises
+    ------
+    DegenerateGeometry
+        The matches do not determine a homography.
     """
-    sigma = SIGMA * float(np.sqrt(strict.size[0] * strict.size[1])) if sigma is None else sigma
+    sigma = APAP.sigma * float(np.sqrt(strict.size[0] * strict.size[1])) if sigma is None else sigma
     return _field(strict.two_view, matches, sigma, gamma, strict.fit.inliers_used)
 
 
-def _field(two_view: TwoView, matches: Matches, sigma: float, gamma: float, kept: NDArray[np.bool_]) -> ApapField:
-    few = matches.subset(kept)
-    equations = LinearEquations.of(few.x, few.y, few.weights)
-    view = knowing_only(two_view, direct_linear(few.x, few.y, few.weights))
-    field = ApapField(view, equations, sigma, gamma, Fit(kept, np.nan, 8 * matches.scale, np.nan, np.nan, np.nan))
-    rms = float(np.sqrt(np.mean(np.sum((field.predict(few.x) - few.y) ** 2, axis=1))))
+def _field(
+    two_view: TwoView, matches: Matches, sigma: float, gamma: float, inliers_used: NDArray[np.bool_]
+) -> ApapField:
+    """The field of the matches that the mask inliers_used (N,) selects."""
+    used = matches.subset(inliers_used)
+    equations = LinearEquations.of(used.x, used.y, used.weights)
+    view = knowing_only(two_view, direct_linear(used.x, used.y, used.weights))
+    fit = Fit(inliers_used, np.nan, FADE.min_px * matches.scale, np.nan, np.nan, np.nan)
+    field = ApapField(view, equations, sigma, gamma, fit)
+    rms = float(np.sqrt(np.mean(np.sum((field.predict(used.x) - used.y) ** 2, axis=1))))
     return replace(field, fit=replace(field.fit, residual_px=rms))
 
 
 def _in_front(rays: Array) -> Array:
-    """π of rays (N, 3), those that run behind the camera or close by as if they were just in front: far outside."""
+    """π of rays (N, 3); rays behind the camera are projected as if just in front of it, far outside the picture."""
     least = LEAST_AHEAD * np.abs(rays[:, :2]).max(axis=1)
-    return rays[:, :2] / np.maximum(rays[:, 2], np.maximum(least, 1e-300))[:, None]
+    result: Array = rays[:, :2] / np.maximum(rays[:, 2], np.maximum(least, 1e-300))[:, None]
+    return result

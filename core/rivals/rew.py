@@ -1,8 +1,8 @@
 """REW, robust elastic warping (Li, Wang, Lai, Zhai and Zhang, IEEE Transactions on Multimedia 2018).
 
-A global transformation, by a rotation and focal lengths where they serve, fitted robustly; a thin-plate spline of two
-components of what it leaves at the matches; matches whose spline weights lie beyond 3σ are outliers, until none is
-left; outside the overlap the spline fades, and the global transformation goes on.
+A robust global transformation, a rotation with focal lengths where that fits; a thin-plate spline of two components
+through its residuals; matches whose spline weights lie beyond 3σ are dropped until none does; outside the overlap the
+spline fades and the global transformation continues.
 """
 
 from __future__ import annotations
@@ -17,26 +17,22 @@ from ..cameras.projective import homogeneous, infinite_homography, inverse_intri
 from ..cameras.two_view import TwoView
 from ..field.fade import fade_width, fading, outside_overlap
 from ..field.field import FieldValues, Fit
+from ..field.options import STRICT
 from ..field.spline import SmoothingProblem, ThinPlateSpline
-from ..field.strict import MIN_CENTRES, PRUNE_FLOOR_PX, PRUNE_SIGMAS, StrictField, best_smoothing, refuse_no_spread
+from ..field.strict import StrictField, best_smoothing, refuse_no_spread
 from ..field.transfer import target_points
 from ..pose.fundamental import transfer_error
 from ..pose.rotation import nearest_rotation
 from ..raster.arrays import Array
 from ..raster.grid import Grid
 from .homography import fit_one_homography, knowing_only
-
-# The focal lengths are known better than within this factor; without a bound parallax may drive them anywhere.
-MOST_ZOOM = 2.0
-FAR_OFF_PX = 1e4
-# A rotation, which has less freedom than a homography, may be so much worse.
-ROTATION_FACTOR, ROTATION_PX = 1.2, 0.5
+from .options import REW
 
 
 @dataclass(frozen=True)
 class RewField:
-    """x' = c + α g(c), c = π(H p): H, the global transformation, in the place of H_inf, g a spline in target px over
-    c."""
+    """x' = c + α g(c), c = π(H p): H, the global transformation, stands in two_view in place of H_inf; spline: g, in
+    target px over c; size, target_size: (W, H) px."""
 
     two_view: TwoView
     size: tuple[int, int]
@@ -48,49 +44,63 @@ class RewField:
 
     @property
     def plane(self) -> Array:
-        """It fades to the global transformation."""
+        """0 (3,): it fades to the global transformation."""
         return np.zeros(3)
 
     def on_grid(self, grid: Grid, ideal: Array | None = None) -> FieldValues:
-        """Shift from π(H p) at a grid's nodes; no depth."""
+        """Shift from π(H p) at a grid's nodes; d is NaN."""
         points = grid.points if ideal is None else ideal
         c, bend = (part.reshape(points.shape) for part in self._parts(points.reshape(-1, 2)))
         alpha = fading(outside_overlap(grid, c + bend, self.size, self.target_size), self.fit.fade_px)
         return FieldValues(np.full(points.shape[:2], np.nan), alpha[..., None] * bend)
 
     def predict(self, points: Array) -> Array:
-        """Target pixels (N, 2) of points (N, 2) of the overlap, where nothing fades."""
+        """Target pixels (N, 2) of points (N, 2) px in the overlap, where nothing fades."""
         c, bend = self._parts(points)
         return c + bend
 
     def refitted(self, matches: Matches) -> RewField:
-        """The spline on other matches, all kept, at the same λ. Raises DegenerateGeometry."""
-        kept = np.full(len(matches), True)
-        return _bent(self.two_view, self.size, self.target_size, matches, kept, self.fit.smoothing)
+        """The spline fitted to other matches, none dropped, with the same λ. Raises DegenerateGeometry."""
+        every = np.full(len(matches), True)
+        return _with_spline(self.two_view, self.size, self.target_size, matches, every, self.fit.smoothing)
 
     def _parts(self, points: Array) -> tuple[Array, Array]:
-        """c, NaN behind the target camera, and g there, each (N, 2)."""
+        """c, NaN behind the target camera, and g there, each (N, 2) px, for points (N, 2) px."""
         c = target_points(self.two_view, points, np.full(len(points), np.nan))
         return c, self.spline.at(np.where(np.isfinite(c), c, 0.0))
 
 
 def fit_rew(strict: StrictField, matches: Matches) -> RewField:
-    """REW on the matches that the strict field stands on, which are without gross outliers already.
+    """Fits REW to the matches of the strict field, which have no gross outliers left.
 
-    λ by the house's cross-validation, where the paper has one for all pictures (0.001·W·H: 0 to 3 dB worse here).
-    Matches given by the user are all kept. Raises DegenerateGeometry.
+    λ is found by the strict field's cross-validation; the paper has one for all pictures, which is up to 3 dB worse.
+
+    Parameters
+    ----------
+    strict : StrictField
+    matches : Matches
+        The matches that `strict` was given, ideal px; of matches given by the user none is dropped.
+
+    Returns
+    -------
+    RewField
+
+    Raises
+    ------
+    DegenerateGeometry
+        The matches do not determine a homography or a spline.
     """
-    few = matches.subset(strict.fit.inliers_used)
-    view = knowing_only(strict.two_view, global_transformation(strict.two_view, few))
-    return _bent(view, strict.size, strict.target_size, matches, strict.fit.inliers_used, None)
+    used = matches.subset(strict.fit.inliers_used)
+    view = knowing_only(strict.two_view, global_transformation(strict.two_view, used))
+    return _with_spline(view, strict.size, strict.target_size, matches, strict.fit.inliers_used, None)
 
 
 def global_transformation(two_view: TwoView, matches: Matches) -> Array:
-    """H (3, 3): K' R K⁻¹ that has the matches nearest, robustly (Cauchy), over R and a common factor of the focal
-    lengths; the homography where that has them nearer by far.
+    """H (3, 3) = K' R K⁻¹, fitted robustly (Cauchy) over R and a common factor of the focal lengths, or the homography
+    where that fits much better.
 
-    The paper has a rotation only; where the camera really moved it leaves so much to the spline that what lies beyond
-    the overlap is off by tens of px. Raises DegenerateGeometry.
+    The paper has the rotation only: where the camera moved it leaves so much to the spline that the picture beyond the
+    overlap is off by tens of px. Raises DegenerateGeometry.
     """
     from scipy.optimize import least_squares  # takes long to load, and other fields do without
 
@@ -99,6 +109,7 @@ def global_transformation(two_view: TwoView, matches: Matches) -> Array:
     start = nearest_rotation(inverse_intrinsics(K_prime) @ H @ K)
 
     def transformation(p: Array) -> Array:
+        """H of a rotation vector relative to `start` and the logarithm of the factor, p (4,)."""
         first, second = K.copy(), K_prime.copy()
         first[:2, :2] *= np.exp(p[3])
         second[:2, :2] *= np.exp(p[3])
@@ -108,28 +119,33 @@ def global_transformation(two_view: TwoView, matches: Matches) -> Array:
         ray = x @ transformation(p).T
         with np.errstate(divide="ignore", invalid="ignore"):
             off = project(ray) - matches.y
-        off = np.where(ray[:, 2:] > 0, np.clip(off, -FAR_OFF_PX, FAR_OFF_PX), FAR_OFF_PX)
-        return (off * np.sqrt(matches.weights)[:, None]).ravel()
+        off = np.where(ray[:, 2:] > 0, np.clip(off, -REW.max_error_px, REW.max_error_px), REW.max_error_px)
+        result: Array = (off * np.sqrt(matches.weights)[:, None]).ravel()
+        return result
 
-    scale = max(float(np.median(np.abs(residuals(np.zeros(4))))), 0.1 * matches.scale)
-    bound = np.array([np.pi, np.pi, np.pi, np.log(MOST_ZOOM)])
-    found = least_squares(residuals, np.zeros(4), bounds=(-bound, bound), loss="cauchy", f_scale=scale, max_nfev=100)
+    scale = max(float(np.median(np.abs(residuals(np.zeros(4))))), REW.noise_floor_px * matches.scale)
+    bound = np.array([np.pi, np.pi, np.pi, np.log(REW.max_zoom)])
+    found = least_squares(
+        residuals, np.zeros(4), bounds=(-bound, bound), loss="cauchy", f_scale=scale, max_nfev=REW.max_evaluations
+    )
     rotated = transformation(found.x)
     off, off_rotated = (float(np.median(transfer_error(M, matches))) for M in (H, rotated))
-    serves = off_rotated <= max(ROTATION_FACTOR * off, ROTATION_PX * matches.scale)
-    return rotated / np.linalg.norm(rotated) if serves else H
+    fits = off_rotated <= max(REW.max_error_ratio * off, REW.max_rotation_px * matches.scale)
+    return rotated / np.linalg.norm(rotated) if fits else H
 
 
-def _bent(
-    view: TwoView, size: tuple[int, int], target_size: tuple[int, int], matches: Matches, kept: NDArray[np.bool_],
+def _with_spline(
+    view: TwoView, size: tuple[int, int], target_size: tuple[int, int], matches: Matches, used: NDArray[np.bool_],
     smoothing: float | None,
 ) -> RewField:  # fmt: skip
-    """The field over a global transformation; smoothing: λ, all `kept` matches stay then; else it is found, and what
-    lies beyond 3σ goes."""
-    index = np.flatnonzero(kept)
+    """The field over a global transformation, from the matches that the mask `used` (N,) selects.
+
+    smoothing: λ, and then no match is dropped; None: λ is found, and outliers are dropped.
+    """
+    index = np.flatnonzero(used)
     c = target_points(view, matches.x[index], np.full(len(index), np.nan))
-    seen = np.isfinite(c).all(axis=1)
-    index, c = index[seen], c[seen]
+    in_front = np.isfinite(c).all(axis=1)
+    index, c = index[in_front], c[in_front]
     refuse_no_spread(matches.x[index], matches.scale)
     g = matches.y[index] - c
     unit = float(np.sqrt(size[0] * size[1]))
@@ -138,16 +154,17 @@ def _bent(
     if smoothing is None:
         smoothing = best_smoothing(problem, g, np.ones(len(g)))
     while True:
-        # residuals are the weights times 8πλ
+        # a residual is 8πλ times the spline's weight, so both have the same outliers
         spline, residual = problem.solve(g, smoothing)
         sigma = np.sqrt(np.mean(residual**2, axis=0))
-        good = (np.abs(residual) <= np.maximum(PRUNE_SIGMAS * sigma, PRUNE_FLOOR_PX * matches.scale)).all(axis=1)
-        if not prune or good.all() or good.sum() < MIN_CENTRES:
+        limit = np.maximum(STRICT.outlier_sigmas * sigma, STRICT.outlier_floor_px * matches.scale)
+        good = (np.abs(residual) <= limit).all(axis=1)
+        if not prune or good.all() or good.sum() < STRICT.min_centres:
             break
         problem, index, g = problem.subset(good), index[good], g[good]
-    left = np.full(len(matches), False)
-    left[index] = True
+    inliers_used = np.full(len(matches), False)
+    inliers_used[index] = True
     rms = float(np.sqrt(np.mean(np.sum(residual**2, axis=1))))
-    moved = np.linalg.norm(g - residual, axis=1)
-    fit = Fit(left, smoothing, fade_width(moved, matches.scale), rms, np.nan, np.nan)
+    displacement = np.linalg.norm(g - residual, axis=1)
+    fit = Fit(inliers_used, smoothing, fade_width(displacement, matches.scale), rms, np.nan, np.nan)
     return RewField(view, size, target_size, spline, fit)

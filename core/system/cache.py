@@ -1,8 +1,8 @@
-"""What was worked out before is not worked out again: results by the content that they follow from, on disk.
+"""A cache of results on disk, by the content that they are computed from.
 
-A key is a digest of everything that decides: pixels, matches, cameras, options, this program's own source and the
-libraries' versions. So nothing ever has to be declared stale; and an entry that is damaged, cut off or another's is no
-entry. Entries are arrays and plain values of our own dataclasses, never pickles: reading one runs nothing.
+A key is a digest of everything that decides a result: pixels, matches, cameras, options, this program's own source and
+the libraries' versions. So entries are never stale, and a damaged one counts as absent. Entries are arrays and plain
+values of our own dataclasses, never pickles: reading one runs no code.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ import cv2
 import numpy as np
 import poselib
 import scipy
+from numpy.typing import NDArray
 
-Kept = TypeVar("Kept")
-# Bytes of all entries together; the least recently used go first. Larger ones than a quarter are not kept at all.
-LIMIT = 2 << 30
+from .options import SYSTEM
+
+Result = TypeVar("Result")
 # The package of the whole engine, whichever name it is installed under.
 _PACKAGE = __name__.rpartition(".system")[0]
 _PLAN = "plan.json"
@@ -53,14 +54,25 @@ class Cache:
     at once, since entries appear whole and never change.
     """
 
-    def __init__(self, folder: Path | None, limit: int = LIMIT) -> None:
+    def __init__(self, folder: Path | None, limit: int = SYSTEM.cache_bytes) -> None:
         self._folder, self._limit = folder, limit
 
-    def remember(self, what: str, decided_by: tuple[Any, ...], make: Callable[[], Kept]) -> Kept:
-        """The result of make(), which `what` and `decided_by` decide: found, or made and kept.
+    def remember(self, what: str, decided_by: tuple[Any, ...], make: Callable[[], Result]) -> Result:
+        """Return the stored result of an earlier call, or call `make` and store what it returns.
 
-        decided_by, and what make returns: dataclasses of this package, arrays, plain values, tuples of them; anything
-        else is made anew each time. Raises what make raises, which is not kept.
+        Parameters
+        ----------
+        what : str
+            Names the computation.
+        decided_by : tuple
+            Everything the result depends on: dataclasses of this package, arrays, plain values, tuples of them.
+            Anything else is not stored, nor is a result of another type.
+        make : callable
+            Computes the result; what it raises is passed on.
+
+        Returns
+        -------
+        The result, equal bit for bit whether it was stored or not.
         """
         if self._folder is None:
             return make()
@@ -68,7 +80,7 @@ class Cache:
             path = self._folder / f"{_digest(what, decided_by)}.npz"
         except _Unknown:
             return make()
-        found = _read(path)
+        found: Result | None = _read(path)
         if found is not None:
             return found
         made = make()
@@ -77,10 +89,10 @@ class Cache:
         return made
 
     def _keep(self, path: Path, value: Any) -> None:
-        arrays: list[np.ndarray] = []
+        arrays: list[NDArray[Any]] = []
         plan = _plan(value, arrays)
         size = sum(array.nbytes + 300 for array in arrays) + 1000
-        if size > self._limit // 4:
+        if size > self._limit // SYSTEM.cache_entry_part:
             return
         temporary = path.with_name(f".{secrets.token_hex(8)}.tmp")
         try:
@@ -133,13 +145,13 @@ def _read(path: Path) -> Any:
         return None
 
 
-def _write(file: IO[bytes], name: str, plan: Any, arrays: list[np.ndarray]) -> None:
+def _write(file: IO[bytes], name: str, plan: Any, arrays: list[NDArray[Any]]) -> None:
     """An .npz with the plan of a value in JSON, which names the entry too."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(_PLAN, json.dumps({"name": name, "value": plan}))
         for number, array in enumerate(arrays):
             with archive.open(f"{number}.npy", "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, array, allow_pickle=False)  # keeps the order of its axes too
+                np.lib.format.write_array(member, array, allow_pickle=False)  # type: ignore[no-untyped-call]  # keeps the order of its axes too
 
 
 def _unpacked(file: IO[bytes], name: str) -> Any:
@@ -150,11 +162,11 @@ def _unpacked(file: IO[bytes], name: str) -> Any:
         arrays = []
         for number in range(len(archive.namelist()) - 1):
             with archive.open(f"{number}.npy") as member:
-                arrays.append(np.lib.format.read_array(member, allow_pickle=False))
+                arrays.append(np.lib.format.read_array(member, allow_pickle=False))  # type: ignore[no-untyped-call]
     return _value(plan["value"], arrays)
 
 
-def _plan(value: Any, arrays: list[np.ndarray]) -> Any:
+def _plan(value: Any, arrays: list[NDArray[Any]]) -> Any:
     """The value as JSON: arrays by their number, NumPy's scalars as arrays of no dimension (their type counts)."""
     if value is None or isinstance(value, (bool, int, str)) or type(value) is float:
         return value
@@ -174,7 +186,7 @@ def _plan(value: Any, arrays: list[np.ndarray]) -> Any:
     return {"class": [module.removeprefix(_PACKAGE), type(value).__qualname__], "fields": parts}
 
 
-def _value(plan: Any, arrays: list[np.ndarray]) -> Any:
+def _value(plan: Any, arrays: list[NDArray[Any]]) -> Any:
     if not isinstance(plan, dict):
         return plan
     if "array" in plan:
@@ -193,7 +205,7 @@ def _value(plan: Any, arrays: list[np.ndarray]) -> Any:
 
 
 def _digest(what: str, decided_by: tuple[Any, ...]) -> str:
-    arrays: list[np.ndarray] = []
+    arrays: list[NDArray[Any]] = []
     plan = _plan(decided_by, arrays)
     digest = blake2b(json.dumps([what, _code(), plan]).encode(), digest_size=20)
     for array in arrays:

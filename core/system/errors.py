@@ -1,6 +1,6 @@
-"""The ways a stitch can end without a picture: each says what was found, what was needed and what to do.
+"""Errors that end a stitch: each says what was found, what was needed and what to do.
 
-Every error carries the exit code of the command line (DESIGN: 2 the call is wrong, 3 the input cannot be stitched,
+Every error carries the exit code of the command line (2 the call is wrong, 3 the input cannot be stitched,
 4 a file cannot be read or written, 130 interrupted), so that no caller has to keep a table of its own.
 """
 

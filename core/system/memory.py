@@ -1,7 +1,7 @@
-"""What is freed is used again by whatever asks next, in a process that is ours.
+"""Settings of glibc's allocator, so that freed memory is reused instead of given back to the system.
 
-glibc gives large arrays back at once, and keeps a heap for each thread, which goes with it: the system has to wipe the
-pages of the next one, which took a fifth of a stitch's time. Nothing of this is done where the allocator is another.
+By default glibc unmaps large arrays at once and keeps a heap for each thread; clearing the pages of the next array then
+took a fifth of a stitch's time. Other allocators are left alone.
 """
 
 from __future__ import annotations
@@ -9,17 +9,19 @@ from __future__ import annotations
 import ctypes
 import sys
 
+from .options import SYSTEM
+
 # mallopt's names (malloc.h) for from where on an array has pages of its own, how much may stay free on top, and the
 # number of heaps.
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
-_LARGE = 1 << 30
 
 
 def use_again() -> None:
-    """For the whole process, before it starts threads: one heap, which keeps what is freed."""
+    """One heap that keeps what is freed, for the whole process; to be called before it starts threads."""
     if sys.platform != "linux":
         return
     libc = ctypes.CDLL(None)
     if hasattr(libc, "mallopt"):
-        for name, value in ((_MMAP_THRESHOLD, _LARGE), (_TRIM_THRESHOLD, _LARGE), (_ARENA_MAX, 1)):
+        large = SYSTEM.large_bytes
+        for name, value in ((_MMAP_THRESHOLD, large), (_TRIM_THRESHOLD, large), (_ARENA_MAX, 1)):
             libc.mallopt(name, value)

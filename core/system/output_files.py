@@ -18,12 +18,11 @@ from pathlib import Path
 from types import TracebackType
 
 from .errors import BadRequest, UnwritableOutput
+from .options import SYSTEM
 
 # .edf-HOST-PROCESS-RANDOM.tmp: whose it is can be told when its process was killed
 _TEMPORARY = re.compile(r"\.edf-([0-9a-f]{8})-(\d+)-[0-9a-f]{12}\.tmp")
 _HOST = f"{zlib.crc32(platform.node().encode()):08x}"
-# Where nobody can say whether its process lives (another host's, Windows), a file this old is a dead one's. Seconds
-_OLD = 86_400
 
 
 class OutputFiles:
@@ -221,7 +220,7 @@ def _is_left(entry: os.DirEntry[str]) -> bool:
         return False
     try:
         if named[1] != _HOST or sys.platform == "win32":
-            return time.time() - entry.stat(follow_symlinks=False).st_mtime > _OLD
+            return time.time() - entry.stat(follow_symlinks=False).st_mtime > SYSTEM.stale_seconds
         os.kill(int(named[2]), 0)  # asks only
     except ProcessLookupError:
         return True
@@ -232,7 +231,7 @@ def _is_left(entry: os.DirEntry[str]) -> bool:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """A short while in which signals wait, so that nobody's impatience (a second Ctrl-C) leaves anything half done."""
+    """SIGINT and SIGTERM wait until the end of this context, so that a second Ctrl-C leaves nothing half done."""
     if threading.current_thread() is not threading.main_thread():  # signals never come here
         yield
         return

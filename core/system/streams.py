@@ -9,8 +9,8 @@ from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
 
-class _Unheard:
-    """Passes everything on to a stream; what cannot be written is dropped, and all that follows."""
+class _MayBreak:
+    """Passes everything on to a stream; from the first failure on, all is dropped."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -36,11 +36,11 @@ class _Unheard:
 
 @contextmanager
 def messages_may_be_lost() -> Iterator[None]:
-    """While it lasts, sys.stderr may be missing or broken: nobody's work is lost for want of a listener."""
+    """In this context a missing or broken sys.stderr does no harm: messages are dropped and the work goes on."""
     _fill_closed()
     before = sys.stderr
     with open(os.devnull, "w", encoding="utf-8") as nowhere:
-        sys.stderr = _Unheard(before if before is not None else nowhere)  # type: ignore[assignment]
+        sys.stderr = _MayBreak(before if before is not None else nowhere)
         try:
             yield
         finally:
@@ -58,7 +58,7 @@ def _fill_closed() -> None:
 
 
 def silence(stream: TextIO) -> None:
-    """Leads a broken stream nowhere, so that what is left in its buffer troubles nobody at the end of the process."""
+    """Redirects a broken stream to nowhere, so that flushing its buffer at exit raises nothing."""
     with suppress(OSError, ValueError), open(os.devnull, "w", encoding="utf-8") as nowhere:
         os.dup2(nowhere.fileno(), stream.fileno())
         stream.flush()

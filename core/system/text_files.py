@@ -1,4 +1,4 @@
-"""Text that users write: lists and tables, whatever their editor or spreadsheet made of them."""
+"""Text files that users write: lists and tables, with the line ends and marks of any editor or spreadsheet."""
 
 from __future__ import annotations
 

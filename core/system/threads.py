@@ -1,7 +1,7 @@
-"""Work on parts that know nothing of each other, by several threads at once: NumPy, OpenCV and zlib let others run.
+"""Work on independent parts by several threads at once; NumPy, OpenCV and zlib release the interpreter lock.
 
-As many as OpenCV uses (`cv2.setNumThreads`). What comes out is the same whatever their number, as long as the parts
-are: they are cut by size alone.
+As many threads as OpenCV uses (`cv2.setNumThreads`). Results do not depend on their number, for parts are cut by size
+alone.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from typing import TypeVar
 
 import cv2
 
-# More would be waiting for memory, and each holds a part of it.
-MOST = 8
+from .options import SYSTEM
+
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 _here = threading.local()
 
 
 def count() -> int:
-    """How many threads work at once; one within the work of another, which has its share already."""
-    return 1 if getattr(_here, "working", False) else max(1, min(MOST, cv2.getNumThreads()))
+    """How many threads work at once: one inside the work of another call, or there would be too many."""
+    return 1 if getattr(_here, "working", False) else max(1, min(SYSTEM.max_threads, cv2.getNumThreads()))
 
 
 def in_order(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[Result]:

@@ -25,7 +25,7 @@ def silent(_stage: str, _share: float) -> None:
 
 
 def frame_of(pair: Pair, options: StitchOptions) -> Frame:
-    return prepare(picture_from_array(pair.reference), picture_from_array(pair.target), options)
+    return prepare([picture_from_array(one) for one in (pair.reference, pair.target)], options)
 
 
 @pytest.fixture(scope="module")
@@ -55,29 +55,29 @@ def pooled(clip: list[Pair], quick: StitchOptions) -> Alignment:
 
 def test_where_nothing_is_asked_the_pictures_stay_what_they_are(small_pair: Pair) -> None:
     pictures = picture_from_array(small_pair.reference), picture_from_array(small_pair.target)
-    frame = prepare(*pictures, StitchOptions())
-    assert frame.reference is pictures[0] and frame.target is pictures[1]
+    frame = prepare(pictures, StitchOptions())
+    assert frame.pictures[0] is pictures[0] and frame.pictures[1] is pictures[1]
     assert frame.full_sizes == ((WIDTH, HEIGHT), (WIDTH, HEIGHT)) and size_of(pictures[0]) == (WIDTH, HEIGHT)
 
 
 def test_masks_hide_and_scale_shrinks(small_pair: Pair) -> None:
     mask, mask_too = np.zeros((2, HEIGHT, WIDTH), bool)
     mask[:40], mask_too[:, 200:] = True, True
-    options = StitchOptions(ignore_reference=mask, ignore_target=mask_too, scale=0.5)
+    options = StitchOptions(ignore=(mask, mask_too), scale=0.5)
     frame = frame_of(small_pair, options)
-    assert size_of(frame.reference) == size_of(frame.target) == (120, 90)
+    assert size_of(frame.pictures[0]) == size_of(frame.pictures[1]) == (120, 90)
     assert frame.full_sizes == ((WIDTH, HEIGHT), (WIDTH, HEIGHT))
-    first, second = frame.reference.alpha, frame.target.alpha
+    first, second = frame.pictures[0].alpha, frame.pictures[1].alpha
     assert first is not None and not first[:20].any() and (first[20:] == 1).all()
     assert second is not None and not second[:, 100:].any() and (second[:, :100] == 1).all()
-    one = frame_of(small_pair, StitchOptions(ignore_target=mask_too))
-    assert one.reference.alpha is None and one.target.alpha is not None
+    one = frame_of(small_pair, StitchOptions(ignore=(None, mask_too)))
+    assert one.pictures[0].alpha is None and one.pictures[1].alpha is not None
 
 
 def test_a_mask_of_another_shape_is_told_with_its_picture(small_pair: Pair) -> None:
-    for option, name in (("ignore_reference", "the reference"), ("ignore_target", "the target")):
+    for number, name in enumerate(("the reference", "the target")):
         with pytest.raises(BadRequest, match=f"mask of {name} has 50×50"):
-            frame_of(small_pair, StitchOptions(**{option: np.zeros((50, 50), bool)}))
+            frame_of(small_pair, StitchOptions(ignore=(None,) * number + (np.zeros((50, 50), bool),)))
 
 
 def test_the_cameras_are_those_of_the_pictures_worked_on(quick: StitchOptions) -> None:
@@ -86,7 +86,7 @@ def test_the_cameras_are_those_of_the_pictures_worked_on(quick: StitchOptions) -
     options = replace(quick, scale=0.5)
     frame = frame_of(pair, options)
     found = align([frame], options, silent)
-    width, height = size_of(frame.reference)
+    width, height = size_of(frame.pictures[0])
     assert (width, height) == (120, 90)
     focal = options.camera.focal_px[0]
     for camera in found.cameras:
@@ -147,14 +147,14 @@ def test_the_view_of_a_smaller_picture_shows_nothing_of_what_is_transparent() ->
 
 
 def test_pooled_frames_have_all_their_matches(alone: list[Alignment], pooled: Alignment) -> None:
-    assert np.array_equal(pooled.matches.x, np.concatenate([one.matches.x for one in alone]))
-    assert np.array_equal(pooled.matches.y, np.concatenate([one.matches.y for one in alone]))
-    assert len(pooled.two_view.inliers) == len(pooled.matches)
+    assert np.array_equal(pooled.edges[0].matches.x, np.concatenate([one.edges[0].matches.x for one in alone]))
+    assert np.array_equal(pooled.edges[0].matches.y, np.concatenate([one.edges[0].matches.y for one in alone]))
+    assert len(pooled.edges[0].two_view.inliers) == len(pooled.edges[0].matches)
 
 
 def pose_errors(pair: Pair, found: Alignment) -> np.ndarray:
     """Degrees of rotation and of the baseline's direction."""
-    truth, view = TrueGeometry.of(pair.reference_camera, pair.target_camera), found.two_view
+    truth, view = TrueGeometry.of(pair.reference_camera, pair.target_camera), found.edges[0].two_view
     between = 2 * np.arcsin(min(1.0, np.linalg.norm(view.t - truth.t) / 2))
     return np.array([rotation_angle(view.R, truth.R), np.degrees(between)])
 
@@ -162,11 +162,11 @@ def pose_errors(pair: Pair, found: Alignment) -> np.ndarray:
 def map_error(pair: Pair, found: Alignment) -> float:
     """Median distance in px of the map from the truth, in the overlap."""
     warp, truth = found.warp, TrueGeometry.of(pair.reference_camera, pair.target_camera)
-    rows, columns = np.nonzero(warp.inside((WIDTH, HEIGHT)))
+    rows, columns = np.nonzero(warp.maps[1].inside())
     points = np.column_stack([columns, rows]).astype(float) - warp.canvas.offset
     keep = ((points >= 0) & (points <= (WIDTH - 1, HEIGHT - 1))).all(axis=1)
     true = truth.target_pixels(points[keep], depth_at(pair.reference_camera, points[keep]))
-    mapped = np.column_stack([warp.map_x[rows, columns], warp.map_y[rows, columns]])[keep]
+    mapped = np.column_stack([warp.maps[1].x[rows, columns], warp.maps[1].y[rows, columns]])[keep]
     return float(np.median(np.linalg.norm(mapped - true, axis=1)))
 
 
@@ -180,9 +180,9 @@ def test_three_frames_tell_more_than_one(clip: list[Pair], alone: list[Alignment
 def test_every_frame_is_made_by_the_same_warp(clip: list[Pair], pooled: Alignment, quick: StitchOptions) -> None:
     results = [compose(frame_of(pair, quick), pooled, quick, Stopwatch(Progress())) for pair in clip]
     for one, pair in zip(results, clip, strict=True):
-        assert np.array_equal(one.warp.map_x, pooled.warp.map_x) and one.warp.canvas == pooled.warp.canvas
-        assert one.two_view is pooled.two_view and one.field is pooled.field
-        assert np.array_equal(one.reference.view, pair.reference) and np.array_equal(one.target.view, pair.target)
+        assert np.array_equal(one.warp.maps[1].x, pooled.warp.maps[1].x) and one.warp.canvas == pooled.warp.canvas
+        assert one.edges[0].two_view is pooled.edges[0].two_view and one.field is pooled.field
+        assert all(map(np.array_equal, [p.view for p in one.pictures], (pair.reference, pair.target)))
     assert not np.array_equal(results[0].pixels, results[1].pixels)
 
 
@@ -190,10 +190,10 @@ def test_a_frame_that_shows_nothing_takes_nothing_away(
     clip: list[Pair], alone: list[Alignment], quick: StitchOptions
 ) -> None:
     fog = np.full((HEIGHT, WIDTH, 3), 200, np.uint8)
-    blank = prepare(picture_from_array(fog), picture_from_array(fog), quick)
+    blank = prepare([picture_from_array(fog)] * 2, quick)
     for frames in ([blank, frame_of(clip[0], quick)], [frame_of(clip[0], quick), blank]):
         found = align(frames, quick, silent)
-        assert np.array_equal(found.warp.map_x, alone[0].warp.map_x, equal_nan=True)
+        assert np.array_equal(found.warp.maps[1].x, alone[0].warp.maps[1].x, equal_nan=True)
     with pytest.raises(TooFewMatches, match="only 0 .* at least 16"):
         align([blank, blank], quick, silent)
 
@@ -201,8 +201,8 @@ def test_a_frame_that_shows_nothing_takes_nothing_away(
 def test_frames_of_other_sizes_are_refused(clip: list[Pair], quick: StitchOptions) -> None:
     cut = picture_from_array(np.ascontiguousarray(clip[1].target[:, :-1]))
     for frame in (
-        prepare(picture_from_array(clip[1].reference), cut, quick),
-        prepare(cut, picture_from_array(clip[1].target), quick),
+        prepare([picture_from_array(clip[1].reference), cut], quick),
+        prepare([cut, picture_from_array(clip[1].target)], quick),
     ):
         with pytest.raises(BadRequest, match="differ in size"):
             align([frame_of(clip[0], quick), frame], quick, silent)
@@ -216,7 +216,7 @@ def test_a_pair_is_refined_and_a_clip_says_why_not(clip: list[Pair], quick: Stit
     several = align([frame_of(one, asked) for one in clip[:2]], asked, silent)
     assert several.dense is not None and several.dense.relief is None and "swims" in several.dense.why
     plain = align([frame_of(one, quick) for one in clip[:2]], quick, silent)
-    assert plain.dense is None and np.array_equal(several.warp.map_x, plain.warp.map_x, equal_nan=True)
+    assert plain.dense is None and np.array_equal(several.warp.maps[1].x, plain.warp.maps[1].x, equal_nan=True)
 
 
 def test_each_stage_is_told_and_features_climb(clip: list[Pair], quick: StitchOptions) -> None:
@@ -230,7 +230,7 @@ def test_each_stage_is_told_and_features_climb(clip: list[Pair], quick: StitchOp
 def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
     small_pair: Pair, quick: StitchOptions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(features, "PREVIEW_BUDGET", 500)
+    monkeypatch.setattr(features, "FEATURES", replace(features.FEATURES, preview_budget=500))
     frame = frame_of(small_pair, quick)
     real = features.detect
     asked: list[tuple[int, ...]] = []
@@ -241,10 +241,11 @@ def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
 
     monkeypatch.setattr(features, "detect", detect)
     found = {blend: align([frame], replace(quick, blend=blend), silent) for blend in ("feather", "linear")}
-    assert asked == [(), (), (500, features.PREVIEW_PIXELS), (500, features.PREVIEW_PIXELS)]
+    assert asked == [(), (), (500, features.FEATURES.preview_pixels), (500, features.FEATURES.preview_pixels)]
     points = np.stack(np.meshgrid(np.linspace(60, 180, 7), np.linspace(30, 150, 7)), axis=-1).reshape(-1, 2)
     away = np.linalg.norm(found["feather"].field.predict(points) - found["linear"].field.predict(points), axis=1)
-    assert len(found["linear"].matches) < 0.8 * len(found["feather"].matches) and np.median(away) < 0.5
+    few, many = (len(found[blend].edges[0].matches) for blend in ("linear", "feather"))
+    assert few < 0.8 * many and np.median(away) < 0.5
 
 
 # --- matches given --------------------------------------------------------------------------------------------------
@@ -252,7 +253,8 @@ def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
 
 def rows_of(found: Alignment) -> np.ndarray:
     """The matches that the field stands on, as an array of the user's."""
-    used = found.matches.subset(np.flatnonzero(found.two_view.inliers)[found.field.fit.inliers_used])
+    edge = found.edges[0]
+    used = edge.matches.subset(np.flatnonzero(edge.two_view.inliers)[found.field.fit.inliers_used])
     return np.column_stack([used.x, used.y])
 
 
@@ -273,8 +275,9 @@ def test_given_matches_are_used_as_they_are(
     rows[7, 2:4] += 6  # off its line: the user knows better
     options = replace(quick, matches=rows)
     found = align([frame_of(small_pair, options)], options, silent)
-    assert np.array_equal(np.column_stack([found.matches.x, found.matches.y, found.matches.weights]), rows)
-    assert found.matches.given and found.two_view.inliers.all() and found.field.fit.inliers_used.all()
+    given = found.edges[0].matches
+    assert np.array_equal(np.column_stack([given.x, given.y, given.weights]), rows)
+    assert given.given and found.edges[0].two_view.inliers.all() and found.field.fit.inliers_used.all()
     assert any("given matches contradict the rest" in warning for warning in found.warnings)
     assert map_error(small_pair, found) < 0.4
 
@@ -286,12 +289,13 @@ def test_given_matches_follow_the_scale(small_pair: Pair, alone: list[Alignment]
     camera = replace(quick.camera, principal=((WIDTH - 1) / 2, (HEIGHT - 1) / 2))
     full, half = (replace(quick, camera=camera, matches=rows, scale=scale) for scale in (1.0, 0.5))
     at_full, at_half = (align([frame_of(small_pair, one)], one, silent) for one in (full, half))
-    assert np.allclose(np.column_stack([at_half.matches.x, at_half.matches.y]), (rows + 0.5) / 2 - 0.5, atol=1e-12)
-    ideal = at_full.two_view.K.copy()
+    halved = at_half.edges[0].matches
+    assert np.allclose(np.column_stack([halved.x, halved.y]), (rows + 0.5) / 2 - 0.5, atol=1e-12)
+    ideal = at_full.edges[0].two_view.K.copy()
     ideal[:2] /= 2
     ideal[:2, 2] -= 0.25
-    assert np.allclose(at_half.two_view.K, ideal)
-    assert rotation_angle(at_half.two_view.R, at_full.two_view.R) < 0.02
+    assert np.allclose(at_half.edges[0].two_view.K, ideal)
+    assert rotation_angle(at_half.edges[0].two_view.R, at_full.edges[0].two_view.R) < 0.02
     sent = (at_half.field.predict((rows[:, :2] + 0.5) / 2 - 0.5) + 0.5) * 2 - 0.5
     assert np.abs(sent - at_full.field.predict(rows[:, :2])).max() < 0.5
 
@@ -304,9 +308,9 @@ def test_given_matches_in_masked_parts_are_dropped(
     rows = rows_of(alone[0])
     mask, mask_too = np.zeros((2, HEIGHT, WIDTH), bool)
     mask[140:], mask_too[:60] = True, True
-    options = replace(quick, matches=rows, ignore_reference=mask, ignore_target=mask_too, scale=scale)
+    options = replace(quick, matches=rows, ignore=(mask, mask_too), scale=scale)
     found = align([frame_of(small_pair, options)], options, silent)
-    back = (np.column_stack([found.matches.x, found.matches.y]) + 0.5) / scale - 0.5
+    back = (np.column_stack([found.edges[0].matches.x, found.edges[0].matches.y]) + 0.5) / scale - 0.5
     expected = (rows[:, 1] < 139.5) & (rows[:, 3] > 59.5)
     assert 16 < expected.sum() < len(rows) - 20 and np.allclose(back, rows[expected], atol=1e-9)
 
@@ -316,7 +320,7 @@ def test_given_matches_that_are_all_masked_are_refused(
 ) -> None:
     mask = np.ones((HEIGHT, WIDTH), bool)
     mask[:, :20] = False  # the left edge, which the target does not see
-    options = replace(quick, matches=rows_of(alone[0]), ignore_reference=mask)
+    options = replace(quick, matches=rows_of(alone[0]), ignore=(mask,))
     with pytest.raises(NoOverlap, match="all the given matches lie in parts .* masked or transparent"):
         align([frame_of(small_pair, options)], options, silent)
 

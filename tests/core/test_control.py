@@ -40,8 +40,8 @@ def in_reference(result: StitchResult, size: tuple[int, int] = (WIDTH, HEIGHT)) 
     """The map (H, W, 2) where the reference lies, and where it falls inside the target."""
     x, y = result.warp.canvas.offset
     box = (slice(y, y + size[1]), slice(x, x + size[0]))
-    mapped = np.stack([result.warp.map_x, result.warp.map_y], axis=-1)[box].astype(float)
-    return mapped, result.warp.inside(result.cameras[1].size)[box]
+    mapped = np.stack([result.warp.maps[1].x, result.warp.maps[1].y], axis=-1)[box].astype(float)
+    return mapped, result.warp.maps[1].inside()[box]
 
 
 def apart(one: StitchResult, other: StitchResult) -> np.ndarray:
@@ -66,11 +66,11 @@ def test_exported_matches_given_back_make_the_same_warp(
     small_pair: Pair, smooth: StitchOptions, field: str, focal: str
 ) -> None:
     options = replace(smooth, field=field, camera=smooth.camera if focal == "given" else CameraRequest())
-    first = stitch(small_pair.reference, small_pair.target, options)
-    again = stitch(small_pair.reference, small_pair.target, replace(options, matches=rows_of(first)))
-    assert len(again.matches) == len(first.used_matches) and again.matches.given
+    first = stitch((small_pair.reference, small_pair.target), options)
+    again = stitch((small_pair.reference, small_pair.target), replace(options, matches=rows_of(first)))
+    assert len(again.edges[0].matches) == len(first.used_matches) and again.edges[0].matches.given
     assert apart(first, again).max() < 0.05
-    third = stitch(small_pair.reference, small_pair.target, replace(options, matches=rows_of(again)))
+    third = stitch((small_pair.reference, small_pair.target), replace(options, matches=rows_of(again)))
     assert np.array_equal(rows_of(again), rows_of(first)) and apart(again, third).max() == 0
 
 
@@ -79,25 +79,26 @@ def test_a_file_of_matches_is_as_good_as_an_array(
 ) -> None:
     (tmp_path / "m.csv").write_bytes(matches_csv(small_result.used_matches))
     by_file, by_array = (
-        stitch(small_pair.reference, small_pair.target, replace(quick, matches=source))
+        stitch((small_pair.reference, small_pair.target), replace(quick, matches=source))
         for source in (tmp_path / "m.csv", rows_of(small_result))
     )
-    assert np.array_equal(by_file.warp.map_x, by_array.warp.map_x)
+    assert np.array_equal(by_file.warp.maps[1].x, by_array.warp.maps[1].x)
 
 
 def test_used_matches_are_those_the_field_stands_on(small_result: StitchResult) -> None:
     used, fit = small_result.used_matches, small_result.field.fit
-    assert len(used) == fit.inliers_used.sum() <= small_result.two_view.inliers.sum() < len(small_result.matches)
+    edge = small_result.edges[0]
+    assert len(used) == fit.inliers_used.sum() <= edge.two_view.inliers.sum() < len(edge.matches)
     sent = small_result.field.predict(used.x)
     assert np.sqrt(np.mean(np.sum((sent - used.y) ** 2, axis=1))) < 0.5
-    every = {tuple(row) for row in np.column_stack([small_result.matches.x, small_result.matches.y])}
+    every = {tuple(row) for row in np.column_stack([small_result.edges[0].matches.x, small_result.edges[0].matches.y])}
     assert {tuple(row) for row in np.column_stack([used.x, used.y])} <= every
 
 
 def test_used_matches_are_px_of_the_full_pictures(small_pair: Pair, quick: StitchOptions) -> None:
-    half = stitch(small_pair.reference, small_pair.target, replace(quick, scale=0.5))
+    half = stitch((small_pair.reference, small_pair.target), replace(quick, scale=0.5))
     used = half.used_matches
-    kept = half.matches.subset(np.flatnonzero(half.two_view.inliers)[half.field.fit.inliers_used])
+    kept = half.edges[0].matches.subset(np.flatnonzero(half.edges[0].two_view.inliers)[half.field.fit.inliers_used])
     assert np.allclose((used.x + 0.5) / 2 - 0.5, kept.x) and np.allclose((used.y + 0.5) / 2 - 0.5, kept.y)
     assert half.full_sizes == ((WIDTH, HEIGHT), (WIDTH, HEIGHT)) and used.x.max() > WIDTH / 2
 
@@ -108,7 +109,7 @@ def test_a_match_outside_its_picture_is_refused(
     rows = rows_of(small_result)
     rows[3, 2] = WIDTH
     with pytest.raises(BadRequest, match="row 3 .* outside the target, which has 240×180"):
-        stitch(small_pair.reference, small_pair.target, replace(quick, matches=rows, scale=0.5))
+        stitch((small_pair.reference, small_pair.target), replace(quick, matches=rows, scale=0.5))
 
 
 # --- masks ----------------------------------------------------------------------------------------------------------
@@ -153,12 +154,12 @@ def test_a_thing_that_moved_disturbs_unless_it_is_masked(
     passer_by: tuple[Pair, Mask, Mask], small_result: StitchResult, smooth: StitchOptions
 ) -> None:
     pair, first, second = passer_by
-    masked = replace(smooth, ignore_reference=first, ignore_target=second)
-    open_eyed, blind = (stitch(pair.reference, pair.target, options) for options in (smooth, masked))
+    masked = replace(smooth, ignore=(first, second))
+    open_eyed, blind = (stitch((pair.reference, pair.target), options) for options in (smooth, masked))
     spoilt, clean, best = (errors_beside(pair, one, first) for one in (open_eyed, blind, small_result))
     assert np.median(best) < 0.2 and np.median(spoilt) > 2, "it is large enough to lead astray"
     assert np.median(clean) < 0.3 and np.percentile(clean, 75) < 0.75
-    for x, mask in ((blind.matches.x, first), (blind.matches.y, second)):
+    for x, mask in ((blind.edges[0].matches.x, first), (blind.edges[0].matches.y, second)):
         column, row = np.rint(x).astype(int).T
         assert len(x) > 60 and not mask[row, column].any()
 
@@ -169,26 +170,27 @@ def test_what_is_masked_is_not_seen_in_the_panorama(
 ) -> None:
     pair, first, second = passer_by
     assert not of_the_thing(small_result.pixels).any()
-    options = replace(quick, blend=blend, exposure=False, ignore_reference=first, ignore_target=second)
-    result = stitch(pair.reference, pair.target, options)
-    assert of_the_thing(result.reference.pixels).sum() > 3000, "the pictures hold it, alpha hides it"
+    options = replace(quick, blend=blend, exposure=False, ignore=(first, second))
+    result = stitch((pair.reference, pair.target), options)
+    assert of_the_thing(result.pictures[0].pixels).sum() > 3000, "the pictures hold it, alpha hides it"
     # where next to nothing is shown, bicubic's negative lobes alone decide about its colour
     assert not of_the_thing(result.pixels)[result.alpha > 0.05].any()
     # where one hides the thing the other shows what is behind, and where both do there is nothing
     x, y = result.warp.canvas.offset
     hidden = np.zeros(result.alpha.shape, bool)
     hidden[y : y + HEIGHT, x : x + WIDTH] = first
-    behind = hidden & (result.target_layer.alpha > 0)
+    behind = hidden & (result.layers[1].alpha > 0)
     away = 0.02 if blend == "multiband" else 1e-6  # light is evened out around what was filled in
-    assert behind.sum() > 500 and np.allclose(result.pixels[behind], result.target_layer.pixels[behind], atol=away)
-    assert not result.alpha[hidden & (result.target_layer.alpha == 0)].any()
+    assert behind.sum() > 500 and np.allclose(result.pixels[behind], result.layers[1].pixels[behind], atol=away)
+    assert not result.alpha[hidden & (result.layers[1].alpha == 0)].any()
 
 
 def test_a_mask_of_one_picture_leaves_the_other_alone(small_pair: Pair, quick: StitchOptions) -> None:
     mask = np.zeros((HEIGHT, WIDTH), np.uint8)
     mask[:30] = 255
-    result = stitch(small_pair.reference, small_pair.target, replace(quick, ignore_target=mask))
-    assert result.reference.alpha is None and result.matches.y[:, 1].min() > 30 and result.matches.x[:, 1].min() < 30
+    result = stitch((small_pair.reference, small_pair.target), replace(quick, ignore=(None, mask)))
+    found = result.edges[0].matches
+    assert result.pictures[0].alpha is None and found.y[:, 1].min() > 30 and found.x[:, 1].min() < 30
 
 
 # --- crop -----------------------------------------------------------------------------------------------------------
@@ -202,6 +204,12 @@ def box_of(kind: Crop, full: StitchResult) -> tuple[int, int, int, int]:
     return (*full.warp.canvas.offset, width, height) if kind == "reference" else largest_rectangle(full.alpha > 0)
 
 
+def arrays_of(result: StitchResult) -> list[np.ndarray]:
+    """The target's map and the inverse depth."""
+    target = result.warp.maps[1].arrays()
+    return [target.x, target.y, result.warp.inverse_depth]
+
+
 def assert_cropped(full: StitchResult, part: StitchResult, box: tuple[int, int, int, int]) -> None:
     """The part is what the box cuts out of the whole, in all of its arrays, and says so."""
     left, top, width, height = box
@@ -210,10 +218,10 @@ def assert_cropped(full: StitchResult, part: StitchResult, box: tuple[int, int, 
     assert (canvas.width, canvas.height) == (width, height) and canvas.offset == (x - left, y - top)
     entry = part.report["canvas"]
     assert (entry["width"], entry["height"], entry["offset"]) == (width, height, [x - left, y - top])
-    for name in ("map_x", "map_y", "inverse_depth"):
-        assert np.array_equal(getattr(part.warp, name), getattr(full.warp, name)[cut], equal_nan=True)
-    for ours, theirs in ((part, full), (part.reference_layer, full.reference_layer),
-                         (part.target_layer, full.target_layer)):  # fmt: skip
+    for ours, theirs in zip(arrays_of(part), arrays_of(full), strict=True):
+        assert np.array_equal(ours, theirs[cut], equal_nan=True)
+    for ours, theirs in ((part, full), (part.layers[0], full.layers[0]),
+                         (part.layers[1], full.layers[1])):  # fmt: skip
         assert np.array_equal(ours.pixels, theirs.pixels[cut]) and np.array_equal(ours.alpha, theirs.alpha[cut])
 
 
@@ -221,7 +229,7 @@ def assert_cropped(full: StitchResult, part: StitchResult, box: tuple[int, int, 
 def test_a_crop_is_a_part_of_the_whole(
     small_pair: Pair, small_result: StitchResult, quick: StitchOptions, kind: Crop
 ) -> None:
-    part = stitch(small_pair.reference, small_pair.target, replace(quick, crop=kind))
+    part = stitch((small_pair.reference, small_pair.target), replace(quick, crop=kind))
     assert_cropped(small_result, part, box_of(kind, small_result))
     if kind == "reference":
         assert part.alpha.shape == (HEIGHT, WIDTH) and part.warp.canvas.offset == (0, 0)
@@ -235,19 +243,19 @@ def test_a_crop_beyond_the_panorama_is_refused_with_its_size(
 ) -> None:
     height, width = small_result.alpha.shape
     with pytest.raises(BadRequest, match=f"{width}×{height}"):
-        stitch(small_pair.reference, small_pair.target, replace(quick, crop=(0, 0, width + 1, 10)))
+        stitch((small_pair.reference, small_pair.target), replace(quick, crop=(0, 0, width + 1, 10)))
 
 
 def test_the_warp_file_of_a_crop_keeps_its_promise(small_pair: Pair, quick: StitchOptions) -> None:
     """x' ~ H_inf p + inverse_depth e' with p = pixel − offset, for what is left of the canvas."""
     options = replace(quick, field="strict", crop=(90, 40, 240, 120))
-    part = stitch(small_pair.reference, small_pair.target, options)
+    part = stitch((small_pair.reference, small_pair.target), options)
     with np.load(io.BytesIO(warp_bytes(part))) as file:
         warp = dict(file)
-    assert warp["map_x"].shape == part.alpha.shape == (120, 240) and (warp["offset"] < 0).any()
+    assert warp["map_x_01"].shape == part.alpha.shape == (120, 240) and (warp["offset"] < 0).any()
     p = homogeneous(np.stack(np.meshgrid(np.arange(240.0), np.arange(120.0)), axis=-1) - warp["offset"])
-    ray = p @ warp["H_inf"].T + warp["inverse_depth"][..., None].astype(float) * warp["e_prime"]
-    mapped = np.stack([warp["map_x"], warp["map_y"]], axis=-1)
+    ray = p @ warp["H_inf"][1].T + warp["inverse_depth"][..., None].astype(float) * warp["e_prime"][1]
+    mapped = np.stack([warp["map_x_01"], warp["map_y_01"]], axis=-1)
     assert np.isfinite(mapped).all() and np.abs(mapped - ray[..., :2] / ray[..., 2:]).max() < 1e-3
 
 
@@ -265,9 +273,10 @@ def from_full(full: StitchResult, half: StitchResult) -> np.ndarray:
     points = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1) - half.warp.canvas.offset
     at = ((points + 0.5) * 2 - 0.5 + full.warp.canvas.offset).astype(np.float32)
     looked_up = np.stack([cv2.remap(m, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderValue=np.nan)
-                          for m in (full.warp.map_x, full.warp.map_y)], axis=-1)  # fmt: skip
-    off = np.linalg.norm((looked_up + 0.5) / 2 - 0.5 - np.stack([half.warp.map_x, half.warp.map_y], axis=-1), axis=-1)
-    return np.where(half.warp.inside(half.cameras[1].size), off, np.nan)
+                          for m in (full.warp.maps[1].x, full.warp.maps[1].y)], axis=-1)  # fmt: skip
+    ours = np.stack([half.warp.maps[1].x, half.warp.maps[1].y], axis=-1)
+    off = np.linalg.norm((looked_up + 0.5) / 2 - 0.5 - ours, axis=-1)
+    return np.where(half.warp.maps[1].inside(), off, np.nan)
 
 
 @pytest.mark.parametrize("field", ["slack", "strict"])
@@ -275,35 +284,35 @@ def test_half_the_scale_is_the_same_panorama_at_half_the_size(pair: Pair, field:
     K = pair.reference_camera.K
     camera = CameraRequest(focal_px=(K[0, 0],), principal=(K[0, 2], K[1, 2]))
     options = StitchOptions(field, camera=camera, measure=False)
-    full = stitch(pair.reference, pair.target, options)
-    half = stitch(pair.reference, pair.target, replace(options, scale=0.5))
+    full = stitch((pair.reference, pair.target), options)
+    half = stitch((pair.reference, pair.target), replace(options, scale=0.5))
     for ours, theirs in zip((*half.alpha.shape, *half.warp.canvas.offset),
                             (*full.alpha.shape, *full.warp.canvas.offset), strict=True):  # fmt: skip
         assert abs(ours - theirs / 2) <= 2
-    assert np.allclose(half.two_view.K, halved_K(full.two_view.K)) and half.report["options"]["scale"] == 0.5
-    assert np.allclose(half.two_view.K_prime, halved_K(full.two_view.K_prime))
+    assert half.report["options"]["scale"] == 0.5
+    assert all(np.allclose(h.K, halved_K(f.K)) for h, f in zip(half.views, full.views, strict=True))
     off = from_full(full, half)
     # matches are fewer and half as sharp: a third of a px of the small picture
     assert np.nanmedian(off) < 0.33 and np.nanpercentile(off, 90) < 1
     # the light is that of the whole, made smaller: the reference's exactly, pixel for pixel
     x, y = half.warp.canvas.offset
-    small = half.reference_layer.pixels[y : y + 150, x : x + 200]
-    light = full.reference.pixels.reshape(150, 2, 200, 2, 3).mean(axis=(1, 3))
+    small = half.layers[0].pixels[y : y + 150, x : x + 200]
+    light = full.pictures[0].pixels.reshape(150, 2, 200, 2, 3).mean(axis=(1, 3))
     assert np.abs(small - light).max() < 1e-5
 
 
 def test_given_matches_and_a_crop_go_with_a_scale(small_pair: Pair, smooth: StitchOptions) -> None:
     """Matches are px of the full pictures, a crop px of the panorama that comes out."""
     strict = replace(smooth, field="strict")
-    full = stitch(small_pair.reference, small_pair.target, strict)
+    full = stitch((small_pair.reference, small_pair.target), strict)
     both = replace(strict, matches=rows_of(full), scale=0.5)
-    half = stitch(small_pair.reference, small_pair.target, both)
+    half = stitch((small_pair.reference, small_pair.target), both)
     off = from_full(full, half)
     assert np.nanmedian(off) < 0.03 and np.nanpercentile(off, 95) < 0.3
     assert all(abs(a - b / 2) <= 1.5 for a, b in zip(half.alpha.shape, full.alpha.shape, strict=True))
     assert np.allclose(rows_of(half), rows_of(full), atol=1e-9)
     for kind in ("reference", "inscribed", (20, 10, 100, 60)):
-        part = stitch(small_pair.reference, small_pair.target, replace(both, crop=kind))
+        part = stitch((small_pair.reference, small_pair.target), replace(both, crop=kind))
         assert_cropped(half, part, box_of(kind, half))
 
 
@@ -317,19 +326,19 @@ def test_deep_and_transparent_pictures_at_half_the_scale(
     deep[0][:41, :61] = (65535, 0, 65535)
     reference = np.dstack([deep[0], alpha])
     options = replace(quick, scale=0.5, matches=rows_of(small_result))
-    plain = stitch(small_pair.reference, small_pair.target, options)
-    result = stitch(reference, deep[1], options)
-    assert result.bits == 16 and plain.bits == 8 and result.reference.alpha is not None
+    plain = stitch((small_pair.reference, small_pair.target), options)
+    result = stitch((reference, deep[1]), options)
+    assert result.bits == 16 and plain.bits == 8 and result.pictures[0].alpha is not None
     seen = rows_of(small_result)[:, :2]
     hidden = (np.rint((seen + 0.5) / 2 - 0.5) < (30, 20)).all(axis=1)
-    assert len(result.matches) == len(seen) - hidden.sum()
+    assert len(result.edges[0].matches) == len(seen) - hidden.sum()
     x, y = result.warp.canvas.offset
-    a = result.reference_layer.alpha[y : y + 90, x : x + 120]
+    a = result.layers[0].alpha[y : y + 90, x : x + 120]
     assert not a[:20, :30].any() and (a[21:] == 1).all() and (a[:, 31:] == 1).all()
     assert np.allclose(a[20, :30], 0.5) and np.allclose(a[:20, 30], 0.5) and np.allclose(a[20, 30], 0.75)
-    ours = result.reference_layer.pixels[y : y + 90, x : x + 120]
+    ours = result.layers[0].pixels[y : y + 90, x : x + 120]
     ox, oy = plain.warp.canvas.offset
-    theirs = plain.reference_layer.pixels[oy : oy + 90, ox : ox + 120]
+    theirs = plain.layers[0].pixels[oy : oy + 90, ox : ox + 120]
     assert np.abs(ours - theirs)[a == 1].max() < 1e-5
     assert not of_the_thing(result.pixels)[result.alpha > 0].any()
 
@@ -338,10 +347,10 @@ def test_a_mask_of_the_full_size_goes_with_a_scale(pair: Pair) -> None:
     mask = np.zeros((300, 400), bool)
     mask[:, 300:360] = True
     camera = CameraRequest(focal_px=(pair.reference_camera.K[0, 0],))
-    options = StitchOptions(camera=camera, scale=0.5, ignore_reference=mask, measure=False)
-    result = stitch(pair.reference, pair.target, options)
+    options = StitchOptions(camera=camera, scale=0.5, ignore=(mask,), measure=False)
+    result = stitch((pair.reference, pair.target), options)
     x, y = result.warp.canvas.offset
-    alpha = result.reference_layer.alpha[y : y + 150, x : x + 200]
+    alpha = result.layers[0].alpha[y : y + 150, x : x + 200]
     assert not alpha[:, 150:180].any() and (alpha[:, :150] == 1).all() and (alpha[:, 180:] == 1).all()
-    within = (result.matches.x[:, 0] > 149.5) & (result.matches.x[:, 0] < 179.5)
+    within = (result.edges[0].matches.x[:, 0] > 149.5) & (result.edges[0].matches.x[:, 0] < 179.5)
     assert len(within) > 40 and not within.any()

@@ -11,6 +11,7 @@ from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import distance_to_line, homogeneous, project
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.choices import FADES, FIELDS, RIVALS
 from edf_stitch.core.field.field import Field
 from edf_stitch.core.field.slack import SlackField
@@ -101,10 +102,10 @@ def test_without_parallax_every_field_is_the_homography(name: str) -> None:
     for fade in FADES:
         field = fit_field(name, fade, still, Matches(x, y), SIZE, SIZE)
         canvas = Canvas(900, 650, (300, 200))
-        warp = build_map(field, still, canvas, *CAMERAS)
+        warp = build_map(field, views_of(still, CAMERAS), canvas)
         points = np.stack(np.meshgrid(np.arange(900.0), np.arange(650.0)), axis=-1) - canvas.offset
         expected = target_points(still, points, np.zeros(points.shape[:2]))
-        assert np.nanmax(np.abs(np.stack([warp.map_x, warp.map_y], axis=-1) - expected)) < 1e-3
+        assert np.nanmax(np.abs(np.stack([warp.maps[1].x, warp.maps[1].y], axis=-1) - expected)) < 1e-3
         assert not warp.inverse_depth.any()
         again = field.refitted(Matches(x[::2], y[::2]))
         assert np.abs(again.predict(x) - y).max() < 1e-6
@@ -198,9 +199,9 @@ def test_it_fades_over_five_times_what_fades() -> None:
 
 def map_of(field: Field, canvas: Canvas) -> tuple[np.ndarray, np.ndarray]:
     """Target pixels (H, W, 2) of a canvas, and its points in the reference's plane."""
-    warp = build_map(field, SIDE, canvas, *CAMERAS)
+    warp = build_map(field, views_of(SIDE, CAMERAS), canvas)
     points = np.stack(np.meshgrid(np.arange(float(canvas.width)), np.arange(float(canvas.height))), axis=-1)
-    return np.stack([warp.map_x, warp.map_y], axis=-1).astype(float), points - canvas.offset
+    return np.stack([warp.maps[1].x, warp.maps[1].y], axis=-1).astype(float), points - canvas.offset
 
 
 @every_field

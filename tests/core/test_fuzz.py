@@ -146,7 +146,7 @@ odd_arrays = st.one_of(
 @given(odd_arrays, odd_arrays)
 def test_arrays_as_pictures(first: np.ndarray, second: np.ndarray) -> None:
     with np.errstate(all="ignore"):
-        assert ends(lambda: stitch(first, second)) is None, "nothing in them to hold on to"
+        assert ends(lambda: stitch((first, second))) is None, "nothing in them to hold on to"
 
 
 @settings(max_examples=60)
@@ -222,14 +222,14 @@ def changed(pair: Pair, how: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, St
         size = [pictures[0].shape[1], pictures[0].shape[0], second.shape[1], second.shape[0]]
         options["matches"] = np.random.default_rng(seed).random((count, 4)) * (np.array(size) - 1)
     if "mask" in how:
-        options["ignore_reference"] = rng.random(pictures[0].shape[:2]) < rng.random()
+        options["ignore"] = (rng.random(pictures[0].shape[:2]) < rng.random(),)
     return pictures[0], second, replace(StitchOptions(measure=False, **options), camera=CameraRequest(**camera))
 
 
 def sound(result: StitchResult) -> None:
     """What everybody may rely on."""
     shape = result.alpha.shape
-    assert result.pixels.shape[:2] == shape == result.warp.map_x.shape == result.target_layer.alpha.shape
+    assert result.pixels.shape[:2] == shape == result.warp.maps[1].x.shape == result.layers[1].alpha.shape
     assert np.isfinite(result.pixels).all() and np.isfinite(result.alpha).all()
     assert result.alpha.min() >= 0 and result.alpha.max() <= 1
     assert shape[0] * shape[1] < 60 * 240 * 180, "no panorama is out of all proportion to its pictures"
@@ -238,7 +238,8 @@ def sound(result: StitchResult) -> None:
 
 def tried(pair: Pair, how: dict[str, Any]) -> None:
     with np.errstate(all="ignore"):
-        result = ends(lambda: stitch(*changed(pair, how)))
+        first, second, options = changed(pair, how)
+        result = ends(lambda: stitch((first, second), options))
     if result is not None:
         sound(result)
 
@@ -266,4 +267,4 @@ def test_nested_beyond_what_python_bears(tmp_path: Path) -> None:
 def test_a_mirrored_picture_is_refused_in_words(small_pair: Pair) -> None:
     with pytest.raises(StitchError, match="behind the second camera: check whether one is mirrored"):
         tried_first, second, options = changed(small_pair, {"flipped": True, "principal": (0.0, 322.0)})
-        stitch(tried_first, second, options)
+        stitch((tried_first, second), options)

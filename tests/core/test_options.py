@@ -17,8 +17,8 @@ from edf_stitch.core.system.errors import BadRequest
 def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
-        "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore_reference": None,
-        "ignore_target": None, "projection": "perspective", "level": "auto", "scale": 1.0, "crop": "full",
+        "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore": (),
+        "projection": "perspective", "level": "auto", "scale": 1.0, "crop": "full",
         "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "holes": "transparent",
         "seed": 0,
         "measure": True, "cache": None,
@@ -42,7 +42,7 @@ def test_nothing_changes_them_afterwards() -> None:
     {"holes": "inpaint"},
     *({"crop": name} for name in CROPS), {"crop": (0, 0, 1, 1)}, {"crop": (3, 4, 500, 600)}, {"scale": 1},
     {"scale": LEAST_SCALE}, {"scale": 0.5}, {"seed": 0}, {"seed": 2**31 - 1}, {"matches": Path("m.csv")},
-    {"matches": np.zeros((20, 4))}, {"ignore_reference": Path("a.png")}, {"ignore_target": np.zeros((4, 4), bool)},
+    {"matches": np.zeros((20, 4))}, {"ignore": (Path("a.png"),)}, {"ignore": (None, np.zeros((4, 4), bool))},
 ])  # fmt: skip
 def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
     options = StitchOptions(**asked)

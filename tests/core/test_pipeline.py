@@ -20,8 +20,9 @@ from edf_stitch.core.cameras.projective import (
     sampson_residuals,
 )
 from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.compose.multiband import bands_for
-from edf_stitch.core.panorama import visibility
+from edf_stitch.core.field import visibility
 from edf_stitch.core.panorama.warp import build_map
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
@@ -55,17 +56,17 @@ def true_pixels(pair: Pair, points: np.ndarray) -> np.ndarray:
 
 def shown(result: StitchResult, in_reference: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Reference points of the canvas pixels that show the target, and the target pixels the map fetches there."""
-    target_size, size = (p.view.shape[1::-1] for p in (result.target, result.reference))
-    rows, columns = np.nonzero(result.warp.inside(target_size))
+    target_size, size = (p.view.shape[1::-1] for p in (result.pictures[1], result.pictures[0]))
+    rows, columns = np.nonzero(result.warp.maps[1].inside())
     points = np.column_stack([columns, rows]).astype(float) - result.warp.canvas.offset
-    mapped = np.column_stack([result.warp.map_x[rows, columns], result.warp.map_y[rows, columns]]).astype(float)
+    mapped = np.column_stack([result.warp.maps[1].x[rows, columns], result.warp.maps[1].y[rows, columns]]).astype(float)
     keep = ((points >= 0) & (points <= np.array(size) - 1)).all(axis=1) | (not in_reference)
     return points[keep], mapped[keep]
 
 
 def true_errors(pair: Pair, result: StitchResult) -> tuple[np.ndarray, np.ndarray]:
     """Distances in px from the truth: of the inliers, and of the map in the overlap."""
-    x, y = (one[result.two_view.inliers] for one in (result.matches.x, result.matches.y))
+    x, y = (one[result.edges[0].two_view.inliers] for one in (result.edges[0].matches.x, result.edges[0].matches.y))
     points, mapped = shown(result, in_reference=True)
     return (np.linalg.norm(y - true_pixels(pair, x), axis=1),
             np.linalg.norm(mapped - true_pixels(pair, points), axis=1))  # fmt: skip
@@ -77,7 +78,7 @@ def pose_deviation(pair: Pair, result: StitchResult) -> tuple[float, float]:
     Their noise is measured against the truth; gross errors (4 σ) carry no information.
     """
     truth = truth_of(pair)
-    x, y = (one[result.two_view.inliers] for one in (result.matches.x, result.matches.y))
+    x, y = (one[result.edges[0].two_view.inliers] for one in (result.edges[0].matches.x, result.edges[0].matches.y))
     residual = np.abs(sampson_residuals(truth.F, x, y))
     sigma = float(np.median(residual)) / 0.6745
     x, y = x[residual < 4 * sigma], y[residual < 4 * sigma]
@@ -104,7 +105,7 @@ def test_the_map_is_nearer_to_the_truth_than_a_single_match(pair: Pair, result: 
 
 def test_the_map_lies_on_the_true_epipolar_lines(pair: Pair, result: StitchResult) -> None:
     """All over the target, on average within the noise of a single match across its line."""
-    x, y = (one[result.two_view.inliers] for one in (result.matches.x, result.matches.y))
+    x, y = (one[result.edges[0].two_view.inliers] for one in (result.edges[0].matches.x, result.edges[0].matches.y))
     noise = np.median(distance_to_line(truth_of(pair).F, x, y)) / 0.6745
     assert distance_to_line(truth_of(pair).F, *shown(result)).mean() < noise < 0.3
 
@@ -112,7 +113,7 @@ def test_the_map_lies_on_the_true_epipolar_lines(pair: Pair, result: StitchResul
 def test_with_the_focal_length_known_the_pose_is_as_good_as_the_matches_allow(
     pair: Pair, result: StitchResult
 ) -> None:
-    errors = pose_errors(result.two_view, truth_of(pair), (400, 300))
+    errors = pose_errors(result.edges[0].two_view, truth_of(pair), (400, 300))
     rotation, baseline = pose_deviation(pair, result)
     assert 0.01 < rotation < 0.1 and 0.1 < baseline < 1, "the pair is what it was"
     assert errors["rotation_deg"] < 4 * rotation
@@ -121,7 +122,7 @@ def test_with_the_focal_length_known_the_pose_is_as_good_as_the_matches_allow(
 
 def test_with_the_focal_length_known_infinity_is_where_it_is(pair: Pair, result: StitchResult) -> None:
     """0.79 px is what a calibrated solver reaches on real pairs of twice the size (FIELD)."""
-    errors = pose_errors(result.two_view, truth_of(pair), (400, 300))
+    errors = pose_errors(result.edges[0].two_view, truth_of(pair), (400, 300))
     assert errors["focal_percent"] == 0 and errors["h_inf_px"] < 0.79
 
 
@@ -131,8 +132,8 @@ def test_given_cameras_are_taken_as_they_are(pair: Pair) -> None:
 
     cameras = {"cameras": {"reference": entry(pair.reference_camera), "target": entry(pair.target_camera)}}
     options = StitchOptions("strict", camera=CameraRequest(cameras=cameras), measure=False)
-    given = stitch(pair.reference, pair.target, options)
-    truth, view = truth_of(pair), given.two_view
+    given = stitch((pair.reference, pair.target), options)
+    truth, view = truth_of(pair), given.edges[0].two_view
     assert rotation_angle(view.R, truth.R) < 1e-6 and np.allclose(view.t, truth.t) and np.allclose(view.F, truth.F)
     assert distance_to_line(truth.F, *shown(given)).max() < 1e-3
     matches, field = true_errors(pair, given)
@@ -152,9 +153,9 @@ def test_the_panorama_is_made_of_its_pictures(pair: Pair, result: StitchResult) 
     x, y = result.warp.canvas.offset
     only = np.zeros((height, width), bool)
     only[y : y + 300, x : x + 400] = True
-    assert np.array_equal(result.reference_layer.alpha > 0, only)
-    assert np.array_equal(result.alpha > 0, only | (result.target_layer.alpha > 0))
-    only &= (result.target_layer.alpha == 0) & far_from_seam(result)
+    assert np.array_equal(result.layers[0].alpha > 0, only)
+    assert np.array_equal(result.alpha > 0, only | (result.layers[1].alpha > 0))
+    only &= (result.layers[1].alpha == 0) & far_from_seam(result)
     pasted = np.zeros_like(result.pixels)
     pasted[y : y + 300, x : x + 400] = decode(pair.reference)
     assert only.sum() > 10_000 and np.array_equal(result.pixels[only], pasted[only])
@@ -163,10 +164,10 @@ def test_the_panorama_is_made_of_its_pictures(pair: Pair, result: StitchResult) 
 
 def far_from_seam(result: StitchResult) -> np.ndarray:
     """Where no band of the blend reaches."""
-    assert result.from_target is not None
+    assert result.labels is not None
     reach = 2 * (4 << bands_for(result.alpha)) + 1
     near = [cv2.dilate(((result.alpha > 0) & side).astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0
-            for side in (result.from_target, ~result.from_target)]  # fmt: skip
+            for side in (result.labels == 1, result.labels != 1)]  # fmt: skip
     return ~(near[0] & near[1])
 
 
@@ -174,7 +175,10 @@ def far_from_seam(result: StitchResult) -> np.ndarray:
 
 
 def same(a: StitchResult, b: StitchResult) -> bool:
-    arrays = [(r.pixels, r.alpha, r.warp.map_x, r.warp.map_y, r.warp.inverse_depth, r.two_view.F) for r in (a, b)]
+    arrays = [
+        (r.pixels, r.alpha, r.warp.maps[1].x, r.warp.maps[1].y, r.warp.inverse_depth, r.edges[0].two_view.F)
+        for r in (a, b)
+    ]
     return all(np.array_equal(one, other, equal_nan=True) for one, other in zip(*arrays, strict=True))
 
 
@@ -185,8 +189,8 @@ def good(pair: Pair, result: StitchResult) -> bool:
 
 
 def test_files_and_arrays_give_the_same(folder: Path, small_result: StitchResult, known: StitchOptions) -> None:
-    by_path = stitch(folder / "reference.png", folder / "target.png", known)
-    by_name = stitch(str(folder / "reference.png"), str(folder / "target.png"), known)
+    by_path = stitch((folder / "reference.png", folder / "target.png"), known)
+    by_name = stitch((str(folder / "reference.png"), str(folder / "target.png")), known)
     assert same(by_path, small_result) and same(by_name, small_result)
     assert by_path.report == by_name.report
     assert [entry["name"] for entry in by_path.report["pictures"]] == ["reference.png", "target.png"]
@@ -201,45 +205,45 @@ def test_16_bits_give_the_same_map_and_keep_their_depth(
     small_pair: Pair, small_result: StitchResult, known: StitchOptions
 ) -> None:
     deep = [one.astype(np.uint16) * 257 for one in (small_pair.reference, small_pair.target)]
-    result = stitch(*deep, known)
+    result = stitch(deep, known)
     assert same(result, small_result) and result.bits == 16
-    assert stitch(deep[0], small_pair.target, replace(known, measure=False)).bits == 16, "the deeper one's"
+    assert stitch((deep[0], small_pair.target), replace(known, measure=False)).bits == 16, "the deeper one's"
 
 
 def test_float_keeps_its_light(small_pair: Pair, known: StitchOptions) -> None:
     light = [40 * decode(one) ** 2 for one in (small_pair.reference, small_pair.target)]
-    result = stitch(*light, known)
+    result = stitch(light, known)
     assert good(small_pair, result) and result.bits == 32
     x, y = result.warp.canvas.offset
     box = (slice(y, y + 180), slice(x, x + 240))
-    only = ((result.target_layer.alpha == 0) & far_from_seam(result))[box]
+    only = ((result.layers[1].alpha == 0) & far_from_seam(result))[box]
     assert only.sum() > 1000 and np.array_equal(result.pixels[box][only], light[0][only]), "never clipped"
     assert result.pixels.max() > 2 and result.pixels.min() >= 0 and np.isfinite(result.pixels).all()
-    assert same(result, stitch(*(one.astype(np.float64) for one in light), known))
+    assert same(result, stitch([one.astype(np.float64) for one in light], known))
 
 
 def test_gray(small_pair: Pair, known: StitchOptions) -> None:
     gray = [cv2.cvtColor(one, cv2.COLOR_RGB2GRAY) for one in (small_pair.reference, small_pair.target)]
-    result = stitch(*gray, known)
+    result = stitch(gray, known)
     assert good(small_pair, result) and result.pixels.shape[2] == 1
-    mixed = stitch(gray[0], small_pair.target, known)
+    mixed = stitch((gray[0], small_pair.target), known)
     assert good(small_pair, mixed) and mixed.pixels.shape[2] == 3
-    assert np.array_equal(mixed.reference_layer.pixels[..., 0], mixed.reference_layer.pixels[..., 2])
+    assert np.array_equal(mixed.layers[0].pixels[..., 0], mixed.layers[0].pixels[..., 2])
 
 
 def test_transparent_parts_are_neither_matched_nor_shown(small_pair: Pair, known: StitchOptions) -> None:
     hole = np.full((180, 240), 255, np.uint8)
     hole[40:100, 150:210] = 0  # in the overlap
-    result = stitch(np.dstack([small_pair.reference, hole]), small_pair.target, known)
+    result = stitch((np.dstack([small_pair.reference, hole]), small_pair.target), known)
     assert good(small_pair, result) and result.report["pictures"][0]["alpha"] is True
-    inside = (result.matches.x > (150, 40)).all(axis=1) & (result.matches.x < (209, 99)).all(axis=1)
+    inside = (result.edges[0].matches.x > (150, 40)).all(axis=1) & (result.edges[0].matches.x < (209, 99)).all(axis=1)
     assert not inside.any()
     x, y = result.warp.canvas.offset
     box = (slice(y + 45, y + 95), slice(x + 155, x + 205))
-    gained = result.target_layer.pixels[box] * result.decided.exposure.gain
+    gained = result.layers[1].pixels[box] * result.decided[1].exposure.gain
     assert np.allclose(result.pixels[box], gained, atol=0.02), "the other picture shows through"
-    assert not result.reference_layer.alpha[box].any() and (result.alpha[box] == 1).all()
-    seen_through = stitch(small_pair.reference, np.dstack([small_pair.target, np.roll(hole, -40, axis=1)]), known)
+    assert not result.layers[0].alpha[box].any() and (result.alpha[box] == 1).all()
+    seen_through = stitch((small_pair.reference, np.dstack([small_pair.target, np.roll(hole, -40, axis=1)])), known)
     x, y = seen_through.warp.canvas.offset
     assert good(small_pair, seen_through) and (seen_through.alpha[y : y + 180, x : x + 240] == 1).all()
 
@@ -251,7 +255,7 @@ def test_pictures_of_two_sizes(pair: Pair, factor: float) -> None:
     target = cv2.resize(pair.target, size, interpolation=cv2.INTER_CUBIC if factor > 1 else cv2.INTER_AREA)
     focal = pair.reference_camera.K[0, 0]
     request = CameraRequest(focal_px=(focal, factor * focal))
-    result = stitch(pair.reference, target, StitchOptions(camera=request, measure=False))
+    result = stitch((pair.reference, target), StitchOptions(camera=request, measure=False))
     camera = pair.target_camera
     scaled = replace(camera, K=np.diag([factor, factor, 1]) @ camera.K, size=size)
     scaled.K[:2, 2] += (factor - 1) / 2
@@ -279,8 +283,8 @@ def test_portraits_that_lie_on_their_side_equal_upright_ones(
         stored = cv2.imdecode(np.frombuffer(data, np.uint8), flags)[..., ::-1]
         upright.append(np.ascontiguousarray(np.rot90(stored, -1 if orientation == 6 else 1)))
     assert upright[0].shape == (240, 180, 3)
-    from_files = stitch(tmp_path / "reference.jpg", tmp_path / "target.jpg", known)
-    assert same(from_files, stitch(*upright, known))
+    from_files = stitch((tmp_path / "reference.jpg", tmp_path / "target.jpg"), known)
+    assert same(from_files, stitch(upright, known))
     canvas = from_files.warp.canvas
     assert canvas.height > 1.3 * 240 and canvas.width < 1.3 * 180, "the second place lies above the first"
 
@@ -289,14 +293,14 @@ def test_pictures_of_two_kinds_from_files(folder: Path, small_pair: Pair, known:
     pytest.importorskip("OpenEXR")
     data, _ = encode_picture(decode(small_pair.target), None, 32, ".exr")
     (tmp_path / "target.exr").write_bytes(data)
-    result = stitch(folder / "reference.png", tmp_path / "target.exr", known)
+    result = stitch((folder / "reference.png", tmp_path / "target.exr"), known)
     assert good(small_pair, result) and result.bits == 32
 
 
 def test_half_a_picture_of_nothing_is_transparent_and_said(small_pair: Pair, known: StitchOptions) -> None:
     light = decode(small_pair.target)
     light[:, 200:] = np.nan
-    result = stitch(decode(small_pair.reference), light, known)
+    result = stitch((decode(small_pair.reference), light), known)
     assert np.isfinite(result.pixels).all() and good(small_pair, result)
     assert any("not finite" in warning for warning in result.warnings)
 
@@ -311,7 +315,7 @@ def test_the_same_input_gives_the_same_result_whatever_opencvs_threads(
     try:
         for threads in (1, 2):
             cv2.setNumThreads(threads)
-            again = stitch(small_pair.reference, small_pair.target, known)
+            again = stitch((small_pair.reference, small_pair.target), known)
             assert same(again, small_result) and again.report == small_result.report
     finally:
         cv2.setNumThreads(before)
@@ -321,13 +325,13 @@ def test_the_same_pixels_whichever_strip_is_done_first(
     small_pair: Pair, known: StitchOptions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Small pictures are one strip; here they are dozens, with dense refinement and all."""
-    for module in (arrays, visibility):
-        monkeypatch.setattr(module, "STRIP", 5_000)
+    monkeypatch.setattr(arrays, "PARTS", replace(arrays.PARTS, strip_pixels=5_000))
+    monkeypatch.setattr(visibility, "STRIP", 5_000)
     before, results = cv2.getNumThreads(), []
     try:
         for threads in (1, 3):
             cv2.setNumThreads(threads)
-            results.append(stitch(small_pair.reference, small_pair.target, known))
+            results.append(stitch((small_pair.reference, small_pair.target), known))
     finally:
         cv2.setNumThreads(before)
     assert same(*results) and results[0].report == results[1].report
@@ -337,12 +341,13 @@ def test_the_same_field_gives_the_same_map_wherever_memory_lies(small_result: St
     """OpenCV treats the ends of unaligned rows in another way: last bits may depend on where an array lies."""
     random, occupied = np.random.default_rng(0), []
     done = small_result
-    first = build_map(done.field, done.two_view, done.warp.canvas, *done.cameras)
+    first = build_map(done.field, views_of(done.edges[0].two_view, done.cameras), done.warp.canvas)
     for _ in range(16):
         occupied.append(np.empty(random.integers(1, 200_000), np.uint8))
-        again = build_map(done.field, done.two_view, done.warp.canvas, *done.cameras)
-        for name in ("map_x", "map_y", "inverse_depth"):
-            assert np.array_equal(getattr(again, name), getattr(first, name), equal_nan=True), name
+        again = build_map(done.field, views_of(done.edges[0].two_view, done.cameras), done.warp.canvas)
+        for name in ("x", "y"):
+            assert np.array_equal(getattr(again.maps[1], name), getattr(first.maps[1], name), equal_nan=True), name
+        assert np.array_equal(again.inverse_depth, first.inverse_depth, equal_nan=True)
 
 
 def test_chance_comes_from_the_seed_alone(small_pair: Pair, known: StitchOptions) -> None:
@@ -352,7 +357,7 @@ def test_chance_comes_from_the_seed_alone(small_pair: Pair, known: StitchOptions
     for state in (1, 2):
         np.random.seed(state)
         cv2.setRNGSeed(state)
-        results.append(stitch(small_pair.reference, small_pair.target, quick))
+        results.append(stitch((small_pair.reference, small_pair.target), quick))
     assert same(*results) and good(small_pair, results[0])
 
 
@@ -361,7 +366,7 @@ def test_chance_comes_from_the_seed_alone(small_pair: Pair, known: StitchOptions
 
 def test_progress_climbs_through_all_stages(small_pair: Pair, known: StitchOptions) -> None:
     said: list[tuple[str, float]] = []
-    stitch(small_pair.reference, small_pair.target, known, progress=lambda *step: said.append(step))
+    stitch((small_pair.reference, small_pair.target), known, progress=lambda *step: said.append(step))
     assert [stage for stage, _ in itertools.groupby(said, key=lambda step: step[0])] == list(STAGES)
     totals = [total for _, total in said]
     assert totals[0] == 0 and totals == sorted(totals) and totals[-1] <= 1 and totals[-1] >= 0.8
@@ -372,7 +377,7 @@ def test_it_can_be_cancelled_at_every_stage(small_pair: Pair, known: StitchOptio
     for step in itertools.count():
         asked, said = itertools.count(), []
         try:
-            stitch(small_pair.reference, small_pair.target, known, lambda stage, _, said=said: said.append(stage),
+            stitch((small_pair.reference, small_pair.target), known, lambda stage, _, said=said: said.append(stage),
                    lambda asked=asked, step=step: next(asked) == step)  # fmt: skip
         except Cancelled as stop:
             assert stop.exit_code == 130 and len(said) == step, "no more work after the question"
@@ -391,7 +396,7 @@ def test_what_the_callers_own_function_raises_comes_through(small_pair: Pair) ->
             raise Mine
 
     with pytest.raises(Mine):
-        stitch(small_pair.reference, small_pair.target, progress=progress)
+        stitch((small_pair.reference, small_pair.target), progress=progress)
 
 
 # --- refusals ------------------------------------------------------------------------------------------------------
@@ -427,7 +432,7 @@ REFUSED = {
 def test_what_cannot_be_stitched_is_refused_with_advice(case: str) -> None:
     pictures, kind, words = REFUSED[case]
     with pytest.raises(kind, match=words) as refused:
-        stitch(*pictures)
+        stitch(pictures)
     assert refused.value.exit_code == 3
 
 
@@ -436,17 +441,17 @@ def test_chance_look_alikes_are_refused(small_pair: Pair, monkeypatch: pytest.Mo
     chance = matches.Matches(random.uniform(0, 170, (50, 2)), random.uniform(0, 170, (50, 2)))
     monkeypatch.setattr(features, "match", lambda *_: chance)
     with pytest.raises((NoOverlap, DegenerateGeometry), match="of 50 matches|50 points look alike") as refused:
-        stitch(small_pair.reference, small_pair.target)
+        stitch((small_pair.reference, small_pair.target))
     assert refused.value.exit_code == 3
 
 
 def test_pictures_that_cannot_be_read(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(UnreadableImage, match="missing.png") as refused:
-        stitch(tmp_path / "missing.png", folder / "target.png")
+        stitch((tmp_path / "missing.png", folder / "target.png"))
     assert refused.value.exit_code == 4
     (tmp_path / "cut.png").write_bytes((folder / "target.png").read_bytes()[:2000])
     with pytest.raises(UnreadableImage, match="cut.png.*damaged"):
-        stitch(folder / "reference.png", tmp_path / "cut.png")
+        stitch((folder / "reference.png", tmp_path / "cut.png"))
 
 
 @pytest.mark.parametrize("options", [
@@ -465,14 +470,15 @@ def test_options_that_are_not_offered(options: dict) -> None:
 ])  # fmt: skip
 def test_arrays_that_are_no_pictures(array: np.ndarray, small_pair: Pair) -> None:
     with pytest.raises(BadRequest):
-        stitch(array, small_pair.target)
+        stitch((array, small_pair.target))
 
 
 def test_the_blend_is_the_one_asked_for(small_pair: Pair, small_result: StitchResult, known: StitchOptions) -> None:
-    linear = stitch(small_pair.reference, small_pair.target, replace(known, blend="linear", exposure=False))
-    assert np.array_equal(linear.warp.map_x, small_result.warp.map_x) and linear.report["options"]["blend"] == "linear"
-    both = (linear.reference_layer.alpha > 0) & (linear.target_layer.alpha > 0)
-    average = (linear.reference_layer.pixels + linear.target_layer.pixels)[both] / 2
+    linear = stitch((small_pair.reference, small_pair.target), replace(known, blend="linear", exposure=False))
+    assert np.array_equal(linear.warp.maps[1].x, small_result.warp.maps[1].x)
+    assert linear.report["options"]["blend"] == "linear"
+    both = (linear.layers[0].alpha > 0) & (linear.layers[1].alpha > 0)
+    average = (linear.layers[0].pixels + linear.layers[1].pixels)[both] / 2
     assert np.allclose(linear.pixels[both], average, atol=1e-6)
     assert not np.allclose(small_result.pixels[both], average, atol=1e-2)
 
@@ -483,7 +489,7 @@ def test_the_blend_is_the_one_asked_for(small_pair: Pair, small_result: StitchRe
 # One homography's overlap PSNR in dB on the same pairs (FIELD): what parallax costs whoever ignores it.
 @pytest.mark.parametrize(("name", "homography"), [("DHW-temple", 20.97), ("DFW_desk", 25.51)])
 def test_photographs_align_better_than_by_a_homography(data: Path, name: str, homography: float) -> None:
-    result = stitch(*sorted((data / "pairs" / name).iterdir()))
+    result = stitch(sorted((data / "pairs" / name).iterdir()))
     measured = result.report["measured"]
     assert measured["overlap_psnr_db"] > homography + 2
     assert measured["alignment_median_px"] < 1 and measured["folds"] < 0.005
@@ -504,8 +510,8 @@ def test_a_pair_that_somebody_else_calibrated(data: Path) -> None:
         K[:2, 2] -= 0.25  # pixel centres are integers before and after
         cameras.append(SceneCamera(K, R, t, halves[0].shape[1::-1]))
     given = {"cameras": {role: {"K": c.K.tolist()} for role, c in zip(("reference", "target"), cameras, strict=True)}}
-    result = stitch(*halves, StitchOptions(camera=CameraRequest(cameras=given), measure=False))
-    errors = pose_errors(result.two_view, TrueGeometry.of(*cameras), cameras[1].size)
+    result = stitch(halves, StitchOptions(camera=CameraRequest(cameras=given), measure=False))
+    errors = pose_errors(result.edges[0].two_view, TrueGeometry.of(*cameras), cameras[1].size)
     assert errors["h_inf_px"] < 0.79, "PoseLib's median over 14 such pairs (FIELD)"
     assert errors["rotation_deg"] < 0.1 and errors["baseline_deg"] < 1 and errors["f_px"] < 1
 
@@ -519,7 +525,7 @@ def test_a_pair_wider_than_opencv_can_hold() -> None:
     far, near = strip(1), strip(2)
     first = np.vstack([far[:60, 100:33_100], near[60:, 100:33_100]])
     second = np.vstack([far[:60, 110:33_110], near[60:, 130:33_130]])
-    result = stitch(first, second, StitchOptions(camera=CameraRequest(focal_px=(20_000.0,))))
+    result = stitch((first, second), StitchOptions(camera=CameraRequest(focal_px=(20_000.0,))))
     assert result.warp.canvas.width > 33_000 and result.report["measured"]["overlap_px"] > 3_000_000
 
 

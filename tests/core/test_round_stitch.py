@@ -27,7 +27,7 @@ ROUND = ("cylindrical", "equirectangular")
 @pytest.fixture(scope="module")
 def results(small_pair: Pair, known: StitchOptions) -> dict[str, StitchResult]:
     return {
-        kind: stitch(small_pair.reference, small_pair.target, replace(known, projection=kind)) for kind in ROUND
+        kind: stitch((small_pair.reference, small_pair.target), replace(known, projection=kind)) for kind in ROUND
     }  # fmt: skip
 
 
@@ -55,8 +55,8 @@ def test_the_map_is_the_true_one(results: dict[str, StitchResult], small_pair: P
     far, world = ranges(small_pair, rays_of(result))
     seen = (homogeneous(world.reshape(-1, 3)) @ np.column_stack([second.R, second.t]).T) @ second.K.T
     true = (seen[:, :2] / seen[:, 2:]).reshape(*far.shape, 2)
-    both = (result.target_layer.alpha > 0) & (result.reference_layer.alpha > 0)
-    off = np.hypot(result.warp.map_x - true[..., 0], result.warp.map_y - true[..., 1])[both]
+    both = (result.layers[1].alpha > 0) & (result.layers[0].alpha > 0)
+    off = np.hypot(result.warp.maps[1].x - true[..., 0], result.warp.maps[1].y - true[..., 1])[both]
     assert both.sum() > 10_000 and np.median(off) < 0.4
     baseline = np.linalg.norm(second.place - small_pair.reference_camera.place)
     d = result.warp.inverse_depth[both] * far[both] / baseline
@@ -71,8 +71,8 @@ def test_the_picture_is_what_a_camera_of_that_kind_sees(
     result = results[kind]
     _, world = ranges(small_pair, rays_of(result))
     true = Textures(0).light(world)
-    shown = result.reference_layer.alpha > 0
-    ours = result.reference_layer.pixels
+    shown = result.layers[0].alpha > 0
+    ours = result.layers[0].pixels
     error = np.abs(ours - true)[shown].mean()
     for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
         assert error < 0.75 * np.abs(np.roll(ours, step, axis=axis) - true)[shown].mean(), "a pixel aside is worse"
@@ -104,7 +104,7 @@ def test_the_report_says_which_ray_a_pixel_shows(results: dict[str, StitchResult
     rise = rise if kind == "cylindrical" else np.arctan(rise)
     at = np.array(projection["centre"]) + projection["focal_px"] * np.array([heading, rise])
     column, row = np.rint(at).astype(int)
-    expected = result.reference.pixels[68:73, 98:103].reshape(-1, 3)
+    expected = result.pictures[0].pixels[68:73, 98:103].reshape(-1, 3)
     found = result.pixels[row, column]
     assert (found > expected.min(axis=0) - 0.05).all() and (found < expected.max(axis=0) + 0.05).all()
     options = result.report["options"]
@@ -114,27 +114,27 @@ def test_the_report_says_which_ray_a_pixel_shows(results: dict[str, StitchResult
 def test_a_flat_panorama_reports_its_plane(small_result: StitchResult) -> None:
     entry = small_result.report["canvas"]
     assert entry["projection"]["kind"] == "perspective" and entry["offset"] == list(small_result.warp.canvas.offset)
-    centre = small_result.two_view.K[:2, 2] + small_result.warp.canvas.offset
+    centre = small_result.edges[0].two_view.K[:2, 2] + small_result.warp.canvas.offset
     assert np.allclose(entry["projection"]["centre"], centre) and entry["projection"]["level"] == [0, 0, 0]
 
 
 def test_the_sphere_is_whole_and_the_rest_of_it_empty(results: dict[str, StitchResult]) -> None:
     result = results["equirectangular"]
     height, width = result.alpha.shape
-    assert width == 2 * height and abs(width - 2 * np.pi * result.two_view.K[0, 0]) < 4
+    assert width == 2 * height and abs(width - 2 * np.pi * result.edges[0].two_view.K[0, 0]) < 4
     left, top, whole_width, whole_height = result.spread
     assert (whole_width, whole_height) == (width, height) and left < 0 and top < 0
     part = np.s_[-top : -top + result.warp.canvas.height, -left : -left + result.warp.canvas.width]
     assert (result.alpha > 0).sum() == (result.alpha[part] > 0).sum() > 10_000
-    assert result.target_layer.alpha.shape == result.warp.map_x.shape == result.alpha[part].shape
+    assert result.layers[1].alpha.shape == result.warp.maps[1].x.shape == result.alpha[part].shape
     assert result.alpha[part].size < 0.2 * result.alpha.size, "the empty part costs nothing before the end"
 
 
 def test_by_hand_the_reference_looks_where_it_is_told_to(small_pair: Pair, known: StitchOptions) -> None:
     options = replace(known, projection="equirectangular", level=(90.0, 30.0, 0.0), measure=False)
-    result = stitch(small_pair.reference, small_pair.target, options)
+    result = stitch((small_pair.reference, small_pair.target), options)
     height, width = result.alpha.shape
-    rows, columns = np.nonzero(np.pad(result.reference_layer.alpha, ((-result.spread[1], 0), (-result.spread[0], 0))))
+    rows, columns = np.nonzero(np.pad(result.layers[0].alpha, ((-result.spread[1], 0), (-result.spread[0], 0))))
     assert abs(columns.mean() / width - 0.75) < 0.01 and abs(rows.mean() / height - (0.5 - 30 / 180)) < 0.02
     assert result.report["options"]["level"] == [90.0, 30.0, 0.0]
     assert np.allclose(result.report["canvas"]["projection"]["level"], (90, 30, 0))
@@ -146,7 +146,8 @@ def test_the_horizon_is_that_of_upright_edges_and_of_the_poses_found(results: di
         assert projection is not None
         yaw, pitch, roll = angles_of(projection.rotation)
         assert abs(yaw) < 1e-6 and 0 < abs(pitch) < 0.5 and abs(roll) < 0.5, "the scene's edges are upright"
-        assert abs(angles_of(rotation_for("auto", result.two_view.R))[1]) > 3, "which the poses alone do not tell"
+        level = rotation_for("auto", [view.R for view in result.views])
+        assert abs(angles_of(level)[1]) > 3, "which the poses alone do not tell"
 
 
 @pytest.mark.parametrize("kind", ROUND)
@@ -158,20 +159,21 @@ def test_crops(small_pair: Pair, known: StitchOptions, results: dict[str, Stitch
     middle = (int(columns.mean()) - 30, int(rows.mean()) - 20, 70, 50)
     beyond = (int(columns[0]) - 5, int(rows[0]) - 3, 40, 30) if kind == "equirectangular" else (0, 0, 25, 20)
     left, top, *_ = full.spread
-    own = np.pad(full.reference_layer.alpha > 0, ((-top, height), (-left, width)))[:height, :width]
+    own = np.pad(full.layers[0].alpha > 0, ((-top, height), (-left, width)))[:height, :width]
     own_rows, own_columns = np.flatnonzero(own.any(axis=1)), np.flatnonzero(own.any(axis=0))
     frame = (own_columns[0], own_rows[0], np.ptp(own_columns) + 1, np.ptp(own_rows) + 1)
     for crop, box in (
         ("inscribed", largest_rectangle(shown)), ("reference", frame), (middle, middle), (beyond, beyond),
     ):  # fmt: skip
         options = replace(known, projection=kind, crop=crop, measure=False)
-        part = stitch(small_pair.reference, small_pair.target, options)
+        part = stitch((small_pair.reference, small_pair.target), options)
         x, y, w, h = box
         assert np.array_equal(part.pixels, full.pixels[y : y + h, x : x + w]), crop
         assert np.array_equal(part.alpha, full.alpha[y : y + h, x : x + w])
         assert part.report["canvas"]["width"] == w
-        assert part.warp.map_x.shape <= (h, w) and part.warp.map_x.size <= h * w, "no more is kept than is shown"
-        assert np.array_equal(part.spread_out().reference_layer.alpha > 0, own[y : y + h, x : x + w])
+        shape = part.warp.maps[1].shape
+        assert shape <= (h, w) and shape[0] * shape[1] <= h * w, "no more is kept than is shown"
+        assert np.array_equal(part.spread_out().layers[0].alpha > 0, own[y : y + h, x : x + w])
         assert np.allclose(
             np.array(part.report["canvas"]["projection"]["centre"]) + (x, y),
             full.report["canvas"]["projection"]["centre"],
@@ -181,7 +183,7 @@ def test_crops(small_pair: Pair, known: StitchOptions, results: dict[str, Stitch
 def test_a_crop_beside_both_pictures_is_refused(small_pair: Pair, known: StitchOptions) -> None:
     options = replace(known, projection="equirectangular", crop=(0, 0, 50, 50), measure=False)
     with pytest.raises(BadRequest, match="the crop 0,0,50,50 .* lies beside both pictures"):
-        stitch(small_pair.reference, small_pair.target, options)
+        stitch((small_pair.reference, small_pair.target), options)
 
 
 def test_files_of_a_sphere_all_have_its_size(results: dict[str, StitchResult], tmp_path: Path) -> None:
@@ -189,20 +191,21 @@ def test_files_of_a_sphere_all_have_its_size(results: dict[str, StitchResult], t
     request = OutputRequest(tmp_path / "all.png", layers=tmp_path / "layers")
     with OutputFiles(overwrite=False) as files:
         write(result, request, files)
-    sizes = {load_picture(path).pixels.shape[:2] for path in (request.panorama, *(tmp_path / "layers").iterdir())}
+    pictures = (request.panorama, *(tmp_path / "layers").glob("*.png"))
+    sizes = {load_picture(path).pixels.shape[:2] for path in pictures}
     assert sizes == {result.alpha.shape}
     with np.load(io.BytesIO(warp_bytes(result))) as warp:
-        assert warp["map_x"].shape == warp["inverse_depth"].shape == result.alpha.shape
+        assert warp["map_x_01"].shape == warp["inverse_depth"].shape == result.alpha.shape
         assert np.isnan(warp["offset"]).all() and str(warp["projection"]) == "equirectangular"
         # as a reader computes it, from what the file holds alone
-        height, width = warp["map_x"].shape
+        height, width = warp["map_x_01"].shape
         x, y = np.meshgrid(np.arange(width), np.arange(height))
         theta, phi = (x - warp["centre"][0]) / warp["focal"], (y - warp["centre"][1]) / warp["focal"]
         own = np.stack([np.cos(phi) * np.sin(theta), np.sin(phi), np.cos(phi) * np.cos(theta)], axis=-1)
-        p = own @ warp["rotation"].T @ warp["K"].T
-        at = p @ warp["H_inf"].T + warp["inverse_depth"][..., None] * warp["e_prime"]
-        seen = np.isfinite(warp["map_x"]) & (np.pad(result.target_layer.alpha, _margins(result)) > 0)
-        off = np.hypot(at[..., 0] / at[..., 2] - warp["map_x"], at[..., 1] / at[..., 2] - warp["map_y"])[seen]
+        p = own @ warp["rotation"].T @ warp["K"][0].T
+        at = p @ warp["H_inf"][1].T + warp["inverse_depth"][..., None] * warp["e_prime"][1]
+        seen = np.isfinite(warp["map_x_01"]) & (np.pad(result.layers[1].alpha, _margins(result)) > 0)
+        off = np.hypot(at[..., 0] / at[..., 2] - warp["map_x_01"], at[..., 1] / at[..., 2] - warp["map_y_01"])[seen]
         assert off.max() < 2.0 and np.median(off) < 0.5, "slack apart"
 
 
@@ -210,15 +213,15 @@ def test_what_a_window_shows_of_a_round_panorama(results: dict[str, StitchResult
     for result in results.values():
         whole = result.spread_out()
         shape = result.alpha.shape
-        assert whole.from_target is not None and result.from_target is not None
-        for part in (whole.warp.map_x, whole.occluded, whole.target_layer.alpha, whole.from_target, whole.confidence):
+        assert whole.labels is not None and result.labels is not None
+        for part in (whole.warp.maps[1].x, whole.occluded[1], whole.layers[1].alpha, whole.labels, whole.confidence):
             assert part.shape == shape
-        assert whole.from_target.sum() == result.from_target.sum() > 0
-        assert (whole.target_layer.alpha > 0).sum() == (result.target_layer.alpha > 0).sum()
+        assert (whole.labels == 1).sum() == (result.labels == 1).sum() > 0
+        assert (whole.layers[1].alpha > 0).sum() == (result.layers[1].alpha > 0).sum()
         geometry = full_geometry(whole)
         assert np.isnan(geometry["S"]).all() and geometry["canvas"] == shape[::-1]
         assert np.nanmedian(match_rows(whole)["errors"]) < 0.5
-        assert np.nanmedian(displacement_px(whole)[whole.target_layer.alpha > 0]) > 1
+        assert np.nanmedian(displacement_px(whole)[whole.layers[1].alpha > 0]) > 1
         picture, (low, high) = heat_map(whole)
         assert (picture[..., 3] > 0).any() and low < high
         grid = depth_grid(whole)
@@ -255,6 +258,6 @@ def test_pictures_whose_pose_nobody_knows_are_shown_by_their_homography(small_pa
     rows = np.column_stack([x, y[:, :2] / y[:, 2:]])
     rows = rows[((rows[:, 2:] > 1) & (rows[:, 2:] < (width - 2, height - 2))).all(axis=1)]
     options = replace(StitchOptions(projection="cylindrical"), matches=rows, measure=False)
-    result = stitch(small_pair.reference, small_pair.target, options)
-    assert result.two_view.model == "plane"
+    result = stitch((small_pair.reference, small_pair.target), options)
+    assert result.edges[0].two_view.model == "plane"
     assert np.nanmax(np.linalg.norm(look_up(result.warp, rows[:, :2]) - rows[:, 2:], axis=1)) < 0.5

@@ -190,7 +190,7 @@ def test_the_demo(home, tmp_path):
     pictures = {path.stem: cv2.imread(str(path)) for path in (tmp_path / "out").rglob("*.png")}
     assert {"reference", "target", "panorama", "truth"} <= set(pictures)
     assert pictures["panorama"].shape[1] > pictures["reference"].shape[1]
-    assert np.isfinite(np.load(tmp_path / "out" / "warp.npz")["map_x"]).any()
+    assert np.isfinite(np.load(tmp_path / "out" / "warp.npz")["map_x_01"]).any()
     rotation = next(line for line in done.stdout.splitlines() if line.startswith("rotation error"))
     assert float(rotation.split()[2]) < 0.1
 
@@ -250,7 +250,7 @@ def test_blenders_worker_stitches_as_the_checkout_does(home, pair, tmp_path):
     maps = []
     for warp in warps:
         x, y = warp["offset"]
-        maps.append(np.stack([warp[key][y : y + 360, x : x + 480] for key in ("map_x", "map_y")]))
+        maps.append(np.stack([warp[key][y : y + 360, x : x + 480] for key in ("map_x_01", "map_y_01")]))
     apart = np.hypot(*(maps[0] - maps[1]))
     assert np.nanmedian(apart) < 0.1
     assert np.nanpercentile(apart, 99) < 1.0

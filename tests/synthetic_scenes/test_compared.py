@@ -23,7 +23,7 @@ def truth(rendered: RenderedPair) -> RenderedTruth:
 
 @pytest.fixture(scope="module")
 def stitched(rendered: RenderedPair, truth: RenderedTruth) -> StitchResult:
-    return stitch(rendered.reference, rendered.target, StitchOptions(camera=truth.camera, measure=False))
+    return stitch((rendered.reference, rendered.target), StitchOptions(camera=truth.camera, measure=False))
 
 
 def test_it_tells_the_true_focal_lengths(rendered: RenderedPair, truth: RenderedTruth) -> None:
@@ -53,11 +53,11 @@ def test_what_is_hidden_is_counted_both_ways(truth: RenderedTruth, stitched: Sti
     y, x = rows - canvas.offset[1] - top, columns - canvas.offset[0] - left
     there = (y >= 0) & (x >= 0) & (y < hidden.shape[0]) & (x < hidden.shape[1])
     true = np.where(there, hidden[np.where(there, y, 0), np.where(there, x, 0)], False)
-    right = hidden_quality(replace(stitched, occluded=true), truth.truth)
+    right = hidden_quality(replace(stitched, occluded=(true, true)), truth.truth)
     assert right == {"occluded_precision": 1.0, "occluded_recall": 1.0}
-    everything = hidden_quality(replace(stitched, occluded=np.ones_like(true)), truth.truth)
+    everything = hidden_quality(replace(stitched, occluded=(true, np.ones_like(true))), truth.truth)
     assert everything["occluded_recall"] == 1.0 and 0 < everything["occluded_precision"] < 0.5
-    nothing = hidden_quality(replace(stitched, occluded=np.zeros_like(true)), truth.truth)
+    nothing = hidden_quality(replace(stitched, occluded=(true, np.zeros_like(true))), truth.truth)
     assert nothing["occluded_recall"] == 0.0 and np.isnan(nothing["occluded_precision"])
 
 

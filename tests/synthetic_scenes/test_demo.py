@@ -69,4 +69,4 @@ def test_the_command_as_a_user_calls_it(tmp_path: Path) -> None:
     assert {"reference.png", "target.png"} <= {Path(line).name for line in lines}
     said = {key: float(line[demo.LABEL :].split()[0]) for (key, *_), line in zip(demo.MEASURES, lines, strict=False)}
     assert said["rotation_deg"] < 0.1 and said["alignment_px"] < 0.5 and said["whole_psnr_db"] > 25
-    assert np.isfinite(np.load(tmp_path / "out" / "warp.npz")["map_x"]).any()
+    assert np.isfinite(np.load(tmp_path / "out" / "warp.npz")["map_x_01"]).any()

@@ -23,6 +23,8 @@ from edf_stitch.synthetic_scenes.rendered import RenderedPair
 from edf_stitch.synthetic_scenes.scene_pictures import scene_pictures
 from edf_stitch.synthetic_scenes.stitches import WAYS, Shared, stitched
 
+from ..pairs import warp_of, with_map, with_two_view
+
 
 @pytest.fixture(scope="module")
 def truth(rendered: RenderedPair) -> Truth:
@@ -41,11 +43,13 @@ def perfect(result: StitchResult, truth: Truth) -> StitchResult:
     height, width = truth.in_target.shape
     x, y = (np.where(truth.in_target, truth.target[..., k], -9).astype(np.float32) for k in range(2))
     canvas = replace(result.warp.canvas, width=width, height=height, offset=(-truth.corner[0], -truth.corner[1]))
-    view = replace(result.two_view, K=g.K, K_prime=g.K_prime, R=g.R, t=g.t, F=g.F, H_inf=g.H_inf, e_prime=g.e_prime)
-    warp = replace(result.warp, canvas=canvas, map_x=x, map_y=y, depth=np.zeros_like(x))
+    view = replace(
+        result.edges[0].two_view, K=g.K, K_prime=g.K_prime, R=g.R, t=g.t, F=g.F, H_inf=g.H_inf, e_prime=g.e_prime
+    )
+    warp = warp_of(canvas, x, y, size=result.cameras[1].size, reference=result.cameras[0].size)
     alpha = (truth.in_target | truth.in_reference).astype(np.float32)
     pixels = np.zeros((height, width, 3), np.float32)
-    return replace(result, two_view=view, warp=warp, panorama=Layer(pixels, alpha))
+    return with_two_view(replace(result, warp=warp, panorama=Layer(pixels, alpha)), view)
 
 
 def test_the_truth_scores_nothing_off(perfect: StitchResult, truth: Truth) -> None:
@@ -59,8 +63,8 @@ def test_the_truth_scores_nothing_off(perfect: StitchResult, truth: Truth) -> No
 
 
 def moved(result: StitchResult, dx: float, dy: float) -> StitchResult:
-    warp = replace(result.warp, map_x=result.warp.map_x + np.float32(dx), map_y=result.warp.map_y + np.float32(dy))
-    return replace(result, warp=warp)
+    target = result.warp.maps[1].arrays()
+    return replace(result, warp=with_map(result.warp, target.x + np.float32(dx), target.y + np.float32(dy)))
 
 
 def test_a_map_that_is_off_is_off_by_as_much(perfect: StitchResult, truth: Truth) -> None:
@@ -73,21 +77,21 @@ def test_a_map_that_is_off_is_off_by_as_much(perfect: StitchResult, truth: Truth
 
 
 def test_cameras_that_are_off_are_told(perfect: StitchResult, truth: Truth) -> None:
-    view = perfect.two_view
+    view = perfect.edges[0].two_view
     R = rotation_from_vector(np.radians([0, 0.5, 0])) @ view.R
     turned = replace(view, R=R, H_inf=infinite_homography(view.K, view.K_prime, R))
-    found = figures(replace(perfect, two_view=turned), truth)
+    found = figures(with_two_view(perfect, turned), truth)
     assert found["rotation_deg"] == pytest.approx(0.5, abs=1e-6)
     focal = view.K_prime[0, 0]
     # half a degree moves the picture's middle by f tan 0.5°, and more towards its sides
     assert 1 < found["h_inf_px"] / (focal * np.tan(np.radians(0.5))) < 1.3 and found["alignment_px"] < 1e-3
     zoomed = replace(view, K=view.K * np.array([[1.03, 1, 1], [1, 1.03, 1], [1, 1, 1]]))
-    assert figures(replace(perfect, two_view=zoomed), truth)["focal_percent"] == pytest.approx(3)
+    assert figures(with_two_view(perfect, zoomed), truth)["focal_percent"] == pytest.approx(3)
     t = rotation_from_vector(np.radians([0, 0, 2.0])) @ view.t
-    assert 0.1 < figures(replace(perfect, two_view=replace(view, t=t)), truth)["epipole_deg"] <= 2.0 + 1e-9
+    assert 0.1 < figures(with_two_view(perfect, replace(view, t=t)), truth)["epipole_deg"] <= 2.0 + 1e-9
     F = view.F.copy()
     F[2, 2] += 2 * np.hypot(*(F @ [150, 100, 1])[:2])
-    assert figures(replace(perfect, two_view=replace(view, F=F)), truth)["f_px"] == pytest.approx(2, rel=0.3)
+    assert figures(with_two_view(perfect, replace(view, F=F)), truth)["f_px"] == pytest.approx(2, rel=0.3)
 
 
 def test_what_is_not_covered_is_missed(perfect: StitchResult, truth: Truth) -> None:
@@ -112,7 +116,7 @@ def test_a_real_stitch_is_close(result: StitchResult, truth: Truth) -> None:
 
 def test_a_composition_is_held_against_the_plain_average(result: StitchResult, truth: Truth) -> None:
     found = composition(result, truth)
-    average = averaged(result.reference_layer, result.target_layer)
+    average = averaged(*result.layers, result.layers[0].alpha > 0)
     plain, shown = on_the_wide_canvas(replace(result, panorama=average), truth)
     assert found["over_average_db"] > 0 and found["overlap_over_average_db"] > found["over_average_db"]
     there = found["composed_psnr_db"] - found["over_average_db"]
@@ -151,5 +155,5 @@ def test_what_ways_share_changes_nothing(rendered: RenderedPair) -> None:
     shared: Shared = {}
     stitched(rendered, "known/slack", shared)
     together, alone = stitched(rendered, "known/strict", shared), stitched(rendered, "known/strict")
-    assert set(shared) == {"known"} and np.array_equal(together.warp.map_x, alone.warp.map_x, equal_nan=True)
+    assert set(shared) == {"known"} and np.array_equal(together.warp.maps[1].x, alone.warp.maps[1].x, equal_nan=True)
     assert np.array_equal(together.pixels, alone.pixels)

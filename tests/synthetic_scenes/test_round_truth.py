@@ -50,7 +50,7 @@ def apart(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def test_it_is_what_blenders_panoramic_camera_sees(rendered: RenderedPair, tmp_path: Path) -> None:
-    result = stitch(rendered.reference, rendered.target, panorama_options(rendered, level="none"))
+    result = stitch((rendered.reference, rendered.target), panorama_options(rendered, level="none"))
     height, width = result.alpha.shape
     left, top, _, _ = result.spread
     box = (-left, -top, result.warp.canvas.width, result.warp.canvas.height)
@@ -61,14 +61,14 @@ def test_it_is_what_blenders_panoramic_camera_sees(rendered: RenderedPair, tmp_p
     }, tmp_path)  # fmt: skip
     part = np.s_[box[1] : box[1] + box[3], box[0] : box[0] + box[2]]
     assert true.shape == result.pixels[part].shape
-    own, both = result.reference_layer.alpha == 1, result.target_layer.alpha == 1
-    off = apart(result.reference_layer.pixels[own], true[own])
+    own, both = result.layers[0].alpha == 1, result.layers[1].alpha == 1
+    off = apart(result.layers[0].pixels[own], true[own])
     for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        assert apart(np.roll(result.reference_layer.pixels, step, axis)[own], true[own]) > 1.8 * off
+        assert apart(np.roll(result.layers[0].pixels, step, axis)[own], true[own]) > 1.8 * off
     assert off < 4, "two renders of 16 and 24 samples"
     # the target beyond the reference hangs on the field's plane there, as in a flat panorama
-    assert apart(result.target_layer.pixels[both & own], true[both & own]) < 8
-    assert apart(result.target_layer.pixels[both & ~own], true[both & ~own]) < 20
+    assert apart(result.layers[1].pixels[both & own], true[both & own]) < 8
+    assert apart(result.layers[1].pixels[both & ~own], true[both & ~own]) < 20
 
 
 @pytest.mark.parametrize("level", ["none", (25.0, -12.0, 6.0)])
@@ -76,9 +76,9 @@ def test_as_a_world_the_reference_camera_sees_the_reference(
     rendered: RenderedPair, tmp_path: Path, level: object
 ) -> None:
     """The camera as Create Cameras places it, at the origin along +y with z up; and any other place and turn."""
-    result = stitch(rendered.reference, rendered.target, panorama_options(rendered, level=level))
+    result = stitch((rendered.reference, rendered.target), panorama_options(rendered, level=level))
     image = tmp_path / "panorama.exr"
-    alone = result.reference_layer.within(result.spread).pixels
+    alone = result.layers[0].within(result.spread).pixels
     image.write_bytes(encode_picture(alone, None, 32, ".exr")[0])
     rotation = np.array(result.report["canvas"]["projection"]["rotation"])
     upright = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])

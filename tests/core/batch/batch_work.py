@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -66,10 +67,12 @@ def quick(monkeypatch: pytest.MonkeyPatch, small_result: StitchResult) -> list[s
     """Stitches nothing: gives the small pair's result, and keeps the names of the references."""
     calls: list[str] = []
 
-    def stitched(reference: Path, target: Path, options: StitchOptions, progress: Callable, *_: object) -> StitchResult:
-        calls.append(reference.stem)
+    def stitched(pictures: Sequence[Path], options: StitchOptions, progress: Callable, *_: object) -> StitchResult:
+        calls.append(pictures[0].stem)
         progress("features", 0.5)
-        return small_result
+        names = [path.name for path in pictures]
+        named = (replace(one, name=name) for one, name in zip(small_result.pictures, names, strict=True))
+        return replace(small_result, pictures=tuple(named))
 
     monkeypatch.setattr(batch, "stitch", stitched)
     return calls

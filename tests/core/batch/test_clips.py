@@ -67,18 +67,18 @@ def test_a_clip_has_one_alignment_and_nothing_swims(whole: Path) -> None:
     height, width = made["shot_0007"].shape[:2]
     with np.load(out / "shot.warp.npz") as warp:
         x, y = warp["offset"]
-        map_x, map_y = warp["map_x"], warp["map_y"]
+        map_x, map_y = warp["map_x_01"], warp["map_y_01"]
     assert map_x.shape == (height, width)
     for at, (name, number) in enumerate(zip(made, FRAMES, strict=True)):
-        reference = raw(out / "shot" / f"{name}.layers" / "reference.png")
+        reference = raw(out / "shot" / f"{name}.layers" / f"00_a_{number:04d}.png")
         assert np.array_equal(reference[y : y + 180, x : x + 240, :3], raw(whole / "in" / f"a_{number:04d}.png"))
         # what does not walk stands still, to the last bit, also where only the target shows it
-        target = raw(out / "shot" / f"{name}.layers" / "target.png")
+        target = raw(out / "shot" / f"{name}.layers" / f"01_b_{number:04d}.png")
         walking = np.hypot(map_x - at * SIDE - SIDE / 2, map_y - 120 - SIDE / 2) < SIDE
         first = np.hypot(map_x - SIDE / 2, map_y - 120 - SIDE / 2) < SIDE
         still = (target[..., 3] > 0) & ~walking & ~first
         assert still.sum() > 15_000
-        assert np.array_equal(target[still], raw(out / "shot" / "shot_0007.layers" / "target.png")[still])
+        assert np.array_equal(target[still], raw(out / "shot" / "shot_0007.layers" / "01_b_0007.png")[still])
     report = json.loads((out / "shot.report.json").read_text("utf-8"))
     assert report["clip"] == {"frames": list(FRAMES), "aligned_on": list(FRAMES), "shown": 7}
     assert report["pictures"][0]["name"] == "a_0007.png" and report["matches"]["found"] > 400
@@ -86,8 +86,10 @@ def test_a_clip_has_one_alignment_and_nothing_swims(whole: Path) -> None:
         "batch.json", ".edf/shot.json", *(f".edf/shot/{name}.json" for name in made),
         *(f"shot.{kind}" for kind in ("report.json", "matches.csv", "timing.json", "warp.npz")),
         *(f"shot/{name}{one}" for name in made for one in (
-            ".png", ".layers/reference.png", ".layers/target.png", ".layers/occluded.png", ".layers/confidence.png",
-            ".layers/seam.png")),
+            ".png", ".layers/occluded_01.png", ".layers/confidence.png", ".layers/labels.png", ".layers/seam.png",
+            ".layers/canvas.json")),
+        *(f"shot/shot_{number:04d}.layers/0{i}_{side}_{number:04d}.png" for number in FRAMES
+          for i, side in enumerate("ab")),
     }  # fmt: skip
     (item,) = summary(out)["items"]
     assert (item["status"], item["panorama"], item["size"]) == ("done", "shot/shot_0007.png", [width, height])
@@ -97,7 +99,7 @@ def test_a_clip_has_one_alignment_and_nothing_swims(whole: Path) -> None:
 
 def test_frames_stitched_one_by_one_would_swim(whole: Path, known: StitchOptions) -> None:
     """What the test above relies on."""
-    maps = [stitch(*(whole / "in" / f"{side}_{n:04d}.png" for side in "ab"), known).warp.map_x for n in FRAMES[:2]]
+    maps = [stitch([whole / "in" / f"{side}_{n:04d}.png" for side in "ab"], known).warp.maps[1].x for n in FRAMES[:2]]
     assert maps[0].shape != maps[1].shape or not np.array_equal(*maps)
 
 
@@ -163,7 +165,7 @@ def test_an_interrupted_clip_goes_on_where_it_was(
         patch.setattr(batch, "compose", compose)
         assert clip(work) == 130
     assert list(panoramas(work / "out")) == ["shot_0007", "shot_0008"]
-    assert len(files(work / "out")) == 2 * 6 + 4 + 3 + 1, "two frames with layers, the report's, stamps, batch.json"
+    assert len(files(work / "out")) == 2 * 8 + 4 + 3 + 1, "two frames with layers, the report's, stamps, batch.json"
     times = {path: path.stat().st_mtime_ns for path in (work / "out").rglob("shot*") if path.is_file()}
     said()
     assert clip(work, "--resume") == 0 and "2 frames done, 2 skipped" in said()[0]

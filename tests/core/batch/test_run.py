@@ -6,7 +6,7 @@ import json
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -60,9 +60,9 @@ def test_a_bad_pair_is_reported_and_the_rest_goes_on(
 def test_the_exit_code_is_that_of_the_failure_that_matters_most(
     work: Path, monkeypatch: pytest.MonkeyPatch, small_result: StitchResult, troubles: dict, expected: int
 ) -> None:
-    def stitched(reference: Path, *_: object) -> StitchResult:
-        if reference.stem in troubles:
-            raise troubles[reference.stem]
+    def stitched(pictures: Sequence[Path], *_: object) -> StitchResult:
+        if pictures[0].stem in troubles:
+            raise troubles[pictures[0].stem]
         return small_result
 
     monkeypatch.setattr(batch, "stitch", stitched)
@@ -77,7 +77,7 @@ def test_a_missing_file_is_told_in_its_turn(
     (work / "in" / "target2.png").unlink()
     found = batch.stitch
     monkeypatch.setattr(
-        batch, "stitch", lambda first, second, *more: (found if second.exists() else stitch)(first, second, *more))
+        batch, "stitch", lambda pictures, *more: (found if pictures[1].exists() else stitch)(pictures, *more))
     assert run(work, "--quiet") == 4
     (line,) = said()
     assert line.startswith("edf: [2/3] p2: failed: ") and "target2.png: no such file" in line
@@ -110,7 +110,7 @@ def test_options_reach_every_pair_and_a_line_may_have_its_own_camera(
     (work / "good.csv").write_text(
         "reference,target,focal35\nin/reference1.png,in/target1.png,28\nin/reference2.png,in/target2.png,\n", "utf-8")
     asked: list[StitchOptions] = []
-    monkeypatch.setattr(batch, "stitch", lambda _, __, options, *___: asked.append(options) or small_result)
+    monkeypatch.setattr(batch, "stitch", lambda _, options, *__: asked.append(options) or small_result)
     assert run(work, "--quiet", "--seed", "5", "--principal", "100,90") == 0
     own, common = (options.camera for options in asked)
     assert (own.focal35, own.focal_px, own.principal) == ((28.0,), (), (100.0, 90.0))
@@ -121,8 +121,10 @@ def test_options_reach_every_pair_and_a_line_may_have_its_own_camera(
 def test_layers_warp_and_the_kind_of_file(work: Path, quick: list) -> None:
     assert run(work, "--quiet", "--layers", "--warp", "--format", "jpg") == 0
     expected = {f"p1{suffix}" for suffix in (
-        ".jpg", ".report.json", ".matches.csv", ".timing.json", ".warp.npz", ".layers/reference.png",
-        ".layers/target.png", ".layers/occluded.png", ".layers/confidence.png", ".layers/seam.png")}  # fmt: skip
+        ".jpg", ".report.json", ".matches.csv", ".timing.json", ".warp.npz", ".layers/00_reference1.png",
+        ".layers/01_target1.png",
+        ".layers/occluded_01.png", ".layers/confidence.png", ".layers/labels.png", ".layers/seam.png",
+        ".layers/canvas.json")}  # fmt: skip
     assert {name for name in files(work / "out") if name.startswith("p1")} == expected
 
 
@@ -234,7 +236,7 @@ import sys, time
 from edf_stitch.core.batch import run as batch
 from edf_stitch.core.commands import cli
 stitch = batch.stitch
-batch.stitch = lambda reference, *more: stitch(reference, *more) if "1" in reference.name else time.sleep(600)
+batch.stitch = lambda pictures, *more: stitch(pictures, *more) if "1" in pictures[0].name else time.sleep(600)
 sys.exit(cli.main())
 """
 

@@ -9,11 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera, Knowledge
+from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import rotation_angle, rotation_from_vector
 from edf_stitch.core.cameras.sources import (
-    ASSUMED_SIGMA,
-    CROPPED_SIGMA,
-    EXIF_SIGMA,
     CameraRequest,
     cameras_for,
     read_camera_file,
@@ -22,6 +20,8 @@ from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.system.errors import BadRequest, UnreadableImage
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+ASSUMED_SIGMA, CROPPED_SIGMA, EXIF_SIGMA = INTRINSICS.assumed_sigma, INTRINSICS.cropped_sigma, INTRINSICS.exif_sigma
 
 LANDSCAPE, PORTRAIT = (4000, 3000), (3000, 4000)
 NAMES = ("left.jpg", "right.jpg")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.projective import (
+    ahead_of_camera,
     distance_to_line,
     fundamental_from_pose,
     homogeneous,
@@ -289,3 +290,9 @@ def test_the_epipole_may_lie_at_infinity_or_in_the_picture(t: tuple[float, ...],
             assert np.isfinite(sampson_residuals(F, here, here)).all()
             assert np.isfinite(distance_to_line(F, here, here)).all()
             assert np.isfinite(in_front(K, K, R, direction, here, here)).all()
+
+
+def test_what_lies_ahead_of_a_camera_is_told_by_its_third_coordinate_relative_to_the_others() -> None:
+    points = np.array([[100.0, 50, 1], [100, 50, -1], [100, 50, 0], [2e6, 50, 1], [50, -2e6, 1], [0.5e6, 0, 1]])
+    assert ahead_of_camera(*points.T).tolist() == [True, False, False, False, False, True]
+    assert not ahead_of_camera(np.array([np.nan, 1.0]), np.array([1.0, 1.0]), np.array([1.0, np.nan])).any()

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -57,8 +57,8 @@ def quick(monkeypatch: pytest.MonkeyPatch, small_result: StitchResult) -> list[t
     """Stitches nothing: gives the small pair's result, and keeps what it was called with."""
     calls: list[tuple] = []
 
-    def stitch(reference: Path, target: Path, options: StitchOptions, progress: Callable) -> StitchResult:
-        calls.append((reference, target, options))
+    def stitch(pictures: Sequence[Path], options: StitchOptions, progress: Callable) -> StitchResult:
+        calls.append((*pictures, options))
         for number, stage in enumerate(STAGES):
             progress(stage, number / 10)
         return small_result
@@ -81,15 +81,16 @@ def test_a_stitch_from_files_to_files(
     height, width = small_result.alpha.shape
     assert err.splitlines()[-1] == f"edf: {tmp_path / 'out.png'}: {width}×{height}"
     assert set(files(tmp_path)) == {
-        "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-        "layers/target.png", "layers/occluded.png", "layers/confidence.png", "layers/seam.png"}
+        "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/00_reference.png",
+        "layers/01_target.png", "layers/occluded_01.png", "layers/confidence.png", "layers/labels.png",
+        "layers/seam.png", "layers/canvas.json"}
     # the same as stitch() from Python gives
     expected, _ = encode_picture(small_result.pixels, small_result.alpha, 8, ".png")
     assert (tmp_path / "out.png").read_bytes() == expected
     report = json.loads((tmp_path / "report.json").read_text("utf-8"))
     assert report["measured"] == small_result.report["measured"] and report["pictures"][0]["name"] == "reference.png"
     with np.load(tmp_path / "warp.npz") as warp:
-        assert np.array_equal(warp["map_x"], small_result.warp.map_x)
+        assert np.array_equal(warp["map_x_01"], small_result.warp.maps[1].x)
 
 
 def test_progress_is_plain_lines_where_there_is_no_terminal(
@@ -156,7 +157,7 @@ def test_a_camera_file_with_the_pictures_names(
     assert said() == ("", "")
     first, second = small_pair.reference_camera, small_pair.target_camera
     with np.load(tmp_path / "warp.npz") as warp:
-        assert np.allclose(warp["R"], second.R @ first.R.T) and np.allclose(warp["K"], first.K)
+        assert np.allclose(warp["R"][1], second.R @ first.R.T) and np.allclose(warp["K"][0], first.K)
     del table["target.png"]
     (tmp_path / "cameras.json").write_text(json.dumps({"cameras": table}), "utf-8")
     assert main(["stitch", *pictures, "-o", str(tmp_path / "other.png"), *arguments, "--overwrite"]) == 2

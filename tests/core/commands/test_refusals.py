@@ -198,7 +198,7 @@ def test_a_few_pixels_that_are_no_numbers_are_left_out_with_a_warning(
 
 
 @pytest.mark.parametrize(
-    "taken", ["out.png", "r.json", "r.timing.json", "w.npz", "layers/target.png", "layers/reference.exr"]
+    "taken", ["out.png", "r.json", "r.timing.json", "w.npz", "layers/01_target.png", "layers/00_reference.exr"]
 )
 def test_every_output_that_exists_stays(
     folder: Path, tmp_path: Path, refused: Refused, never_stitched: None, taken: str
@@ -241,7 +241,7 @@ def test_a_folder_that_may_not_be_written(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="file size limits are POSIX")
-@pytest.mark.parametrize(("limit", "lost"), [(10_000, "out.jpg"), (60_000, "new/layers/reference.png")])
+@pytest.mark.parametrize(("limit", "lost"), [(10_000, "out.jpg"), (60_000, "new/layers/00_reference.png")])
 def test_a_disk_that_is_full_in_the_end(folder: Path, tmp_path: Path, limit: int, lost: str) -> None:
     """Whichever file does not fit takes the others with it, and the folders made for them."""
     # a limit on file sizes stands for the full disk; it holds for a whole process, so it gets its own
@@ -276,7 +276,10 @@ def test_an_output_never_replaces_what_is_stitched(
     before = files(tmp_path)
     out, words = tmp_path / "out.jpg", ("is read by this work", "choose another name")
     refused(2, [*own, "-o", own[index], *overwrite], str(own[index]), *words)
-    refused(2, [*own, "-o", out, "--layers", tmp_path, *overwrite], *words)  # reference.png and target.png
+    for option, name in (("--cameras", "canvas.json"), ("--ignore-target", "occluded_01.png")):  # of the layers' folder
+        (tmp_path / name).write_bytes(b"mine")
+        refused(2, [*own, "-o", out, option, tmp_path / name, "--layers", tmp_path, *overwrite], *words)
+        (tmp_path / name).unlink()
     try:
         (tmp_path / "link.png").symlink_to(own[index])
     except OSError:

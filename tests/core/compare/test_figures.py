@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.alignment import Geometry
 from edf_stitch.core.compare.figures import FIGURES, figures_of
 from edf_stitch.core.compare.tables import shown
 from edf_stitch.core.measure.metrics import canvas_quality, overlap_quality, overlap_views, psnr, ssim
@@ -21,35 +20,31 @@ from edf_stitch.core.pipeline import StitchResult
 def test_canvas_values_are_of_both_pictures_black_outside_the_overlap(small_result: StitchResult) -> None:
     """The slow way: the whole canvas built and averaged."""
     result = small_result
-    view, fetched, inside = overlap_views(result.reference, result.target, result.warp)
+    view, fetched, inside = overlap_views((result.pictures[0], result.pictures[1]), result.warp)
     canvas = result.warp.canvas
     whole = np.zeros((2, canvas.height, canvas.width, 3), np.uint8)
     (x, y), (height, width) = canvas.offset, inside.shape
     for layer, part in zip(whole, (view, fetched), strict=True):
         layer[y : y + height, x : x + width] = np.where(inside[..., None], part, 0)
     everywhere = np.ones(whole.shape[1:3], bool)
-    found = canvas_quality(result.reference, result.target, result.warp)
+    found = canvas_quality((result.pictures[0], result.pictures[1]), result.warp)
     assert found["canvas_psnr_db"] == pytest.approx(psnr(*whole, everywhere), abs=1e-4)
     # windows that hang over the canvas's edge are counted by the one and not by the other
     assert found["canvas_ssim"] == pytest.approx(ssim(*whole, everywhere), abs=0.02)
-    assert found["canvas_psnr_db"] > overlap_quality(result.reference, result.target, result.warp)["overlap_psnr_db"]
+    assert found["canvas_psnr_db"] > overlap_quality(result.pictures, result.warp)["overlap_psnr_db"]
 
 
 def test_folds_are_those_of_the_report(small_result: StitchResult) -> None:
     """Before what turns over was taken for hidden: else no field would have any."""
     report = {**small_result.report, "measured": {**small_result.report["measured"], "folds": 0.125}}
-    nothing = Geometry(
-        small_result.cameras, small_result.matches, small_result.matches, small_result.two_view, ()
-    )
-    found = figures_of(replace(small_result, report=report), nothing, small_result.two_view.F, 0)
+    edge = small_result.edges[0]
+    found = figures_of(replace(small_result, report=report), edge, edge.two_view.F, 0)
     assert found["folds"] == 0.125
 
 
 def test_every_figure_has_a_name_and_digits(small_result: StitchResult) -> None:
-    registration = Geometry(
-        small_result.cameras, small_result.matches, small_result.matches, small_result.two_view, ()
-    )
-    found = figures_of(small_result, registration, small_result.two_view.F, 0)
+    edge = small_result.edges[0]
+    found = figures_of(small_result, edge, edge.two_view.F, 0)
     assert set(found) == {name for name in FIGURES if not name.startswith("truth_")}
     assert all(shown(value, name) for name, value in found.items())
     assert found["projectivity_px"] == found["projectivity_independent_px"], "by the same F the same"
@@ -67,8 +62,8 @@ def test_the_judges_scorer_says_the_same_of_the_overlap(
         [sys.executable, str(score), *pictures, str(tmp_path / "warp.npz")], capture_output=True, text=True, check=True
     )
     theirs = json.loads(said.stdout)
-    ours = overlap_quality(small_result.reference, small_result.target, small_result.warp)
-    ours |= canvas_quality(small_result.reference, small_result.target, small_result.warp)
+    ours = overlap_quality(small_result.pictures, small_result.warp)
+    ours |= canvas_quality(small_result.pictures, small_result.warp)
     assert ours["overlap_psnr_db"] == pytest.approx(theirs["ov_psnr_rgb"], abs=0.01)
     assert ours["overlap_ssim"] == pytest.approx(theirs["ov_ssim_g11"], abs=0.002)
     assert ours["canvas_psnr_db"] == pytest.approx(theirs["canvas_psnr_rgb"], abs=0.01)

@@ -57,7 +57,7 @@ def test_everything_is_there_and_agrees(done: tuple[dict, Path], folder: Path) -
 def test_it_is_what_a_stitch_of_its_own_measures(done: tuple[dict, Path], folder: Path) -> None:
     """Sharing features and geometry changes nothing."""
     figures = done[0]["pairs"][0]["fields"]["slack"]["figures"]
-    alone = stitch(folder / "reference.png", folder / "target.png").report["measured"]
+    alone = stitch((folder / "reference.png", folder / "target.png")).report["measured"]
     for name in ("overlap_psnr_db", "overlap_ssim", "alignment_median_px", "held_out_rms_px", "off_line_mean_px"):
         assert figures[name] == pytest.approx(alone[name], abs=1e-9), name
     assert figures["projectivity_px"] == pytest.approx(alone["projectivity_own_px"], abs=1e-9)
@@ -140,7 +140,7 @@ def test_nothing_is_replaced_unasked_and_nothing_is_left_of_what_was_cancelled(f
 
 @pytest.mark.parametrize(("change", "words"), [
     ({"crop": "inscribed"}, "--crop"), ({"matches": np.zeros((20, 4))}, "--matches belongs to one pair"),
-    ({"ignore_target": np.zeros((5, 5))}, "--ignore-target belongs to one pair"),
+    ({"ignore": (None, np.zeros((5, 5)))}, "--ignore-target belongs to one pair"),
 ])  # fmt: skip
 def test_what_makes_no_sense_for_several_pairs_is_refused(
     folder: Path, tmp_path: Path, change: dict, words: str

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 from edf_stitch.core.choices import FIELDS
-from edf_stitch.core.compare.page import MOST_FIELDS, comparison_page
+from edf_stitch.core.compare.options import COMPARISON
+from edf_stitch.core.compare.page import comparison_page
 from edf_stitch.core.compare.published import published
 from edf_stitch.core.compare.tables import best, comparison_csv, comparison_markdown, medians, shown, timing_markdown
 
@@ -96,7 +97,7 @@ def test_the_page_runs_nothing_and_loads_nothing_from_elsewhere() -> None:
 @pytest.mark.parametrize("fields", [("slack", "rew"), FIELDS])
 def test_every_field_can_be_chosen_to_blink(fields: tuple[str, ...]) -> None:
     page = comparison_page(summary(entry("a", **dict.fromkeys(fields, 20.0)), fields=fields))
-    assert page.count('type="radio"') == len(fields) <= MOST_FIELDS and page.count(" checked>") == 1
+    assert page.count('type="radio"') == len(fields) <= COMPARISON.max_fields and page.count(" checked>") == 1
     assert page.count('alt="reference"') == len(fields)
     for k in range(1, len(fields) + 1):
         assert f"input:nth-of-type({k}):checked ~ .stacks > div:nth-child({k})" in page

@@ -29,7 +29,9 @@ def blend(reference: Layer, target: Layer, mode: str) -> Layer:
     if mode == "multiband":
         side = distance_labels(reference, target)
         return in_bands(reference, target, side, overlap_of(reference, target, hidden))
-    return averaged(reference, target) if mode == "linear" else feathered(reference, target, hidden)
+    if mode == "linear":
+        return averaged(reference, target, reference.alpha > 0)
+    return feathered(reference, target, hidden)
 
 
 def light(seed: int, channels: int = 3) -> np.ndarray:

@@ -8,19 +8,26 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.compose.composition import Decided, composed, pooled_decision
+from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.view import View
+from edf_stitch.core.compose.composition import Composition, Decided, composed, pooled_decision
 from edf_stitch.core.compose.overlap import SAME_TONE
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
+from edf_stitch.core.panorama.reference_map import ReferenceMap
+from edf_stitch.core.panorama.warp import Warp
 from edf_stitch.core.raster.arrays import without_specks
 from edf_stitch.core.raster.log_encoding import log_encode
+from edf_stitch.core.raster.picture_map import PictureMap
 
-from ..panorama.test_visibility import OFFSET, SHAPE, SIDEWAYS, TARGET, points
+from ...pairs import with_map
+from ..field.test_visibility import OFFSET, SHAPE, SIDEWAYS, TARGET, points
 
 FLOATS = (False, False)
 
 
-def pictures(gain: float = 1.0) -> tuple[Layer, Layer, Any]:
+def pictures(gain: float = 1.0) -> tuple[Layer, Layer, Warp]:
     """What the canvas shows of cards before a wall, pasted and fetched by the true warp."""
     warp, hidden = SIDEWAYS.truth()
     rough = cv2.resize(np.random.default_rng(0).random((60, 90, 3)), SHAPE[::-1], interpolation=cv2.INTER_CUBIC)
@@ -31,15 +38,17 @@ def pictures(gain: float = 1.0) -> tuple[Layer, Layer, Any]:
     inside = ((x >= 0) & (y >= 0) & (x < TARGET[0]) & (y < TARGET[1])).astype(np.float32)
     seen = light.copy()
     seen[hidden] = [0.05, 0.4, 0.1]  # of what hides it
-    alpha = warp.inside(TARGET).astype(np.float32)
+    alpha = warp.maps[1].inside().astype(np.float32)
     return Layer(light * inside[..., None], inside), Layer(seen * alpha[..., None] / np.float32(gain), alpha), warp
 
 
-def compose(first: Layer, second: Layer, warp: Any, decided: Decided | None = None, said: list | None = None,
+def compose(first: Layer, second: Layer, warp: Warp, decided: Decided | None = None, said: list | None = None,
             painted: np.ndarray | None = None, keep: bool = False, **options: Any) -> tuple[Layer, Layer, Decided]:
+    """The panorama, the second layer as it was exposed, and what was decided about it."""
     steps = (lambda *step: None) if said is None else (lambda stage, share: said.append(stage))
-    return composed(first, second, warp, SIDEWAYS.view, TARGET, StitchOptions(**options), FLOATS, painted, steps,
-                    decided, keep)  # fmt: skip
+    both = None if decided is None else (decided, decided)  # about the reference there is nothing to decide
+    made = composed((first, second), warp, SIDEWAYS.views, StitchOptions(**options), FLOATS, painted, steps, both, keep)
+    return made.panorama, made.exposed[1], made.decided[1]
 
 
 @pytest.mark.parametrize("options", [{}, {"blend": "feather"}, {"blend": "feather", "seam": "none"}, {"seam": "none"}])
@@ -78,7 +87,7 @@ def test_an_average_hides_nothing() -> None:
     both = (first.alpha > 0) & (second.alpha > 0)
     exposed = found.exposure.applied(second)
     assert np.allclose(out.pixels[both], (first.pixels[both] + exposed.pixels[both]) / 2, atol=1e-6)
-    assert found.from_target is None
+    assert found.chosen is None
 
 
 def test_exposure_is_evened_out_unless_it_is_to_stay() -> None:
@@ -102,8 +111,8 @@ def test_paint_decides() -> None:
     painted = np.zeros(SHAPE, np.int8)
     painted[60:120, 120:200] = 1
     _, _, found = compose(first, second, warp, painted=painted)
-    assert found.from_target is not None
-    assert found.from_target[(painted > 0) & (second.alpha > 0)].all()
+    assert found.chosen is not None
+    assert found.chosen[(painted > 0) & (second.alpha > 0)].all()
 
 
 def test_frames_keep_to_what_was_decided_for_the_clip() -> None:
@@ -127,15 +136,15 @@ def test_a_clips_seam_is_cheap_over_all_its_frames() -> None:
         walker = first.pixels.copy()
         walker[top : top + 40, 230:300] = 0.9
         decisions.append(compose(Layer(walker, first.alpha), second, warp, keep=True)[2])
-    shared = pooled_decision(decisions)
-    assert shared.from_target is not None and shared.cost is not None
+    (shared,) = pooled_decision([[decision] for decision in decisions])
+    assert shared.chosen is not None and shared.cost is not None
     for name in ("cost", "price"):
         assert np.allclose(getattr(shared, name), np.mean([getattr(d, name) for d in decisions], axis=0))
     assert shared.exposure.gain == pytest.approx(np.median([d.exposure.gain for d in decisions], axis=0))
     dropped = compose(first, second, warp)[2]
-    assert dropped.from_target is not None and dropped.cost is dropped.price is dropped.known is None
-    none = pooled_decision([replace(d, known=None, cost=None, box=None, from_target=None) for d in decisions])
-    assert none.from_target is None
+    assert dropped.chosen is not None and dropped.cost is dropped.price is dropped.known is None
+    (none,) = pooled_decision([[replace(d, known=None, cost=None, box=None, chosen=None)] for d in decisions])
+    assert none.chosen is None
 
 
 def test_offsets_are_those_of_the_tests_world() -> None:
@@ -151,10 +160,81 @@ def test_specks_are_of_no_consequence() -> None:
 
 def test_what_turns_over_comes_from_the_reference_and_still_counts_as_a_fold() -> None:
     first, second, warp = pictures()
-    row, column = np.argwhere((first.alpha > 0) & (second.alpha > 0) & warp.inside(TARGET)).mean(axis=0).astype(int)
+    row, column = np.argwhere((first.alpha > 0) & (second.alpha > 0) & warp.maps[1].inside()).mean(axis=0).astype(int)
     spot = np.s_[row - 3 : row + 3, column - 3 : column + 3]
-    map_x = warp.map_x.copy()
+    map_x = warp.maps[1].x.copy()
     map_x[spot] = map_x[spot][:, ::-1]
     _, _, plain = compose(first, second, warp)
-    _, _, found = compose(first, second, replace(warp, map_x=map_x))
+    _, _, found = compose(first, second, with_map(warp, map_x))
     assert found.folds > plain.folds and found.hidden[spot][1:-1, 1:-1].mean() > 0.8
+
+
+# --- three pictures -------------------------------------------------------------------------------------------------
+
+HEIGHT, WIDTH = 100, 420
+SIDE_BY_SIDE = (slice(0, 140), slice(100, 300), slice(260, 420))  # 40 columns are shared by two, none by all
+
+
+def shown_in(columns: slice) -> np.ndarray:
+    """Where a picture of these columns shows something: all but the uppermost rows, which none shows."""
+    shown = np.zeros((HEIGHT, WIDTH), bool)
+    shown[10:, columns] = True
+    return shown
+
+
+def three(lights: Any, columns: tuple[slice, ...] = SIDE_BY_SIDE, **options: Any) -> Composition:
+    """Three pictures of what has no depth, seen from one place: each a part of the canvas, pixel for pixel."""
+    shown = [shown_in(one) for one in columns]
+    layers = [Layer((light * one[..., None]).astype(np.float32), one) for light, one in zip(lights, shown, strict=True)]
+    canvas, camera = Canvas(WIDTH, HEIGHT, (0, 0)), Camera(np.eye(3), (WIDTH, HEIGHT), "test", 0.0)
+    x, y = np.meshgrid(np.arange(WIDTH, dtype=np.float32), np.arange(HEIGHT, dtype=np.float32))
+    same = PictureMap(x, y, camera.size)
+    warp = Warp(canvas, (ReferenceMap(canvas, camera), same, same), np.full((HEIGHT, WIDTH), np.nan, np.float32))
+    view = View(camera, np.eye(3), np.eye(3), np.zeros(3), np.eye(3), np.zeros(3))
+    return composed(layers, warp, (view,) * 3, StitchOptions(**options), (True,) * 3, None, lambda *_: None)
+
+
+def wall() -> np.ndarray:
+    return 0.3 + 0.1 * np.random.default_rng(1).random((HEIGHT, WIDTH, 3))
+
+
+@pytest.mark.parametrize("options", [{}, {"blend": "feather"}, {"seam": "none"}])
+def test_three_pictures_side_by_side_show_all_that_any_of_them_shows(options: dict) -> None:
+    tones = np.float32([0.2, 0.35, 0.5])
+    made = three(tones[:, None, None, None] * np.ones((3, HEIGHT, WIDTH, 3)), exposure=False, **options)
+    shown = np.stack([shown_in(columns) for columns in SIDE_BY_SIDE])
+    assert np.array_equal(made.panorama.alpha > 0, shown.any(axis=0)) and len(made.decided) == len(made.exposed) == 3
+    labels = made.labels
+    assert labels is not None and (labels[~shown.any(axis=0)] == -1).all()
+    for number in range(3):
+        assert (labels[shown[number] & (shown.sum(axis=0) == 1)] == number).all()
+        assert shown[number][labels == number].all()
+    first, second = made.decided[1].chosen, made.decided[2].chosen
+    assert made.decided[0].chosen is None and first is not None and second is not None
+    assert np.array_equal(labels == 2, second) and np.array_equal(labels == 1, first & ~second)
+    assert np.array_equal(labels == 0, shown.any(axis=0) & ~first & ~second)
+    for columns, tone in zip((slice(0, 60), slice(180, 220), slice(340, WIDTH)), tones, strict=True):
+        assert (made.panorama.pixels[10:, columns] == tone).all(), "away from the seams all stays as it is"
+
+
+def test_the_third_pictures_exposure_follows_through_the_second() -> None:
+    """It does not meet the reference: what it is matched to is the second as that was matched."""
+    made = three([wall(), wall() / 2, wall() / 4])
+    for number, gain in ((1, 2.0), (2, 4.0)):
+        assert made.decided[number].exposure.blocks > 0
+        assert np.allclose(made.decided[number].exposure.gain, gain, rtol=1e-4)
+        shown = shown_in(SIDE_BY_SIDE[number])
+        assert np.allclose(made.exposed[number].pixels[shown], wall()[shown], rtol=1e-4)
+    shown = made.panorama.alpha > 0
+    assert np.allclose(made.panorama.pixels[shown], wall()[shown], rtol=1e-3)
+
+
+def test_an_average_of_three_counts_each_alike() -> None:
+    lights = np.random.default_rng(2).random((3, HEIGHT, WIDTH, 3)).astype(np.float32)
+    columns = (slice(0, 300), slice(60, 360), slice(120, WIDTH))
+    made = three(lights, columns, blend="linear", exposure=False)
+    shown = np.stack([shown_in(one) for one in columns])
+    count = shown.sum(axis=0)
+    assert made.labels is None and (count == 3).sum() > 10_000
+    mean = (lights.astype(float) * shown[..., None]).sum(axis=0)[count > 0] / count[count > 0, None]
+    assert np.allclose(made.panorama.pixels[count > 0], mean, atol=1e-6)

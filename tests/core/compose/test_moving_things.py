@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.compose import moving_things
 from edf_stitch.core.compose.moving_things import times
 from edf_stitch.core.compose.overlap import overlap_of
-from edf_stitch.core.compose.seam import find_seam, known_labels, seam_cost, target_price
+from edf_stitch.core.compose.seam import added_price, find_seam, known_labels, seam_cost
 from edf_stitch.core.panorama.layers import Layer
+from edf_stitch.core.raster.picture_map import PictureMap
 
 H, W = 240, 400
 LEFT, RIGHT = slice(0, 280), slice(120, 400)
@@ -31,18 +29,20 @@ def layer(columns: slice, pixels: np.ndarray) -> Layer:
     return Layer(pixels * alpha[..., None], alpha)
 
 
-def warp(**more: Any) -> Any:
+def flat() -> PictureMap:
     x, y = np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32))
-    return SimpleNamespace(**({"map_x": x, "map_y": y, "lazy_confidence": None} | more))
+    return PictureMap(x, y, (W, H))
 
 
-def found(reference: np.ndarray, target: np.ndarray, hidden: np.ndarray = NOTHING, **more: Any) -> np.ndarray:
+def found(
+    reference: np.ndarray, target: np.ndarray, hidden: np.ndarray = NOTHING, picture_map: PictureMap | None = None
+) -> np.ndarray:
     """The times on the whole canvas."""
     first, second = layer(LEFT, reference), layer(RIGHT, target)
     overlap = overlap_of(first, second, hidden)
     assert overlap is not None
     out = np.zeros((H, W), np.int8)
-    out[overlap.box] = times(overlap, warp(**more), first, second, hidden)
+    out[overlap.box] = times(overlap, picture_map or flat(), first, second, hidden)
     return out
 
 
@@ -64,10 +64,10 @@ def test_who_walks_out_of_the_reference_is_seen_once() -> None:
     first, second = layer(LEFT, reference), layer(RIGHT, target)
     overlap = overlap_of(first, second, NOTHING)
     assert overlap is not None
-    known, cost = known_labels(first, second, NOTHING), seam_cost(overlap, warp())
-    when = times(overlap, warp(), first, second, NOTHING)
+    known, cost = known_labels(first, second, NOTHING), seam_cost(overlap, flat(), None)
+    when = times(overlap, flat(), first, second, NOTHING)
     alone, together = (
-        find_seam(known, cost, target_price(overlap, NOTHING, given), overlap.box) for given in (None, when)
+        find_seam(known, cost, added_price(overlap, NOTHING, given), overlap.box) for given in (None, when)
     )
     assert not alone[WALKER].any() and together[WALKER].all()
 
@@ -77,9 +77,9 @@ def test_what_parallax_hides_did_not_move() -> None:
     reference, target = ground(), ground()
     strip = np.s_[90:150, 230:242]
     reference[strip] = 0.02
-    jump = warp().map_x
-    jump[:, 242:] += 12
-    assert not found(reference, target, map_x=jump).any()
+    jump = flat()
+    jump.x[:, 242:] += 12
+    assert not found(reference, target, picture_map=jump).any()
     hidden = NOTHING.copy()
     hidden[strip] = True
     assert not found(reference, target, hidden).any()

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 from edf_stitch.core.compose import seam
 from edf_stitch.core.compose.min_cut import FIRST, FREE, NOWHERE, SECOND
 from edf_stitch.core.compose.overlap import Overlap, overlap_of
-from edf_stitch.core.compose.seam import find_seam, known_labels, seam_cost, target_price
+from edf_stitch.core.compose.seam import added_price, find_seam, known_labels, seam_cost
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.arrays import without_specks
+from edf_stitch.core.raster.picture_map import PictureMap
 
 H, W = 200, 300
 LEFT, RIGHT = slice(0, 220), slice(80, 300)
@@ -29,17 +27,18 @@ def gray() -> np.ndarray:
     return np.full((H, W, 3), 0.3, np.float32)
 
 
-def flat_warp(**more: Any) -> Any:
-    x, y = np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32))
-    return SimpleNamespace(**({"map_x": x, "map_y": y, "lazy_confidence": None} | more))
+def flat_map(x: np.ndarray | None = None) -> PictureMap:
+    """The identity, or with another x."""
+    plain, y = np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32))
+    return PictureMap(plain if x is None else x, y, (W, H))
 
 
-def cut(first: Layer, second: Layer, hidden: np.ndarray = NOTHING, painted: np.ndarray | None = None, **warp: Any
-        ) -> np.ndarray:
+def cut(first: Layer, second: Layer, hidden: np.ndarray = NOTHING, painted: np.ndarray | None = None,
+        x: np.ndarray | None = None, confidence: np.ndarray | None = None) -> np.ndarray:
     overlap = overlap_of(first, second, hidden)
     assert overlap is not None
     known = known_labels(first, second, without_specks(hidden), painted)
-    cost, price = seam_cost(overlap, flat_warp(**warp)), target_price(overlap, hidden)
+    cost, price = seam_cost(overlap, flat_map(x), confidence), added_price(overlap, hidden)
     return find_seam(known, cost, price, overlap.box)
 
 
@@ -114,7 +113,7 @@ def test_the_reference_keeps_what_it_can_at_every_size(size: int) -> None:
         overlap = overlap_of(pair[0], pair[1], nothing)
         assert overlap is not None
         x, y = np.meshgrid(*(np.arange(side, dtype=np.float32) for side in nothing.shape[::-1]))
-        cost, price = seam_cost(overlap, flat_warp(map_x=x, map_y=y)), target_price(overlap, nothing)
+        cost, price = seam_cost(overlap, PictureMap(x, y, nothing.shape[::-1]), None), added_price(overlap, nothing)
         found = (~find_seam(known_labels(*pair, nothing), cost, price, overlap.box)).sum(axis=1)
         assert (np.abs(found - size * kept) <= 3 * size).all()
 
@@ -136,7 +135,7 @@ def test_it_keeps_away_from_edges_of_depth_and_from_doubt() -> None:
     confidence = np.ones((H, W), np.float32)
     confidence[:, 190:] = 0
     other = gray() + np.float32(0.1)
-    for warp, most in (({"map_x": jumpy}, 207), ({"lazy_confidence": confidence}, 192)):
+    for warp, most in (({"x": jumpy}, 207), ({"confidence": confidence}, 192)):
         assert ((~cut(layer(LEFT, gray()), layer(RIGHT, other), **warp)).sum(axis=1) <= most).all()
         alike = cut(layer(LEFT, gray()), layer(RIGHT, gray()), **warp)
         assert ((~alike).sum(axis=1) == 220).all(), "where nothing differs, any place will do"
@@ -182,7 +181,7 @@ def test_cost_is_high_where_tones_or_gradients_differ() -> None:
     other[120:160, 100:150] += random.normal(0, 0.05, (40, 50, 3)).astype(np.float32)
     overlap = overlap_of(layer(LEFT, gray()), layer(RIGHT, other), NOTHING)
     assert isinstance(overlap, Overlap)
-    cost = seam_cost(overlap, flat_warp())
+    cost = seam_cost(overlap, flat_map(), None)
     quiet = cost[:40].mean()
     assert cost.shape == overlap.both.shape and (cost >= 0).all() and (cost <= 1).all()
     assert cost[55:95, 25:65].mean() > 10 * quiet and cost[125:155, 25:65].mean() > 10 * quiet

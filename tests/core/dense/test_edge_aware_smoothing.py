@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from edf_stitch.core.dense import edge_aware_smoothing
 from edf_stitch.core.dense.edge_aware_smoothing import Smoother, edge_weights
+from edf_stitch.core.dense.options import SMOOTHING
 
 
 def halves(shape: tuple[int, int] = (40, 60)) -> np.ndarray:
@@ -59,7 +62,7 @@ def test_a_constant_stays_and_rows_and_columns_are_alike() -> None:
 
 def test_one_pass_solves_the_systems_of_rows_and_of_columns(monkeypatch: pytest.MonkeyPatch) -> None:
     """Against dense matrices."""
-    monkeypatch.setattr(edge_aware_smoothing, "PASSES", 1)
+    monkeypatch.setattr(edge_aware_smoothing, "SMOOTHING", replace(SMOOTHING, passes=1))
     rng = np.random.default_rng(4)
     values = rng.normal(size=(7, 9)).astype(np.float32)
     across, down = (rng.uniform(0, 30, shape).astype(np.float32) for shape in ((7, 8), (6, 9)))

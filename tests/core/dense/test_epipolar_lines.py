@@ -10,7 +10,8 @@ import pytest
 from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.projective import distance_to_line, homogeneous, project
 from edf_stitch.core.cameras.two_view import TwoView
-from edf_stitch.core.dense.epipolar_lines import EVERY, EpipolarLines, SparseMap, coarse_places, in_between
+from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
+from edf_stitch.core.dense.options import LINES
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -216,7 +217,7 @@ def test_what_is_smooth_is_right_between_the_places_it_is_worked_out_at(shape: t
     bent, broken = in_between(shape, work(*coarse_places(shape)))
     assert bent.shape == shape and bent.dtype == np.float32
     np.testing.assert_allclose(bent, whole[..., 0], atol=1e-3)
-    near = 30 - EVERY
+    near = 30 - LINES.coarse_step
     np.testing.assert_allclose(broken[:, :near], whole[:, :near, 1], atol=1e-4)
     assert np.isnan(broken[:, 31:]).all()
 

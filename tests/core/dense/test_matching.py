@@ -12,7 +12,8 @@ import pytest
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.dense import matching
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
-from edf_stitch.core.dense.matching import COARSE_SHARE, FINER, View, in_tones_of, search, search_base
+from edf_stitch.core.dense.matching import View, in_tones_of, search, search_base
+from edf_stitch.core.dense.options import MATCHING
 from edf_stitch.core.field.transfer import target_points
 
 from ..line_scenes import MARGIN, MOTIONS, SIZE, Field, Scene, scene
@@ -71,14 +72,14 @@ def test_tones_follow_the_curve_between_the_pictures() -> None:
     both = np.ones(first.shape, bool)
     both[:, :40] = False
     second[:, :30] = 255
-    first, second = np.rint(first).astype(np.uint8), np.rint(second * FINER).astype(np.uint16)
+    first, second = np.rint(first).astype(np.uint8), np.rint(second * MATCHING.sublevels).astype(np.uint16)
     found = in_tones_of(first, second, both)
     wrong = np.abs(found.astype(int) - first)[both]
     assert wrong.max() <= 4 and wrong.mean() < 0.1, "between the levels of 8 bits, too"
     unknown = in_tones_of(first, second, np.zeros(first.shape, bool))
-    assert np.array_equal(unknown, np.rint(second / FINER)), "nothing is known of the curve"
+    assert np.array_equal(unknown, np.rint(second / MATCHING.sublevels)), "nothing is known of the curve"
     coloured = in_tones_of(
-        np.stack([first, 255 - first], -1), np.stack([second, 255 * FINER - second], -1), both
+        np.stack([first, 255 - first], -1), np.stack([second, 255 * MATCHING.sublevels - second], -1), both
     )  # fmt: skip
     assert np.array_equal(coloured[..., 0], found) and np.abs(coloured[..., 1] - 255.0 + first)[both].max() <= 4
 
@@ -149,7 +150,7 @@ def test_what_noise_hides_at_full_size_is_found_at_half_and_counts_less() -> Non
     noisy = (np.clip(p + rng.normal(0, 25, p.shape), 0, 255).astype(np.uint8) for p in (pair.reference, pair.target))
     along, counts = search(lines, field, *(View.of(p, None, 1.0) for p in noisy), 1.0, REACH)
     guessed = (counts > 0) & (counts < 1) & pair.visible(lines)
-    assert guessed.mean() > 0.05 and np.allclose(counts[guessed], COARSE_SHARE)
+    assert guessed.mean() > 0.05 and np.allclose(counts[guessed], MATCHING.coarse_confidence)
     assert (np.abs(along - pair.truth(lines))[guessed] < 3).mean() > 0.6
 
 
@@ -243,10 +244,10 @@ def test_matching_band_by_band_finds_what_matching_at_once_does(monkeypatch: pyt
         matcher = create(**options)
         return SimpleNamespace(compute=lambda a, b: heights.append(len(a)) or matcher.compute(a, b))
 
-    monkeypatch.setattr(matching, "MOST_COSTS", 50 * 240 * 32)
+    monkeypatch.setattr(matching, "MATCHING", replace(matching.MATCHING, costs_at_once=50 * 240 * 32))
     monkeypatch.setattr(cv2, "StereoSGBM_create", watched)
     banded, sure_too = matching._matched(first, second, 32)
-    assert len(heights) == 8 and max(heights) == 50 + 2 * matching.NEIGHBOURS
+    assert len(heights) == 8 and max(heights) == 50 + 2 * MATCHING.band_margin_rows
     assert (sure != sure_too).mean() < 0.01 and (np.abs(at_once - banded)[sure & sure_too] > 0.5).mean() < 0.002
 
 

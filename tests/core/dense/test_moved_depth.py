@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
-from edf_stitch.core.dense.moved_depth import RIM, build_refinement
+from edf_stitch.core.dense.moved_depth import build_refinement
+from edf_stitch.core.dense.options import BEYOND
 from edf_stitch.core.field.refined_depth import RefinedDepth
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.raster.pull_push import carried_on
@@ -87,7 +88,8 @@ def test_on_its_nodes_it_does_what_the_moves_do(made: tuple) -> None:
     more, shift, sure = relief.at(x, y)
     sent = target_points(pair.view, lines.ideal, lines.inverse_depth + more.astype(float)) + lines.shift + shift
     meant = np.stack(lines.target(along, across), axis=-1)
-    inner = np.s_[RIM // 2 : -(RIM // 2), RIM // 2 : -(RIM // 2)]
+    rim = BEYOND.confidence_erosion // 2
+    inner = np.s_[rim:-rim, rim:-rim]
     np.testing.assert_allclose(sent[inner], meant[inner], atol=0.05)
     assert np.abs(sent - meant).max() < 1, "the last nodes before the border are what the others say"
     np.testing.assert_allclose(sure, 0.7, atol=1e-6)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
 from edf_stitch.core.dense.matching import View
-from edf_stitch.core.dense.refine import _guide, _overlap, _plain, _there
+from edf_stitch.core.dense.refine import _guide, _in_both, _overlap, _plain
+from edf_stitch.core.field.folding import folds, turning
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.panorama.folding import folds, turning
 from edf_stitch.core.pictures.picture import Picture, load_picture, picture_from_array
 from edf_stitch.core.pipeline import StitchResult, stitch
 
@@ -25,7 +25,7 @@ DATA = Path(pytest.importorskip("skimage").__file__).parent / "data"
 def motorcycle() -> tuple[StitchResult, StitchResult]:
     """Scikit-image's pair (Middlebury 2014), without and with dense refinement; nothing told of the cameras."""
     pictures = [load_picture(DATA / f"motorcycle_{side}.png").view for side in ("left", "right")]
-    sparse, dense = (stitch(*pictures, StitchOptions(dense=dense, measure=False)) for dense in (False, True))
+    sparse, dense = (stitch(pictures, StitchOptions(dense=dense, measure=False)) for dense in (False, True))
     return sparse, dense
 
 
@@ -43,7 +43,7 @@ def errors(result: StitchResult) -> np.ndarray:
     visible = known & (there >= 0) & (disparity >= nearest[y.astype(int), column] - 1)
     left, top = result.warp.canvas.offset
     box = np.s_[top : top + height, left : left + width]
-    return np.hypot(result.warp.map_x[box] - there, result.warp.map_y[box] - y)[visible]
+    return np.hypot(result.warp.maps[1].x[box] - there, result.warp.maps[1].y[box] - y)[visible]
 
 
 def test_motorcycle_within_half_a_pixel(motorcycle: tuple[StitchResult, StitchResult]) -> None:
@@ -53,14 +53,14 @@ def test_motorcycle_within_half_a_pixel(motorcycle: tuple[StitchResult, StitchRe
 
 def test_the_field_stays_exact_on_its_lines_and_does_not_fold(motorcycle: tuple[StitchResult, StitchResult]) -> None:
     _, dense = motorcycle
-    view, warp = dense.two_view, dense.warp
+    view, warp = dense.views[1], dense.warp
     assert warp.confidence is not None and 0 <= warp.confidence.min() and warp.confidence.max() <= 1
-    assert folds(turning(warp, dense.cameras[1].size)) < 0.1
+    assert folds(turning(warp.maps[1])) < 0.1
     x = np.stack(np.meshgrid(np.arange(741.0), np.arange(500.0), [1.0]), axis=-1)[:, :, 0]
     left, top = warp.canvas.offset
     box = np.s_[top : top + 500, left : left + 741]
     ray = x @ view.H_inf.T + warp.inverse_depth[box][..., None] * view.e_prime
-    off = np.hypot(ray[..., 0] / ray[..., 2] - warp.map_x[box], ray[..., 1] / ray[..., 2] - warp.map_y[box])
+    off = np.hypot(ray[..., 0] / ray[..., 2] - warp.maps[1].x[box], ray[..., 1] / ray[..., 2] - warp.maps[1].y[box])
     assert np.nanmax(off) < 3.0, "what leaves the lines is slack, and small"
 
 
@@ -158,7 +158,7 @@ def test_nodes_that_either_picture_does_not_show_are_not_there(by_hand: SimpleNa
     clear = np.abs(y - 139) > 0.01  # on the last line rounding decides
 
     def there(move: float, alpha: np.ndarray | None = None, alpha_too: np.ndarray | None = None) -> np.ndarray:
-        return _there(lines, zero + move, zero, pictures(alpha, alpha_too))[clear]
+        return _in_both(lines, zero + move, zero, pictures(alpha, alpha_too))[clear]
 
     assert lines.direction[0, 0, 0] > 0
     for move in (0.0, 5.0):

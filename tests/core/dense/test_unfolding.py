@@ -7,13 +7,13 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core.cameras.projective import homogeneous
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
-from edf_stitch.core.dense.unfolding import _areas, _hidden, _where_little_moved, unfolded
-from edf_stitch.core.panorama.canvas import Canvas
-from edf_stitch.core.panorama.folding import jacobian
-from edf_stitch.core.panorama.visibility import occluded
-from edf_stitch.core.panorama.warp import Warp
+from edf_stitch.core.dense.unfolding import _areas, _hidden, _without_large_moves, unfolded
+from edf_stitch.core.field.folding import jacobian
+from edf_stitch.core.field.visibility import nearness_of, occluded
+from edf_stitch.core.raster.picture_map import PictureMap
 
 from ..line_scenes import Field
 
@@ -45,8 +45,11 @@ def noisy(view: TwoView, lines: EpipolarLines, along: np.ndarray) -> int:
 
 def hidden(view: TwoView, lines: EpipolarLines, along: np.ndarray) -> np.ndarray:
     depth = (lines.inverse_depth + along * lines.depth_per_px).astype(np.float32)
-    warp = Warp(Canvas(*SIZE, (0, 0)), *lines.target(along), depth)
-    return occluded(warp, view, SIZE)
+    x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
+    infinite = (homogeneous(np.stack([x, y], axis=-1).astype(float)) @ view.H_inf[2]).astype(np.float32)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        nearness = nearness_of(depth, depth * np.float32(view.e_prime[2]) + infinite)
+    return occluded(PictureMap(*lines.target(along), SIZE), nearness)
 
 
 def noise(shape: tuple[int, int], much: float, sigma: float) -> np.ndarray:
@@ -158,6 +161,6 @@ def test_patches_that_smoothing_moved_far_are_put_back() -> None:
     along = start.copy()
     along[5:15, 5:15] += 2.0
     along[25:35, 20:40] += np.where(np.arange(20) < 10, 1.0, 9.0)
-    found = _where_little_moved(along, start)
+    found = _without_large_moves(along, start)
     assert np.array_equal(found[:20], along[:20]) and np.array_equal(found[20:], start[20:])
-    assert np.array_equal(_where_little_moved(along[:20], start[:20]), along[:20])
+    assert np.array_equal(_without_large_moves(along[:20], start[:20]), along[:20])

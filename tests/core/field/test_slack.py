@@ -12,8 +12,10 @@ from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import distance_to_line
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.cameras.view import views_of
+from edf_stitch.core.field.options import STRICT
 from edf_stitch.core.field.slack import SlackField, _on_matches, fit_slack
-from edf_stitch.core.field.strict import CENTRE_BUDGET, StrictField, fit_strict
+from edf_stitch.core.field.strict import StrictField, fit_strict
 from edf_stitch.core.field.transfer import inverse_depths, target_points
 from edf_stitch.core.fields import fit_field
 from edf_stitch.core.panorama.canvas import Canvas
@@ -83,7 +85,7 @@ def test_the_whole_overlap_is_mended_not_its_matches_only(distorted: tuple[Stric
     strict, slack = distorted
     warp, points, both = overlap_of(slack)
     true = target_points(SIDE, points, curved(points)) + bent(points)
-    error = np.linalg.norm(np.stack([warp.map_x, warp.map_y], axis=-1) - true, axis=-1)[both]
+    error = np.linalg.norm(np.stack([warp.maps[1].x, warp.maps[1].y], axis=-1) - true, axis=-1)[both]
     assert both.sum() > 300_000 and np.median(error) < 0.03
     assert np.percentile(error, 95) < 0.2
 
@@ -164,10 +166,10 @@ def test_heavy_matches_count_for_more() -> None:
 
 def overlap_of(field: StrictField | SlackField) -> tuple[Warp, np.ndarray, np.ndarray]:
     """The map around the reference, its points (…, 2), and where both pictures show something."""
-    warp = build_map(field, SIDE, Canvas(1240, 940, (20, 20)), *CAMERAS)
+    warp = build_map(field, views_of(SIDE, CAMERAS), Canvas(1240, 940, (20, 20)))
     points = np.stack(np.meshgrid(np.arange(-20.0, 1220), np.arange(-20.0, 920)), axis=-1)
     within = (points >= 0).all(axis=-1) & (points <= np.array(SIZE) - 1).all(axis=-1)
-    return warp, points, within & warp.inside(SIZE)
+    return warp, points, within & warp.maps[1].inside()
 
 
 def test_far_outside_the_overlap_nothing_of_it_is_left(distorted: tuple[StrictField, SlackField]) -> None:
@@ -208,7 +210,7 @@ def test_the_map_is_the_strict_one_and_slack_on_top(distorted: tuple[StrictField
     """x' = π(H_inf p + d e') + s(p) with the inverse depth that the warp exports."""
     strict, slack = distorted
     warp, points, both = overlap_of(slack)
-    mapped = np.stack([warp.map_x, warp.map_y], axis=-1).astype(float)
+    mapped = np.stack([warp.maps[1].x, warp.maps[1].y], axis=-1).astype(float)
     base = target_points(SIDE, points, warp.inverse_depth.astype(float))
     inner = cv2.erode(both.astype(np.uint8), np.ones((41, 41), np.uint8))
     probe = tuple(part[::7] for part in np.nonzero(inner))
@@ -220,17 +222,18 @@ def test_the_map_is_the_strict_one_and_slack_on_top(distorted: tuple[StrictField
     assert distance_to_line(SIDE.F, points[probe], mapped[probe] - s).max() < 0.005
     other = overlap_of(strict)[0]
     assert 1000 * np.abs(other.inverse_depth - warp.inverse_depth).max() < 1e-3
-    seen = np.isfinite(other.map_x)
-    assert distance_to_line(SIDE.F, points[seen], np.stack([other.map_x, other.map_y], axis=-1)[seen]).max() < 1e-3
+    mapped = np.stack([other.maps[1].x, other.maps[1].y], axis=-1)
+    seen = np.isfinite(mapped[..., 0])
+    assert distance_to_line(SIDE.F, points[seen], mapped[seen]).max() < 1e-3
 
 
 def test_outside_the_map_returns_to_the_lines(distorted: tuple[StrictField, SlackField]) -> None:
     _, slack = distorted
-    warp = build_map(slack, SIDE, Canvas(900, 900, (-1200 - int(slack.fit.fade_px) - 60, 0)), *CAMERAS)
+    warp = build_map(slack, views_of(SIDE, CAMERAS), Canvas(900, 900, (-1200 - int(slack.fit.fade_px) - 60, 0)))
     points = np.stack(np.meshgrid(np.arange(900.0), np.arange(900.0)), axis=-1) - warp.canvas.offset
-    seen = np.isfinite(warp.map_x)
+    seen = np.isfinite(warp.maps[1].x)
     assert seen.mean() > 0.5
-    mapped = np.stack([warp.map_x, warp.map_y], axis=-1)[seen].astype(float)
+    mapped = np.stack([warp.maps[1].x, warp.maps[1].y], axis=-1)[seen].astype(float)
     rounding = np.spacing(np.abs(mapped).max().astype(np.float32))
     assert distance_to_line(SIDE.F, points[seen], mapped).max() < 1e-3 + rounding
 
@@ -242,13 +245,13 @@ def test_slack_is_in_ideal_pixels_of_a_lens_that_bends() -> None:
     camera = replace(CAMERAS[0], distortion=np.array([-0.1, 0.02, 0, 0, 0]))
     camera_prime = replace(CAMERAS[1], distortion=np.array([0.05, 0, 0.001, 0, 0]))
     left, top = -600, -230
-    warp = build_map(slack, SIDE, Canvas(420, 500, (left, top)), camera, camera_prime)
+    warp = build_map(slack, views_of(SIDE, (camera, camera_prime)), Canvas(420, 500, (left, top)))
     raw = np.stack(np.meshgrid(np.arange(620.0, 1000, 9), np.arange(250.0, 700, 9)), axis=-1).reshape(-1, 2)
     column, row = (raw + (left, top)).astype(int).T
     expected = distort(slack.predict(undistort(raw, camera)), camera_prime)
     inside = ((expected > 0) & (expected < np.array(SIZE) - 1)).all(axis=1)
     assert inside.mean() > 0.5
-    mapped = np.column_stack([warp.map_x[row, column], warp.map_y[row, column]])
+    mapped = np.column_stack([warp.maps[1].x[row, column], warp.maps[1].y[row, column]])
     assert np.abs(mapped - expected)[inside].max() < 0.02
 
 
@@ -274,7 +277,7 @@ def test_without_parallax_too_there_are_at_most_a_thousand_centres() -> None:
     view = without_parallax()
     x, y, _ = some_matches(view, planar, 2000)
     field = fit_field("slack", "plane", view, Matches(x, y), SIZE, SIZE)
-    assert isinstance(field, SlackField) and len(field.spline.centres) <= CENTRE_BUDGET
+    assert isinstance(field, SlackField) and len(field.spline.centres) <= STRICT.max_centres
 
 
 @pytest.fixture(scope="module")

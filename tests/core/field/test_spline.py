@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.field.spline import SLAB, SmoothingProblem, ThinPlateSpline, kernel, spread_points
+from edf_stitch.core.field.options import SPLINE
+from edf_stitch.core.field.spline import SmoothingProblem, ThinPlateSpline, kernel, spread_points
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
@@ -205,7 +206,7 @@ def test_slabs_make_no_difference() -> None:
     points = some_points(5, 1000)
     spline, _ = SmoothingProblem.build(points, np.ones(1000), UNIT).solve(wavy(points), 1e-3)
     xs, ys = np.linspace(0, WIDTH, 130), np.linspace(0, HEIGHT, 45)
-    assert len(xs) * len(ys) * 1000 > 2 * SLAB  # several slabs of both kinds
+    assert len(xs) * len(ys) * 1000 > 2 * SPLINE.kernel_values_at_once  # several slabs of both kinds
     whole = spline.on_axes(xs, ys)
     grid = np.stack(np.meshgrid(xs, ys), axis=-1)
     single = np.array([spline.at(row) for row in grid])
@@ -308,7 +309,7 @@ def test_slabs_make_no_difference_to_several_functions() -> None:
     values = np.column_stack([wavy(points), -points[:, 1] / 500])
     spline, _ = SmoothingProblem.build(points, np.ones(1000), UNIT).solve(values, 1e-3)
     xs, ys = np.linspace(0, WIDTH, 90), np.linspace(0, HEIGHT, 50)
-    assert len(xs) * len(ys) * 1000 > 2 * SLAB
+    assert len(xs) * len(ys) * 1000 > 2 * SPLINE.kernel_values_at_once
     grid = np.stack(np.meshgrid(xs, ys), axis=-1)
     assert np.allclose(spline.on_axes(xs, ys), spline.at(grid.reshape(-1, 2)).reshape(50, 90, 2), atol=1e-4)
 

@@ -17,16 +17,10 @@ from edf_stitch.core.cameras.projective import (
     rotation_from_vector,
 )
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.field.options import STRICT
 from edf_stitch.core.field.plane import fit_plane
 from edf_stitch.core.field.spline import SmoothingProblem
-from edf_stitch.core.field.strict import (
-    CENTRE_BUDGET,
-    MIN_CENTRES,
-    SMOOTHING_LADDER,
-    StrictField,
-    _supported,
-    fit_strict,
-)
+from edf_stitch.core.field.strict import StrictField, _supported, fit_strict
 from edf_stitch.core.field.transfer import inverse_depths, target_points
 from edf_stitch.core.raster.grid import Grid
 from edf_stitch.core.system.errors import DegenerateGeometry
@@ -261,7 +255,7 @@ def test_a_noisy_curved_scene_is_followed_within_its_noise(noise: float) -> None
     assert noise * 0.9 < field.fit.held_out_px < 1.3 * noise
     assert field.fit.residual_px < field.fit.held_out_px
     assert field.fit.inliers_used.mean() > 0.97
-    assert field.fit.smoothing in SMOOTHING_LADDER
+    assert field.fit.smoothing in STRICT.smoothing_ladder
 
 
 def test_what_is_said_of_the_fit_is_so() -> None:
@@ -293,7 +287,7 @@ def test_at_most_a_thousand_centres_spread_over_the_picture() -> None:
     x, y, _ = some_matches(SIDE, curved, 3000, 0.5)
     field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     used = field.fit.inliers_used
-    assert 0.4 * CENTRE_BUDGET < used.sum() <= CENTRE_BUDGET and used.shape == (3000,)
+    assert 0.4 * STRICT.max_centres < used.sum() <= STRICT.max_centres and used.shape == (3000,)
     kept = x[used]
     counts = np.histogram2d(kept[:, 0], kept[:, 1], bins=(3, 3), range=((350, 1200), (0, 900)))[0]
     assert counts.min() > 0.5 * counts.mean()
@@ -372,7 +366,7 @@ def test_given_matches_are_all_kept_whatever_they_say() -> None:
 def test_more_given_matches_than_centres_are_thinned() -> None:
     x, y, _ = some_matches(SIDE, curved, 1500)
     kept = fit_strict(SIDE, Matches(x, y, given=True), SIZE, SIZE).fit.inliers_used
-    assert 0.4 * CENTRE_BUDGET < kept.sum() <= CENTRE_BUDGET
+    assert 0.4 * STRICT.max_centres < kept.sum() <= STRICT.max_centres
 
 
 def test_a_match_of_more_weight_pulls_harder() -> None:
@@ -467,8 +461,8 @@ def test_coarser_pictures_are_judged_in_their_own_pixels() -> None:
 
 
 def test_too_few_depths_are_refused() -> None:
-    x, y, _ = some_matches(SIDE, planar, MIN_CENTRES - 1)
-    with pytest.raises(DegenerateGeometry, match=f"only {MIN_CENTRES - 1} of {MIN_CENTRES - 1}"):
+    x, y, _ = some_matches(SIDE, planar, STRICT.min_centres - 1)
+    with pytest.raises(DegenerateGeometry, match=f"only {STRICT.min_centres - 1} of {STRICT.min_centres - 1}"):
         fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     forward = view(np.eye(3), (0, 0, -1))
     centre = np.array([599.5, 449.5])
@@ -477,7 +471,7 @@ def test_too_few_depths_are_refused() -> None:
         fit_strict(forward, Matches(centre + away, centre - 1.5 * away), SIZE, SIZE)
 
 
-@pytest.mark.parametrize("count", [MIN_CENTRES, MIN_CENTRES + 2])
+@pytest.mark.parametrize("count", [STRICT.min_centres, STRICT.min_centres + 2])
 def test_a_handful_of_matches_makes_a_field(count: int) -> None:
     x, y, _ = some_matches(SIDE, planar, count, 0.2, seed=6)
     field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)

@@ -12,15 +12,16 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.choices import FIELDS
 from edf_stitch.core.field.field import Field
-from edf_stitch.core.field.strict import MIN_CENTRES
+from edf_stitch.core.field.options import STRICT
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.fields import fit_field
 from edf_stitch.core.measure.held_out import HeldOut, held_out
 from edf_stitch.core.measure.metrics import CoverageSamples, look_up
 from edf_stitch.core.panorama.warp import build_warp
-from edf_stitch.core.rivals.homography import LEAST_MATCHES
+from edf_stitch.core.rivals.options import HOMOGRAPHY
 from edf_stitch.core.system.errors import DegenerateGeometry
 
 SIZE = (400, 300)
@@ -177,7 +178,7 @@ def test_outliers_that_the_whole_fit_dropped_take_no_part(view: TwoView) -> None
 @pytest.mark.parametrize("name", FIELDS)
 def test_too_few_or_badly_placed_matches_give_nan_without_a_word(name: str, view: TwoView) -> None:
     # APAP begins with the strict field, and so with more matches than its own homographies need: it is never short
-    few = matches_of(view, planar, LEAST_MATCHES if name == "homography" else MIN_CENTRES)
+    few = matches_of(view, planar, HOMOGRAPHY.min_matches if name == "homography" else STRICT.min_centres)
     # 38 on one line, 8 off it: without the strip only a line is left
     x = np.concatenate([np.column_stack([np.full(38, 100.0), np.linspace(20, 280, 38)]),
                         np.column_stack([np.full(8, 300.0), np.linspace(20, 280, 8)])])  # fmt: skip
@@ -198,7 +199,7 @@ def test_a_field_sends_points_where_its_map_does(name: str, view: TwoView, camer
     matches = matches_of(view, curved, 300, noise=0.3)
     field = fitted(name, view, matches)
     points = matches.x[(np.abs(matches.x - (250, 150)) < (100, 100)).all(axis=1)]
-    shown = look_up(build_warp(field, field.two_view, camera, camera), points)
+    shown = look_up(build_warp(field, views_of(field.two_view, (camera, camera))), points)
     assert len(points) > 50 and np.abs(field.predict(points) - shown).max() < 0.05
 
 
@@ -230,7 +231,7 @@ def test_matches_on_a_line_refit_nothing(view: TwoView) -> None:
     with pytest.raises(DegenerateGeometry, match="on a line"):
         field.refitted(lined)
     with pytest.raises(DegenerateGeometry):
-        field.refitted(matches.subset(np.arange(MIN_CENTRES - 1)))
+        field.refitted(matches.subset(np.arange(STRICT.min_centres - 1)))
 
 
 @pytest.mark.parametrize("name", ["strict", "slack"])

@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.lens import distort
+from edf_stitch.core.cameras.view import views_of
+from edf_stitch.core.field.folding import folds, turning
 from edf_stitch.core.measure.metrics import (
     CoverageSamples,
     appearance,
@@ -21,11 +23,12 @@ from edf_stitch.core.measure.metrics import (
     ssim,
 )
 from edf_stitch.core.panorama.canvas import Canvas
-from edf_stitch.core.panorama.folding import folds, turning
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.warp import Warp, build_warp
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.raster.colour import decode, encode
+
+from ...pairs import warp_of, with_map
 
 
 def two_pictures(channels: int = 3) -> tuple[np.ndarray, np.ndarray]:
@@ -46,7 +49,7 @@ def blob() -> np.ndarray:
 
 def map_of(x: np.ndarray, y: np.ndarray, offset: tuple[int, int] = (0, 0)) -> Warp:
     height, width = x.shape
-    return Warp(Canvas(width, height, offset), x.astype(np.float32), y.astype(np.float32), np.zeros(x.shape, "f4"))
+    return warp_of(Canvas(width, height, offset), x, y)
 
 
 def identity(width: int, height: int, offset: tuple[int, int] = (0, 0)) -> Warp:
@@ -103,17 +106,18 @@ def test_a_mask_without_room_for_a_window() -> None:
 def test_a_fold_is_found_and_a_bend_is_not() -> None:
     y, x = np.mgrid[:80, :200].astype(float)
     bend = map_of(x + 9 * np.sin(x / 10) * np.cos(y / 30), y + 0.2 * x)
-    assert folds(turning(bend, (200, 80))) == 0, "slope 0.1 at least"
-    assert folds(turning(map_of(199 - x, y), (200, 80))) == 0, "a mirror turns everything over: not a fold"
+    assert folds(turning(bend.maps[1].arrays())) == 0, "slope 0.1 at least"
+    assert folds(turning(map_of(199 - x, y).maps[1].arrays())) == 0, "a mirror turns everything over: not a fold"
     there_and_back = np.where(x < 120, x, 240 - x)  # the last 80 of 200 columns run backwards
-    assert folds(turning(map_of(there_and_back, y), (200, 80))) == pytest.approx(80 / 199, abs=2 / 199)
-    assert folds(turning(map_of(np.where(x < 120, x, 2 * x), y), (120, 80))) == 0
+    assert folds(turning(map_of(there_and_back, y).maps[1].arrays())) == pytest.approx(80 / 199, abs=2 / 199)
+    within = warp_of(Canvas(200, 80, (0, 0)), np.where(x < 120, x, 2 * x), y, size=(120, 80))
+    assert folds(turning(within.maps[1].arrays())) == 0
     beyond = np.where(x < 120, x, -1 - x)
-    assert folds(turning(map_of(beyond, y), (200, 80))) < 0.02, "what falls outside the target does not count"
-    assert folds(turning(map_of(np.full_like(x, np.nan), y), (200, 80))) == 0
+    assert folds(turning(map_of(beyond, y).maps[1].arrays())) < 0.02, "what falls outside the target does not count"
+    assert folds(turning(map_of(np.full_like(x, np.nan), y).maps[1].arrays())) == 0
     hidden = np.zeros((80, 200), bool)
     hidden[:, 123:] = True
-    assert folds(turning(map_of(there_and_back, y), (200, 80)), hidden) == 0, "nor what is hidden, nor its rim"
+    assert folds(turning(map_of(there_and_back, y).maps[1].arrays()), hidden) == 0, "nor what is hidden, nor its rim"
 
 
 def curved_map() -> tuple[Warp, object]:
@@ -139,13 +143,13 @@ def test_at_pixels_the_map_is_itself_up_to_the_last_one() -> None:
     y, x = np.mgrid[:50, :70]
     points = np.column_stack([x.ravel() - 12, y.ravel() - 7]).astype(float)
     found = look_up(warp, points)
-    assert np.array_equal(found, np.column_stack([warp.map_x.ravel(), warp.map_y.ravel()]).astype(float))
+    assert np.array_equal(found, np.column_stack([warp.maps[1].x.ravel(), warp.maps[1].y.ravel()]).astype(float))
 
 
 def test_outside_the_canvas_and_behind_the_camera_nothing_is_looked_up() -> None:
     warp, _ = curved_map()
     assert np.isnan(look_up(warp, np.array([[-14.0, 0], [0, 44], [60, 0], [1e7, 0]]))).all()
-    warp.map_x[20:24, 30:34] = np.nan
+    warp.maps[1].x[20:24, 30:34] = np.nan
     assert np.isnan(look_up(warp, np.array([[18.5 + 1, 14.5]]))[0, 0])
     assert look_up(warp, np.empty((0, 2))).shape == (0, 2)
 
@@ -155,27 +159,27 @@ def test_a_canvas_beyond_opencvs_32767_pixels(turned: bool) -> None:
     warp = identity(40_000, 6) if not turned else identity(6, 40_000)
     points = np.array([[1.0, 2], [35_000.5, 3.5]])[:, :: -1 if turned else 1]
     assert np.abs(look_up(warp, points) - points).max() < 0.01
-    picture = picture_from_array(np.zeros((*warp.map_x.shape, 3), np.uint8))
-    assert overlap_quality(picture, picture, warp)["overlap_px"] == 240_000
+    picture = picture_from_array(np.zeros((*warp.maps[1].x.shape, 3), np.uint8))
+    assert overlap_quality((picture, picture), warp)["overlap_px"] == 240_000
 
 
 def test_the_quality_of_an_overlap() -> None:
     a, b = two_pictures()
     first, second = picture_from_array(a), picture_from_array(b)
     canvas = identity(150, 100, offset=(10, 4))
-    assert overlap_quality(first, first, canvas) == {
+    assert overlap_quality((first, first), canvas) == {
         "overlap_px": 90 * 120, "overlap_psnr_db": float("inf"), "overlap_ssim": pytest.approx(1)}
     whole = np.ones((90, 120), bool)
-    found = overlap_quality(first, second, canvas)
+    found = overlap_quality((first, second), canvas)
     assert found == {"overlap_px": 90 * 120, "overlap_psnr_db": pytest.approx(psnr(a, b, whole)),
                      "overlap_ssim": pytest.approx(ssim(a, b, whole))}  # fmt: skip
-    moved = replace(canvas, map_x=canvas.map_x + 30)  # the target lies 30 px further left
-    found = overlap_quality(first, picture_from_array(np.roll(b, 30, axis=1)), moved)
+    moved = with_map(canvas, canvas.maps[1].x + 30)  # the target lies 30 px further left
+    found = overlap_quality((first, picture_from_array(np.roll(b, 30, axis=1))), moved)
     mask = whole.copy()
     mask[:, 90:] = False
     assert found["overlap_px"] == mask.sum() and found["overlap_psnr_db"] == pytest.approx(psnr(a, b, mask))
     gray = two_pictures(1)
-    found = overlap_quality(*(picture_from_array(one) for one in gray), canvas)
+    found = overlap_quality([picture_from_array(one) for one in gray], canvas)
     assert found["overlap_psnr_db"] == pytest.approx(psnr(*gray, whole))
 
 
@@ -185,7 +189,7 @@ def test_what_is_transparent_is_not_compared(which: str) -> None:
     hidden = np.dstack([a if which == "reference" else b, np.full((90, 120), 255, np.uint8)])
     hidden[20:60, 30:70] = (0, 255, 0, 0)
     pictures = [picture_from_array(hidden if role == which else one) for role, one in (("reference", a), ("target", b))]
-    found = overlap_quality(*pictures, identity(120, 90))
+    found = overlap_quality(pictures, identity(120, 90))
     mask = np.ones((90, 120), bool)
     mask[20:60, 30:70] = False
     assert found["overlap_px"] == mask.sum()
@@ -195,16 +199,16 @@ def test_what_is_transparent_is_not_compared(which: str) -> None:
 def test_without_an_overlap_there_is_no_quality() -> None:
     picture = picture_from_array(two_pictures()[0])
     far = identity(120, 90)
-    far = replace(far, map_x=far.map_x + 1000)
-    found = overlap_quality(picture, picture, far)
+    far = with_map(far, far.maps[1].x + 1000)
+    found = overlap_quality((picture, picture), far)
     assert found["overlap_px"] == 0 and np.isnan(found["overlap_psnr_db"]) and np.isnan(found["overlap_ssim"])
 
 
 def test_canvas_points_that_show_the_target(by_hand: SimpleNamespace) -> None:
     cameras = (by_hand.camera((120, 90), 100.0), by_hand.camera((100, 80), 100.0))
     warp = identity(200, 150, offset=(30, 20))
-    warp = replace(warp, map_x=warp.map_x - 50, map_y=warp.map_y + 5)  # reference columns 50-149, rows −5 to 74
-    warp.map_x[70:, :] = np.nan  # reference rows from 50 on
+    warp = with_map(warp, warp.maps[1].x - 50, warp.maps[1].y + 5)  # reference columns 50-149, rows −5 to 74
+    warp.maps[1].x[70:, :] = np.nan  # reference rows from 50 on
     every = coverage_samples(warp, cameras, samples=10**6)
     x, y = np.meshgrid(np.arange(50, 150), np.arange(-5, 50))
     assert np.array_equal(every.points, np.column_stack([x.ravel(), y.ravel()]))
@@ -240,9 +244,9 @@ def test_a_map_on_its_lines_is_off_by_nothing_also_through_a_lens(
 ) -> None:
     camera = by_hand.camera((400, 300), 380.0, distortion)
     view = by_hand.view(camera, camera, (2.0, -14, 3), (1, 0.1, 0.15))
-    warp = build_warp(by_hand.plane_field(6e-5, -1e-4, 0.12), view, camera, camera)
+    warp = build_warp(by_hand.plane_field(6e-5, -1e-4, 0.12), views_of(view, (camera, camera)))
     assert off_line_mean(view.F, coverage_samples(warp, (camera, camera))) < 1e-3
-    aside = replace(warp, map_y=warp.map_y + np.float32(0.5))
+    aside = with_map(warp, y=warp.maps[1].y + np.float32(0.5))
     assert off_line_mean(view.F, coverage_samples(aside, (camera, camera))) == pytest.approx(0.5, rel=0.25)
 
 
@@ -259,25 +263,25 @@ def two_layers(shift: int = 0) -> tuple[Layer, Layer]:
 
 
 def cut_at(first: Layer, second: Layer, column: int) -> tuple[Layer, np.ndarray]:
-    side = np.zeros(first.alpha.shape, bool)
-    side[:, column:] = True
-    return Layer(np.where(side[..., None], second.pixels, first.pixels), np.ones_like(first.alpha)), side
+    side = np.zeros(first.alpha.shape, np.int16)
+    side[:, column:] = 1
+    return Layer(np.where(side[..., None] == 1, second.pixels, first.pixels), np.ones_like(first.alpha)), side
 
 
 def test_a_panorama_cut_from_its_pictures_is_faithful_to_them() -> None:
     first, second = two_layers(shift=6)
     whole, side = cut_at(first, second, 100)
-    seen = appearance(whole, first, second, side, (False, False))
+    seen = appearance(whole, (first, second), side, False)
     assert seen["source_fidelity_mean"] > 0.95 and seen["source_fidelity_p5"] > 0.4
-    same = appearance(first, first, first, side, (False, False))
+    same = appearance(first, (first, first), side, False)
     assert same["source_fidelity_p5"] == pytest.approx(1, abs=1e-6) and same["seam_visibility"] == 0
 
 
 def test_a_ghost_is_faithful_to_neither() -> None:
     first, second = two_layers(shift=6)
     ghost = Layer((first.pixels + second.pixels) / 2, np.ones_like(first.alpha))
-    assert appearance(ghost, first, second, None, (False, False))["source_fidelity_mean"] < 0.9
-    assert math.isnan(appearance(ghost, first, second, None, (False, False))["seam_visibility"])
+    assert appearance(ghost, (first, second), None, False)["source_fidelity_mean"] < 0.9
+    assert math.isnan(appearance(ghost, (first, second), None, False)["seam_visibility"])
 
 
 def test_a_seam_shows_by_as_many_levels_as_the_pictures_differ() -> None:
@@ -285,7 +289,7 @@ def test_a_seam_shows_by_as_many_levels_as_the_pictures_differ() -> None:
     first, _ = two_layers()
     brighter = np.full_like(flat, float(decode(encode(flat, 8)[:1, :1] + np.uint8(5))[0, 0, 0]))
     whole, side = cut_at(Layer(flat, first.alpha), Layer(brighter, first.alpha), 100)
-    seen = appearance(whole, Layer(flat, first.alpha), Layer(brighter, first.alpha), side, (False, False))
+    seen = appearance(whole, (Layer(flat, first.alpha), Layer(brighter, first.alpha)), side, False)
     assert seen["seam_visibility"] == pytest.approx(5)
 
 
@@ -294,7 +298,7 @@ def test_light_beyond_white_counts_and_pictures_that_do_not_meet_have_no_figures
     bright = [Layer(1 + 50 * part.pixels, part.alpha) for part in (first, second)]
     whole, side = cut_at(*bright, 100)
     ghost = Layer((bright[0].pixels + bright[1].pixels) / 2, whole.alpha)
-    assert appearance(whole, *bright, side, (True, True))["source_fidelity_mean"] > 0.9
-    assert appearance(ghost, *bright, side, (True, True))["source_fidelity_mean"] < 0.9
+    assert appearance(whole, bright, side, True)["source_fidelity_mean"] > 0.9
+    assert appearance(ghost, bright, side, True)["source_fidelity_mean"] < 0.9
     apart = Layer(second.pixels, np.zeros_like(second.alpha))
-    assert all(math.isnan(value) for value in appearance(whole, first, apart, None, (False, False)).values())
+    assert all(math.isnan(value) for value in appearance(whole, (first, apart), None, False).values())

@@ -12,9 +12,11 @@ import pytest
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import distance_to_line
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.measure.metrics import CoverageSamples, coverage_samples
-from edf_stitch.core.measure.projectivity import LEAST_MATCHES, eight_point, independent_fundamental, projectivity
+from edf_stitch.core.measure.options import INDEPENDENT
+from edf_stitch.core.measure.projectivity import eight_point, independent_fundamental, projectivity
 from edf_stitch.core.panorama.warp import build_warp
 
 SIZE = (400, 300)
@@ -26,7 +28,7 @@ def wall(by_hand: SimpleNamespace, distortion: tuple[float, ...] = ()) -> tuple[
     """A slanted wall, seen by two turned cameras."""
     camera = by_hand.camera(SIZE, 380.0, distortion)
     view = by_hand.view(camera, camera, *TURNED)
-    warp = build_warp(by_hand.plane_field(6e-5, -1e-4, 0.12), view, camera, camera)
+    warp = build_warp(by_hand.plane_field(6e-5, -1e-4, 0.12), views_of(view, (camera, camera)))
     return view, coverage_samples(warp, (camera, camera))
 
 
@@ -34,7 +36,8 @@ def level(by_hand: SimpleNamespace) -> tuple[TwoView, CoverageSamples]:
     """Level lines; the target is the same picture moved: it shows 100 columns right of the reference."""
     camera = by_hand.camera(SIZE, 400.0)
     view = by_hand.view(camera, camera, (0, 0, 0), (-1, 0, 0))
-    return view, coverage_samples(build_warp(by_hand.plane_field(0, 0, 0.25), view, camera, camera), (camera, camera))
+    pair = camera, camera
+    return view, coverage_samples(build_warp(by_hand.plane_field(0, 0, 0.25), views_of(view, pair)), pair)
 
 
 def matches_of(view: TwoView, count: int, noise: float = 0.0, wrong: float = 0.0, seed: int = 0) -> Matches:
@@ -77,7 +80,7 @@ def test_the_distance_is_the_references_not_the_targets(by_hand: SimpleNamespace
     """A target of half the focal length: a pixel of it is two of the reference's."""
     camera, half = by_hand.camera(SIZE, 400.0), by_hand.camera(SIZE, 200.0)
     view = by_hand.view(camera, half, (0, 0, 0), (-1, 0, 0))
-    warp = build_warp(by_hand.plane_field(0, 0, 0.25), view, camera, half)
+    warp = build_warp(by_hand.plane_field(0, 0, 0.25), views_of(view, (camera, half)))
     moved = np.array([[1, 0, 0], [0, 1, 1.0], [0, 0, 1]])
     assert projectivity(moved.T @ view.F, coverage_samples(warp, (camera, half))) == pytest.approx(2, abs=1e-3)
 
@@ -161,7 +164,7 @@ def test_an_f_that_is_off_is_found_out(by_hand: SimpleNamespace) -> None:
     camera = by_hand.camera(SIZE, 380.0)
     (omega, t) = TURNED
     wrong = by_hand.view(camera, camera, (omega[0] + 1.0, *omega[1:]), t)
-    warp = build_warp(by_hand.plane_field(6e-5, -1e-4, 0.12), wrong, camera, camera)
+    warp = build_warp(by_hand.plane_field(6e-5, -1e-4, 0.12), views_of(wrong, (camera, camera)))
     shown = coverage_samples(warp, (camera, camera))
     independent = independent_fundamental(matches_of(view, 400, noise=0.2))
     assert projectivity(wrong.F, shown) < 1e-3 and projectivity(independent, shown) > 2
@@ -169,9 +172,10 @@ def test_an_f_that_is_off_is_found_out(by_hand: SimpleNamespace) -> None:
 
 def test_matches_that_determine_no_f(by_hand: SimpleNamespace) -> None:
     view, _ = wall(by_hand)
-    for count in (LEAST_MATCHES - 1, 5, 0):
-        assert np.isnan(independent_fundamental(matches_of(view, LEAST_MATCHES).subset(np.arange(count)))).all()
-    assert np.isfinite(independent_fundamental(matches_of(view, LEAST_MATCHES))).all()
+    enough = matches_of(view, INDEPENDENT.min_matches)
+    for count in (INDEPENDENT.min_matches - 1, 5, 0):
+        assert np.isnan(independent_fundamental(enough.subset(np.arange(count)))).all()
+    assert np.isfinite(independent_fundamental(enough)).all()
     random = np.random.default_rng(2)
     chance = Matches(random.uniform(0, 300, (20, 2)), random.uniform(0, 300, (20, 2)))
     assert np.isnan(independent_fundamental(chance)).all()

@@ -11,41 +11,49 @@ from typing import Any
 import numpy as np
 import pytest
 from edf_stitch.core.alignment import Alignment
-from edf_stitch.core.cameras.lens import distort
+from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import homogeneous, project, rotation_from_vector
+from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.choices import FIELDS, RIVALS
+from edf_stitch.core.field.folding import folds, turning
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.fields import fit_field
 from edf_stitch.core.measure.report import make_report, plain
 from edf_stitch.core.panorama.canvas import Canvas
-from edf_stitch.core.panorama.folding import folds, turning
-from edf_stitch.core.panorama.warp import Warp, build_warp
+from edf_stitch.core.panorama.warp import build_warp
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
+
+from ...pairs import warp_of, with_map
 
 
 def report_of(
     result: StitchResult, measure: bool = True, holes: str = "transparent", **changed: Any
 ) -> tuple[dict[str, Any], list[str]]:
     """The report of a result in whose alignment something is changed."""
-    alignment = replace(
-        Alignment(result.cameras, result.matches, result.two_view, result.field, result.warp, ()), **changed
-    )
+    cameras = changed.get("cameras", result.cameras)
+    edge = replace(result.edges[0], two_view=changed.pop("two_view", result.edges[0].two_view))
+    if "matches" in changed:
+        found = changed.pop("matches")
+        ideal = replace(found, x=undistort(found.x, cameras[0]), y=undistort(found.y, cameras[1]))
+        edge = replace(edge, matches=found, ideal=ideal)
+    views = views_of(edge.two_view, cameras)
+    alignment = replace(Alignment(cameras, (edge,), views, result.field, result.warp, ()), **changed)
     decided = result.decided
     if "warp" in changed:  # what is hidden lies on the warp's own canvas
-        hidden = np.zeros(alignment.warp.map_x.shape, bool)
-        decided = replace(decided, hidden=hidden, folds=folds(turning(alignment.warp, result.cameras[1].size)))
+        hidden = np.zeros(alignment.warp.maps[1].x.shape, bool)
+        further = replace(decided[1], hidden=hidden, folds=folds(turning(alignment.warp.maps[1].arrays())))
+        decided = decided[0], further
     return make_report(
-        StitchOptions(measure=measure, holes=holes), (result.reference, result.target), alignment,
-        alignment.warp.canvas, decided, {},
+        StitchOptions(measure=measure, holes=holes), result.pictures, alignment, alignment.warp.canvas, decided, {},
     )
 
 
 @pytest.fixture(scope="module")
 def strict(small_pair: Pair, known: StitchOptions) -> StitchResult:
     """The small pair by the strict field."""
-    return stitch(small_pair.reference, small_pair.target, replace(known, field="strict"))
+    return stitch((small_pair.reference, small_pair.target), replace(known, field="strict"))
 
 
 def test_numbers_json_has_no_word_for_become_null() -> None:
@@ -57,20 +65,23 @@ def test_numbers_json_has_no_word_for_become_null() -> None:
         "nan": None, "inf": [None, None], "array": [[1.5, None], [None, 2.0]], "deep": [{"tuple": [None, 1]}]}
 
 
+def with_holes(result: StitchResult, holes: int) -> StitchResult:
+    return replace(result, decided=(result.decided[0], replace(result.decided[1], holes=holes)))
+
+
 def test_holes_are_counted_and_said_where_they_matter(small_result: StitchResult) -> None:
-    pixels = small_result.warp.map_x.size
+    pixels = small_result.warp.maps[1].x.size
     for holes, said in ((0, False), (int(5e-5 * pixels), False), (int(2e-4 * pixels) + 1, True)):
-        decided = replace(small_result.decided, holes=holes)
-        report, spoken = report_of(replace(small_result, decided=decided))
+        report, spoken = report_of(with_holes(small_result, holes))
         assert report["composition"]["hole_px"] == holes
         assert any(f"{holes} pixels were seen by neither camera" in line for line in spoken) == said
         assert report["composition"]["inpainted_px"] == 0
 
 
 def test_filled_holes_are_counted_and_said(small_result: StitchResult) -> None:
-    decided = replace(small_result.decided, holes=int(2e-4 * small_result.warp.map_x.size) + 1)
-    report, spoken = report_of(replace(small_result, decided=decided), holes="inpaint")
-    assert report["composition"]["inpainted_px"] == report["composition"]["hole_px"] == decided.holes
+    holes = int(2e-4 * small_result.warp.maps[1].x.size) + 1
+    report, spoken = report_of(with_holes(small_result, holes), holes="inpaint")
+    assert report["composition"]["inpainted_px"] == report["composition"]["hole_px"] == holes
     assert any("filled smoothly" in line for line in spoken)
 
 
@@ -84,15 +95,15 @@ def test_numpys_numbers_become_pythons() -> None:
 
 
 def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
-    report, view = result.report, result.two_view
+    report, view = result.report, result.edges[0].two_view
     assert json.loads(json.dumps(report, allow_nan=False)) == report, "plain JSON, no NaN"
     assert report["canvas"] == {
         "width": result.alpha.shape[1], "height": result.alpha.shape[0], "offset": list(result.warp.canvas.offset),
         "cropped": False, "projection": {
             "kind": "perspective", "focal_px": view.K[0, 0], "rotation": np.eye(3).tolist(), "level": [0.0, 0.0, 0.0],
             "centre": list(view.K[:2, 2] + result.warp.canvas.offset)}}
-    assert report["matches"]["found"] == len(result.matches)
-    assert report["matches"]["inliers"] == view.inliers.sum() <= len(result.matches)
+    assert report["matches"]["found"] == len(result.edges[0].matches)
+    assert report["matches"]["inliers"] == view.inliers.sum() <= len(result.edges[0].matches)
     for name in ("K", "K_prime", "R", "t", "F", "H_inf", "e_prime"):
         assert np.array_equal(report["two_view"][name], getattr(view, name)), name
     assert report["two_view"]["model"] == "general" and "epipolar" in report["two_view"]["why"]
@@ -101,7 +112,7 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
     dense = report["field"]["dense"]
     assert dense["used"] and 0.5 < dense["found"] <= 1 and dense["across_px"] < 0.5 < dense["reach_px"]
     assert report["field"]["kind"] == "slack" and report["field"]["plane"] == list(result.field.plane)
-    for entry, array in zip(report["pictures"], (result.reference, result.target), strict=True):
+    for entry, array in zip(report["pictures"], (result.pictures[0], result.pictures[1]), strict=True):
         assert (entry["height"], entry["width"]) == array.view.shape[:2]
         assert (entry["name"], entry["bits"], entry["alpha"], entry["icc"]) == ("array", 8, False, False)
         assert entry["camera"]["fixed"] and entry["camera"]["focal_px"] == view.K[0, 0]
@@ -124,10 +135,10 @@ def bilinear(values: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def test_alignment_is_the_distance_from_the_map_to_the_matches(result: StitchResult) -> None:
-    view, warp = result.two_view, result.warp
-    x, y = result.matches.x[view.inliers], result.matches.y[view.inliers]
+    view, warp = result.edges[0].two_view, result.warp
+    x, y = result.edges[0].matches.x[view.inliers], result.edges[0].matches.y[view.inliers]
     at = x + warp.canvas.offset
-    error = np.hypot(*(bilinear(m, at) - y[:, k] for k, m in enumerate((warp.map_x, warp.map_y))))
+    error = np.hypot(*(bilinear(m, at) - y[:, k] for k, m in enumerate((warp.maps[1].x, warp.maps[1].y))))
     measured = result.report["measured"]
     assert measured["alignment_median_px"] == pytest.approx(np.median(error), abs=1e-3)
     assert measured["alignment_p95_px"] == pytest.approx(np.percentile(error, 95), abs=5e-3)
@@ -171,7 +182,7 @@ def test_what_was_not_asked_for_is_not_measured(small_result: StitchResult) -> N
 @pytest.mark.parametrize("name", FIELDS)
 def test_without_parallax_what_has_no_meaning_is_null_without_a_word(small_result: StitchResult, name: str) -> None:
     """A rotation or a plane: H_inf is the homography between the pictures, and there is no epipolar geometry."""
-    cameras, old = small_result.cameras, small_result.two_view
+    cameras, old = small_result.cameras, small_result.edges[0].two_view
     size = cameras[0].size
     nan = np.full((3, 3), np.nan)
     H = cameras[1].K @ rotation_from_vector(np.radians([1.0, -9, 2])) @ np.linalg.inv(cameras[0].K)
@@ -184,7 +195,7 @@ def test_without_parallax_what_has_no_meaning_is_null_without_a_word(small_resul
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         field = fit_field(name, "plane", view, Matches(x, y), size, size)
-        warp = build_warp(field, field.two_view, *cameras)
+        warp = build_warp(field, views_of(field.two_view, cameras))
         report, said = report_of(small_result, matches=Matches(x, y), two_view=field.two_view, field=field, warp=warp)
     measured = report["measured"]
     without_depth = {"negative_share"} if name in RIVALS else set()
@@ -196,7 +207,7 @@ def test_without_parallax_what_has_no_meaning_is_null_without_a_word(small_resul
 
 def test_through_a_lens_all_is_measured_in_ideal_pixels(by_hand: SimpleNamespace, small_result: StitchResult) -> None:
     """A slanted wall through barrels: in raw pixels its lines are bent, and by them everything would be px off."""
-    height, width = small_result.reference.view.shape[:2]
+    height, width = small_result.pictures[0].view.shape[:2]
     camera = by_hand.camera((width, height), 220.0, (-0.2, 0.04))
     view = replace(by_hand.view(camera, camera, (2.0, -10, 3), (1, 0.1, 0.15)), inliers=np.full(300, True))
     x = np.random.default_rng(1).uniform(0, (width - 1, height - 1), (3000, 2))
@@ -205,7 +216,7 @@ def test_through_a_lens_all_is_measured_in_ideal_pixels(by_hand: SimpleNamespace
     seen = np.all([(p >= 0).all(axis=1) & (p <= (width - 1, height - 1)).all(axis=1) for p in raw], axis=0)
     x, y = x[seen][:300], y[seen][:300]
     field = fit_field("strict", "plane", view, Matches(x, y), camera.size, camera.size)
-    warp, matches = build_warp(field, view, camera, camera), Matches(raw[0][seen][:300], raw[1][seen][:300])
+    warp, matches = build_warp(field, views_of(view, (camera, camera))), Matches(raw[0][seen][:300], raw[1][seen][:300])
     report, _ = report_of(
         small_result, cameras=(camera, camera), matches=matches, two_view=view, field=field, warp=warp
     )
@@ -215,7 +226,7 @@ def test_through_a_lens_all_is_measured_in_ideal_pixels(by_hand: SimpleNamespace
 
 def test_a_target_within_the_reference_has_nothing_beyond(by_hand: SimpleNamespace, small_result: StitchResult) -> None:
     x, y = np.meshgrid(np.arange(240), np.arange(180))
-    warp = Warp(Canvas(240, 180, (0, 0)), x.astype("f4"), y.astype("f4"), np.zeros(x.shape, "f4"))
+    warp = warp_of(Canvas(240, 180, (0, 0)), x, y)
     measured = report_of(small_result, warp=warp)[0]["measured"]
     assert measured["projectivity_points"] == 0
     assert [key for key, value in measured.items() if value is None] == [
@@ -224,7 +235,7 @@ def test_a_target_within_the_reference_has_nothing_beyond(by_hand: SimpleNamespa
 
 def test_the_overlap_is_measured_on_the_8_bit_views(result: StitchResult) -> None:
     measured = result.report["measured"]
-    shown = result.warp.inside((400, 300))
+    shown = result.warp.maps[1].inside()
     x, y = result.warp.canvas.offset
     assert measured["overlap_px"] == shown[y : y + 300, x : x + 400].sum()
     assert 20 < measured["overlap_psnr_db"] < 60 and 0.5 < measured["overlap_ssim"] <= 1
@@ -247,12 +258,12 @@ def test_each_doubt_is_said_in_words(result: StitchResult) -> None:
     canvas = replace(result.warp.canvas, cropped=True)
     report, said = report_of(result, measure=False, warp=replace(result.warp, canvas=canvas))
     assert len(said) == 1 and "cropped" in said[0] and report["canvas"]["cropped"] is True
-    map_x = result.warp.map_x.copy()
-    shown = np.argwhere(result.warp.inside((400, 300)))
+    map_x = result.warp.maps[1].x.copy()
+    shown = np.argwhere(result.warp.maps[1].inside())
     (top, left), (bottom, right) = shown.min(axis=0), shown.max(axis=0)
     middle = slice((left + right) // 2 - 20, (left + right) // 2 + 20)
     map_x[top:bottom, middle] = map_x[top:bottom, middle][:, ::-1]
-    report, said = report_of(result, measure=False, warp=replace(result.warp, map_x=map_x))
+    report, said = report_of(result, measure=False, warp=with_map(result.warp, map_x))
     assert any("folds over" in one and "%" in one for one in said)
     assert report["measured"]["folds"] == pytest.approx(40 / 400, abs=0.03)
 

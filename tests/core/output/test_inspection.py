@@ -10,6 +10,8 @@ from edf_stitch.core.output import inspection
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
+from ...pairs import with_map, with_two_view
+
 
 @pytest.fixture(scope="module")
 def half(pair: Pair) -> StitchResult:
@@ -19,7 +21,7 @@ def half(pair: Pair) -> StitchResult:
     K = pair.reference_camera.K
     camera = CameraRequest(focal_px=(float(K[0, 0]),), principal=(float(K[0, 2]), float(K[1, 2])))
     options = StitchOptions(camera=camera, scale=0.5, crop="reference", measure=False)
-    return stitch(pair.reference, pair.target, options)
+    return stitch((pair.reference, pair.target), options)
 
 
 def test_geometry_is_that_of_the_full_pictures(half: StitchResult, pair: Pair):
@@ -58,14 +60,14 @@ def test_an_error_is_measured_in_full_pixels(half: StitchResult):
 def test_the_slide_is_what_depth_does(half: StitchResult):
     """d·|∂x'/∂d|, doubled to full px; nothing where all is infinitely far."""
     far = inspection.displacement_px(half)
-    H, e = half.two_view.H_inf, half.two_view.e_prime
+    H, e = half.edges[0].two_view.H_inf, half.edges[0].two_view.e_prime
     x, y = 120, 60
     offset = half.warp.canvas.offset
     point = np.array([x - offset[0], y - offset[1], 1.0])
     ideal = project((H @ point + half.warp.inverse_depth[y, x] * e)[None]) - project((H @ point)[None])
     slack = 0.6  # px at half size: what `slack` adds besides
     assert abs(far[y, x] - 2 * np.linalg.norm(ideal)) < 2 * slack
-    flat = replace(half, two_view=replace(half.two_view, e_prime=np.zeros(3)))
+    flat = with_two_view(half, replace(half.edges[0].two_view, e_prime=np.zeros(3)))
     assert not inspection.displacement_px(flat).any()
 
 
@@ -75,15 +77,15 @@ def test_the_slide_is_measured_through_the_lenses(half: StitchResult):
                     zip(half.cameras, (-0.12, 0.08), strict=True))  # fmt: skip
     canvas = half.warp.canvas
     raw = np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1)
-    q = homogeneous(undistort(raw, cameras[0])) @ half.two_view.H_inf.T
+    q = homogeneous(undistort(raw, cameras[0])) @ half.edges[0].two_view.H_inf.T
     far = distort(q[..., :2] / q[..., 2:], cameras[1])
-    warp = replace(half.warp, map_x=far[..., 0].astype(np.float32), map_y=far[..., 1].astype(np.float32))
-    assert inspection.displacement_px(replace(half, cameras=cameras, warp=warp)).max() < 1e-3
+    seen = replace(half, cameras=cameras, warp=with_map(half.warp, *np.moveaxis(far.astype(np.float32), -1, 0)))
+    assert inspection.displacement_px(with_two_view(seen, half.edges[0].two_view)).max() < 1e-3
 
 
 def test_the_heat_map_ends_where_the_target_does(half: StitchResult):
     heat, (low, high) = inspection.heat_map(half)
-    shows = half.target_layer.alpha > 0
+    shows = half.layers[1].alpha > 0
     assert heat.shape == (150, 200, 4) and np.array_equal(heat[..., 3] > 0, shows)
     assert 0 < low < high
     far = inspection.displacement_px(half)
@@ -93,13 +95,13 @@ def test_the_heat_map_ends_where_the_target_does(half: StitchResult):
 
 
 def test_the_difference_is_black_where_the_pictures_agree(half: StitchResult):
-    same = replace(half, target_layer=half.reference_layer)
+    same = replace(half, layers=(half.layers[0], half.layers[0]))
     shown = inspection.difference(same)
     assert not shown[..., :3].any() and (shown[..., 3] == 255).all()
-    other = replace(half.reference_layer, light=1 - half.reference_layer.pixels)
-    assert inspection.difference(replace(half, target_layer=other))[..., :3].mean() > 40
-    nothing = replace(half.target_layer, alpha=np.zeros_like(half.target_layer.alpha))
-    assert not inspection.difference(replace(half, target_layer=nothing))[..., 3].any()
+    other = replace(half.layers[0], light=1 - half.layers[0].pixels)
+    assert inspection.difference(replace(half, layers=(half.layers[0], other)))[..., :3].mean() > 40
+    nothing = replace(half.layers[1], alpha=np.zeros_like(half.layers[1].alpha))
+    assert not inspection.difference(replace(half, layers=(half.layers[0], nothing)))[..., 3].any()
 
 
 def test_the_depth_grid_reaches_from_corner_to_corner(half: StitchResult):

@@ -24,12 +24,17 @@ from edf_stitch.core.system.output_files import OutputFiles
 from edf_stitch.core.system.progress import STAGES
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
+from ...pairs import with_two_view
+
 NPZ = {
-    "map_x": ("<f4", None), "map_y": ("<f4", None), "inverse_depth": ("<f4", None), "offset": ("<i8", (2,)),
-    "F": ("<f8", (3, 3)), "H_inf": ("<f8", (3, 3)), "e_prime": ("<f8", (3,)), "K": ("<f8", (3, 3)),
-    "K_prime": ("<f8", (3, 3)), "R": ("<f8", (3, 3)), "t": ("<f8", (3,)), "dist": ("<f8", (5,)),
-    "dist_prime": ("<f8", (5,)),
+    "format": ("<i8", ()), "canvas": ("<i8", (2,)), "offset": ("<i8", (2,)), "map_x_01": ("<f4", None),
+    "map_y_01": ("<f4", None), "box_01": ("<i8", (4,)), "inverse_depth": ("<f4", None), "K": ("<f8", (2, 3, 3)),
+    "R": ("<f8", (2, 3, 3)), "t": ("<f8", (2, 3)), "dist": ("<f8", (2, 5)), "H_inf": ("<f8", (2, 3, 3)),
+    "e_prime": ("<f8", (2, 3)), "F": ("<f8", (1, 3, 3)), "edges": ("<i8", (1, 2)),
 }  # fmt: skip
+
+
+NAMES = ("reference.png", "target.png")
 
 
 def everything(folder: Path) -> dict[str, bytes]:
@@ -40,9 +45,16 @@ def all_of(folder: Path, panorama: str = "out.png") -> OutputRequest:
     return OutputRequest(folder / panorama, folder / "report.json", folder / "layers", folder / "warp.npz")
 
 
+def named(result: StitchResult) -> StitchResult:
+    """The result of arrays as if they had come from files."""
+    pictures = tuple(replace(picture, name=name) for picture, name in zip(result.pictures, NAMES, strict=True))
+    return replace(result, pictures=pictures)
+
+
 def write_all(result: StitchResult, folder: Path, panorama: str = "out.png") -> list[str]:
+    result = named(result)
     with OutputFiles() as files:
-        check(all_of(folder, panorama), files)
+        check(all_of(folder, panorama), files, NAMES)
         return write(result, all_of(folder, panorama), files)
 
 
@@ -59,17 +71,18 @@ def raw(path: Path) -> np.ndarray:
 
 def test_all_files_and_no_others_are_there(written: Path) -> None:
     assert set(everything(written)) == {
-        "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-        "layers/target.png", "layers/occluded.png", "layers/confidence.png", "layers/seam.png"}
+        "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/00_reference.png",
+        "layers/01_target.png", "layers/occluded_01.png", "layers/confidence.png", "layers/labels.png",
+        "layers/seam.png", "layers/canvas.json"}
 
 
 def test_what_was_filled_is_marked(small_result: StitchResult, tmp_path: Path) -> None:
     """Hidden from the target, and not shown by the reference."""
-    occluded = np.zeros_like(small_result.occluded)
+    occluded = np.zeros_like(small_result.occluded[1])
     occluded[30:60, 200:] = True
     report = {**small_result.report, "options": {**small_result.report["options"], "holes": "inpaint"}}
-    result = replace(small_result, occluded=occluded, report=report)
-    alone = (result.reference_layer.alpha == 0) & (result.target_layer.alpha > 0)
+    result = replace(small_result, occluded=(small_result.occluded[0], occluded), report=report)
+    alone = (result.layers[0].alpha == 0) & (result.layers[1].alpha > 0)
     write_all(result, tmp_path)
     marked = raw(tmp_path / "layers" / "inpainted.png")
     assert np.array_equal(marked > 0, occluded & alone) and (occluded & alone).sum() > 100
@@ -85,7 +98,7 @@ def test_only_the_panorama_where_nothing_else_was_asked_for(small_result: Stitch
 def test_the_same_stitch_twice_gives_the_same_bytes(
     small_pair: Pair, known: StitchOptions, written: Path, tmp_path: Path
 ) -> None:
-    write_all(stitch(small_pair.reference, small_pair.target, known), tmp_path)
+    write_all(stitch((small_pair.reference, small_pair.target), known), tmp_path)
     ours, theirs = everything(written), everything(tmp_path)
     assert ours.keys() == theirs.keys()
     assert [name for name in ours if ours[name] != theirs[name]] in ([], ["report.timing.json"])
@@ -119,37 +132,44 @@ def test_the_panorama_is_the_result(small_result: StitchResult, written: Path) -
 
 
 def test_the_warp_file_holds_what_design_says(small_pair: Pair, known: StitchOptions, written: Path) -> None:
-    strict = stitch(small_pair.reference, small_pair.target, replace(known, field="strict"))
+    strict = stitch((small_pair.reference, small_pair.target), replace(known, field="strict"))
     with np.load(io.BytesIO(warp_bytes(strict)), allow_pickle=False) as file:
         found = dict(file)
     height, width = strict.alpha.shape
     assert set(found) == set(NPZ)
     for name, (kind, shape) in NPZ.items():
-        assert found[name].dtype.str == kind and found[name].shape == (shape or (height, width)), name
+        expected = (height, width) if shape is None else shape
+        assert found[name].dtype.str == kind and found[name].shape == expected, name
+    assert found["format"] == 2 and found["canvas"].tolist() == [width, height]
+    assert found["box_01"].tolist() == [0, 0, width, height] and found["edges"].tolist() == [[0, 1]]
+    for name, own in (("R", np.eye(3)), ("t", np.zeros(3)), ("H_inf", np.eye(3)), ("e_prime", np.zeros(3))):
+        assert np.array_equal(found[name][0], own), "the reference stands at the origin"
     # a reader's view of it: canvas pixel − offset is a reference pixel; x' ~ H_inf p + d e'; x'ᵀ F x = 0
     y, x = np.mgrid[:height, :width]
     p = np.stack([x - found["offset"][0], y - found["offset"][1], np.ones_like(x)], axis=-1).astype(float)
-    q = p @ found["H_inf"].T + found["inverse_depth"][..., None].astype(float) * found["e_prime"]
-    mapped = np.stack([found["map_x"], found["map_y"]], axis=-1)
+    q = p @ found["H_inf"][1].T + found["inverse_depth"][..., None].astype(float) * found["e_prime"][1]
+    mapped = np.stack([found["map_x_01"], found["map_y_01"]], axis=-1)
     assert np.abs(q[..., :2] / q[..., 2:] - mapped).max() < 5e-4
-    line = p @ found["F"].T
+    line = p @ found["F"][0].T
     off = np.abs((line[..., :2] * mapped).sum(axis=-1) + line[..., 2]) / np.hypot(line[..., 0], line[..., 1])
     assert off.max() < 1e-3
-    assert np.allclose(found["K_prime"] @ found["R"] @ np.linalg.inv(found["K"]), found["H_inf"])
-    assert np.allclose(found["K_prime"] @ found["t"], found["e_prime"])
-    assert np.linalg.norm(found["t"]) == pytest.approx(1)
+    (K, K_prime), R, t = found["K"], found["R"][1], found["t"][1]
+    assert np.allclose(K_prime @ R @ np.linalg.inv(K), found["H_inf"][1])
+    assert np.allclose(K_prime @ t, found["e_prime"][1])
+    assert np.linalg.norm(t) == pytest.approx(1)
     # the map also says where it falls outside the target picture
     assert np.isfinite(mapped).all() and mapped[..., 0].min() < -1 and mapped[..., 0].max() > 240
     # the paste: the reference's first pixel lies at offset
-    reference = raw(written / "layers" / "reference.png")
+    reference = raw(written / "layers" / "00_reference.png")
     left, top = found["offset"]
     assert reference[top, left, 3] == 255 and not reference[:top, :, 3].any() and not reference[:, :left, 3].any()
 
 
 def test_what_a_model_lacks_is_nan_in_the_warp_file(small_result: StitchResult) -> None:
-    lacking = replace(small_result.two_view, F=np.full((3, 3), np.nan), t=np.full(3, np.nan))
-    with np.load(io.BytesIO(warp_bytes(replace(small_result, two_view=lacking)))) as file:
-        assert np.isnan(file["F"]).all() and np.isnan(file["t"]).all() and np.isfinite(file["H_inf"]).all()
+    lacking = replace(small_result.edges[0].two_view, F=np.full((3, 3), np.nan), t=np.full(3, np.nan))
+    with np.load(io.BytesIO(warp_bytes(with_two_view(small_result, lacking)))) as file:
+        assert np.isnan(file["F"]).all() and np.isnan(file["t"][1]).all() and not file["t"][0].any()
+        assert np.isfinite(file["H_inf"]).all()
 
 
 def test_an_npz_depends_on_its_arrays_only() -> None:
@@ -164,7 +184,7 @@ def test_layers_are_both_pictures_on_the_whole_canvas_before_blending(
     small_pair: Pair, small_result: StitchResult, written: Path
 ) -> None:
     height, width = small_result.alpha.shape
-    reference, target = (raw(written / "layers" / f"{name}.png") for name in ("reference", "target"))
+    reference, target = (raw(written / "layers" / f"{name}.png") for name in ("00_reference", "01_target"))
     assert reference.shape == target.shape == (height, width, 4)
     x, y = small_result.warp.canvas.offset
     box = (slice(y, y + 180), slice(x, x + 240))
@@ -172,24 +192,45 @@ def test_layers_are_both_pictures_on_the_whole_canvas_before_blending(
     alpha = np.zeros((height, width), np.uint8)
     alpha[box] = 255
     assert np.array_equal(reference[..., 3], alpha)
-    assert np.array_equal(target[..., 3], 255 * small_result.warp.inside((240, 180)))
+    assert np.array_equal(target[..., 3], 255 * small_result.warp.maps[1].inside())
     assert (target[box][..., 3] > 0).sum() > 10_000, "nothing cut away where both show something"
     inner = cv2.erode(target[..., 3], np.ones((3, 3))) > 0
-    fetched = cv2.remap(small_pair.target, small_result.warp.map_x, small_result.warp.map_y, cv2.INTER_LINEAR)
+    fetched = cv2.remap(small_pair.target, small_result.warp.maps[1].x, small_result.warp.maps[1].y, cv2.INTER_LINEAR)
     assert np.median(np.abs(fetched.astype(int) - target[..., 2::-1])[inner]) <= 3
 
 
 def test_what_the_target_cannot_see_is_white_in_a_mask(small_result: StitchResult, tmp_path: Path) -> None:
     hidden = np.zeros(small_result.alpha.shape, bool)
     hidden[10:20, 30:40] = True
-    write_all(replace(small_result, occluded=hidden), tmp_path)
-    assert np.array_equal(raw(tmp_path / "layers" / "occluded.png"), np.where(hidden, 255, 0))
+    write_all(replace(small_result, occluded=(small_result.occluded[0], hidden)), tmp_path)
+    assert np.array_equal(raw(tmp_path / "layers" / "occluded_01.png"), np.where(hidden, 255, 0))
+
+
+def test_labels_say_which_picture_is_shown(small_result: StitchResult, written: Path) -> None:
+    labels, found = small_result.labels, raw(written / "layers" / "labels.png")
+    assert labels is not None and set(np.unique(labels)) == {-1, 0, 1}
+    assert found.dtype == np.uint8 and np.array_equal(found, labels + 1)
+    assert np.array_equal(labels >= 0, small_result.alpha > 0), "what is shown comes from somewhere"
+
+
+def test_the_layers_folder_says_what_it_holds(small_result: StitchResult, written: Path) -> None:
+    about = json.loads((written / "layers" / "canvas.json").read_text("utf-8"))
+    height, width = small_result.alpha.shape
+    assert about == {"format": 2, "size": [width, height], "names": list(NAMES),
+                     "projection": small_result.report["canvas"]["projection"]}  # fmt: skip
+
+
+def test_layers_of_other_pictures_are_not_mixed_with_these(small_result: StitchResult, tmp_path: Path) -> None:
+    (tmp_path / "layers").mkdir()
+    (tmp_path / "layers" / "01_other.png").write_bytes(b"mine")
+    with pytest.raises(BadRequest, match="holds layers of other pictures .01_other.png"):
+        check(all_of(tmp_path), OutputFiles(overwrite=True), NAMES)
 
 
 def test_the_seam_is_a_mask_to_paint_on(small_result: StitchResult, written: Path) -> None:
-    seam, sides = raw(written / "layers" / "seam.png"), small_result.from_target
+    seam, sides = raw(written / "layers" / "seam.png"), small_result.labels == 1
     shown = small_result.alpha > 0
-    assert sides is not None and sides.any() and (shown & ~sides).any()
+    assert sides.any() and (shown & ~sides).any()
     assert np.array_equal(seam[..., 3], np.where(shown, 255, 0))
     painted = read_painted(written / "layers" / "seam.png")
     assert np.array_equal(painted[shown], np.where(sides, 1, -1)[shown]) and not painted[~shown].any()
@@ -197,12 +238,10 @@ def test_the_seam_is_a_mask_to_paint_on(small_result: StitchResult, written: Pat
 
 def as_float(result: StitchResult) -> StitchResult:
     """The same result as if it came from float pictures twice as bright."""
-    layers = {
-        name: replace(getattr(result, name), light=2 * getattr(result, name).pixels)
-        for name in ("reference_layer", "target_layer")
-    }
+    layers = tuple(replace(layer, light=2 * layer.pixels) for layer in result.layers)
     brighter = Layer(2 * result.pixels, result.alpha)
-    return replace(result, panorama=brighter, reference=replace(result.reference, bits=32), **layers)
+    pictures = replace(result.pictures[0], bits=32), result.pictures[1]
+    return replace(result, panorama=brighter, pictures=pictures, layers=layers)
 
 
 def test_layers_of_float_pictures_have_exr_beside_them(small_result: StitchResult, tmp_path: Path) -> None:
@@ -210,10 +249,10 @@ def test_layers_of_float_pictures_have_exr_beside_them(small_result: StitchResul
     bright = as_float(small_result)
     assert write_all(bright, tmp_path, "out.exr") == []
     assert set(everything(tmp_path)) == {
-        "out.exr", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-        "layers/reference.exr", "layers/target.png", "layers/target.exr", "layers/occluded.png",
-        "layers/confidence.png", "layers/seam.png"}
-    for name, layer in (("reference", bright.reference_layer), ("target", bright.target_layer)):
+        "out.exr", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/00_reference.png",
+        "layers/00_reference.exr", "layers/01_target.png", "layers/01_target.exr", "layers/occluded_01.png",
+        "layers/confidence.png", "layers/labels.png", "layers/seam.png", "layers/canvas.json"}
+    for name, layer in zip(("00_reference", "01_target"), bright.layers, strict=True):
         back = load_picture(tmp_path / "layers" / f"{name}.exr")
         assert back.pixels.max() > 1 and back.bits == 32
         assert np.array_equal(back.alpha, layer.alpha) and np.array_equal(back.pixels, layer.pixels)
@@ -241,7 +280,7 @@ def test_jpeg_is_black_where_nothing_is_shown(small_result: StitchResult, tmp_pa
 def test_every_kind_of_panorama(small_result: StitchResult, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"out{suffix}"
     with OutputFiles() as files:
-        check(OutputRequest(path), files)
+        check(OutputRequest(path), files, NAMES)
         assert write(small_result, OutputRequest(path), files) == []
     back = load_picture(path)
     assert back.view.shape == small_result.pixels.shape
@@ -251,18 +290,19 @@ def test_every_kind_of_panorama(small_result: StitchResult, tmp_path: Path, suff
 @pytest.mark.parametrize("name", ["out.gif", "out", "out.png.bak", "out.npz"])
 def test_an_unknown_kind_of_panorama_is_refused_before_the_work(tmp_path: Path, name: str) -> None:
     with pytest.raises(BadRequest, match=r"use \.png"):
-        check(OutputRequest(tmp_path / name), OutputFiles())
+        check(OutputRequest(tmp_path / name), OutputFiles(), NAMES)
 
 
 @pytest.mark.parametrize("name", ["warp.np", "warp", "warp.exr"])
 def test_an_unknown_kind_of_warp_is_refused_before_the_work(tmp_path: Path, name: str) -> None:
     with pytest.raises(BadRequest, match=r"\.npz"):
-        check(OutputRequest(tmp_path / "out.png", warp=tmp_path / name), OutputFiles())
+        check(OutputRequest(tmp_path / "out.png", warp=tmp_path / name), OutputFiles(), NAMES)
 
 
 @pytest.mark.parametrize("name", [
-    "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/reference.png",
-    "layers/target.png", "layers/target.exr", "layers/occluded.png", "layers/confidence.png", "layers/seam.png",
+    "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/00_reference.png",
+    "layers/01_target.png", "layers/01_target.exr", "layers/occluded_01.png", "layers/confidence.png",
+    "layers/seam.png", "layers/labels.png", "layers/canvas.json",
 ])  # fmt: skip
 def test_what_exists_is_refused_before_the_work_and_not_touched(
     small_result: StitchResult, tmp_path: Path, name: str
@@ -270,18 +310,18 @@ def test_what_exists_is_refused_before_the_work_and_not_touched(
     (tmp_path / "layers").mkdir()
     (tmp_path / name).write_bytes(b"mine")
     with pytest.raises(UnwritableOutput, match=f"{Path(name).name} exists: use --overwrite"):
-        check(all_of(tmp_path), OutputFiles())
+        check(all_of(tmp_path), OutputFiles(), NAMES)
     assert everything(tmp_path) == {name: b"mine"}
     with OutputFiles(overwrite=True) as files:
-        check(all_of(tmp_path), files)
-        write(small_result, all_of(tmp_path), files)
-    assert everything(tmp_path)["out.png"] != b"mine" and (tmp_path / "layers" / "target.png").exists()
+        check(all_of(tmp_path), files, NAMES)
+        write(named(small_result), all_of(tmp_path), files)
+    assert everything(tmp_path)["out.png"] != b"mine" and (tmp_path / "layers" / "01_target.png").exists()
 
 
 @pytest.mark.parametrize(("panorama", "report", "warp"), [
     ("a.png", "a.png", None), ("b.png", "a.npz", "a.npz"), ("b.png", "c/../a.npz", "a.npz"),
-    ("layers/target.png", None, None), ("b.png", "layers/reference.png", None),
-    ("layers/occluded.png", None, None), ("layers/confidence.png", None, None),
+    ("layers/01_target.png", None, None), ("b.png", "layers/00_reference.png", None),
+    ("layers/occluded_01.png", None, None), ("layers/confidence.png", None, None),
 ])  # fmt: skip
 def test_two_outputs_of_one_name_are_refused_before_the_work(
     tmp_path: Path, panorama: str, report: str | None, warp: str | None
@@ -291,7 +331,7 @@ def test_two_outputs_of_one_name_are_refused_before_the_work(
     request = OutputRequest(
         tmp_path / panorama, report and tmp_path / report, tmp_path / "layers", warp and tmp_path / warp)
     with pytest.raises(BadRequest, match="two outputs"):
-        check(request, OutputFiles())
+        check(request, OutputFiles(), NAMES)
 
 
 def stop_after(calls: int, original: Callable, trouble: type[BaseException]) -> Callable:

@@ -74,8 +74,8 @@ def test_strips_and_parts_equal_the_whole(step: int) -> None:
 
 
 def shifted(dx: float, dy: float, scale: float = 1.0):  # noqa: ANN201
-    """A map: target pixel = scale · (reference pixel − shift)."""
-    return lambda grid: scale * (grid.points - (dx, dy))
+    """One further picture's map: its pixel = scale · (reference pixel − shift)."""
+    return lambda grid: [scale * (grid.points - (dx, dy))]
 
 
 def corners(dx: float, dy: float, width: float, height: float) -> np.ndarray:
@@ -88,9 +88,9 @@ def test_the_canvas_holds_both_pictures_and_not_much_more(
     dx: float, dy: float, target_size: tuple[int, int]
 ) -> None:
     size = (200, 150)
-    reach, cut = expected_reach(corners(dx, dy, *(s - 1 for s in target_size)), size, target_size)
+    reach, cut = expected_reach([corners(dx, dy, *(s - 1 for s in target_size))], size, [target_size])
     assert not cut
-    canvas = bounding_canvas(shifted(dx, dy), (0, 0, *size), target_size, reach)
+    canvas = bounding_canvas(shifted(dx, dy), (0, 0, *size), [target_size], reach)
     left, top = -canvas.offset[0], -canvas.offset[1]
     right, bottom = max(size[0], dx + target_size[0]) - 1, max(size[1], dy + target_size[1]) - 1
     need = (min(0, dx), min(0, dy), right, bottom)
@@ -103,40 +103,41 @@ def test_the_canvas_holds_both_pictures_and_not_much_more(
 
 
 def test_a_target_that_shows_nothing_useful_leaves_the_reference() -> None:
-    canvas = bounding_canvas(shifted(1e6, 0), (0, 0, 60, 40), (60, 40), np.array([0.0, 0, 60, 40]))
+    canvas = bounding_canvas(shifted(1e6, 0), (0, 0, 60, 40), [(60, 40)], np.array([0.0, 0, 60, 40]))
     assert canvas.offset == (0, 0) and 60 <= canvas.width <= 62 and 40 <= canvas.height <= 42
 
 
 def test_what_is_stretched_beyond_four_times_in_length_is_cropped_and_said() -> None:
-    def bend(grid: Grid) -> np.ndarray:
+    def bend(grid: Grid) -> list[np.ndarray]:
         """Fine up to x = 300, then the target creeps: 0.1 target pixels for each canvas pixel, 0.1 in y too."""
         x, y = grid.points[..., 0], grid.points[..., 1]
         slow = np.maximum(x - 300, 0)
-        return np.stack([np.minimum(x, 300) - 100 + 0.05 * slow, np.where(slow > 0, 75 + 0.05 * (y - 75), y)], axis=-1)
+        there = np.minimum(x, 300) - 100 + 0.05 * slow, np.where(slow > 0, 75 + 0.05 * (y - 75), y)
+        return [np.stack(there, axis=-1)]
 
-    canvas = bounding_canvas(bend, (0, 0, 200, 150), (400, 150), np.array([0.0, 0, 900, 150]))
+    canvas = bounding_canvas(bend, (0, 0, 200, 150), [(400, 150)], np.array([0.0, 0, 900, 150]))
     assert canvas.cropped and 295 <= canvas.width + canvas.offset[0] <= 300 + 2 * 20
 
 
 def test_an_outline_that_runs_to_infinity_is_looked_for_within_reach_only() -> None:
     points = corners(50, 0, 100, 100)
     points[1] = np.nan
-    reach, cut = expected_reach(points, (200, 150), (100, 100))
+    reach, cut = expected_reach([points], (200, 150), [(100, 100)])
     far = MAX_REACH * 200
     assert cut and np.array_equal(reach, (-far, -far, 200 + far, 150 + far))
 
 
 def test_an_outline_too_far_away_is_cut() -> None:
-    reach, cut = expected_reach(corners(50, 0, 1e5, 100), (200, 150), (100, 100))
+    reach, cut = expected_reach([corners(50, 0, 1e5, 100)], (200, 150), [(100, 100)])
     assert cut and reach[2] == 200 + MAX_REACH * 200 and reach[0] <= 0
-    reach, cut = expected_reach(corners(50, 20, 100, 100), (200, 150), (100, 100))
+    reach, cut = expected_reach([corners(50, 20, 100, 100)], (200, 150), [(100, 100)])
     assert not cut and (reach[:2] <= (0, 0)).all() and (reach[2:] >= (200, 150)).all()
 
 
 def test_a_panorama_of_too_many_pixels_is_refused_with_its_size() -> None:
     size = (40_000, 26_000)
     with pytest.raises(OutputTooLarge, match=r"4\d{4}×2\d{4} pixels, 1000 million at most: use smaller pictures"):
-        bounding_canvas(shifted(0, 0), (0, 0, *size), size, np.array([0.0, 0, *size]))
+        bounding_canvas(shifted(0, 0), (0, 0, *size), [size], np.array([0.0, 0, *size]))
 
 
 # --- the outline of a picture, and areas ---------------------------------------------------------------------------
@@ -166,5 +167,5 @@ def test_an_area_is_in_target_pixels_for_each_of_the_canvas(matrix: tuple[float,
 
 
 def test_an_outline_within_reach_gets_a_margin_of_a_tenth_of_the_longer_side() -> None:
-    reach, cut = expected_reach(corners(150, -40, 300, 100), (200, 150), (300, 100))
+    reach, cut = expected_reach([corners(150, -40, 300, 100)], (200, 150), [(300, 100)])
     assert not cut and np.allclose(reach, (0, -40 - 20, 450 + 20, 150))

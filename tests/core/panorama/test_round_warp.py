@@ -12,18 +12,22 @@ from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import fundamental_from_pose, skew
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.field.strict import StrictField, fit_strict
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.fields import fit_field
 from edf_stitch.core.measure.metrics import look_up
 from edf_stitch.core.panorama.canvas import Canvas
-from edf_stitch.core.panorama.layers import reference_layer
+from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.panorama.levelling import turned
 from edf_stitch.core.panorama.projection import Projection, round_projection
-from edf_stitch.core.panorama.visibility import inverse_depth_in_target
-from edf_stitch.core.panorama.warp import Warp, build_map, build_warp, reference_box, reference_map
+from edf_stitch.core.panorama.reference_map import ReferenceMap
+from edf_stitch.core.panorama.warp import Warp, build_map, build_warp
 from edf_stitch.core.pictures.picture import picture_from_array
+from edf_stitch.core.raster.lazy import whole
 from edf_stitch.core.system.errors import BadRequest
+
+from ...pairs import with_map
 
 SIZE, TARGET = (320, 240), (300, 260)
 ROUND = ("cylindrical", "equirectangular")
@@ -67,11 +71,12 @@ def rays_of(canvas: Canvas) -> np.ndarray:
 def test_every_pixel_lies_on_the_epipolar_line_of_its_ray(by_hand: SimpleNamespace, stand: str, kind: str) -> None:
     """x'ᵀ K'⁻ᵀ [t]ₓ R r = 0, and x' ~ K' (R r + d t), as somebody who reads the .npz computes them."""
     view, *cameras = scene(by_hand, stand)
-    warp = build_warp(fit_strict(view, matches_of(view), SIZE, TARGET), view, *cameras, projection_of(view, kind))
+    field = fit_strict(view, matches_of(view), SIZE, TARGET)
+    warp = build_warp(field, views_of(view, cameras), projection_of(view, kind))
     rays = rays_of(warp.canvas).reshape(-1, 3)
-    seen = warp.inside(TARGET).ravel()
+    seen = warp.maps[1].inside().ravel()
     assert seen.sum() > 30_000
-    x = np.column_stack([warp.map_x.ravel(), warp.map_y.ravel(), np.ones(len(seen))])[seen]
+    x = np.column_stack([warp.maps[1].x.ravel(), warp.maps[1].y.ravel(), np.ones(len(seen))])[seen]
     line = rays[seen] @ (np.linalg.inv(view.K_prime).T @ skew(view.t) @ view.R).T
     off = np.abs((x * line).sum(axis=1)) / np.hypot(line[:, 0], line[:, 1])
     assert off.max() < 1e-4, "float32 of 300 px"
@@ -87,8 +92,8 @@ def test_the_field_is_the_flat_panoramas(by_hand: SimpleNamespace, name: str, fa
     """Fading and slack included: what a pixel of the reference's plane shows is what its ray shows."""
     view, *cameras = scene(by_hand, "sideways")
     field = fit_field(name, fade, view, matches_of(view, bend=1.0), SIZE, TARGET)
-    flat = build_warp(field, view, *cameras)
-    warp = build_warp(field, view, *cameras, projection_of(view, kind))
+    flat = build_warp(field, views_of(view, cameras))
+    warp = build_warp(field, views_of(view, cameras), projection_of(view, kind))
     x, y = np.meshgrid(np.arange(2, flat.canvas.width - 2, 3), np.arange(2, flat.canvas.height - 2, 3))
     points = np.column_stack([x.ravel(), y.ravel()]) - np.array(flat.canvas.offset, float)
     theirs = look_up(flat, points)
@@ -111,7 +116,7 @@ def test_a_plane_is_a_plane_all_round(by_hand: SimpleNamespace, kind: str) -> No
     y = target_points(view, x, x @ m[:2] + m[2])
     field = fit_strict(view, Matches(x, y), SIZE, TARGET)
     canvas = Canvas(1500, 400, (750, 200), projection=projection_of(view, kind))
-    warp = build_map(field, view, canvas, *cameras)
+    warp = build_map(field, views_of(view, cameras), canvas)
     expected = rays_of(canvas) @ (view.K.T @ m)
     assert (rays_of(canvas)[..., 2] < -0.2).sum() > 1000
     assert np.abs(warp.inverse_depth - expected).max() < 1e-4 * np.abs(expected).max()
@@ -121,16 +126,21 @@ def test_a_plane_is_a_plane_all_round(by_hand: SimpleNamespace, kind: str) -> No
 @pytest.mark.parametrize("stand", STANDS)
 def test_the_canvas_holds_both_pictures_whole_and_no_more(by_hand: SimpleNamespace, stand: str, kind: str) -> None:
     view, *cameras = scene(by_hand, stand)
-    warp = build_warp(fit_strict(view, matches_of(view), SIZE, TARGET), view, *cameras, projection_of(view, kind))
-    map_x, map_y = reference_map(warp.canvas, cameras[0])
-    own = (map_x >= 0) & (map_x <= SIZE[0] - 1) & (map_y >= 0) & (map_y <= SIZE[1] - 1)
-    for shown, x, y, size in ((own, map_x, map_y, SIZE), (warp.inside(TARGET), warp.map_x, warp.map_y, TARGET)):
+    field = fit_strict(view, matches_of(view), SIZE, TARGET)
+    warp = build_warp(field, views_of(view, cameras), projection_of(view, kind))
+    maps = [one.arrays() for one in warp.maps]
+    assert [one.size for one in maps] == [SIZE, TARGET]
+    own, theirs = (
+        (one.x >= 0) & (one.x <= width - 1) & (one.y >= 0) & (one.y <= height - 1)
+        for one, (width, height) in zip(maps, (SIZE, TARGET), strict=True)
+    )
+    for shown, one, size in ((own, maps[0], SIZE), (theirs, maps[1], TARGET)):
         found = np.zeros(size[::-1], np.uint8)
-        found[np.rint(y[shown]).astype(int), np.rint(x[shown]).astype(int)] = 1
+        found[np.rint(one.y[shown]).astype(int), np.rint(one.x[shown]).astype(int)] = 1
         assert cv2.dilate(found, np.ones((7, 7), np.uint8)).all()
-    seen = own | warp.inside(TARGET)
+    seen = own | theirs
     assert seen[0].any() and seen[-1].any() and seen[:, 0].any() and seen[:, -1].any() and not warp.canvas.cropped
-    left, top, width, height = reference_box(warp.canvas, cameras[0])
+    left, top, width, height = warp.maps[0].box()
     assert own[top : top + height, left : left + width].sum() == own.sum()
     assert own[top].any() and own[:, left].any() and own[top + height - 1].any() and own[:, left + width - 1].any()
 
@@ -147,15 +157,16 @@ def wide(by_hand: SimpleNamespace) -> tuple[TwoView, Camera, Camera, StrictField
 
 
 def test_a_wide_pair_that_a_plane_must_crop_is_whole_on_a_cylinder(by_hand: SimpleNamespace) -> None:
-    *parts, field = wide(by_hand)
-    assert build_warp(field, *parts).canvas.cropped
+    view, *cameras, field = wide(by_hand)
+    views = views_of(view, cameras)
+    assert build_warp(field, views).canvas.cropped
     for kind in ROUND:
-        warp = build_warp(field, *parts, projection_of(parts[0], kind, np.eye(3)))
+        warp = build_warp(field, views, projection_of(view, kind, np.eye(3)))
         assert not warp.canvas.cropped
-        assert (rays_of(warp.canvas)[..., 2] < 0)[warp.inside(SIZE)].mean() > 0.05, "some of it lies behind"
-        shown = warp.inside(SIZE)
+        assert (rays_of(warp.canvas)[..., 2] < 0)[warp.maps[1].inside()].mean() > 0.05, "some of it lies behind"
+        shown = warp.maps[1].inside()
         found = np.zeros(SIZE[::-1], np.uint8)
-        found[np.rint(warp.map_y[shown]).astype(int), np.rint(warp.map_x[shown]).astype(int)] = 1
+        found[np.rint(warp.maps[1].y[shown]).astype(int), np.rint(warp.maps[1].x[shown]).astype(int)] = 1
         assert cv2.dilate(found, np.ones((9, 9), np.uint8)).all()
 
 
@@ -164,11 +175,11 @@ def test_pictures_over_a_pole_or_across_the_line_behind_are_whole_on_a_sphere(
     by_hand: SimpleNamespace, level: np.ndarray
 ) -> None:
     view, *cameras = scene(by_hand, "sideways")
-    warp = build_warp(
-        fit_strict(view, matches_of(view), SIZE, TARGET), view, *cameras, projection_of(view, "equirectangular", level)
-    )
+    field = fit_strict(view, matches_of(view), SIZE, TARGET)
+    warp = build_warp(field, views_of(view, cameras), projection_of(view, "equirectangular", level))
     assert not warp.canvas.cropped
-    for size, x, y in ((SIZE, *reference_map(warp.canvas, cameras[0])), (TARGET, warp.map_x, warp.map_y)):
+    for size, one in zip((SIZE, TARGET), warp.maps, strict=True):
+        x, y = one.arrays().x, one.arrays().y
         with np.errstate(invalid="ignore"):
             shown = (x >= 0) & (x <= size[0] - 1) & (y >= 0) & (y <= size[1] - 1)
         found = np.zeros(size[::-1], np.uint8)
@@ -181,7 +192,7 @@ def test_pictures_over_a_pole_or_across_the_line_behind_are_whole_on_a_sphere(
 def test_a_cylinder_ends_before_the_zenith_and_says_so(by_hand: SimpleNamespace) -> None:
     view, *cameras = scene(by_hand, "sideways")
     field = fit_strict(view, matches_of(view), SIZE, TARGET)
-    warp = build_warp(field, view, *cameras, projection_of(view, "cylindrical", turned(0, 70, 0)))
+    warp = build_warp(field, views_of(view, cameras), projection_of(view, "cylindrical", turned(0, 70, 0)))
     assert warp.canvas.cropped and warp.canvas.height < 3.1 * 300
 
 
@@ -190,11 +201,11 @@ def test_the_depth_order_counts_the_same(by_hand: SimpleNamespace, kind: str) ->
     """Inverse depth in front of the target, where canvas points are rays: the flat panorama's at the same places."""
     view, *cameras = scene(by_hand, "forward")
     field = fit_strict(view, matches_of(view), SIZE, TARGET)
-    warp = build_warp(field, view, *cameras, projection_of(view, kind))
-    frame = build_map(field, view, Canvas(*SIZE, (0, 0)), *cameras)
+    warp = build_warp(field, views_of(view, cameras), projection_of(view, kind))
+    frame = build_map(field, views_of(view, cameras), Canvas(*SIZE, (0, 0)))
     points = np.random.default_rng(3).uniform((20, 20), (300, 220), (200, 2))
     found, expected = (
-        look_up(replace(w, map_x=inverse_depth_in_target(w, view), map_y=w.map_y), points)[:, 0] for w in (warp, frame)
+        look_up(with_map(w, whole(w.nearness(views_of(view, cameras), 1))), points)[:, 0] for w in (warp, frame)
     )
     target = look_up(frame, points)
     seen = (target > 5).all(axis=1) & (target < np.array(TARGET) - 6).all(axis=1)  # where nothing fades
@@ -211,7 +222,7 @@ def test_the_reference_is_fetched_where_its_rays_are(
     x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
     picture = picture_from_array(np.stack([x, y, 0 * x], axis=-1).astype(np.float32))
     canvas = Canvas(420, 330, (210, 165), projection=projection_of(view, kind))
-    layer = reference_layer(picture, canvas, camera)
+    layer = layer_of(picture, ReferenceMap(canvas, camera))
     shown = layer.alpha == 1
     assert 40_000 < shown.sum() < canvas.width * canvas.height and not layer.pixels[layer.alpha == 0].any()
     places = canvas.of_reference(layer.pixels[shown][:, :2].astype(float), camera)
@@ -221,8 +232,8 @@ def test_the_reference_is_fetched_where_its_rays_are(
 def test_a_lens_bends_both_panoramas_alike(by_hand: SimpleNamespace) -> None:
     view, *cameras = scene(by_hand, "sideways", (-0.2, 0.05))
     field = fit_strict(view, matches_of(view), SIZE, TARGET)
-    frame = build_map(field, view, Canvas(*SIZE, (0, 0)), *cameras)
-    warp = build_warp(field, view, *cameras, projection_of(view, "cylindrical"))
+    frame = build_map(field, views_of(view, cameras), Canvas(*SIZE, (0, 0)))
+    warp = build_warp(field, views_of(view, cameras), projection_of(view, "cylindrical"))
     points = np.random.default_rng(3).uniform((5, 5), (314, 234), (400, 2))
     target = look_up(frame, points)
     seen = (target > 5).all(axis=1) & (target < np.array(TARGET) - 6).all(axis=1)  # where nothing fades
@@ -233,7 +244,7 @@ def test_a_field_of_the_plane_alone_is_refused(by_hand: SimpleNamespace) -> None
     view, *cameras = scene(by_hand, "sideways")
     field = fit_field("paper", "plane", view, matches_of(view), SIZE, TARGET)
     with pytest.raises(BadRequest, match="'paper' knows the reference's plane only: use slack or strict"):
-        build_warp(field, view, *cameras, projection_of(view, "cylindrical"))
+        build_warp(field, views_of(view, cameras), projection_of(view, "cylindrical"))
 
 
 def test_a_rotation_needs_no_depth(by_hand: SimpleNamespace) -> None:
@@ -242,21 +253,21 @@ def test_a_rotation_needs_no_depth(by_hand: SimpleNamespace) -> None:
     view = replace(view, t=zero, e_prime=zero, F=np.full((3, 3), np.nan), model="rotation")
     x = matches_of(view).x
     field = fit_strict(view, Matches(x, target_points(view, x, np.zeros(len(x)))), SIZE, TARGET)
-    warp = build_warp(field, view, *cameras, projection_of(view, "equirectangular"))
+    warp = build_warp(field, views_of(view, cameras), projection_of(view, "equirectangular"))
     assert not warp.inverse_depth.any()
     at = rays_of(warp.canvas) @ (view.K_prime @ view.R).T
-    shown = warp.inside(TARGET)
-    assert np.abs(at[shown][:, 0] / at[shown][:, 2] - warp.map_x[shown]).max() < 1e-3
+    shown = warp.maps[1].inside()
+    assert np.abs(at[shown][:, 0] / at[shown][:, 2] - warp.maps[1].x[shown]).max() < 1e-3
 
 
 def test_beyond_its_edges_a_warp_is_nothing(by_hand: SimpleNamespace) -> None:
     view, *cameras = scene(by_hand, "sideways")
     field = fit_strict(view, matches_of(view), SIZE, TARGET)
-    warp = build_warp(field, view, *cameras, projection_of(view, "equirectangular"))
+    warp = build_warp(field, views_of(view, cameras), projection_of(view, "equirectangular"))
     whole: Warp = warp.within(warp.canvas.whole)
-    assert whole.map_x.shape == (whole.canvas.height, whole.canvas.width) and whole.canvas.whole[:2] == (0, 0)
+    assert whole.maps[1].x.shape == (whole.canvas.height, whole.canvas.width) and whole.canvas.whole[:2] == (0, 0)
     left, top, _, _ = warp.canvas.whole
     part = np.s_[-top : -top + warp.canvas.height, -left : -left + warp.canvas.width]
-    assert np.array_equal(whole.map_x[part], warp.map_x, equal_nan=True)
-    assert np.isfinite(whole.map_x).sum() == np.isfinite(warp.map_x).sum()
+    assert np.array_equal(whole.maps[1].x[part], warp.maps[1].x, equal_nan=True)
+    assert np.isfinite(whole.maps[1].x).sum() == np.isfinite(warp.maps[1].x).sum()
     assert np.abs(fundamental_from_pose(view.K, view.K_prime, view.R, view.t) - view.F).max() < 1e-9

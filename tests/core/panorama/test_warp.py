@@ -9,14 +9,17 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.projective import distance_to_line
+from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.field.field import FieldValues
 from edf_stitch.core.field.refined_depth import RefinedDepth
 from edf_stitch.core.panorama.canvas import Canvas
-from edf_stitch.core.panorama.layers import reference_layer, target_layer
+from edf_stitch.core.panorama.layers import layer_of
+from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp, build_map, build_warp
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
 from edf_stitch.core.raster import sampling
 from edf_stitch.core.raster.grid import Grid
+from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.core.raster.sampling import fetch
 from edf_stitch.core.system.errors import NoOverlap
 
@@ -42,7 +45,7 @@ def wavy(by_hand: SimpleNamespace) -> object:
 def made(by_hand: SimpleNamespace, stand: str, field: object | None = None) -> tuple[Warp, SimpleNamespace]:
     camera, camera_prime = by_hand.camera(SIZE, 300.0), by_hand.camera((300, 260), 310.0)
     view = by_hand.view(camera, camera_prime, *STANDS[stand])
-    warp = build_warp(field or wavy(by_hand), view, camera, camera_prime)
+    warp = build_warp(field or wavy(by_hand), views_of(view, (camera, camera_prime)))
     return warp, SimpleNamespace(view=view, size=camera.size, target_size=camera_prime.size)
 
 
@@ -51,11 +54,16 @@ def canvas_points(warp: Warp) -> np.ndarray:
     return np.stack([x, y], axis=-1).astype(float) - warp.canvas.offset
 
 
+def planes_of(warp: Warp) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The target's x and y, and the inverse depth."""
+    return warp.maps[1].x, warp.maps[1].y, warp.inverse_depth
+
+
 @pytest.mark.parametrize("stand", STANDS)
 def test_every_canvas_pixel_lies_on_its_epipolar_line(by_hand: SimpleNamespace, stand: str) -> None:
     warp, scene = made(by_hand, stand)
-    shown = warp.inside(scene.target_size)
-    mapped = np.stack([warp.map_x, warp.map_y], axis=-1)
+    shown = warp.maps[1].inside()
+    mapped = np.stack([warp.maps[1].x, warp.maps[1].y], axis=-1)
     finite = np.isfinite(mapped).all(axis=-1)
     points = canvas_points(warp)
     inside = np.zeros(shown.shape, bool)
@@ -77,12 +85,12 @@ def test_the_map_is_h_inf_p_plus_inverse_depth_times_e(by_hand: SimpleNamespace,
     ray += warp.inverse_depth.reshape(-1, 1).astype(float) * scene.view.e_prime
     front = ray[:, 2] > 1e-3
     expected = ray[front, :2] / ray[front, 2:]
-    mapped = np.column_stack([warp.map_x.ravel(), warp.map_y.ravel()])[front]
+    mapped = np.column_stack([warp.maps[1].x.ravel(), warp.maps[1].y.ravel()])[front]
     # float32 of the result, and of d e' before the division
     rounding = 2**-23 * (np.abs(expected) + np.abs(scene.view.e_prime).max() / ray[front, 2:])
     assert (np.abs(mapped - expected) <= rounding).all()
-    assert warp.map_x.dtype == warp.map_y.dtype == warp.inverse_depth.dtype == np.float32
-    assert warp.map_x.shape == warp.map_y.shape == warp.inverse_depth.shape == (warp.canvas.height, warp.canvas.width)
+    for plane in planes_of(warp):
+        assert plane.dtype == np.float32 and plane.shape == (warp.canvas.height, warp.canvas.width)
 
 
 def test_the_inverse_depth_is_the_fields_at_every_pixel(by_hand: SimpleNamespace) -> None:
@@ -95,19 +103,19 @@ def test_strips_leave_no_trace(by_hand: SimpleNamespace) -> None:
     view = by_hand.view(camera, camera, *STANDS["sideways"])
     field = wavy(by_hand)
     canvas = Canvas(1203, 1001, (17, -5))  # 1.2 million pixels: two strips
-    warp = build_map(field, view, canvas, camera, camera)
+    warp = build_map(field, views_of(view, (camera, camera)), canvas)
     grid = Grid.over(-17, 5, 1203, 1001)
     whole = grid.to_pixels(field.on_grid(grid).inverse_depth, -17, 5, 1203, 1001)
     # BLAS sums a strip of another height in another order on some processors: the last float32 digit is its own
     assert np.allclose(warp.inverse_depth, whole, rtol=2**-21, atol=0)
-    rows = np.abs(np.diff(warp.map_y, 2, axis=0))
+    rows = np.abs(np.diff(warp.maps[1].y, 2, axis=0))
     assert rows.max() < 3 * np.median(rows.max(axis=1)), "no line where two strips meet"
 
 
 def test_the_canvas_is_no_larger_than_what_it_shows(by_hand: SimpleNamespace) -> None:
     for stand in STANDS:
         warp, scene = made(by_hand, stand)
-        shown = warp.inside(scene.target_size)
+        shown = warp.maps[1].inside()
         x, y = warp.canvas.offset
         assert x >= 0 and y >= 0 and x + SIZE[0] <= warp.canvas.width and y + SIZE[1] <= warp.canvas.height
         shown[y : y + SIZE[1], x : x + SIZE[0]] = True
@@ -118,24 +126,25 @@ def test_the_canvas_is_no_larger_than_what_it_shows(by_hand: SimpleNamespace) ->
 def test_the_whole_target_is_shown(by_hand: SimpleNamespace) -> None:
     """Its corners too: none of its pixels lies further than a canvas pixel's reach from one that was fetched."""
     warp, scene = made(by_hand, "sideways")
-    shown = warp.inside(scene.target_size)
+    shown = warp.maps[1].inside()
     found = np.zeros(scene.target_size[::-1], np.uint8)
-    found[np.rint(warp.map_y[shown]).astype(int), np.rint(warp.map_x[shown]).astype(int)] = 1
+    found[np.rint(warp.maps[1].y[shown]).astype(int), np.rint(warp.maps[1].x[shown]).astype(int)] = 1
     assert cv2.dilate(found, np.ones((7, 7), np.uint8)).all()
 
 
 def test_no_turn_and_no_depth_is_the_target_itself(by_hand: SimpleNamespace) -> None:
     camera = by_hand.camera((97, 61), 80.0)
     view = by_hand.view(camera, camera, (0, 0, 0), (-1, 0, 0))
-    warp = build_warp(by_hand.plane_field(0, 0, 0), view, camera, camera)
+    warp = build_warp(by_hand.plane_field(0, 0, 0), views_of(view, (camera, camera)))
     assert warp.canvas == Canvas(97, 61, (0, 0))
-    assert np.abs(warp.map_x - np.arange(97)).max() < 1e-4 and np.abs(warp.map_y - np.arange(61)[:, None]).max() < 1e-4
-    assert (warp.inverse_depth == 0).all()
+    x, y, inverse_depth = planes_of(warp)
+    assert np.abs(x - np.arange(97)).max() < 1e-4 and np.abs(y - np.arange(61)[:, None]).max() < 1e-4
+    assert (inverse_depth == 0).all()
 
 
-def identity(width: int, height: int, dx: float = 0.0, dy: float = 0.0) -> Warp:
+def identity(width: int, height: int, dx: float = 0.0, dy: float = 0.0) -> PictureMap:
     x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-    return Warp(Canvas(width, height, (0, 0)), x + np.float32(dx), y + np.float32(dy), np.zeros((height, width), "f4"))
+    return PictureMap(x + np.float32(dx), y + np.float32(dy), (width, height))
 
 
 def noise(height: int, width: int, channels: int, seed: int = 0) -> np.ndarray:
@@ -145,7 +154,7 @@ def noise(height: int, width: int, channels: int, seed: int = 0) -> np.ndarray:
 @pytest.mark.parametrize("channels", [1, 3])
 def test_the_identity_map_returns_every_pixel_as_it_is(channels: int) -> None:
     picture = picture_from_array(noise(41, 53, channels) * 100 - 3)
-    layer = target_layer(picture, identity(53, 41))
+    layer = layer_of(picture, identity(53, 41))
     assert np.array_equal(layer.pixels, picture.pixels) and (layer.alpha == 1).all()
 
 
@@ -153,8 +162,8 @@ def test_the_identity_map_returns_every_pixel_as_it_is(channels: int) -> None:
 @pytest.mark.parametrize(("dx", "dy"), [(7, 0), (-3, 5), (0, -40), (52, 0)])
 def test_a_map_of_whole_pixels_moves_pixels_and_nothing_else(channels: int, dx: int, dy: int) -> None:
     source = noise(41, 53, channels)
-    warp = identity(53, 41, dx, dy)
-    out = fetch(source, warp.map_x, warp.map_y)
+    moved = identity(53, 41, dx, dy)
+    out = fetch(source, moved.x, moved.y)
     expected = np.zeros_like(source)
     to_y, to_x = slice(max(0, -dy), min(41, 41 - dy)), slice(max(0, -dx), min(53, 53 - dx))
     expected[to_y, to_x] = source[to_y.start + dy : to_y.stop + dy, to_x.start + dx : to_x.stop + dx]
@@ -164,11 +173,11 @@ def test_a_map_of_whole_pixels_moves_pixels_and_nothing_else(channels: int, dx: 
 def test_straight_lines_of_light_are_met_between_pixels() -> None:
     """A ramp fetched at fractions is that ramp: no shift by half a pixel, and the rim is as good as the middle."""
     y, x = np.mgrid[:30, :40].astype(np.float32)
-    warp = identity(39, 29, 0.5, 0.5)  # where bicubic is symmetrical, hence exact on a ramp
-    out = fetch(np.stack([x, y], axis=-1), warp.map_x, warp.map_y)
-    assert np.abs(out[1:-1, 1:-1, 0] - warp.map_x[1:-1, 1:-1]).max() < 1e-4
-    assert np.abs(out[1:-1, 1:-1, 1] - warp.map_y[1:-1, 1:-1]).max() < 1e-4
-    assert np.abs(out[..., 0] - warp.map_x).max() < 0.2 and np.abs(out[..., 1] - warp.map_y).max() < 0.2
+    half = identity(39, 29, 0.5, 0.5)  # where bicubic is symmetrical, hence exact on a ramp
+    out = fetch(np.stack([x, y], axis=-1), half.x, half.y)
+    assert np.abs(out[1:-1, 1:-1, 0] - half.x[1:-1, 1:-1]).max() < 1e-4
+    assert np.abs(out[1:-1, 1:-1, 1] - half.y[1:-1, 1:-1]).max() < 1e-4
+    assert np.abs(out[..., 0] - half.x).max() < 0.2 and np.abs(out[..., 1] - half.y).max() < 0.2
 
 
 def test_positions_count_to_a_fifteenth_of_a_pixel() -> None:
@@ -183,7 +192,7 @@ def test_the_reference_is_an_exact_paste(by_hand: SimpleNamespace) -> None:
     array = noise(31, 47, 4)
     array[:9, :9, 3] = 0
     for picture in (picture_from_array(array), picture_from_array(array[..., :3]), picture_from_array(array[..., :1])):
-        layer = reference_layer(picture, Canvas(70, 50, (11, 8)))
+        layer = layer_of(picture, ReferenceMap(Canvas(70, 50, (11, 8)), by_hand.camera((47, 31), 40.0)))
         box = (slice(8, 39), slice(11, 58))
         assert np.array_equal(layer.pixels[box], picture.pixels)
         assert np.array_equal(layer.alpha[box], np.ones((31, 47)) if picture.alpha is None else picture.alpha)
@@ -205,7 +214,7 @@ def half_transparent() -> Picture:
 
 @pytest.mark.parametrize("shift", [0.0, 0.1, 0.25, 0.5, 0.8])
 def test_transparent_colours_never_bleed(shift: float) -> None:
-    layer = target_layer(half_transparent(), identity(60, 40, shift, 0.3))
+    layer = layer_of(half_transparent(), identity(60, 40, shift, 0.3))
     seen = layer.alpha > 0
     assert seen.any() and np.abs(layer.pixels[seen] - (0.25, 0.5, 0.75)).max() < 1e-3
     assert not layer.pixels[~seen].any()
@@ -217,7 +226,7 @@ def test_alpha_is_straight() -> None:
     array = noise(30, 40, 4)
     array[..., :3] = 0.6
     array[..., 3] = np.linspace(0.2, 1, 40)
-    layer = target_layer(picture_from_array(array), identity(40, 30, 0.37, 0.21))
+    layer = layer_of(picture_from_array(array), identity(40, 30, 0.37, 0.21))
     shown = layer.alpha > 0
     assert np.abs(layer.pixels[shown] - 0.6).max() < 1e-5, "not multiplied by alpha"
     expected = np.interp(np.arange(39) + 0.37, np.arange(40), array[0, :, 3])
@@ -233,7 +242,7 @@ def test_values_stay_within_the_pictures_range(channels: int) -> None:
         array[..., 3] = random.random((50, 50)) < 0.7
     picture = picture_from_array(array)
     x, y = (random.uniform(-3, 52, (80, 80)).astype(np.float32) for _ in range(2))
-    layer = target_layer(picture, Warp(Canvas(80, 80, (0, 0)), x, y, x))
+    layer = layer_of(picture, PictureMap(x, y, (50, 50)))
     assert layer.pixels.min() >= 0 and layer.pixels.max() <= 700
     assert 0 <= layer.alpha.min() and layer.alpha.max() <= 1
     raw = fetch(picture.pixels, x, y)
@@ -244,7 +253,7 @@ def test_no_value_is_darker_than_the_darkest_of_a_bright_picture() -> None:
     random = np.random.default_rng(5)
     picture = picture_from_array(np.where(random.random((50, 50, 3)) < 0.5, 20.0, 700.0).astype(np.float32))
     x, y = (random.uniform(0, 49, (80, 80)).astype(np.float32) for _ in range(2))
-    layer = target_layer(picture, Warp(Canvas(80, 80, (0, 0)), x, y, x))
+    layer = layer_of(picture, PictureMap(x, y, (50, 50)))
     assert layer.alpha.all() and layer.pixels.min() >= 20 and layer.pixels.max() <= 700
 
 
@@ -252,36 +261,36 @@ def test_behind_the_camera_there_is_nothing(by_hand: SimpleNamespace) -> None:
     camera = by_hand.camera((200, 150), 100.0)
     view = by_hand.view(camera, camera, (0, -60, 0), (-1, 0, 0))
     canvas = Canvas(600, 150, (380, 0))  # reaches 70° to the left of the reference's axis: 130° from the target's
-    warp = build_map(by_hand.plane_field(0, 0, 0.1), view, canvas, camera, camera)
+    warp = build_map(by_hand.plane_field(0, 0, 0.1), views_of(view, (camera, camera)), canvas)
     ray = canvas_points(warp) @ view.H_inf[2, :2] + view.H_inf[2, 2] + 0.1 * view.e_prime[2]
     behind = ray < -0.01
-    assert behind.sum() > 1000 and np.isnan(warp.map_x[behind]).all() and np.isnan(warp.map_y[behind]).all()
-    assert np.isfinite(warp.map_x[ray > 0.01]).all() and np.isfinite(warp.inverse_depth).all()
-    assert not warp.inside(camera.size)[behind].any()
-    layer = target_layer(picture_from_array(noise(150, 200, 3)), warp)
+    assert behind.sum() > 1000 and np.isnan(warp.maps[1].x[behind]).all() and np.isnan(warp.maps[1].y[behind]).all()
+    assert np.isfinite(warp.maps[1].x[ray > 0.01]).all() and np.isfinite(warp.inverse_depth).all()
+    assert not warp.maps[1].inside()[behind].any()
+    layer = layer_of(picture_from_array(noise(150, 200, 3)), warp.maps[1])
     assert np.isfinite(layer.pixels).all() and not layer.alpha[behind].any() and not layer.pixels[behind].any()
 
 
 def test_a_target_that_reaches_to_infinity_is_cropped_and_says_so(by_hand: SimpleNamespace) -> None:
     camera = by_hand.camera((200, 150), 100.0)  # 90° wide: turned by 60° it reaches 105° to the side
     view = by_hand.view(camera, camera, (0, -60, 0), (-1, 0, 0.2))
-    warp = build_warp(by_hand.plane_field(0, 0, 0.1), view, camera, camera)
+    warp = build_warp(by_hand.plane_field(0, 0, 0.1), views_of(view, (camera, camera)))
     assert warp.canvas.cropped
     assert warp.canvas.width <= 200 + 2 * 3 * 200 and warp.canvas.height <= 150 + 2 * 3 * 200
-    assert warp.inside(camera.size).sum() > 2000
+    assert warp.maps[1].inside().sum() > 2000
     # nothing is shown that is stretched much more than four times in length
-    x, y = warp.map_x, warp.map_y
+    x, y = warp.maps[1].x, warp.maps[1].y
     area = np.diff(x[:-1], axis=1) * np.diff(y[:, :-1], axis=0) - np.diff(x[:, :-1], axis=0) * np.diff(y[:-1], axis=1)
-    columns = np.where(warp.inside(camera.size)[:-1, :-1], area, np.nan)
+    columns = np.where(warp.maps[1].inside()[:-1, :-1], area, np.nan)
     assert np.nanmedian(columns[:, -12:-2]) > 0.5 / 4**2
 
 
 def test_a_target_that_lies_too_far_away_is_cropped_and_says_so(by_hand: SimpleNamespace) -> None:
     camera = by_hand.camera((200, 150), 100.0)
-    view = by_hand.view(camera, camera, (0, 0, 0), (1, 0, 0))
-    warp = build_warp(by_hand.plane_field(0, 0, 7.0), view, camera, camera)  # 700 px to the left: three widths are 600
+    views = views_of(by_hand.view(camera, camera, (0, 0, 0), (1, 0, 0)), (camera, camera))
+    warp = build_warp(by_hand.plane_field(0, 0, 7.0), views)  # 700 px to the left: three widths are 600
     assert warp.canvas.cropped and 600 <= warp.canvas.offset[0] < 690
-    whole = build_warp(by_hand.plane_field(0, 0, 5.0), view, camera, camera)
+    whole = build_warp(by_hand.plane_field(0, 0, 5.0), views)
     assert not whole.canvas.cropped and whole.canvas.offset == (500, 0) and whole.canvas.width == 700
 
 
@@ -289,13 +298,13 @@ def test_a_warp_that_leads_nowhere_near_is_refused(by_hand: SimpleNamespace) -> 
     camera = by_hand.camera((200, 150), 200.0)
     view = by_hand.view(camera, camera, (0, -170, 0), (-1, 0, 0))
     with pytest.raises(NoOverlap, match="nowhere near"):
-        build_warp(by_hand.plane_field(0, 0, 0.0), view, camera, camera)
+        build_warp(by_hand.plane_field(0, 0, 0.0), views_of(view, (camera, camera)))
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["wide", "tall"])
 def test_sources_and_targets_beyond_opencvs_32767_pixels(turned: bool) -> None:
-    source, warp = noise(6, 40_000, 1), identity(40_000, 6, -2.0, 1.0)
-    map_x, map_y = warp.map_x, warp.map_y
+    source, moved = noise(6, 40_000, 1), identity(40_000, 6, -2.0, 1.0)
+    map_x, map_y = moved.x, moved.y
     expected = np.zeros_like(source)
     expected[:-1, 2:] = source[1:, :-2]
     if turned:
@@ -319,8 +328,7 @@ def test_tiles_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     map_x[40:44, 50:60] = np.nan
     whole = fetch(source, map_x, map_y)
     for tile, limit in ((64, 32_000), (7, 32_000), (64, 20), (4096, 20)):
-        monkeypatch.setattr(sampling, "TILE", tile)
-        monkeypatch.setattr(sampling, "REMAP_LIMIT", limit)
+        monkeypatch.setattr(sampling, "PARTS", replace(sampling.PARTS, tile_side=tile, max_remap_side=limit))
         assert np.array_equal(fetch(source, map_x, map_y), whole)
 
 
@@ -346,15 +354,15 @@ def test_a_distorted_pair_and_the_same_pair_undistorted_meet(by_hand: SimpleName
     camera_prime = by_hand.camera(SIZE, 290.0, bent if which != "reference" else straight)
     view = by_hand.view(camera, camera_prime, (2, -5, 3), (-1.0, 0.1, 0.1))
     field = by_hand.plane_field(4e-4, -6e-4, 0.3)  # a slanted plane: d differs from pixel to pixel
-    warp = build_warp(field, view, camera, camera_prime)
+    warp = build_warp(field, views_of(view, (camera, camera_prime)))
     x, y = warp.canvas.offset
     box = (slice(y, y + SIZE[1]), slice(x, x + SIZE[0]))
     ideal = cv2_undistorted(canvas_points(warp)[box], camera)
     rays = np.concatenate([ideal, np.ones((*ideal.shape[:2], 1))], axis=-1) @ view.H_inf.T
     rays += field.depth(ideal)[..., None] * view.e_prime
     expected = cv2_distorted(rays[..., :2] / rays[..., 2:], camera_prime)
-    mapped = np.stack([warp.map_x, warp.map_y], axis=-1)[box]
-    shown = warp.inside(SIZE)[box]
+    mapped = np.stack([warp.maps[1].x, warp.maps[1].y], axis=-1)[box]
+    shown = warp.maps[1].inside()[box]
     assert shown.sum() > 20_000
     assert np.abs(mapped - expected)[shown].max() < 0.02
 
@@ -380,11 +388,12 @@ class Shifted:
 def test_a_shift_comes_on_top_and_the_canvas_makes_room_for_it(by_hand: SimpleNamespace) -> None:
     camera = by_hand.camera(SIZE, 300.0)
     view, plane = by_hand.view(camera, camera, *STANDS["parallel"]), by_hand.plane_field(0, 0, 0.2)
-    theirs, ours = (build_warp(field, view, camera, camera) for field in (plane, Shifted(plane, (0, -12.0))))
+    views = views_of(view, (camera, camera))
+    theirs, ours = (build_warp(field, views) for field in (plane, Shifted(plane, (0, -12.0))))
     a, b = theirs.canvas, ours.canvas
     assert (b.width, b.height, b.offset) == (a.width, a.height + 12, a.offset)
-    for name, by in (("map_x", 0), ("map_y", -12), ("inverse_depth", 0)):
-        assert np.abs(getattr(ours, name)[: a.height] - getattr(theirs, name) - by).max() < 1e-4
+    for with_shift, without, by in zip(planes_of(ours), planes_of(theirs), (0, -12, 0), strict=True):
+        assert np.abs(with_shift[: a.height] - without - by).max() < 1e-4
 
 
 # --- a part of the canvas ------------------------------------------------------------------------------------------
@@ -397,11 +406,10 @@ def test_a_part_of_a_warp_and_of_a_layer(by_hand: SimpleNamespace) -> None:
     part = whole.within(box)
     assert (part.canvas.width, part.canvas.height, part.canvas.cropped) == (90, 40, False)
     assert np.array_equal(canvas_points(part), canvas_points(whole)[cut])
-    for name in ("map_x", "map_y", "inverse_depth"):
-        array = getattr(part, name)
-        assert np.array_equal(array, getattr(whole, name)[cut], equal_nan=True) and array.flags.c_contiguous
-    layer = target_layer(picture_from_array(noise(260, 300, 3)), whole)
-    again = target_layer(picture_from_array(noise(260, 300, 3)), part)
+    for array, all_of_it in zip(planes_of(part), planes_of(whole), strict=True):
+        assert np.array_equal(array, all_of_it[cut], equal_nan=True) and array.flags.c_contiguous
+    layer = layer_of(picture_from_array(noise(260, 300, 3)), whole.maps[1])
+    again = layer_of(picture_from_array(noise(260, 300, 3)), part.maps[1])
     assert np.array_equal(layer.within(box).pixels, again.pixels)
     assert np.array_equal(layer.within(box).alpha, again.alpha)
     flagged = replace(whole, canvas=replace(whole.canvas, cropped=True))
@@ -413,12 +421,35 @@ def test_depth_and_confidence_are_the_same_whatever_part_is_asked_for(by_hand: S
     view = by_hand.view(camera, camera, *STANDS["sideways"])
     nodes = np.random.default_rng(2).normal(scale=0.01, size=(30, 40, 4)).astype(np.float32)
     relief = RefinedDepth((100.5, 200.5), (20.0, 20.0), nodes[..., 0], nodes[..., 1:3], np.abs(nodes[..., 3]))
-    warp = build_map(wavy(by_hand), view, Canvas(1203, 1001, (17, -5)), camera, camera, relief)
+    warp = build_map(wavy(by_hand), views_of(view, (camera, camera)), Canvas(1203, 1001, (17, -5)), relief)
     assert warp.lazy_confidence is not None and warp.confidence is not None
     for plane, all_of_it in ((warp.depth, warp.inverse_depth), (warp.lazy_confidence, warp.confidence)):
         assert all_of_it[300:500, 300:500].any()
         for part in (np.s_[700:900, 0:1203], np.s_[815:1001, 333:700], np.s_[3:4, 9:10]):
             assert np.array_equal(plane[part], all_of_it[part])
-    x, y = warp.map_x[300:500, 300:500], warp.map_y[300:500, 300:500]
-    flat = build_map(wavy(by_hand), view, Canvas(1203, 1001, (17, -5)), camera, camera)
-    assert np.hypot(x - flat.map_x[300:500, 300:500], y - flat.map_y[300:500, 300:500]).mean() > 0.5
+    x, y = warp.maps[1].x[300:500, 300:500], warp.maps[1].y[300:500, 300:500]
+    flat = build_map(wavy(by_hand), views_of(view, (camera, camera)), Canvas(1203, 1001, (17, -5)))
+    assert np.hypot(x - flat.maps[1].x[300:500, 300:500], y - flat.maps[1].y[300:500, 300:500]).mean() > 0.5
+
+
+# --- three pictures -------------------------------------------------------------------------------------------------
+
+
+def test_each_further_picture_has_the_map_it_has_alone(by_hand: SimpleNamespace) -> None:
+    """Depth lies along the reference's rays: two more pictures of it do not touch each other."""
+    camera, lens = by_hand.camera(SIZE, 300.0), by_hand.camera((300, 260), 310.0, (-0.1, 0.02))
+    pairs = [
+        views_of(by_hand.view(camera, other, *STANDS[stand]), (camera, other))
+        for other, stand in ((camera, "sideways"), (lens, "up"))
+    ]
+    (reference, first), (_, second) = pairs
+    field, canvas = by_hand.plane_field(4e-4, -6e-4, 0.3), Canvas(500, 400, (80, 90))
+    warp = build_map(field, (reference, first, second), canvas)
+    assert len(warp.maps) == 3 and [one.size for one in warp.maps] == [SIZE, SIZE, (300, 260)]
+    for one, pair in zip(warp.maps[1:], pairs, strict=True):
+        alone = build_map(field, pair, canvas)
+        assert one.inside().sum() > 10_000
+        assert np.array_equal(one.x, alone.maps[1].x, equal_nan=True)
+        assert np.array_equal(one.y, alone.maps[1].y, equal_nan=True)
+        assert np.array_equal(warp.inverse_depth, alone.inverse_depth)
+    assert np.abs(warp.maps[1].x - warp.maps[2].x).max() > 10, "not one picture twice"

@@ -150,6 +150,8 @@ def test_a_webp_of_one_colour_unpacks_a_million_times(tmp_path: Path) -> None:
 
 
 def test_a_layer_more_than_memory_holds_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace
+
     import OpenEXR
     from edf_stitch.core.pictures import decoding
 
@@ -158,7 +160,7 @@ def test_a_layer_more_than_memory_holds_is_refused(tmp_path: Path, monkeypatch: 
     with OpenEXR.File(kind, {f"pass{number:02}.{name}": plane for number in range(9) for name in "RGB"}) as file:
         file.write(str(tmp_path / "many.exr"))
     assert load_picture(tmp_path / "many.exr").view.shape == (64, 96, 3)
-    monkeypatch.setattr(decoding, "_MOST_SAMPLES", 27 * 64 * 96 - 1)
+    monkeypatch.setattr(decoding, "READING", replace(decoding.READING, max_exr_samples=27 * 64 * 96 - 1))
     with pytest.raises(UnreadableImage, match="render only the picture"):
         load_picture(tmp_path / "many.exr")
 

@@ -145,9 +145,9 @@ def loaded(tmp_path: Path, pixels: np.ndarray, profile: bytes | None) -> Picture
 def test_one_profile_for_both_is_kept_and_two_become_srgb(tmp_path: Path) -> None:
     light = NOISE[..., :3] * 0.5 + 0.2
     wide, plain = loaded(tmp_path, light, icc()), loaded(tmp_path, light, None)
-    a, b = in_same_colour_space(wide, wide)
+    a, b = in_same_colour_space((wide, wide))
     assert a.icc == b.icc == icc() and np.array_equal(a.pixels, wide.pixels)
-    a, b = in_same_colour_space(wide, plain)
+    a, b = in_same_colour_space((wide, plain))
     assert a.icc is None and b.icc is None and b is plain and a.warnings == ()
     profile = parse_icc(icc())
     assert profile is not None
@@ -156,7 +156,7 @@ def test_one_profile_for_both_is_kept_and_two_become_srgb(tmp_path: Path) -> Non
     assert np.allclose(decode(a.view), a.pixels.clip(0, 1), atol=0.006), "the view follows"
     # the same colours under two profiles
     seen = loaded(tmp_path, (light @ np.linalg.inv(profile.to_srgb).T).astype(np.float32), icc())
-    a, b = in_same_colour_space(seen, loaded(tmp_path, light, icc(primaries=SRGB, gamma=1.8)))
+    a, b = in_same_colour_space((seen, loaded(tmp_path, light, icc(primaries=SRGB, gamma=1.8))))
     assert np.allclose(a.pixels, b.pixels, atol=2e-3)
 
 
@@ -164,9 +164,9 @@ def test_profiles_that_are_not_understood(tmp_path: Path) -> None:
     light = NOISE[..., :3]
     lut, plain = loaded(tmp_path, light, icc(pcs=b"Lab ")), loaded(tmp_path, light, None)
     assert np.array_equal(lut.pixels, plain.pixels) and lut.warnings == ()
-    a, b = in_same_colour_space(lut, lut)
+    a, b = in_same_colour_space((lut, lut))
     assert a.icc == b.icc == icc(pcs=b"Lab ") and a.warnings == (), "out as it came in"
-    a, b = in_same_colour_space(plain, lut)
+    a, b = in_same_colour_space((plain, lut))
     assert b.icc is None and "taken as sRGB" in b.warnings[0]
     # a CMYK profile describes what the decoder has turned to RGB already
     png = encode_picture(light, None, 8, ".png")[0]

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.compose.blend import averaged, feathered
-from edf_stitch.core.panorama.layers import reference_layer, target_layer
+from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.masks import painted_over, read_mask, read_painted, without
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
@@ -209,7 +209,7 @@ def noisy(picture: Picture, mask: np.ndarray) -> Picture:
 @pytest.fixture(scope="module")
 def masks(small_result: StitchResult) -> tuple[np.ndarray, np.ndarray]:
     """A part of the overlap in the reference, another in the target."""
-    height, width = small_result.reference.view.shape[:2]
+    height, width = small_result.pictures[0].view.shape[:2]
     first, second = np.zeros((2, height, width), bool)
     first[height // 3 : height // 2, width // 2 : 3 * width // 4] = True
     second[height // 2 : 3 * height // 4, width // 4 : width // 2] = True
@@ -218,7 +218,7 @@ def masks(small_result: StitchResult) -> tuple[np.ndarray, np.ndarray]:
 
 def test_no_feature_comes_from_the_mask(small_result: StitchResult, masks: tuple[np.ndarray, np.ndarray]) -> None:
     mask = masks[0]
-    picture = without(small_result.reference, mask)
+    picture = without(small_result.pictures[0], mask)
     points = features.detect(picture.view, picture.alpha).points
     column, row = np.rint(points).astype(int).T
     assert len(points) > 50 and not mask[row, column].any()
@@ -249,13 +249,14 @@ def test_paint_that_cannot_be_read_is_told_by_its_name(tmp_path: Path) -> None:
 def test_what_the_mask_hides_changes_no_layer_and_no_blend(
     small_result: StitchResult, masks: tuple[np.ndarray, np.ndarray]
 ) -> None:
-    pictures, found = (small_result.reference, small_result.target), []
+    pictures, found = small_result.pictures, []
     for noise in (np.zeros_like(masks[0]), True):
         first, second = (without(noisy(p, m & noise), m) for p, m in zip(pictures, masks, strict=True))
-        base, layer = reference_layer(first, small_result.warp.canvas), target_layer(second, small_result.warp)
-        found.append([layer, averaged(base, layer), feathered(base, layer, np.zeros(base.alpha.shape, bool))])
+        base, layer = (layer_of(p, one) for p, one in zip((first, second), small_result.warp.maps, strict=True))
+        shown = base.alpha > 0
+        found.append([layer, averaged(base, layer, shown), feathered(base, layer, np.zeros_like(shown))])
     for ours, theirs in zip(*found, strict=True):
         shown = ours.alpha > 0
         assert shown.any() and np.array_equal(ours.alpha, theirs.alpha)
         assert np.allclose(ours.pixels[shown], theirs.pixels[shown], atol=1e-6)
-    assert (found[0][0].alpha[small_result.target_layer.alpha > 0] == 0).any(), "something was hidden"
+    assert (found[0][0].alpha[small_result.layers[1].alpha > 0] == 0).any(), "something was hidden"

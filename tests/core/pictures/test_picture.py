@@ -367,17 +367,17 @@ def test_other_arrays_are_a_bad_call(array: object) -> None:
 
 def test_pair_of_gray_and_colour_and_of_two_exposures() -> None:
     gray, colour = picture_from_array(image(np.uint8, 1)), picture_from_array(image(np.uint8, 3))
-    a, b = in_same_colour_space(gray, colour)
+    a, b = in_same_colour_space((gray, colour))
     assert b is colour and a.pixels.shape == a.view.shape == colour.pixels.shape
     assert np.array_equal(a.pixels[..., 0], gray.pixels[..., 0]) and np.array_equal(a.view[..., 2], gray.view[..., 0])
     light = SMOOTH[..., :3].astype(np.float32)
     dim, bright = picture_from_array(light), picture_from_array(light * 2)
-    a, b = in_same_colour_space(dim, bright)
+    a, b = in_same_colour_space((dim, bright))
     assert np.abs(dim.view.astype(int) - bright.view).max() <= 1
     assert np.array_equal(a.pixels, dim.pixels)
     seen = (b.view < 250) & (a.view > 60)
     assert np.allclose(decode(b.view)[seen] / decode(a.view)[seen], 2, rtol=0.05), "twice the light shows"
-    far = in_same_colour_space(dim, picture_from_array(light * 1000))
+    far = in_same_colour_space((dim, picture_from_array(light * 1000)))
     assert np.abs(far[0].view.astype(int) - far[1].view).max() <= 1, "both can be seen"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -17,7 +18,7 @@ from hypothesis import strategies as st
 
 @pytest.fixture
 def small_strips(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(arrays, "STRIP", 400)  # pixels: ten lines
+    monkeypatch.setattr(arrays, "PARTS", replace(arrays.PARTS, strip_pixels=400))  # ten lines
     yield
 
 

@@ -11,6 +11,7 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import (
     fundamental_from_pose,
     homogeneous,
@@ -20,13 +21,15 @@ from edf_stitch.core.cameras.projective import (
     rotation_from_vector,
     sampson_residuals,
 )
-from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
 from edf_stitch.core.cameras.two_view import TwoView
-from edf_stitch.core.pose.estimation import MIN_MATCHES, _least_truncated, _poses_of_plane, estimate
+from edf_stitch.core.pose.estimation import _least_truncated, _poses_of_plane, estimate
+from edf_stitch.core.pose.options import ESTIMATION
 from edf_stitch.core.pose.refinement import Pose
 from edf_stitch.core.system.errors import DegenerateGeometry, NoOverlap, TooFewMatches
 
 from ..point_scenes import FOCAL, SIZE, spoiled, turned_by, unit
+
+ASSUMED_SIGMA, EXIF_SIGMA = INTRINSICS.assumed_sigma, INTRINSICS.exif_sigma
 
 
 @dataclass(frozen=True)
@@ -433,14 +436,14 @@ def test_reference_and_target_change_places() -> None:
 # --- nothing to go by ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("count", [0, 1, MIN_MATCHES - 1])
+@pytest.mark.parametrize("count", [0, 1, ESTIMATION.min_matches - 1])
 def test_too_few_matches_are_said_to_be_too_few(count: int) -> None:
-    with pytest.raises(TooFewMatches, match=f"only {count} .* at least {MIN_MATCHES}") as caught:
+    with pytest.raises(TooFewMatches, match=f"only {count} .* at least {ESTIMATION.min_matches}") as caught:
         estimate(scene().matches.subset(np.arange(count)), known(), known())
     assert caught.value.exit_code == 3
 
 
-@pytest.mark.parametrize("count", [MIN_MATCHES, 60, 400])
+@pytest.mark.parametrize("count", [ESTIMATION.min_matches, 60, 400])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_matches_by_chance_are_no_overlap(count: int, seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.matches import Matches
-from edf_stitch.core.pose.features import FEATURE_PIXELS, Features, detect, match, spread_evenly
+from edf_stitch.core.pose.features import Features, detect, match, spread_evenly
+from edf_stitch.core.pose.options import FEATURES
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
@@ -73,9 +74,9 @@ def test_a_big_picture_is_shrunk_and_its_points_come_back_to_full_size() -> None
     small = texture(240, 320, 2, 1)
     times = 8
     large = cv2.resize(small, None, fx=times, fy=times, interpolation=cv2.INTER_CUBIC)[..., None]
-    assert large.shape[0] * large.shape[1] > 1.5 * FEATURE_PIXELS
+    assert large.shape[0] * large.shape[1] > 1.5 * FEATURES.pixels
     found = detect(large, budget=2000)
-    assert found.scale == pytest.approx(np.sqrt(large.size / FEATURE_PIXELS), rel=2e-3)
+    assert found.scale == pytest.approx(np.sqrt(large.size / FEATURES.pixels), rel=2e-3)
     assert found.points[:, 0].max() > 0.9 * large.shape[1] and found.points[:, 1].max() > 0.9 * large.shape[0]
     distance, offset = nearest((detect(small).points + 0.5) * times - 0.5, found.points)
     same = distance < 0.25 * times

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import homogeneous, infinite_homography, project
-from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
-from edf_stitch.core.pose.focal import SPREAD_MATCHES, KnownFocal, focal_warnings, known_focal
+from edf_stitch.core.pose import options
+from edf_stitch.core.pose.focal import KnownFocal, focal_warnings, known_focal
 from edf_stitch.core.pose.refinement import Pose, focal_deviations, refine_pose
 
 from ..point_scenes import FOCAL, SIZE, turned_by, unit
+
+ASSUMED_SIGMA, EXIF_SIGMA = INTRINSICS.assumed_sigma, INTRINSICS.exif_sigma
 
 # R and t of target cameras, each half a unit or more away: what they tell of the focal length follows from DESIGN 4
 CONVERGING = (turned_by(8, -15, 5), 0.8 * unit(1, -0.4, 0.3))
@@ -173,7 +176,7 @@ def test_a_guess_cannot_be_contradicted_nor_can_what_is_given() -> None:
 @pytest.mark.parametrize("seed, worse", [(1, "longer"), (8, "shorter")])
 def test_the_spread_is_that_of_the_focal_length_that_moves_infinity_more(seed: int, worse: str) -> None:
     """Of one longer by two deviations and one as much shorter, each with the pose that goes with it."""
-    matches, true = scene(CONVERGING, seed, SPREAD_MATCHES)
+    matches, true = scene(CONVERGING, seed, options.FOCAL.spread_matches)
     about, found = known(matches, true, camera(FOCAL, 0.1))
     away = {}
     for side, change in (("longer", 2 * about.deviation), ("shorter", -2 * about.deviation)):

@@ -19,11 +19,6 @@ from edf_stitch.core.cameras.projective import (
     sampson_residuals,
 )
 from edf_stitch.core.pose.fundamental import (
-    LEAST_OFF,
-    LEAST_PX,
-    LEAST_SHARE,
-    MIN_INLIERS,
-    RANSAC_PX,
     fit_homography,
     fundamental_candidates,
     refuse_chance,
@@ -31,6 +26,7 @@ from edf_stitch.core.pose.fundamental import (
     shows_parallax,
     transfer_error,
 )
+from edf_stitch.core.pose.options import FUNDAMENTAL
 from edf_stitch.core.system.errors import DegenerateGeometry, NoOverlap
 
 from ..point_scenes import SIZE, spoiled
@@ -86,8 +82,8 @@ def test_the_first_candidate_explains_what_is_true(outliers: float) -> None:
     made = scene("general", 1, 400, 0.5, outliers)
     found = fundamental_candidates(made.matches, 0)
     true = made.matches.subset(~made.wrong)
-    assert (np.abs(sampson_residuals(found[0], true.x, true.y)) < RANSAC_PX).mean() > 0.95
-    threshold = RANSAC_PX * made.matches.scale
+    assert (np.abs(sampson_residuals(found[0], true.x, true.y)) < FUNDAMENTAL.inlier_px).mean() > 0.95
+    threshold = FUNDAMENTAL.inlier_px * made.matches.scale
     cost = [np.minimum(np.abs(sampson_residuals(F, made.matches.x, made.matches.y)), threshold).sum() for F in found]
     assert len(found) >= 2 and cost == sorted(cost)
 
@@ -100,9 +96,9 @@ def test_the_same_seed_gives_the_same_candidates() -> None:
     assert [F.tobytes() for F in one] == [F.tobytes() for F in other]
 
 
-@pytest.mark.parametrize("count", [MIN_INLIERS + 1, 400])
+@pytest.mark.parametrize("count", [FUNDAMENTAL.min_inliers + 1, 400])
 def test_fewer_that_agree_than_needed_are_counted_in_the_refusal(count: int) -> None:
-    needed = max(MIN_INLIERS, math.ceil(0.08 * count))
+    needed = max(FUNDAMENTAL.min_inliers, math.ceil(0.08 * count))
     with pytest.raises(NoOverlap, match=rf"{count} points look alike .* at least {needed} needed"):
         fundamental_candidates(by_chance(count, 0), 0)
 
@@ -123,7 +119,7 @@ def test_whatever_opencv_fails_at_poselib_is_left(monkeypatch: pytest.MonkeyPatc
     matches = scene("general").matches
     found = fundamental_candidates(matches, 0)
     assert len(found) == 2
-    assert (np.abs(sampson_residuals(found[0], matches.x, matches.y)) < RANSAC_PX).mean() > 0.95
+    assert (np.abs(sampson_residuals(found[0], matches.x, matches.y)) < FUNDAMENTAL.inlier_px).mean() > 0.95
 
 
 # --- chance --------------------------------------------------------------------------------------------------------
@@ -132,7 +128,7 @@ def test_whatever_opencv_fails_at_poselib_is_left(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("n", [40, 300])
 def test_as_many_on_their_lines_as_chance_would_bring_are_refused(n: int) -> None:
     """The expected number of such findings, in whole numbers: at most one is beyond chance."""
-    alpha = 2 * RANSAC_PX * math.hypot(*SIZE) / (SIZE[0] * SIZE[1])
+    alpha = 2 * FUNDAMENTAL.inlier_px * math.hypot(*SIZE) / (SIZE[0] * SIZE[1])
     beyond = next(
         k for k in range(8, n)
         if math.log((n - 7) * math.comb(n, k) * math.comb(k, 7)) + (k - 7) * math.log(alpha) <= 0
@@ -143,7 +139,7 @@ def test_as_many_on_their_lines_as_chance_would_bring_are_refused(n: int) -> Non
         line = homogeneous(inside.x) @ F_TRUE.T
         y[on:] += 50 * line[on:, :2] / np.linalg.norm(line[on:, :2], axis=1, keepdims=True)  # well off their lines
         matches = Matches(inside.x, y)
-        assert (np.abs(sampson_residuals(F_TRUE, matches.x, y)) < RANSAC_PX).sum() == on
+        assert (np.abs(sampson_residuals(F_TRUE, matches.x, y)) < FUNDAMENTAL.inlier_px).sum() == on
         if refused:
             with pytest.raises(NoOverlap, match=f"{n} points look alike, but the {on} .* by chance"):
                 refuse_chance(matches, F_TRUE, SIZE)
@@ -164,7 +160,8 @@ def test_a_homography_is_found_and_its_sigma_is_the_noise(kind: str, outliers: f
     clean = scene(kind, 3, 400, 0.0).matches.x
     off = project(homogeneous(clean) @ found.H.T) - project(homogeneous(clean) @ true.T)
     assert np.sqrt((off**2).sum(axis=1).mean()) < noise
-    within = 1 - np.exp(-((2 * RANSAC_PX / noise) ** 2) / 4)  # both pictures' noise, normal in two components
+    # both pictures' noise, normal in two components
+    within = 1 - np.exp(-((2 * FUNDAMENTAL.inlier_px / noise) ** 2) / 4)
     assert found.inliers[~made.wrong].mean() > within - 0.04 and found.inliers[made.wrong].sum() <= 4
     # the median of 200 is known to ± 6 %, and what lies beyond the threshold is missing from it
     assert found.sigma == pytest.approx(noise, rel=0.15)
@@ -173,8 +170,8 @@ def test_a_homography_is_found_and_its_sigma_is_the_noise(kind: str, outliers: f
 
 def test_sigma_is_not_believed_to_be_below_what_keypoints_can_do() -> None:
     matches = scene("plane", 0, 100, 0.0).matches
-    assert fit_homography(matches, 0).sigma == LEAST_PX
-    assert fit_homography(Matches(matches.x, matches.y, scale=3.0), 0).sigma == 3 * LEAST_PX
+    assert fit_homography(matches, 0).sigma == FUNDAMENTAL.least_noise_px
+    assert fit_homography(Matches(matches.x, matches.y, scale=3.0), 0).sigma == 3 * FUNDAMENTAL.least_noise_px
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -319,7 +316,7 @@ def test_fewer_than_so_many_or_such_a_share_are_never_parallax(count: int) -> No
     homography = fit_homography(matches, 0)
     line = homogeneous(matches.x) @ F_TRUE.T
     along = np.column_stack([-line[:, 1], line[:, 0]]) / np.linalg.norm(line[:, :2], axis=1, keepdims=True)
-    enough = max(LEAST_OFF, math.ceil(LEAST_SHARE * count))
+    enough = max(FUNDAMENTAL.min_off_plane, math.ceil(FUNDAMENTAL.min_off_plane_share * count))
     for off, expected in ((enough - 1, False), (2 * enough, True)):
         y = matches.y.copy()
         y[:off] += 30 * along[:off]

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import PRINCIPAL_SIGMA, Camera, Knowledge
+from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import (
     homogeneous,
     in_front,
@@ -18,12 +19,8 @@ from edf_stitch.core.cameras.projective import (
     rotation_from_vector,
     sampson_residuals,
 )
-from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
+from edf_stitch.core.pose.options import REFINEMENT
 from edf_stitch.core.pose.refinement import (
-    BEYOND_PX,
-    EFFECTIVE_MATCHES,
-    SYSTEMATIC_PX,
-    TAILS,
     Pose,
     _Problem,
     cheirality_residual,
@@ -34,6 +31,8 @@ from edf_stitch.core.pose.refinement import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+ASSUMED_SIGMA, EXIF_SIGMA, PRINCIPAL_SIGMA = INTRINSICS.assumed_sigma, INTRINSICS.exif_sigma, INTRINSICS.principal_sigma
+FREEDOM, EFFECTIVE_MATCHES = REFINEMENT.prior_freedom, REFINEMENT.effective_matches
 SIZE = (1200, 900)
 FOCAL = 1000.0
 CONVERGING = rotation_from_vector(np.radians([4.0, -14.0, 5.0]))
@@ -154,7 +153,7 @@ def test_the_normal_matrix_is_made_of_the_residuals_derivatives(
         first, second = (np.log(K[0, 0] / cam.focal) for K in (moved.K, moved.K_prime))
         out = [] if log_sigma == 0 else [first / log_sigma]
         if log_sigma == ASSUMED_SIGMA:
-            out = [np.sign(first) * np.sqrt(TAILS * np.log1p((first / log_sigma) ** 2 / TAILS))]
+            out = [np.sign(first) * np.sqrt(FREEDOM * np.log1p((first / log_sigma) ** 2 / FREEDOM))]
         if principal:
             out += list((moved.K - cam.K)[:2, 2] / (principal * SIZE[0]))
         return np.array(out + ([(second - first) / 0.3] if zoom else []))
@@ -355,7 +354,7 @@ def test_points_pushed_behind_infinity_are_pulled_back() -> None:
         cam = camera(0.5 * FOCAL)
         found, _ = refine_pose(matches, Pose(cam.K, cam.K, true.R, true.t), cam, cam, 5.0, iterations=60)
         beyond = cheirality_residual(found, matches.x, matches.y)
-        assert (beyond < -BEYOND_PX).mean() < 0.15
+        assert (beyond < -REFINEMENT.cheirality_sigma_px).mean() < 0.15
         assert in_front(found.K, found.K_prime, found.R, found.t, matches.x, matches.y).mean() > 0.85
 
 
@@ -395,7 +394,7 @@ def test_an_assumption_pulls_less_the_further_it_is_off(z: float) -> None:
             return residual, derivative[0]
 
         at, slope = prior(z * log_sigma)
-        cost = TAILS * np.log1p(z**2 / TAILS) if log_sigma == ASSUMED_SIGMA else z**2
+        cost = FREEDOM * np.log1p(z**2 / FREEDOM) if log_sigma == ASSUMED_SIGMA else z**2
         assert at**2 == pytest.approx(cost, rel=1e-6, abs=1e-18) and at * z >= 0
         h = 1e-5 * log_sigma
         # the slope is that of Gauss and Newton's gradient: at · slope is half the cost's derivative
@@ -469,8 +468,8 @@ def test_the_focal_deviation_is_in_proportion_to_the_noise_but_not_below_the_sys
         return focal_deviations(replace(matches, scale=scale), true, cam, cam, sigma, False)[1]
 
     assert alone(2.0) == pytest.approx(2 * alone(1.0), rel=1e-6)
-    assert alone(0.01) == pytest.approx(SYSTEMATIC_PX * alone(1.0), rel=1e-6)
-    assert alone(0.01, scale=3.0) == pytest.approx(3 * SYSTEMATIC_PX * alone(1.0), rel=1e-6)
+    assert alone(0.01) == pytest.approx(REFINEMENT.systematic_px * alone(1.0), rel=1e-6)
+    assert alone(0.01, scale=3.0) == pytest.approx(3 * REFINEMENT.systematic_px * alone(1.0), rel=1e-6)
 
 
 @pytest.mark.parametrize("log_sigma", [0.05, ASSUMED_SIGMA])

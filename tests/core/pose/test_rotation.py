@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import (
     homogeneous,
     infinite_homography,
@@ -13,9 +14,10 @@ from edf_stitch.core.cameras.projective import (
     rotation_angle,
     rotation_from_vector,
 )
-from edf_stitch.core.cameras.sources import ASSUMED_SIGMA, EXIF_SIGMA
 from edf_stitch.core.pose.fundamental import fit_homography
 from edf_stitch.core.pose.rotation import Rotation, fit_rotation
+
+ASSUMED_SIGMA, EXIF_SIGMA = INTRINSICS.assumed_sigma, INTRINSICS.exif_sigma
 
 SIZE = (1200, 900)
 FOCAL = 1000.0

@@ -7,8 +7,9 @@ import pytest
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import homogeneous, project
 from edf_stitch.core.field.strict import fit_strict
-from edf_stitch.core.rivals.apap import GAMMA, SIGMA, fit_apap
+from edf_stitch.core.rivals.apap import fit_apap
 from edf_stitch.core.rivals.homography import direct_linear
+from edf_stitch.core.rivals.options import APAP
 
 from ..field.test_strict import SIDE, SIZE, curved, some_matches
 
@@ -22,7 +23,8 @@ def matches() -> Matches:
 def test_with_all_weights_alike_it_is_the_homography(matches: Matches) -> None:
     strict = fit_strict(SIDE, matches, SIZE, SIZE)
     whole = project(homogeneous(matches.x) @ direct_linear(*_kept(matches, strict)).T)
-    off = [np.abs(fit_apap(strict, matches, gamma=g).predict(matches.x) - whole).max() for g in (GAMMA, 0.1, 0.5, 1.0)]
+    gammas = (APAP.gamma, 0.1, 0.5, 1.0)
+    off = [np.abs(fit_apap(strict, matches, gamma=g).predict(matches.x) - whole).max() for g in gammas]
     assert off[-1] < 1e-6 and off == sorted(off, reverse=True) and off[0] > 3
     assert np.abs(fit_apap(strict, matches, sigma=1e7).predict(matches.x) - whole).max() < 1e-3
 
@@ -31,9 +33,9 @@ def test_a_point_has_the_homography_that_its_weights_give(matches: Matches) -> N
     """The moving direct linear transformation, point by point, by singular values as the paper has it."""
     strict = fit_strict(SIDE, matches, SIZE, SIZE)
     x, y, _ = _kept(matches, strict)
-    sigma = SIGMA * np.sqrt(SIZE[0] * SIZE[1])
+    sigma = APAP.sigma * np.sqrt(SIZE[0] * SIZE[1])
     for point in ((500.0, 300.0), (800.0, 600.0)):
-        weight = np.maximum(np.exp(-((x - point) ** 2).sum(axis=1) / sigma**2), GAMMA)
+        weight = np.maximum(np.exp(-((x - point) ** 2).sum(axis=1) / sigma**2), APAP.gamma)
         T, T_prime = (_similarity(p) for p in (x, y))
         a, b = homogeneous(x) @ T.T, homogeneous(y) @ T_prime.T
         rows = np.vstack([

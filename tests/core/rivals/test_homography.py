@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import homogeneous, project
-from edf_stitch.core.rivals.homography import LEAST_MATCHES, direct_linear, fit_one_homography
+from edf_stitch.core.rivals.homography import direct_linear, fit_one_homography
+from edf_stitch.core.rivals.options import HOMOGRAPHY
 from edf_stitch.core.system.errors import DegenerateGeometry
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -39,7 +40,7 @@ def test_weights_decide_between_contradicting_matches() -> None:
 
 
 @pytest.mark.parametrize("points", [
-    np.random.default_rng(0).uniform(0, 500, (LEAST_MATCHES - 1, 2)), np.full((20, 2), 7.0),
+    np.random.default_rng(0).uniform(0, 500, (HOMOGRAPHY.min_matches - 1, 2)), np.full((20, 2), 7.0),
     np.linspace((0, 0), (400, 300), 30),
 ], ids=["few", "spot", "line"])  # fmt: skip
 def test_what_determines_no_homography_is_refused(points: np.ndarray) -> None:

@@ -10,8 +10,9 @@ import pytest
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import distance_to_line
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.field.options import STRICT
 from edf_stitch.core.field.spline import ThinPlateSpline, kernel
-from edf_stitch.core.field.strict import SMOOTHING_LADDER, fit_strict
+from edf_stitch.core.field.strict import fit_strict
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.raster.grid import Grid
 from edf_stitch.core.rivals.paper import PaperField, fit_paper, solve_paper
@@ -139,7 +140,7 @@ def test_exact_matches_are_met(two_view: TwoView) -> None:
     probe, true, _ = some_matches(two_view, depths, 300, seed=9)
     error = np.linalg.norm(field.predict(probe) - true, axis=1)
     assert np.isfinite(error).all() and np.median(error) < 0.5
-    assert field.fit.smoothing in SMOOTHING_LADDER and field.name == "paper"
+    assert field.fit.smoothing in STRICT.smoothing_ladder and field.name == "paper"
     left = np.linalg.norm(y - field.predict(x), axis=1)[field.fit.inliers_used]
     assert field.fit.residual_px == pytest.approx(np.sqrt((left**2).mean()), rel=1e-6)
 

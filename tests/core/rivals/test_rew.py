@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import homogeneous, infinite_homography, project
+from edf_stitch.core.field.options import STRICT
 from edf_stitch.core.field.spline import ThinPlateSpline
-from edf_stitch.core.field.strict import SMOOTHING_LADDER, fit_strict
+from edf_stitch.core.field.strict import fit_strict
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.raster.grid import Grid
 from edf_stitch.core.rivals.homography import direct_linear
@@ -29,7 +30,7 @@ def rew_of(noise: float = 0.3, two_view=SIDE, depths=curved, count: int = 200) -
 def test_it_reproduces_its_matches() -> None:
     """Without noise the least smoothing is the best, and nothing is left."""
     field, matches = rew_of(noise=0.0)
-    assert field.fit.smoothing == SMOOTHING_LADDER[0] and field.fit.residual_px < 0.05
+    assert field.fit.smoothing == STRICT.smoothing_ladder[0] and field.fit.residual_px < 0.05
     kept = matches.subset(field.fit.inliers_used)
     assert len(kept) > 190 and np.abs(field.predict(kept.x) - kept.y).max() < 0.3
 

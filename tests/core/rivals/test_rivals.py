@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.choices import RIVALS
 from edf_stitch.core.field.field import Field
 from edf_stitch.core.field.transfer import target_points
@@ -50,20 +51,20 @@ def test_it_knows_no_depth_and_no_cameras(name: str) -> None:
     view = field.two_view
     assert np.isnan(view.F).all() and np.isnan(view.R).all() and np.isnan(view.t).all() and not view.e_prime.any()
     assert np.isnan(field.on_grid(Grid.over(0, 0, 900, 600, 500)).inverse_depth).all()
-    warp = build_map(field, view, Canvas(300, 200, (0, 0)), *CAMERAS)
-    assert np.isnan(warp.inverse_depth).all() and np.isfinite(warp.map_x).all()
+    warp = build_map(field, views_of(view, CAMERAS), Canvas(300, 200, (0, 0)))
+    assert np.isnan(warp.inverse_depth).all() and np.isfinite(warp.maps[1].x).all()
 
 
 @every_rival
 def test_what_it_sends_is_what_its_map_says_in_the_overlap(name: str) -> None:
     field = rival(name)
     canvas = Canvas(600, 500, (-450, -150))
-    warp = build_map(field, field.two_view, canvas, *CAMERAS)
+    warp = build_map(field, views_of(field.two_view, CAMERAS), canvas)
     points = np.stack(np.meshgrid(np.arange(0.0, 600, 7), np.arange(0.0, 500, 7)), axis=-1)
     sent = field.predict((points - canvas.offset).reshape(-1, 2)).reshape(points.shape)
     inside = overlap(field, points - canvas.offset)
     column, row = np.moveaxis(points.astype(int), -1, 0)
-    mapped = np.stack([warp.map_x[row, column], warp.map_y[row, column]], axis=-1)
+    mapped = np.stack([warp.maps[1].x[row, column], warp.maps[1].y[row, column]], axis=-1)
     assert inside.mean() > 0.8 and np.abs(mapped - sent)[inside].max() < 0.02
 
 
@@ -100,10 +101,10 @@ def test_on_matches_of_one_homography_every_rival_is_that_homography(name: str, 
     x, y, _ = some_matches(two_view, planar, 200)
     field = fit_field(name, "plane", two_view, Matches(x, y), SIZE, SIZE)
     canvas = Canvas(900, 650, (100, 50))
-    warp = build_map(field, field.two_view, canvas, *CAMERAS)
+    warp = build_map(field, views_of(field.two_view, CAMERAS), canvas)
     points = np.stack(np.meshgrid(np.arange(900.0), np.arange(650.0)), axis=-1) - canvas.offset
     expected = target_points(two_view, points, planar(points) if two_view is SIDE else np.zeros(points.shape[:2]))
-    mapped = np.stack([warp.map_x, warp.map_y], axis=-1)
+    mapped = np.stack([warp.maps[1].x, warp.maps[1].y], axis=-1)
     # exact in the overlap; beyond it to what rounding leaves of homographies of few matches
     assert np.nanmax(np.abs(mapped - expected)) < 0.01
 
@@ -129,12 +130,13 @@ def test_given_matches_are_all_kept(name: str) -> None:
 
 @every_rival
 def test_a_stitch_with_it_says_what_it_lacks(name: str, small_pair: Pair, known: StitchOptions) -> None:
-    result = stitch(small_pair.reference, small_pair.target, replace(known, field=name))
+    result = stitch((small_pair.reference, small_pair.target), replace(known, field=name))
     report = json.loads(json.dumps(result.report))
     assert report["field"]["kind"] == name and report["two_view"]["F"] == [[None] * 3] * 3
     assert report["measured"]["projectivity_own_px"] is None
     assert report["measured"]["overlap_psnr_db"] > 15 and report["measured"]["held_out_rms_px"] > 0
     with np.load(io.BytesIO(warp_bytes(result))) as warp:
-        assert np.isfinite(warp["map_x"]).any() and np.isfinite(warp["H_inf"]).all()
-        for lacking in ("F", "R", "t", "e_prime", "inverse_depth"):
-            assert np.isnan(warp[lacking]).all(), lacking
+        assert np.isfinite(warp["map_x_01"]).any() and np.isfinite(warp["H_inf"]).all()
+        for lacking in ("R", "t", "e_prime"):
+            assert np.isfinite(warp[lacking][0]).all() and np.isnan(warp[lacking][1]).all(), lacking
+        assert np.isnan(warp["F"]).all() and np.isnan(warp["inverse_depth"]).all()

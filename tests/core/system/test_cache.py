@@ -53,8 +53,8 @@ def entries(folder: Path) -> list[Path]:
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_geometry_and_every_field_come_back_bit_by_bit(result: StitchResult, name: str) -> None:
-    view, cameras = result.two_view, result.cameras
-    used = result.matches.subset(view.inliers)
+    view, cameras = result.edges[0].two_view, result.cameras
+    used = result.edges[0].matches.subset(view.inliers)
     field = fit_field(name, "plane", view, used, cameras[0].size, cameras[1].size)
     data = packed((view, field, cameras, used))
     back = unpacked(data)
@@ -249,19 +249,19 @@ def test_a_second_stitch_looks_for_nothing(
 ) -> None:
     known = replace(known, dense=True)
     options = replace(known, cache=tmp_path)
-    first = stitch(small_pair.reference, small_pair.target, options)
-    plain = stitch(small_pair.reference, small_pair.target, known)
+    first = stitch((small_pair.reference, small_pair.target), options)
+    plain = stitch((small_pair.reference, small_pair.target), known)
     monkeypatch.setattr(features, "detect", lambda *_: pytest.fail("features were looked for"))
     monkeypatch.setattr(alignment, "refine", lambda *_: pytest.fail("was refined"))
     for change in ({}, {"blend": "linear"}, {"crop": "inscribed"}, {"projection": "cylindrical"}):
-        again = stitch(small_pair.reference, small_pair.target, replace(options, **change))
+        again = stitch((small_pair.reference, small_pair.target), replace(options, **change))
         if not change:
             for other in (first, plain):
                 assert again.report == other.report
                 assert again.pixels.tobytes() == other.pixels.tobytes()
-                assert again.warp.map_x.tobytes() == other.warp.map_x.tobytes()
+                assert again.warp.maps[1].x.tobytes() == other.warp.maps[1].x.tobytes()
     with pytest.raises(pytest.fail.Exception):
-        stitch(small_pair.reference[:-1], small_pair.target, options)
+        stitch((small_pair.reference[:-1], small_pair.target), options)
 
 
 def test_the_same_bytes_with_it_and_without_and_with_any_number_of_threads(folder: Path, tmp_path: Path) -> None:

@@ -51,7 +51,7 @@ def test_the_first_error_in_the_parts_order_comes_through_and_nothing_is_begun_a
 
     with pytest.raises(ValueError, match="2"):
         each(work, range(50))
-    assert max(begun) <= 2 + threads.MOST
+    assert max(begun) <= 2 + threads.SYSTEM.max_threads
 
 
 def test_work_within_work_is_done_by_the_thread_it_is_in(at_once: int) -> None:

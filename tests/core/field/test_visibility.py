@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -12,14 +10,19 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.lens import undistort
 from edf_stitch.core.cameras.projective import homogeneous, infinite_homography
-from edf_stitch.core.panorama import visibility
+from edf_stitch.core.cameras.view import View
+from edf_stitch.core.field import folding, visibility
+from edf_stitch.core.field.folding import turned_over, turning
+from edf_stitch.core.field.visibility import BESIDE, _folded_blocks, by_agreement, occluded
 from edf_stitch.core.panorama.canvas import Canvas
-from edf_stitch.core.panorama.folding import turned_over, turning
-from edf_stitch.core.panorama.visibility import BESIDE, _folded_blocks, by_agreement, inverse_depth_in_target, occluded
+from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
+from edf_stitch.core.raster.lazy import whole
+from edf_stitch.core.raster.picture_map import PictureMap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ...pairs import with_map
 from ..point_scenes import turned_by, unit
 
 OFFSET = (40, 25)
@@ -43,8 +46,11 @@ class Cards:
         return np.diag([self.zoom, self.zoom, 1.0]) @ K
 
     @property
-    def view(self) -> Any:
-        return SimpleNamespace(H_inf=infinite_homography(K, self.K_prime, self.R), e_prime=self.K_prime @ self.t)
+    def views(self) -> tuple[View, View]:
+        cameras = (Camera(K, TARGET, "test", 0.0), Camera(self.K_prime, self.target_size, "test", 0.0))
+        H_inf = infinite_homography(K, self.K_prime, self.R)
+        return (View(cameras[0], K, np.eye(3), np.zeros(3), np.eye(3), np.zeros(3)),
+                View(cameras[1], self.K_prime, self.R, self.t, H_inf, self.K_prime @ self.t))  # fmt: skip
 
     @property
     def target_size(self) -> tuple[int, int]:
@@ -62,10 +68,16 @@ class Cards:
 
     def warp(self, depth: np.ndarray) -> Warp:
         d = 1 / depth
-        x = homogeneous(points()) @ self.view.H_inf.T + d[..., None] * self.view.e_prime
+        reference, target = self.views
+        x = homogeneous(points()) @ target.H_inf.T + d[..., None] * target.e_prime
         x[x[..., 2] <= 0] = np.nan
-        maps = ((x[..., k] / x[..., 2]).astype(np.float32) for k in range(2))
-        return Warp(Canvas(SHAPE[1], SHAPE[0], OFFSET), *maps, d.astype(np.float32))
+        canvas = Canvas(SHAPE[1], SHAPE[0], OFFSET)
+        x, y = ((x[..., k] / x[..., 2]).astype(np.float32) for k in range(2))
+        maps = ReferenceMap(canvas, reference.camera), PictureMap(x, y, target.size)
+        return Warp(canvas, maps, d.astype(np.float32))
+
+    def occluded(self, warp: Warp) -> np.ndarray:
+        return occluded(warp.maps[1].arrays(), warp.nearness(self.views, 1))
 
     def truth(self) -> tuple[Warp, np.ndarray]:
         """The true warp, and what is really hidden from the target by cards that the canvas shows."""
@@ -74,7 +86,7 @@ class Cards:
         world = rays * depth[..., None]
         place = -self.R.T @ self.t
         warp = self.warp(depth)
-        return warp, warp.inside(self.target_size) & (self.seen_along(place, world - place) < 1 - 1e-6)
+        return warp, warp.maps[1].inside() & (self.seen_along(place, world - place) < 1 - 1e-6)
 
 
 def points() -> np.ndarray:
@@ -96,7 +108,7 @@ SIDEWAYS = Cards(CARDS, turned_by(0, -3, 1), unit(-1, 0.1, 0.05))
 ], ids=["sideways", "other side", "forward", "aslant", "target finer", "target coarser"])  # fmt: skip
 def test_finds_what_cards_hide(cards: Cards) -> None:
     warp, hidden = cards.truth()
-    found = occluded(warp, cards.view, cards.target_size)
+    found = cards.occluded(warp)
     assert found.dtype == bool and found.shape == SHAPE
     assert hidden.mean() > 0.005, "else there is nothing to find"
     right = (found & hidden).sum()
@@ -107,7 +119,7 @@ def test_finds_what_cards_hide(cards: Cards) -> None:
 def test_the_nearest_to_the_target_owns_the_pixel_not_the_nearest_to_the_reference() -> None:
     """x'₃ / d is the depth in front of the target camera, in baselines."""
     warp, hidden = SIDEWAYS.truth()
-    near = inverse_depth_in_target(warp, SIDEWAYS.view)
+    near = whole(warp.nearness(SIDEWAYS.views, 1))
     world = homogeneous(points()) @ np.linalg.inv(K).T / warp.inverse_depth[..., None]
     there = (world @ SIDEWAYS.R.T + SIDEWAYS.t)[..., 2]
     assert np.allclose(near, 1 / there, rtol=1e-4)
@@ -116,11 +128,12 @@ def test_the_nearest_to_the_target_owns_the_pixel_not_the_nearest_to_the_referen
 def test_depth_in_front_of_the_target_is_that_of_the_undistorted_point() -> None:
     warp, _ = SIDEWAYS.truth()
     lens = Camera(K, (TARGET[0], TARGET[1]), "test", 0.0, np.array([-0.2, 0, 0, 0, 0]))
-    near = inverse_depth_in_target(warp, SIDEWAYS.view, lens)
+    reference, target = SIDEWAYS.views
+    near = whole(warp.nearness((replace(reference, camera=lens), target), 1))
     world = homogeneous(undistort(points(), lens)) @ np.linalg.inv(K).T / warp.inverse_depth[..., None]
     there = (world @ SIDEWAYS.R.T + SIDEWAYS.t)[..., 2]
     assert np.allclose(near, 1 / there, rtol=1e-4)
-    assert np.abs(near / inverse_depth_in_target(warp, SIDEWAYS.view) - 1).max() > 1e-3, "the lens matters here"
+    assert np.abs(near / whole(warp.nearness(SIDEWAYS.views, 1)) - 1).max() > 1e-3, "the lens matters here"
 
 
 @settings(max_examples=20)
@@ -135,18 +148,18 @@ def test_a_plane_hides_nothing_of_itself(yaw: float, pitch: float, depth: float,
     cards = Cards((), turned_by(*random.uniform(-15, 15, 3)), unit(*random.normal(size=3)), zoom)
     with np.errstate(divide="ignore"):
         warp = cards.warp(1 / d)
-    assert not occluded(warp, cards.view, cards.target_size).any()
+    assert not cards.occluded(warp).any()
 
 
 def test_a_smooth_hill_without_folds_hides_nothing() -> None:
     x, y = np.moveaxis(points(), -1, 0)
     d = 0.12 + 0.05 * np.sin(x / 25) * np.cos(y / 30)
     warp = SIDEWAYS.warp(1 / d)
-    assert (np.diff(warp.map_x, axis=1) > 0).all()
-    assert not occluded(warp, SIDEWAYS.view, TARGET).any()
+    assert (np.diff(warp.maps[1].x, axis=1) > 0).all()
+    assert not SIDEWAYS.occluded(warp).any()
     steep = SIDEWAYS.warp(1 / (0.4 + 0.38 * np.sin(x / 25) * np.cos(y / 30)))
-    assert (np.diff(steep.map_x, axis=1) < 0).any()
-    assert occluded(steep, SIDEWAYS.view, TARGET).any(), "where the map folds, something is hidden"
+    assert (np.diff(steep.maps[1].x, axis=1) < 0).any()
+    assert SIDEWAYS.occluded(steep).any(), "where the map folds, something is hidden"
 
 
 @pytest.mark.parametrize("t", [(-1, 0.1, 0.05), (1, 0.2, -0.3), (0.2, 0.1, -1.0)])
@@ -157,37 +170,37 @@ def test_where_the_map_folds_is_all_that_has_to_be_looked_at(
     scene = replace(SIDEWAYS, t=unit(*t))
     warp, _ = scene.truth()
     if mirrored:
-        warp = replace(warp, map_x=scene.target_size[0] - 1 - warp.map_x)
+        warp = with_map(warp, scene.target_size[0] - 1 - warp.maps[1].x)
     monkeypatch.setattr(visibility, "STRIP", 5000)  # in several pieces
-    seen = visibility._folded_blocks(warp, scene.target_size)
+    seen = visibility._folded_blocks(warp.maps[1])
     assert seen.any()
-    found = occluded(warp, scene.view, scene.target_size)
+    found = scene.occluded(warp)
     monkeypatch.setattr(visibility, "_folded_blocks", lambda *_: np.ones_like(seen))
-    assert found.any() and (found == occluded(warp, scene.view, scene.target_size)).all()
+    assert found.any() and (found == scene.occluded(warp)).all()
 
 
 def test_infinity_and_beyond_are_one_depth() -> None:
     warp, _ = SIDEWAYS.truth()
     d = warp.inverse_depth - 0.3  # the wall and most of the cards behind infinity
     far = replace(warp, depth=np.minimum(d, 0).astype(np.float32))
-    assert not occluded(far, SIDEWAYS.view, TARGET).any()
-    assert (inverse_depth_in_target(far, SIDEWAYS.view) == 0).all()
+    assert not SIDEWAYS.occluded(far).any()
+    assert (whole(far.nearness(SIDEWAYS.views, 1)) == 0).all()
 
 
 def test_without_depth_nothing_is_hidden() -> None:
     warp, _ = SIDEWAYS.truth()
     unknown = replace(warp, depth=np.full(SHAPE, np.nan, np.float32))
-    assert not occluded(unknown, SIDEWAYS.view, TARGET).any()
-    same_place = SimpleNamespace(H_inf=SIDEWAYS.view.H_inf, e_prime=np.zeros(3))
-    assert not occluded(replace(warp, depth=np.zeros(SHAPE, np.float32)), same_place, TARGET).any()
+    assert not SIDEWAYS.occluded(unknown).any()
+    same_place = replace(SIDEWAYS, t=np.zeros(3))
+    assert not same_place.occluded(replace(warp, depth=np.zeros(SHAPE, np.float32))).any()
 
 
 def test_only_what_falls_into_the_target_counts() -> None:
     warp, _ = SIDEWAYS.truth()
-    x = warp.map_x.copy()
+    x = warp.maps[1].x.copy()
     x[:, :150] = np.nan
-    found = occluded(replace(warp, map_x=x), SIDEWAYS.view, TARGET)
-    assert not found[:, :150].any() and not (found & ~warp.inside(TARGET)).any()
+    found = SIDEWAYS.occluded(with_map(warp, x))
+    assert not found[:, :150].any() and not (found & ~warp.maps[1].inside()).any()
 
 
 # --- what turns over ------------------------------------------------------------------------------------------------
@@ -198,16 +211,14 @@ def test_only_what_falls_into_the_target_counts() -> None:
 def test_what_turns_over_is_found_and_nothing_else(
     monkeypatch: pytest.MonkeyPatch, strip: int, mirrored: bool
 ) -> None:
-    monkeypatch.setattr(visibility, "STRIP", strip)
+    monkeypatch.setattr(folding, "STRIP", strip)
     y, x = np.mgrid[0:60, 0:350].astype(np.float32)
     x[20:31, 100:120] = 219 - x[20:31, 100:120]
-    warp = Warp(Canvas(350, 60, (0, 0)), 349 - x if mirrored else x, y, np.zeros_like(x))
-    found = turned_over(turning(warp, (350, 60)))
+    found = turned_over(turning(PictureMap(349 - x if mirrored else x, y, (350, 60))))
     assert found[20:30, 100:119].all() and not found[:18].any() and not found[33:].any()
     assert found.sum() < 20 * 22
-    outside = Warp(warp.canvas, x * 0 - 9, y, warp.inverse_depth)
-    assert not turned_over(turning(outside, (350, 60))).any(), "outside the target"
-
+    outside = PictureMap(x * 0 - 9, y, (350, 60))
+    assert not turned_over(turning(outside)).any(), "outside the target"
 
 
 # --- put right by what both pictures agree on -----------------------------------------------------------------------
@@ -216,7 +227,7 @@ def test_what_turns_over_is_found_and_nothing_else(
 def agreement() -> tuple[Warp, np.ndarray, np.ndarray, np.ndarray]:
     """A warp, what its depth order hides, what really is hidden, and confidence: none where it is, full elsewhere."""
     warp, hidden = SIDEWAYS.truth()
-    told = np.roll(hidden, 1, axis=1) & warp.inside(TARGET)
+    told = np.roll(hidden, 1, axis=1) & warp.maps[1].inside()
     return warp, told, hidden, np.where(hidden, np.float32(0), np.float32(1))
 
 
@@ -224,14 +235,14 @@ def test_rims_follow_what_both_pictures_agree_on() -> None:
     warp, told, hidden, sure = agreement()
     everywhere = np.ones(SHAPE, bool)
     assert (told != hidden).sum() > 50
-    right = by_agreement(told, replace(warp, lazy_confidence=sure), TARGET, everywhere)
+    right = by_agreement(told, warp.maps[1], sure, everywhere)
     assert np.array_equal(right, hidden)
     assert np.array_equal(told, agreement()[1]), "what was given stays as it is"
 
 
 def test_without_dense_refinement_the_depth_order_has_the_last_word() -> None:
     warp, told, _, _ = agreement()
-    assert np.array_equal(by_agreement(told, warp, TARGET, np.ones(SHAPE, bool)), told)
+    assert np.array_equal(by_agreement(told, warp.maps[1], None, np.ones(SHAPE, bool)), told)
 
 
 def test_nothing_lies_beside_a_speck() -> None:
@@ -239,43 +250,43 @@ def test_nothing_lies_beside_a_speck() -> None:
     warp, _, _, _ = agreement()
     speck = np.zeros(SHAPE, bool)
     speck[SHAPE[0] // 2, SHAPE[1] // 2 : SHAPE[1] // 2 + 3] = True
-    unsure, everywhere = replace(warp, lazy_confidence=np.zeros(SHAPE, np.float32)), np.ones(SHAPE, bool)
-    assert warp.inside(TARGET)[speck].all()
-    assert np.array_equal(by_agreement(speck, unsure, TARGET, everywhere), speck)
+    unsure, everywhere = np.zeros(SHAPE, np.float32), np.ones(SHAPE, bool)
+    assert warp.maps[1].inside()[speck].all()
+    assert np.array_equal(by_agreement(speck, warp.maps[1], unsure, everywhere), speck)
 
 
 def test_doubt_alone_hides_nothing() -> None:
     """A bare wall is agreed on nowhere: it is hidden only close by what the depth order hides, and where the reference
     shows it."""
     warp, told, hidden, _ = agreement()
-    unsure, everywhere = replace(warp, lazy_confidence=np.zeros(SHAPE, np.float32)), np.ones(SHAPE, bool)
-    out = by_agreement(told, unsure, TARGET, everywhere)
+    unsure, everywhere = np.zeros(SHAPE, np.float32), np.ones(SHAPE, bool)
+    out = by_agreement(told, warp.maps[1], unsure, everywhere)
     reach = round(BESIDE * max(TARGET))
     near = cv2.dilate(told.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0
-    assert (out & ~told).any() and not (out & ~near).any() and not (out & ~warp.inside(TARGET)).any()
-    assert np.array_equal(by_agreement(told, unsure, TARGET, ~everywhere), told), "beyond the reference: nothing"
+    assert (out & ~told).any() and not (out & ~near).any() and not (out & ~warp.maps[1].inside()).any()
+    assert np.array_equal(by_agreement(told, warp.maps[1], unsure, ~everywhere), told), "beyond the reference: nothing"
     nothing = np.zeros(SHAPE, bool)
-    assert not by_agreement(nothing, unsure, TARGET, everywhere).any()
+    assert not by_agreement(nothing, warp.maps[1], unsure, everywhere).any()
 
 
 def test_a_wall_at_infinity_is_hidden_by_what_stands_before_it() -> None:
     """Points that are infinitely far off own nothing, and are hidden all the same."""
     warp, hidden = SIDEWAYS.truth()
-    wall = np.isclose(warp.inverse_depth, 0.1)
-    d = np.where(wall, np.float32(0), warp.inverse_depth)
-    far = SIDEWAYS.warp(1 / np.maximum(d, 1e-9))
-    found = occluded(far, SIDEWAYS.view, TARGET)
+    d = whole(warp.depth)
+    wall = np.isclose(d, 0.1)
+    far = SIDEWAYS.warp(1 / np.where(wall, 1e-9, d))
+    found = SIDEWAYS.occluded(far)
     assert found.sum() > 0.8 * hidden.sum() and wall[found].mean() > 0.5
 
 
 # --- which part of the target folds fall on -------------------------------------------------------------------------
 
 
-def folded_by_hand(warp: Warp, target_size: tuple[int, int], mirrored: bool) -> np.ndarray:
+def folded_by_hand(picture_map: PictureMap, mirrored: bool) -> np.ndarray:
     """Cell by cell: both triangles of each, and the blocks that its corners' bounding box touches, grown by one."""
-    blocks = np.zeros((target_size[1] // 16 + 1, target_size[0] // 16 + 1), np.uint8)
-    at = np.stack([warp.map_x, warp.map_y], axis=-1).astype(float)
-    sign, last = -1 if mirrored else 1, np.array(target_size) - 1
+    blocks = np.zeros((picture_map.size[1] // 16 + 1, picture_map.size[0] // 16 + 1), np.uint8)
+    at = np.stack([picture_map.x, picture_map.y], axis=-1).astype(float)
+    sign, last = -1 if mirrored else 1, np.array(picture_map.size) - 1
 
     def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
         (x, y), (u, v) = b - a, c - a
@@ -303,9 +314,9 @@ def test_folds_fall_on_the_blocks_that_their_cells_touch(
     y, x = np.mgrid[0:30, 0:40] * 9.0 - 12 + random.normal(0, 1.7, (2, 30, 40))
     x[3, 5] = y[3, 5] = np.nan
     x, y = ((320 - x if mirrored else x).astype(np.float32), y.astype(np.float32))
-    warp = Warp(Canvas(40, 30, (0, 0)), x, y, np.zeros_like(x))
-    found = _folded_blocks(warp, (321, 230))
-    assert np.array_equal(found[:15, :21], folded_by_hand(warp, (321, 230), mirrored)[:15, :21])
+    picture_map = PictureMap(x, y, (321, 230))
+    found = _folded_blocks(picture_map)
+    assert np.array_equal(found[:15, :21], folded_by_hand(picture_map, mirrored)[:15, :21])
     assert 0.02 < found.mean() < 0.6
 
 
@@ -318,5 +329,4 @@ def test_a_fold_that_touches_the_last_line_of_the_target_counts(fold: tuple, cou
     left, top, right, bottom = fold
     x, y = np.array([[left, right], [left, right]], np.float32), np.array([[top, top], [bottom, bottom]], np.float32)
     x[1, 1], y[1, 1] = left, top
-    warp = Warp(Canvas(2, 2, (0, 0)), x, y, np.zeros_like(x))
-    assert _folded_blocks(warp, (100, 80)).any() == counts
+    assert _folded_blocks(PictureMap(x, y, (100, 80))).any() == counts

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.panorama import folding
-from edf_stitch.core.panorama.canvas import Canvas
-from edf_stitch.core.panorama.folding import NO_TURN, cell_areas, folds, jacobian, turned_over, turning
-from edf_stitch.core.panorama.warp import Warp
+from edf_stitch.core.field import folding
+from edf_stitch.core.field.folding import NO_TURN, cell_areas, folds, jacobian, turned_over, turning
+from edf_stitch.core.raster.picture_map import PictureMap
 
 WIDTH, HEIGHT = 30, 20
 
@@ -16,10 +15,6 @@ def affine(a: float, b: float, c: float, d: float, start: tuple[float, float] = 
     """x' = a x + b y, y' = c x + d y from a start, float32."""
     x, y = np.meshgrid(np.arange(WIDTH, dtype=np.float64), np.arange(HEIGHT, dtype=np.float64))
     return tuple((v + s).astype(np.float32) for v, s in zip((a * x + b * y, c * x + d * y), start, strict=True))
-
-
-def warp_of(x: np.ndarray, y: np.ndarray) -> Warp:
-    return Warp(Canvas(x.shape[1], x.shape[0], (0, 0)), x, y, np.zeros(x.shape, np.float32))
 
 
 @pytest.mark.parametrize("matrix", [(1, 0, 0, 1), (2, 0.5, -0.25, 3), (-1, 0, 0, 1), (1, 2, 3, -1)])
@@ -50,11 +45,11 @@ def test_each_pixel_that_shows_the_target_is_turned_one_way(strip: int, monkeypa
     x, y = affine(1, 0, 0, 1, (5.0, 3.0))
     column = np.arange(WIDTH)
     x[:] = np.where(column < 10, column, np.where(column < 20, 9, 28 - column)) + 5
-    turns = turning(warp_of(x, y), (100, 100))
+    turns = turning(PictureMap(x, y, (100, 100)))
     assert turns.shape == x.shape
     assert (turns[:-1, :9] == 1).all() and (turns[:-1, 9:19] == 0).all() and (turns[:-1, 19:29] == -1).all()
     assert (turns[-1] == NO_TURN).all() and (turns[:, -1] == NO_TURN).all()
-    shown = turning(warp_of(x, y), (13, 18)) != NO_TURN
+    shown = turning(PictureMap(x, y, (13, 18))) != NO_TURN
     assert np.array_equal(shown[:-1, :-1], ((x <= 12) & (y <= 17))[:-1, :-1])
 
 

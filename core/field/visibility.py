@@ -1,7 +1,7 @@
-"""What the target cannot see: of several canvas points that claim one of its pixels, the nearest to it owns the pixel.
+"""What a picture cannot see: of several canvas points that claim one of its pixels, the nearest owns it.
 
-A point p at inverse depth d lies x'₃ / d baselines in front of the target camera, x'₃ of H_inf p + d e' before the
-division. So the depth order is in the warp already; a z-buffer over the target's pixels reads it out.
+A point p at inverse depth d lies x'₃ / d baselines in front of the picture's camera, x'₃ of H_inf p + d e' before the
+division. So the depth order is in map and depth already; a z-buffer over the picture's pixels reads it out.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cameras.camera import Camera
-from ..cameras.two_view import TwoView
 from ..raster.arrays import bounds, with_margin, without_specks
+from ..raster.lazy import AnyImage
+from ..raster.picture_map import PictureMap
 from ..system.threads import in_order
-from .warp import Warp
 
 # Cells of the z-buffer are 2^level px wide: as wide as the canvas samples the target there, within this margin.
 COARSEST, MARGIN = 4, 1.1
@@ -31,54 +30,54 @@ STRIP = 2_000_000
 AGREED, ALONE, BESIDE = 0.5, 0.3, 1 / 200
 
 
-def occluded(
-    warp: Warp, two_view: TwoView, target_size: tuple[int, int], camera: Camera | None = None
-) -> NDArray[np.bool_]:
-    """Where (H, W) the map falls on a target pixel that a nearer canvas point owns: what is seen there is not this.
+def occluded(picture_map: PictureMap, nearness: AnyImage) -> NDArray[np.bool_]:
+    """Where (H, W) a map falls on a pixel of its picture that a nearer canvas point owns: what is seen there is not
+    this.
 
-    target_size: (W, H) px; camera: the reference's, if its lens matters. d ≤ 0 is infinitely far; where there is no
-    depth (d NaN, no baseline), nothing hides anything. A surface does not hide itself, however obliquely it is seen and
-    however much the map magnifies. Linear in the pixels.
+    nearness (H, W): baselines per distance from the picture's camera (see `nearness_of`); what is infinitely far has 0,
+    and where there is no depth (NaN, no baseline), nothing hides anything. A surface does not hide itself, however
+    obliquely it is seen and however much the map magnifies. Linear in the pixels.
     """
-    hidden = np.zeros(warp.map_x.shape, bool)
-    contested = _contested(warp, two_view, target_size, camera)
+    hidden = np.zeros(picture_map.x.shape, bool)
+    contested = _contested(picture_map, nearness)
     if not (contested.near > 0).any():
         return hidden
     points, near = contested.points, contested.near
     found = np.zeros(points.size, bool)
     for level in np.flatnonzero(np.bincount(contested.levels)).tolist():
-        cells, count = contested.cells(level, target_size)
+        cells, count = contested.cells(level, picture_map.size)
         owner = _owners(cells, np.flatnonzero(contested.levels == level), near, count)
         claimed = owner[cells]
         # where nobody owns the cell, -1 stands for the last point, and its depth says nothing
         rivals = np.flatnonzero((near[claimed] > near) & (claimed >= 0) & ~found)
-        found[rivals] = _apart(warp, points[rivals], points[claimed[rivals]], LEAVES_CELL * 2.0**level)
+        found[rivals] = _apart(picture_map, points[rivals], points[claimed[rivals]], LEAVES_CELL * 2.0**level)
     hidden.ravel()[points[found]] = True
     # pixels between the samples of what hides them
     closed = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
-    return closed & warp.inside(target_size)
+    return closed & picture_map.inside()
 
 
 def by_agreement(
-    hidden: NDArray[np.bool_], warp: Warp, target_size: tuple[int, int], shown: NDArray[np.bool_]
+    hidden: NDArray[np.bool_], picture_map: PictureMap, confidence: AnyImage | None, shown: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """What is hidden by the depth order (see `occluded`), put right by what dense refinement found in both pictures.
 
     What both agree on both see; and beside what is hidden, what they agree on nowhere is hidden too: the rims that a
     map draws are a few px off, and a band of background that the target does not see has no depth of its own. A speck
     is noise, and nothing lies beside it.
-    shown (H, W): where the reference shows anything. Without dense refinement it stays what it was.
+    confidence (H, W): dense refinement's; without it `hidden` stays what it was; shown (H, W): where the reference
+    shows anything.
     """
     extent = bounds(hidden)
-    if warp.lazy_confidence is None or extent is None:
+    if confidence is None or extent is None:
         return hidden
-    reach = max(1, round(BESIDE * max(target_size)))
+    reach = max(1, round(BESIDE * max(picture_map.size)))
     box = with_margin(extent, reach, hidden.shape)
     rows, columns = box
-    part = warp.within((columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start))
-    sure = np.asarray(warp.lazy_confidence[box])
+    part = picture_map.within((columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start))
+    sure = np.asarray(confidence[box])
     kept = hidden[box] & (sure <= AGREED)
-    alone = (shown[box] & part.inside(target_size) & (sure < ALONE)) | kept
+    alone = (shown[box] & part.inside() & (sure < ALONE)) | kept
     grown = without_specks(kept).astype(np.uint8)
     for _ in range(reach):
         grown = cv2.dilate(grown, np.ones((3, 3), np.uint8)) & alone
@@ -98,30 +97,31 @@ class Contested:
     near: NDArray[np.float32]
     levels: NDArray[np.uint8]
 
-    def cells(self, level: int, target_size: tuple[int, int]) -> tuple[NDArray[np.int32], int]:
+    def cells(self, level: int, size: tuple[int, int]) -> tuple[NDArray[np.int32], int]:
         """In which cell of a level each point falls, and how many cells there are."""
-        columns, rows = ((side >> level) + 1 for side in target_size)
+        columns, rows = ((side >> level) + 1 for side in size)
         row, column = ((v + np.float32(0.5)).astype(np.int32) >> level for v in (self.y, self.x))
         row *= columns
         row += column
         return row, rows * columns
 
 
-def _contested(warp: Warp, two_view: TwoView, target_size: tuple[int, int], camera: Camera | None) -> Contested:
+def _contested(picture_map: PictureMap, nearness: AnyImage) -> Contested:
     """The points among which something may be hidden.
 
     Along an epipolar line the map is a function of one variable, and continuous between pixels. Where it takes a value
     twice it turns back in between, over that value. So what is hidden lies in the target where the map folds, and
     where it folds nowhere nothing is hidden.
     """
-    blocks = _folded_blocks(warp, target_size)
-    height, width = warp.map_x.shape
+    blocks = _folded_blocks(picture_map)
+    height, width = picture_map.x.shape
     rows = max(1, STRIP // width)
 
     def found_from(top: int) -> Contested:
-        strip = warp.within((0, top, width, min(rows, height - top)))
-        inside = np.flatnonzero(strip.inside(target_size))
-        x, y = (values.ravel()[inside] for values in (strip.map_x, strip.map_y))
+        strip = slice(top, min(top + rows, height))
+        part = PictureMap(picture_map.x[strip], picture_map.y[strip], picture_map.size)
+        inside = np.flatnonzero(part.inside())
+        x, y = (values.ravel()[inside] for values in (part.x, part.y))
         row, column = ((v + np.float32(0.5)).astype(np.int32) >> BLOCK for v in (y, x))
         row *= blocks.shape[1]
         row += column
@@ -129,11 +129,11 @@ def _contested(warp: Warp, two_view: TwoView, target_size: tuple[int, int], came
         near = np.empty(0, np.float32)
         if there.size:
             with np.errstate(invalid="ignore", divide="ignore"):
-                near = inverse_depth_in_target(strip, two_view, camera).ravel()[inside[there]]
+                near = nearness[strip, 0:width].ravel()[inside[there]]
             known = np.isfinite(near)
             there, near = (there, near) if known.all() else (there[known], near[known])
         points = inside[there] + top * width
-        return Contested(points, x[there], y[there], near, _levels(warp, top, strip.map_x.shape[0], points))
+        return Contested(points, x[there], y[there], near, _levels(picture_map, top, part.shape[0], points))
 
     # one strip at least, whose parts have the right types
     parts = list(in_order(found_from, range(0, height if blocks.any() else 1, rows)))
@@ -146,19 +146,19 @@ def _contested(warp: Warp, two_view: TwoView, target_size: tuple[int, int], came
     )
 
 
-def _folded_blocks(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_]:
+def _folded_blocks(picture_map: PictureMap) -> NDArray[np.bool_]:
     """The blocks of the target that folds of the map fall on, and their neighbours.
 
     A fold is a triangle between canvas pixels that the map turns over (or flattens); it counts as its bounding box.
     """
-    width, height = target_size
+    width, height = picture_map.size
     counts = np.zeros(((height >> BLOCK) + 2, (width >> BLOCK) + 2), np.int32)
-    mirrored = _mirrored(warp)
-    rows = max(1, STRIP // warp.map_x.shape[1])
+    mirrored = _mirrored(picture_map)
+    rows = max(1, STRIP // picture_map.x.shape[1])
 
     def corners_of(top: int) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]]:
         """First and last blocks, across and down, that the folds of some rows fall on."""
-        x, y = (values[top : top + rows + 1] for values in (warp.map_x, warp.map_y))
+        x, y = (values[top : top + rows + 1] for values in (picture_map.x, picture_map.y))
         with np.errstate(invalid="ignore", over="ignore"):
             right, down = ([np.diff(v, axis=axis) for v in (x, y)] for axis in (1, 0))
             upper = right[0][:-1] * down[1][:, :-1] - right[1][:-1] * down[0][:, :-1]
@@ -170,37 +170,36 @@ def _folded_blocks(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.bool_
         there = (high[0] >= 0) & (high[1] >= 0) & (low[0] <= width - 1) & (low[1] <= height - 1)
         across, down = (
             [(np.clip(ends[axis][there], 0, size - 1) + 0.5).astype(np.intp) >> BLOCK for ends in (low, high)]
-            for axis, size in enumerate(target_size)
+            for axis, size in enumerate(picture_map.size)
         )
         return across, down
 
-    for (x0, x1), (y0, y1) in in_order(corners_of, range(0, warp.map_x.shape[0] - 1, rows)):
+    for (x0, x1), (y0, y1) in in_order(corners_of, range(0, picture_map.x.shape[0] - 1, rows)):
         for at, sign in (((y0, x0), 1), ((y0, x1 + 1), -1), ((y1 + 1, x0), -1), ((y1 + 1, x1 + 1), 1)):
             np.add.at(counts, at, sign)
     covered = counts.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
     return cv2.dilate(covered.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
 
 
-def _mirrored(warp: Warp) -> bool:
+def _mirrored(picture_map: PictureMap) -> bool:
     """Whether most of the map turns the picture over."""
-    step = max(1, min(warp.map_x.shape) // 64)
-    x, y = (values[::step, ::step] for values in (warp.map_x, warp.map_y))
+    step = max(1, min(picture_map.x.shape) // 64)
+    x, y = (values[::step, ::step] for values in (picture_map.x, picture_map.y))
     with np.errstate(invalid="ignore", over="ignore"):
         right, down = ([np.diff(v, axis=axis) for v in (x, y)] for axis in (1, 0))
         turn = right[0][:-1] * down[1][:, :-1] - right[1][:-1] * down[0][:, :-1]
     return bool((turn < 0).sum() > (turn > 0).sum())
 
 
-def inverse_depth_in_target(warp: Warp, two_view: TwoView, camera: Camera | None = None) -> NDArray[np.float32]:
-    """baseline / depth in front of the target camera (H, W): d / x'₃, 0 at infinity and beyond; NaN without depth.
-    camera: the reference's, if its lens matters."""
-    (infinite,) = warp.canvas.project_rows(two_view.H_inf[2:], warp.canvas.xs, warp.canvas.ys, camera)
-    d = warp.inverse_depth
-    w = d * np.float32(two_view.e_prime[2]) + infinite.astype(np.float32)
-    return np.maximum(d, np.float32(0)) / w
+def nearness_of(inverse_depth: NDArray, depth_in_view: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Baselines per distance in front of a picture's camera: d / x'₃, 0 at infinity and beyond; NaN without depth.
+
+    depth_in_view: x'₃ of H_inf p + d e', before the division.
+    """
+    return np.maximum(inverse_depth, np.float32(0)) / depth_in_view
 
 
-def _levels(warp: Warp, top: int, rows: int, points: NDArray[np.intp]) -> NDArray[np.uint8]:
+def _levels(picture_map: PictureMap, top: int, rows: int, points: NDArray[np.intp]) -> NDArray[np.uint8]:
     """Which cells the canvas fills at points of some of its rows: log2 of the target px from one canvas pixel to the
     next, rounded up.
 
@@ -208,8 +207,8 @@ def _levels(warp: Warp, top: int, rows: int, points: NDArray[np.intp]) -> NDArra
     """
     if not points.size:
         return np.empty(0, np.uint8)
-    low, high = max(0, top - 1), min(top + rows + 1, warp.map_x.shape[0])
-    x, y = (values[low:high] for values in (warp.map_x, warp.map_y))
+    low, high = max(0, top - 1), min(top + rows + 1, picture_map.x.shape[0])
+    x, y = (values[low:high] for values in (picture_map.x, picture_map.y))
     longest = np.zeros(x.shape, np.float32)  # squared
     for axis in (0, 1):
         if x.shape[axis] < 2:
@@ -245,34 +244,37 @@ def _owners(
     return owner
 
 
-def _apart(warp: Warp, first: NDArray[np.intp], second: NDArray[np.intp], tolerance: float) -> NDArray[np.bool_]:
+def _apart(
+    picture_map: PictureMap, first: NDArray[np.intp], second: NDArray[np.intp], tolerance: float
+) -> NDArray[np.bool_]:
     """Whether the map moves more than `tolerance` px away between two canvas points (flat indices) that it brings
     together: then they lie on two surfaces, else on one that is seen obliquely."""
-    width = warp.map_x.shape[1]
+    width = picture_map.x.shape[1]
     begin, end = (np.stack(np.divmod(points, width), axis=-1).astype(np.float32) for points in (first, second))
-    home = np.stack([warp.map_x.ravel()[first], warp.map_y.ravel()[first]], axis=-1)
+    home = np.stack([picture_map.x.ravel()[first], picture_map.y.ravel()[first]], axis=-1)
     out = np.zeros(first.size, bool)
     for share in BETWEEN:
         at = begin + np.float32(share) * (end - begin)
-        away = np.flatnonzero(~(_distance(home, warp, np.rint(at)) <= tolerance) & ~out)
+        away = np.flatnonzero(~(_distance(home, picture_map, np.rint(at)) <= tolerance) & ~out)
         # rounded places lie beside the line between the two: those that matter are looked at again, exactly
         low = np.floor(at[away])
         u, v = np.moveaxis(at[away] - low, -1, 0)
         corners = ((0, 0, (1 - u) * (1 - v)), (0, 1, (1 - u) * v), (1, 0, u * (1 - v)), (1, 1, u * v))
-        offset = np.sum([_offset(home[away], warp, low + (i, j), weight) for i, j, weight in corners], axis=0)
+        offset = np.sum([_offset(home[away], picture_map, low + (i, j), weight) for i, j, weight in corners], axis=0)
         out[away[~(np.hypot(*offset) <= tolerance)]] = True  # behind the camera is apart too
     return out
 
 
 def _offset(
-    home: NDArray[np.float32], warp: Warp, at: NDArray[np.float32], weight: NDArray[np.float32] | float = 1.0
-) -> NDArray[np.float32]:
+    home: NDArray[np.float32], picture_map: PictureMap, at: NDArray[np.float32],
+    weight: NDArray[np.float32] | float = 1.0,
+) -> NDArray[np.float32]:  # fmt: skip
     """How far (2, N) the map at canvas places (N, 2: row, column) lies from target pixels (N, 2), times a weight."""
-    height, width = warp.map_x.shape
+    height, width = picture_map.x.shape
     index = np.minimum(at[:, 0].astype(np.intp), height - 1) * width + np.minimum(at[:, 1].astype(np.intp), width - 1)
-    maps = (warp.map_x, warp.map_y)
+    maps = (picture_map.x, picture_map.y)
     return np.stack([weight * (values.ravel()[index] - home[:, k]) for k, values in enumerate(maps)])
 
 
-def _distance(home: NDArray[np.float32], warp: Warp, at: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.hypot(*_offset(home, warp, at))
+def _distance(home: NDArray[np.float32], picture_map: PictureMap, at: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.hypot(*_offset(home, picture_map, at))

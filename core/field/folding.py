@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..raster.picture_map import PictureMap
 from ..system.threads import each
 from .visibility import STRIP
-from .warp import Warp
 
 # What is occluded is known to 3 px.
 RIM = np.ones((7, 7), np.uint8)
@@ -32,19 +32,19 @@ def folds(turns: NDArray[np.int8], hidden: NDArray[np.bool_] | None = None) -> f
     return (total - usual) / total if total else 0.0
 
 
-def turning(warp: Warp, target_size: tuple[int, int]) -> NDArray[np.int8]:
+def turning(picture_map: PictureMap) -> NDArray[np.int8]:
     """Which way (H, W) the map turns its pixels: 1 as they are, -1 mirrored, 0 flattened; NO_TURN where it does not
-    show the target, or nothing is known to the right or below. target_size: (W, H) px."""
-    height, width = warp.map_x.shape
+    show its picture, or nothing is known to the right or below."""
+    height, width = picture_map.shape
     out = np.full((height, width), NO_TURN, np.int8)
     rows = max(1, STRIP // width)
 
     def put(top: int) -> None:
         bottom = min(top + rows, height - 1)
-        strip = warp.within((0, top, width, bottom + 1 - top))
+        strip = picture_map.within((0, top, width, bottom + 1 - top))
         with np.errstate(invalid="ignore", over="ignore"):
-            area = cell_areas(strip.map_x, strip.map_y)
-            counts = strip.inside(target_size)[:-1, :-1] & np.isfinite(area)
+            area = cell_areas(strip.x, strip.y)
+            counts = strip.inside()[:-1, :-1] & np.isfinite(area)
             out[top:bottom, :-1] = np.where(counts, np.sign(area), NO_TURN)
 
     each(put, range(0, height - 1, rows))

@@ -1,0 +1,25 @@
+"""What was chosen for comparisons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ComparisonOptions:
+    """The page of a comparison and its pictures."""
+
+    max_side_px: int = 1600
+    """px of the longer side of the page's pictures at most; differences are taken before they are shrunk."""
+
+    jpeg_quality: int = 88
+    """Quality of the page's pictures, of 100."""
+
+    difference_gain: int = 4
+    """Factor by which differences are shown stronger than they are: a few levels would not be seen."""
+
+    max_fields: int = 12
+    """Fields that one page shows at most: each needs a rule of its own to be chosen without a script."""
+
+
+COMPARISON = ComparisonOptions()

@@ -1,0 +1,225 @@
+"""What was chosen in dense refinement, step by step: each value with its unit, and why it is what it is.
+
+Values without a source were chosen on photographs and rendered scenes: around them the result hardly changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RefineOptions:
+    """The order of the work, and what guides the smoothing (`refine`)."""
+
+    max_searched_px: float = 1.5e6
+    """Pixels of the overlap that are searched at most: beyond, both pictures are shrunk for it."""
+
+    max_refined_px: float = 3e6
+    """Pixels of the overlap that get a node of their own at most: beyond, nodes lie further apart than pixels."""
+
+    min_reach_px: float = 24.0
+    """px, of the shrunk pictures, that are searched along the lines in either direction at least."""
+
+    max_reach_px: float = 96.0
+    """The same at most: time and memory grow with it, and so do false matches."""
+
+    edge_levels: float = 4.0
+    """Gray levels between neighbours at which their connection falls by e; noise is blurred away before."""
+
+    smoothness: float = 5.0
+    """λ of the smoothing that fills what was not found, relative to a pixel found at full size."""
+
+    field_confidence: float = 1e-2
+    """What the sparse field counts where nothing was found, relative to a found pixel: it decides only where there is
+    nothing else."""
+
+    depth_edge_px: float = 0.3
+    """px between the moves of neighbours at which their connection falls to half where the guide has an edge, too."""
+
+    half_texture: float = 1.0
+    """Squared gradient along the line, (gray levels per px)², at which a surface counts as half textured."""
+
+    plain_strength: float = 15.0
+    """What is added to the connection of neighbours (1 by the usual) that are half textured; where there is nothing to
+    match, `SmoothingOptions.max_plain_odds` times as much."""
+
+    plain_doubt: float = 0.99
+    """Share by which what was found there counts less, unless both pictures look alike there: noise does not, a soft
+    surface does."""
+
+    overlap_nodes: int = 64
+    """Nodes along the longer side of the reference that say where the overlap lies."""
+
+    min_overlap_px: int = 32
+    """px of the shorter side of the overlap below which nothing is refined."""
+
+
+@dataclass(frozen=True)
+class MatchingOptions:
+    """Semi-global matching along rectified rows (`matching`; Hirschmüller, IEEE TPAMI 2008)."""
+
+    block_px: int = 3
+    """px of the side of a block that is compared: the smallest that averages noise; larger ones widen near things."""
+
+    step_cost: int = 8
+    """P1 of the paper, per pixel of a block: cost of a change by one px between neighbours. OpenCV's documentation
+    suggests 8 for each channel."""
+
+    jump_cost: int = 48
+    """P2 of the paper, per pixel of a block: cost of any larger change. Six times P1, where OpenCV suggests four: the
+    field is nearly right already, and jumps are few."""
+
+    uniqueness_percent: int = 2
+    """% by which the best place has to beat the second best: low, since the check from the other side follows."""
+
+    costs_at_once: int = 100_000_000
+    """Costs (of a pixel at a place) held at once, four bytes each: more rows are matched band by band."""
+
+    band_margin_rows: int = 32
+    """Rows beside a band that are matched with it: paths of the matcher forget where they came from within these."""
+
+    coarse_smoothness: int = 4
+    """Factor of both costs at half the size, where what was not found at full size is looked for."""
+
+    coarse_confidence: float = 0.1
+    """What is found only there counts, relative to what is found at full size."""
+
+    speckle_side: float = 0.012
+    """Side of the largest patch that is taken for an error, as a share of the side of the rows' picture."""
+
+    speckle_range_px: int = 2
+    """px between neighbours of one such patch at most."""
+
+    sublevels: int = 32
+    """Steps of a gray level in which the target is resampled before its tones become the reference's: its curve may be
+    steep."""
+
+    tone_quantiles: int = 64
+    """Quantiles of the histograms that the tone curve between the pictures goes through."""
+
+    bend_sizes: tuple[float, ...] = (0.2, 0.1, 0.05, 0.025, 0.0)
+    """Shares of the picture's side: bends of the field finer than this are taken out before the search. The first, and
+    so the smoothest, that leaves all within reach is used; 0: none are taken out."""
+
+    reach_percentile: float = 99.5
+    """% of the matches that have to lie within reach: the last few are outliers."""
+
+    reach_factor: float = 1.25
+    """What lies between the matches may be so many times further from the field than they are."""
+
+    reach_margin_px: float = 8.0
+    """px, of the full picture, that are searched beyond that in any case."""
+
+
+@dataclass(frozen=True)
+class LinesOptions:
+    """Evaluating epipolar lines and rows (`epipolar_lines`, `epipolar_rows`)."""
+
+    coarse_step: int = 2
+    """Rows and columns between places where what is smooth is worked out; between them it is interpolated."""
+
+    strip_rows: int = 32
+    """Rows of nodes that a thread works on at once, so that they stay near the processor. No result depends on it."""
+
+    max_epipole_distance: float = 1e6
+    """Sides of the picture at which an epipole at infinity is put: lines of a picture 10 000 px wide then spread by a
+    hundredth of a px."""
+
+
+@dataclass(frozen=True)
+class SmoothingOptions:
+    """The fast global smoother (`edge_aware_smoothing`; Min et al., IEEE TIP 2014)."""
+
+    passes: int = 2
+    """Times that rows and columns are smoothed: the paper's third changes nothing that could be measured here."""
+
+    attenuation: float = 4.0
+    """Factor by which λ falls from pass to pass, of the paper's equation 11."""
+
+    edge_reach_px: int = 7
+    """px of the side of the window in which an edge of the guide is looked for beside a jump in the values."""
+
+    max_plain_odds: float = 20.0
+    """Where there is no texture, neighbours are strengthened by so many times what half a texture gives: a bound."""
+
+
+@dataclass(frozen=True)
+class UnfoldingOptions:
+    """Taking out folds that are not occlusions (`unfolding`)."""
+
+    rounds: int = 2
+    """Times that occlusion is looked at: unfolding uncovers what seemed hidden."""
+
+    median_steps: int = 4
+    """Smoothing steps by medians a round, which leave what is right as it is."""
+
+    mean_steps: int = 4
+    """Smoothing steps by means after them, which end what is left."""
+
+    median_nodes: int = 5
+    """Nodes of the side of a median's window; OpenCV has 3 or 5 for floats."""
+
+    min_mean_sigma: float = 1.5
+    """Nodes: σ of the first mean."""
+
+    means_per_doubling: int = 6
+    """Steps by means over which σ doubles: what does not help is done more widely."""
+
+    max_move_px: float = 8.0
+    """px: more than noise moves a node by. Smoothing that would move any node of a patch further has met the rim of a
+    near thing that occlusion did not find, and the patch stays as it was."""
+
+    min_relative_area: float = 0.1
+    """Area, relative to the usual, that a cell of nodes takes up in the target at least where it is not folded."""
+
+    occlusion_margin: int = 5
+    """Nodes of the side of the window around occluded ones in which nothing is smoothed."""
+
+    usual_area_every: int = 17
+    """One node in so many says what area is usual; a prime divides few widths, so that all columns have their say."""
+
+    smoothing_reach: int = 12
+    """Nodes beyond a fold, on each side, that are smoothed with it: more than the widest mean looks at."""
+
+    strip_rows: int = 128
+    """Rows of nodes that a thread looks at at once. No result depends on it."""
+
+
+@dataclass(frozen=True)
+class BeyondOptions:
+    """How refinement goes on beyond the overlap (`moved_depth`)."""
+
+    fade_length: float = 5.0
+    """Width of the fade outside the overlap in units of the moves (98th percentile), as the field has it."""
+
+    min_fade_px: float = 8.0
+    """px of that width at least."""
+
+    max_fade: float = 0.15
+    """Share of the picture's longer side of that width at most."""
+
+    coarse_step: int = 8
+    """Nodes between places where depth per px and the lines' directions are worked out: they are smooth."""
+
+    ignored_confidence: float = 0.2
+    """Confidence at and below which a move has no say in what goes on beyond the overlap."""
+
+    trusted_confidence: float = 0.5
+    """Confidence at and above which a move has its full say there; in between linear."""
+
+    confidence_erosion: int = 9
+    """Nodes of the side of the window over which the lowest confidence counts: it is an average, and reaches over the
+    rim of what it is about."""
+
+    yielding_share: float = 0.4
+    """Share of the fade's width inside the overlap's border over which doubtful moves give way to what goes on beyond:
+    twice their own size."""
+
+
+REFINE = RefineOptions()
+MATCHING = MatchingOptions()
+LINES = LinesOptions()
+SMOOTHING = SmoothingOptions()
+UNFOLDING = UnfoldingOptions()
+BEYOND = BeyondOptions()

@@ -1,0 +1,147 @@
+"""What was chosen in fitting a field, stage by stage: each value with its unit, and why it is what it is.
+
+May import nothing of the project but raster.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..raster.arrays import Array
+
+
+@dataclass(frozen=True)
+class StrictOptions:
+    """Fitting inverse depth to matches (`strict`). px are in units of the matches' scale."""
+
+    max_centres: int = 1000
+    """Matches that the spline stands on at most: its time grows with their cube, its quality hardly with more."""
+
+    min_centres: int = 8
+    """Matches below which no field is fitted: a plane takes three, and leave-one-out needs some to spare."""
+
+    thinning_cells: float = 200.0
+    """Where matches are thinned: cells along the side √(W·H) of the picture that keep one match each, to begin with."""
+
+    initial_smoothing: float = 1e-3
+    """λ, in units of W·H of the reference, of the first spline, by which gross errors are found: stiff enough that
+    they stand out."""
+
+    smoothing_decades: tuple[float, float] = (-3.0, 2.0)
+    """Powers of ten, relative to `initial_smoothing`, between which leave-one-out looks for the best λ, by halves."""
+
+    gross_error_sigmas: float = 10.0
+    """Robust standard deviations of the leave-one-out errors beyond which a match is a gross error."""
+
+    outlier_sigmas: float = 3.0
+    """Standard deviations of the residuals beyond which a match is an outlier: the usual three."""
+
+    outlier_floor_px: float = 1.0
+    """px: an error this small is never an outlier, whatever the standard deviation; keypoints lie no better."""
+
+    neighbours: int = 8
+    """Nearest matches that a match is compared with before it is dropped."""
+
+    agreeing_neighbours: int = 3
+    """Neighbours that have to agree with a match to protect it: fewer happen by chance, and small objects have few."""
+
+    noise_floor_px: float = 0.1
+    """px: the noise of the matches is never taken to be smaller where a plane is fitted."""
+
+    plane_noise_px: float = 0.3
+    """px: real surfaces are flat to this much at least where a plane to continue is sought."""
+
+    min_relative_sensitivity: float = 1e-3
+    """px per unit of d, relative to the median match: below, the line is seen end-on and says nothing about d."""
+
+    @property
+    def smoothing_ladder(self) -> Array:
+        """The λ (n,) that leave-one-out chooses from."""
+        return decades(*self.smoothing_decades) * self.initial_smoothing
+
+
+@dataclass(frozen=True)
+class SlackOptions:
+    """Fitting what matches leave across their epipolar lines (`slack`)."""
+
+    min_relative_smoothing: float = 10.0
+    """λ at least, in units of the strict spline's λ: the lens bends more slowly than the scene."""
+
+    smoothing_decades: tuple[float, float] = (-5.0, 2.0)
+    """Powers of ten between which λ, in units of W·H, is looked for, by halves: from hardly any smoothing to almost a
+    plane."""
+
+    min_gain: float = 0.03
+    """Share by which slack has to lower the mean square of the leave-one-out errors: less is chance."""
+
+    deciding_matches: int = 500
+    """Matches that decide about λ: more hardly move it, and the time goes with their cube."""
+
+    max_length: float = 2.0
+    """The longest slack, in units of the 98th percentile over the matches: a spline knows no bounds away from them."""
+
+    fade_length: float = 10.0
+    """Width of the fade outside the overlap, in units of the longest slack: straight lines bend by little over that."""
+
+    min_fade_px: float = 16.0
+    """px of that width at least, in units of the matches' scale."""
+
+    @property
+    def smoothing_ladder(self) -> Array:
+        """The λ (n,) that leave-one-out chooses from."""
+        return decades(*self.smoothing_decades)
+
+
+@dataclass(frozen=True)
+class SplineOptions:
+    """Evaluating thin-plate splines (`spline`)."""
+
+    kernel_values_at_once: int = 2_000_000
+    """Kernel values that are held in memory at once: 16 MB in float64. Results do not depend on it."""
+
+
+@dataclass(frozen=True)
+class PlaneOptions:
+    """The plane that a field continues as outside the overlap (`plane`)."""
+
+    draws: int = 400
+    """Planes through three matches that are tried: one that holds a fifth of the area is then met with 96 %."""
+
+    nearby: float = 0.2
+    """Share of the picture's side over which the say of a match falls by e with its distance from where the target
+    goes on."""
+
+    cell: float = 1 / 16
+    """Share of the picture's side of the cells in which all matches together count as one: area counts, not texture."""
+
+    target_nodes: int = 24
+    """Points along each side of the target that say where it goes on beyond the reference."""
+
+    max_reweightings: int = 50
+    """Reweighted least-squares steps at most: a guard, they end where the plane no longer changes."""
+
+
+@dataclass(frozen=True)
+class FadeOptions:
+    """How a field fades outside the overlap (`fade`)."""
+
+    length: float = 5.0
+    """Width of the fade in units of how far the field moves its matches (98th percentile): it falls by at most
+    0.3 px a px then, and cannot fold."""
+
+    min_px: float = 8.0
+    """px of that width at least, in units of the matches' scale."""
+
+
+def decades(low: float, high: float) -> Array:
+    """Powers of ten (n,) from 10**low to 10**high, two to each decade."""
+    return np.asarray(10.0 ** np.arange(low, high + 0.01, 0.5))
+
+
+STRICT = StrictOptions()
+SLACK = SlackOptions()
+SPLINE = SplineOptions()
+PLANE = PlaneOptions()
+FADE = FadeOptions()

@@ -1,0 +1,121 @@
+"""Inverse depth on a canvas, how sure it is, and how near that is to a picture: worked out where they are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.camera import Camera
+from ..cameras.view import View
+from ..field.refined_depth import RefinedDepth
+from ..field.visibility import nearness_of
+from ..raster.arrays import Array, Part, strips, within
+from ..raster.grid import Grid
+from ..raster.lazy import AnyImage, LazyImage
+from .canvas import Canvas
+
+
+@dataclass(frozen=True, eq=False)
+class Depth(LazyImage):
+    """The inverse depth (H, W) of a canvas, from a field's at the nodes of a grid and its dense refinement."""
+
+    canvas: Canvas
+    camera: Camera
+    grid: Grid
+    nodes: Array
+    refined: RefinedDepth | None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W)."""
+        return self.canvas.height, self.canvas.width
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        rows, columns = within(part, self.shape)
+        out = np.empty((rows.stop - rows.start, columns.stop - columns.start), np.float32)
+        # whole strips, as the map was made of: BLAS has other last bits for other shapes
+        for strip in strips(self.shape):
+            low, high = max(rows.start, strip.start), min(rows.stop, strip.stop)
+            if low < high:
+                d = self._alone(strip)
+                out[low - rows.start : high - rows.start] = d[low - strip.start : high - strip.start, columns]
+        return out
+
+    def strip(self, rows: slice) -> tuple[Array, NDArray[np.float32] | None]:
+        """Whole rows of it, and px that dense refinement adds in its picture."""
+        canvas, d = self.canvas, self._of_field(rows)
+        if self.refined is None:
+            return d, None
+        more, sideways, _ = _refined_at(self.refined, canvas, canvas.xs, canvas.ys[rows], self.camera)
+        return d + more, sideways
+
+    def _alone(self, rows: slice) -> Array:
+        """Whole rows of it."""
+        canvas, refined = self.canvas, self.refined
+        if refined is None or canvas.projection is not None:
+            return self.strip(rows)[0]
+        return self._of_field(rows) + refined.part_over(refined.inverse_depth, canvas.xs, canvas.ys[rows])
+
+    def _of_field(self, rows: slice) -> Array:
+        left, top = -self.canvas.offset[0], rows.start - self.canvas.offset[1]
+        # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
+        values = self.grid.to_pixels(self.nodes, left, top, self.canvas.width, rows.stop - rows.start)
+        return values.astype(np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Confidence(LazyImage):
+    """How sure (H, W) dense refinement is on a canvas."""
+
+    canvas: Canvas
+    camera: Camera
+    refined: RefinedDepth
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W)."""
+        return self.canvas.height, self.canvas.width
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        rows, columns = within(part, self.shape)
+        xs, ys = self.canvas.xs[columns], self.canvas.ys[rows]
+        if self.canvas.projection is None:
+            return self.refined.part_over(self.refined.confidence, xs, ys)
+        return _refined_at(self.refined, self.canvas, xs, ys, self.camera)[2]
+
+
+@dataclass(frozen=True, eq=False)
+class Nearness(LazyImage):
+    """Baselines per distance (H, W) from a view's camera (see `visibility.nearness_of`); camera: the reference's."""
+
+    canvas: Canvas
+    camera: Camera
+    view: View
+    depth: AnyImage
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W)."""
+        return self.canvas.height, self.canvas.width
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        rows, columns = within(part, self.shape)
+        xs, ys = self.canvas.xs[columns], self.canvas.ys[rows]
+        (infinite,) = self.canvas.project_rows(self.view.H_inf[2:], xs, ys, self.camera)
+        d = np.asarray(self.depth[part])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return nearness_of(d, d * np.float32(self.view.e_prime[2]) + infinite.astype(np.float32))
+
+
+def _refined_at(
+    refined: RefinedDepth, canvas: Canvas, xs: Array, ys: Array, camera: Camera
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """What dense refinement adds to inverse depth and to its picture's pixels at canvas columns xs and lines ys, and
+    its confidence."""
+    if canvas.projection is None:  # canvas pixels are the reference's
+        return refined.over(xs, ys)
+    places, ahead = canvas.on_reference(xs, ys, camera)
+    more, sideways, confidence = refined.at(places[..., 0], places[..., 1])
+    return more * np.nan_to_num(ahead).astype(np.float32), sideways, confidence

@@ -1,0 +1,57 @@
+"""Tuning values of reading and writing pictures, with their units and why they are what they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ReadingOptions:
+    """What is read, against damaged files and those made to fill the memory (`containers`, `decoding`, `picture`)."""
+
+    # Pixels of a picture, at most: beyond, a stitch does not fit into the memory of common machines.
+    max_pixels: int = 400_000_000
+    # px a side, at most: what JPEG can hold.
+    max_side: int = 65535
+    # Channels of all layers and parts of an EXR file together: four for each of the most pixels.
+    max_exr_samples: int = 1_600_000_000
+    # Pixels that a file may unpack to whatever its length; beyond, its length has to be in proportion.
+    small_pixels: int = 2_000_000
+    # Pixels for each byte of a photograph's file, at most: one takes a tenth of a byte or more for each, and JPEG
+    # cannot write less than six bits for 256.
+    photograph_pixels_per_byte: int = 400
+    # The same for a mask, which may have one colour: deflate packs one bit a pixel a thousand times.
+    drawing_pixels_per_byte: int = 10_000
+    # Bytes of an unpacked ICC profile; real ones have up to 2 MB, and a PNG's is compressed.
+    max_icc_bytes: int = 8 << 20
+    # Share of pixels that are not finite up to which a float picture is used; beyond, something else went wrong.
+    max_not_finite: float = 0.5
+
+
+@dataclass(frozen=True)
+class WritingOptions:
+    """How pictures are written (`encoding`, `png`, `metadata`)."""
+
+    # OpenCV's JPEG quality, 0 to 100: its default, without visible loss.
+    jpeg_quality: int = 95
+    # zlib's level, 1 to 9: the fastest; photographs hardly pack better on higher ones.
+    png_level: int = 1
+    # Bytes of a text in EXIF: the whole block has to fit into one JPEG segment of 64 kB.
+    max_text_bytes: int = 2000
+
+
+@dataclass(frozen=True)
+class MaskOptions:
+    """How masks are understood (`masks`)."""
+
+    # Share of a picture that a mask leaves, at least: one that leaves less is inverted or means something else.
+    least_left: float = 0.01
+    # Share of white up to which paint over a panorama is black, and as much from the other end white.
+    painted: float = 0.25
+    # Share of white by which colours may differ and still be one: rounding, and compression that is not lossless.
+    one_colour: float = 8 / 255
+
+
+READING = ReadingOptions()
+WRITING = WritingOptions()
+MASKS = MaskOptions()

@@ -1,0 +1,207 @@
+"""Tuning values of each stage of pose estimation, with their units and why they are what they are.
+
+Lengths called px are in px of the picture that the matches were found in: they are multiplied by `Matches.scale`.
+References: Lowe, Distinctive Image Features from Scale-Invariant Keypoints, IJCV 2004; Moisan and Stival, A
+Probabilistic Criterion to Detect Rigid Point Matches, IJCV 2004.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class FeatureOptions:
+    """Detecting and matching SIFT features (`features`)."""
+
+    # px of a picture; larger ones are shrunk. SIFT's time and memory grow with pixels, its useful points hardly do.
+    pixels: int = 3_200_000
+    # px a side, likewise: SIFT doubles the picture, and OpenCV's pictures end at 32767.
+    side: int = 16_000
+    # px a side; below, OpenCV's pyramid has no level to stand on.
+    least_side: int = 8
+    # Features of a picture; matching takes time with the square of it.
+    budget: int = 8000
+    # px and features for a preview: a third of the time, and at 1 MP the map's error grows by 3 to 19 %.
+    preview_pixels: int = 400_000
+    preview_budget: int = 3000
+    # Contrast threshold (OpenCV's default is 0.04): small or flat pictures cannot do without faint points.
+    contrast_threshold: float = 0.005
+    # The same where there are enough stronger points: faint ones (clouds, noise) mislead.
+    strong_contrast: float = 0.02
+    # Points from the strongest on that are taken whatever their contrast; beyond, only strong ones.
+    enough_points: int = 3000
+    # Layers per octave and blur of the first one in px: Lowe 2004, section 3.
+    octave_layers: int = 3
+    base_sigma: float = 1.6
+    # Ratio of principal curvatures above which a point counts as lying on an edge (OpenCV's default is 10).
+    edge_threshold: float = 20
+    # Nearest to second nearest distance, at most; Lowe 2004, section 7.1.
+    ratio: float = 0.8
+    # px kept clear of transparent parts: the reach of a small descriptor.
+    alpha_margin: int = 8
+    # Features that each cell of the grid gets of an evenly spread budget, on average.
+    points_per_cell: int = 8
+    # Descriptors compared at a time, so that memory stays bounded.
+    rows_at_once: int = 1024
+
+
+@dataclass(frozen=True)
+class FundamentalOptions:
+    """Robust F and homography from matches alone, and tests against chance (`fundamental`)."""
+
+    # Matches that must agree on F: 7 do on any, and some more lie near its lines by chance.
+    min_inliers: int = 15
+    # The same as a share of all matches.
+    min_inlier_share: float = 0.08
+    # px of Sampson distance within which a match is an inlier of F; twice that of transfer error for a homography.
+    inlier_px: float = 1.5
+    # Thresholds tried, in units of the former: where a lens bends lines, a sharp one fits a part of the picture only.
+    threshold_factors: tuple[float, ...] = (1.0, 2.0)
+    # Most iterations of RANSAC for F and for a homography, and the confidence at which MAGSAC++ stops earlier.
+    iterations: int = 20_000
+    homography_iterations: int = 10_000
+    confidence: float = 0.9999
+    # px: noise is never taken to be less, for no keypoint is placed better.
+    least_noise_px: float = 0.05
+    # Share of the shorter side that inliers must stray from any line, or they tell no geometry.
+    min_spread: float = 0.008
+    # A match is off the homography beyond so many σ and so many px, and on its line within so many σ.
+    off_plane_sigmas: float = 5.0
+    off_plane_px: float = 0.75
+    on_line_sigmas: float = 3.5
+    # Matches off the homography along their lines that show parallax: so many, such a share of all on lines (feature
+    # positions have heavy tails), and so many times those that are off across their lines.
+    min_off_plane: int = 8
+    min_off_plane_share: float = 0.025
+    along_to_across: float = 3.0
+    # Log of the expected number of equally good coincidences among random matches, at most (Moisan and Stival 2004
+    # have 0): noise is not as random as the model.
+    max_log_coincidences: float = -25.0
+
+
+@dataclass(frozen=True)
+class RefinementOptions:
+    """Refining a pose on Sampson distances and priors (`refinement`)."""
+
+    # Matches that count as evidence against a prior, at most: errors of neighbours go together (lens distortion,
+    # rolling shutter).
+    effective_matches: int = 300
+    # px of systematic error a lens leaves in residuals, where they speak against a known and a guessed focal length.
+    systematic_px: float = 0.5
+    systematic_guess_px: float = 0.15
+    # px, σ of the cheirality residual: distortion moves where infinity is seen by about this much.
+    cheirality_sigma_px: float = 2.0
+    # Degrees of freedom of the Student distribution of an assumed focal length.
+    prior_freedom: float = 3.0
+    # Radians; a point of less parallax counts as infinitely far: keypoint noise may put it behind the cameras.
+    min_parallax: float = 2e-3
+    # Share of a match's weight below which its cheirality residual is left out of the equations, to save time.
+    negligible_cheirality: float = 1e-3
+    # σ of the log of the ratio of two focal lengths to what is known of it, when the second is free.
+    zoom_sigma: float = 0.3
+    # Most that log f changes in a step, so that a bad step does not leave the basin.
+    max_focal_step: float = 0.3
+
+
+@dataclass(frozen=True)
+class EstimationOptions:
+    """From matches to a TwoView (`estimation`)."""
+
+    # Matches below which nothing is tried: with fewer, agreement can be chance.
+    min_matches: int = 16
+    # px, σ of the first refinement of every start.
+    start_sigma_px: float = 1.0
+    # px within which a match is an inlier of the pose, at least, however sharp the noise; at most half as much more.
+    inlier_px: float = 2.0
+    # A second F is sought with a threshold of so many σ of the first pose, at most this share of RANSAC's: a wide one
+    # lets in stray matches that the pose bends to.
+    sharp_sigmas: float = 3.0
+    sharp_share: float = 0.4
+    # A rotation may explain a homography's matches so many times worse, or by so many px: lenses are not perfect.
+    rotation_factor: float = 1.6
+    rotation_px: float = 0.75
+    # px beyond noise that matches must move, or both pictures show the same.
+    same_view_px: float = 0.5
+    # Share of the homography's inliers that a pose must explain where there is no parallax, or the plane is all there
+    # is.
+    plane_inlier_share: float = 0.8
+    # Given cameras contradict the matches if they explain less than this share of what a free F does, or with so many
+    # times its noise.
+    given_inlier_share: float = 0.75
+    given_noise_factor: float = 1.6
+    # px off its line from which a given match is reported, and within which given cameras explain a match.
+    given_match_px: float = 3.0
+    given_camera_px: float = 3.0
+    # Share of what a free F explains that given cameras must explain, and px that their noise is never below.
+    given_camera_share: float = 0.5
+    given_camera_noise_px: float = 0.1
+    # Share of consistent points that must lie in front of both cameras.
+    min_front_share: float = 0.5
+    # Share of matches on one homography from which its own poses are tried too: F is unstable on a plane.
+    plane_start_share: float = 0.5
+    # Rounds of refining and choosing inliers anew, at most.
+    rounds: int = 8
+    # Matches that choose among starts, and matches that refine: more take time and change nothing.
+    start_matches: int = 400
+    refinement_matches: int = 1500
+    # Focal lengths in units of the longer side, tried when nothing is known: 19 mm to 200 mm on a 36 mm frame.
+    focal_ladder: tuple[float, ...] = (0.5, 0.7, 0.9, 1.2, 1.6, 2.2, 3.2, 5.0)
+    # σ of log f from which the ladder is tried: what is known better needs no search.
+    ladder_sigma: float = 0.1
+
+
+@dataclass(frozen=True)
+class FocalOptions:
+    """What is said about the focal length (`focal`)."""
+
+    # σ of log f by the matches alone above which they do not determine it.
+    undetermined: float = 0.1
+    # Matches that follow when the focal length is moved to see how far H_inf goes: few suffice for a figure.
+    spread_matches: int = 200
+    # σ by which a focal length must have been moved from what the file claims to be reported.
+    contradiction_sigmas: float = 2.0
+
+
+@dataclass(frozen=True)
+class RotationOptions:
+    """Two pictures from the same place (`rotation`)."""
+
+    # Matches that take part: a rotation and two focal lengths need no more.
+    matches: int = 300
+    # Focal lengths to start from in units of the longer side, where nothing is known: the cost has several minima.
+    focal_starts: tuple[float, ...] = (0.6, 0.9, 1.4, 2.2, 4.0)
+    # σ of the difference of the logs of both changes of focal length: one lens took both more often than not.
+    common_focal_sigma: float = 0.05
+    # σ of noise; residuals are cut off here, and points behind the camera have this one.
+    max_residual: float = 1e4
+    # Evaluations of the residuals for each start, at most.
+    evaluations: int = 100
+
+
+@dataclass(frozen=True)
+class ZoomOptions:
+    """A second focal length (`zoom`)."""
+
+    # Matches that are looked at: more take time and change nothing.
+    matches: int = 400
+    # px of Sampson distance within which a match counts as explained.
+    explained_px: float = 3.0
+    # Share of the robust residuals of a common focal length that two may leave. A second one also soaks up lens
+    # distortion and then leads astray outside the overlap, so it must be worth much.
+    max_residual_share: float = 0.4
+    # Starts: first focal length in units of the assumed one, and second in units of the first. A start from the pose
+    # with a common one would not leave its minimum.
+    focal_starts: tuple[float, ...] = (0.7, 1.0, 1.4)
+    ratio_starts: tuple[float, ...] = (0.55, 0.75, 1.33, 1.8)
+    # Iterations of refining each start.
+    iterations: int = 20
+
+
+FEATURES = FeatureOptions()
+FUNDAMENTAL = FundamentalOptions()
+REFINEMENT = RefinementOptions()
+ESTIMATION = EstimationOptions()
+FOCAL = FocalOptions()
+ROTATION = RotationOptions()
+ZOOM = ZoomOptions()
