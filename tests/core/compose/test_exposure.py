@@ -126,3 +126,13 @@ def test_dark_blocks_tell_nothing_of_the_exposure() -> None:
     flared[:, :104] = 0.04
     found = match_exposure(layer(light), layer(flared), NOTHING, HDR)
     assert np.allclose(found.gain, GAIN, rtol=1e-3) and found.blocks == (H // 8) * (W // 8 - 13)
+
+
+def test_a_level_less_than_whole_is_not_whole() -> None:
+    light = scene(top=0.6)
+    alpha = np.where(np.arange(W) < 100, np.float32(254 / 255), np.float32(1)) * np.ones((H, 1), np.float32)
+    spoilt = np.where(alpha[..., None] == 1, light / GAIN, light / 3)
+    for one, other in ((layer(light, alpha), layer(spoilt)), (layer(light), layer(spoilt, alpha))):
+        found = match_exposure(one, other, NOTHING, HDR)
+        assert found.blocks <= (H // 8) * (W - 96) // 8 and np.allclose(found.gain, GAIN, rtol=1e-3)
+        assert (found.spread < 1e-3).all()
