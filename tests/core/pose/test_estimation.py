@@ -598,3 +598,11 @@ def test_where_no_pose_has_most_of_a_plane_its_homography_is_left(monkeypatch: p
     monkeypatch.setattr("edf_stitch.core.pose.estimation._fit_pose", lambda *_: (found, few, 0.5, False))
     view = estimate(truth.matches, known(), known())
     assert view.model == "plane" and np.isnan(view.t).all() and not view.e_prime.any() and view.inliers.sum() > 90
+
+
+@pytest.mark.parametrize("focal", [600.0, 3500.0, 5000.0])
+def test_a_focal_length_far_from_the_usual_one_is_found(focal: float) -> None:
+    """From the assumed one alone the search would end in another valley, with a focal length less than half of it."""
+    truth = scene("to the side, turned", 0, 300, 0.2, focals=(focal, focal))
+    view = estimate(truth.matches, unknown(), unknown())
+    assert view.K[0, 0] == pytest.approx(focal, rel=0.05) and view.inliers.all()
