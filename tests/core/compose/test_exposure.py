@@ -97,3 +97,42 @@ def test_frames_of_a_clip_share_the_middle_of_their_gains() -> None:
     each = [Exposure(np.float32([g, 1, 1]), np.zeros(3, np.float32), 10) for g in (1.1, 1.2, 9.0)]
     assert pooled([*each, unchanged(3)]).gain.tolist() == pytest.approx([1.2, 1, 1])
     assert pooled([unchanged(3)]).blocks == 0
+
+
+@pytest.mark.parametrize("blocks, known", [(19, 0), (20, 20), (21, 21)])
+def test_fewer_than_twenty_blocks_tell_nothing(blocks: int, known: int) -> None:
+    light = scene(top=0.6)
+    alpha = np.zeros((H, W), np.float32)
+    alpha[16:24, 40 : 40 + 8 * blocks] = 1
+    found = match_exposure(layer(light), layer(light / GAIN, alpha), NOTHING, LDR)
+    assert found.blocks == known and np.allclose(found.gain, GAIN if known else 1, rtol=1e-3)
+
+
+def test_a_block_counts_where_half_of_it_or_more_is_seen() -> None:
+    """Blocks are those of the canvas, wherever the overlap begins: its first columns have a half of one, or less."""
+    light = scene(top=0.6)
+    for first, columns in ((12, 29), (13, 28), (8, 29)):
+        alpha = np.zeros((H, W), np.float32)
+        alpha[16:32, first : 8 * 30] = 1
+        found = match_exposure(layer(light), layer(light / GAIN, alpha), NOTHING, LDR)
+        assert found.blocks == 2 * columns and np.allclose(found.gain, GAIN, rtol=1e-3)
+
+
+def test_dark_blocks_tell_nothing_of_the_exposure() -> None:
+    """Flare lies on them: in one picture they are twenty times too bright."""
+    light = scene(top=0.6) + 0.2
+    flared = light / GAIN
+    light[:, :104] = 0.002
+    flared[:, :104] = 0.04
+    found = match_exposure(layer(light), layer(flared), NOTHING, HDR)
+    assert np.allclose(found.gain, GAIN, rtol=1e-3) and found.blocks == (H // 8) * (W // 8 - 13)
+
+
+def test_a_level_less_than_whole_is_not_whole() -> None:
+    light = scene(top=0.6)
+    alpha = np.where(np.arange(W) < 100, np.float32(254 / 255), np.float32(1)) * np.ones((H, 1), np.float32)
+    spoilt = np.where(alpha[..., None] == 1, light / GAIN, light / 3)
+    for one, other in ((layer(light, alpha), layer(spoilt)), (layer(light), layer(spoilt, alpha))):
+        found = match_exposure(one, other, NOTHING, HDR)
+        assert found.blocks <= (H // 8) * (W - 96) // 8 and np.allclose(found.gain, GAIN, rtol=1e-3)
+        assert (found.spread < 1e-3).all()

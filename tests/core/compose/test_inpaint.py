@@ -58,3 +58,14 @@ def test_it_gives_the_same_wherever_it_is_asked_for() -> None:
 def test_without_holes_nothing_is_done() -> None:
     before = layer(slope(1.0))
     assert inpainted(before, np.zeros(SHAPE, bool), np.zeros(SHAPE, np.float32)) is before
+
+
+def test_what_is_transparent_beside_a_hole_has_no_say() -> None:
+    """The picture ends at the hole's right edge: beyond it lies black that nobody sees."""
+    light = np.full((*SHAPE, 3), 0.5, np.float32)
+    light[:, 72:] = 0
+    whole = layer(light)
+    alpha = whole.alpha & (np.arange(SHAPE[1]) < 72)
+    out = inpainted(Layer(whole.light, alpha), HOLES, np.zeros(SHAPE, np.float32))
+    assert np.abs(out.pixels[HOLES] - 0.5).max() < 1e-3
+    assert np.array_equal(out.alpha, alpha | HOLES)

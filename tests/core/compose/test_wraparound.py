@@ -10,7 +10,7 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.compose.composition import Composition, composed, pooled_decision
-from edf_stitch.core.compose.wraparound import WrappedImage, roll_for, rolled
+from edf_stitch.core.compose.wraparound import WrappedImage, roll_for, rolled, rolled_map
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
@@ -95,3 +95,11 @@ def test_rolled_light_is_rolled_however_it_is_cut_up(columns: int) -> None:
     one, whole = WrappedImage(light, columns), rolled(light, columns)
     for part in (np.s_[:, :], np.s_[10:20, 5:300], np.s_[:, W - 80 :], np.s_[3:4, :1], np.s_[5:9, 7:7]):
         assert np.array_equal(one[part], whole[part])
+
+
+def test_a_map_is_rolled_in_both_directions() -> None:
+    x, y = np.random.default_rng(0).random((2, 5, 8)).astype(np.float32)
+    found = rolled_map(PictureMap(x, y, (30, 20)), 3)
+    for values, whole in ((found.x, x), (found.y, y)):
+        assert np.array_equal(values, np.concatenate([whole[:, 3:], whole[:, :3]], axis=1))
+    assert found.size == (30, 20) and np.array_equal(rolled_map(found, -3).x, x)

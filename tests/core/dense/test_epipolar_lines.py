@@ -222,7 +222,9 @@ def test_what_is_smooth_is_right_between_the_places_it_is_worked_out_at(shape: t
     assert np.isnan(broken[:, 31:]).all()
 
 
-@pytest.mark.parametrize("box", [(3, 5, 40, 30), (-4, 2, 21, 17), (2.25, 5, 40, 30), (3, 5, 4000, 30)])
+@pytest.mark.parametrize(
+    "box", [(3, 5, 40, 30), (-4, 2, 21, 17), (2.25, 5, 40, 30), (3, 5, 4000, 30), (3, 5, 1, 30), (3, 5, 40, 1)]
+)
 def test_over_whole_pixels_it_is_what_it_is_at_them(made: Made, box: tuple[float, float, float, float]) -> None:
     _, sparse = made
     xs, ys = (start + np.arange(float(count)) for start, count in zip(box[:2], box[2:], strict=True))

@@ -249,3 +249,17 @@ def test_matching_band_by_band_finds_what_matching_at_once_does(monkeypatch: pyt
     banded, sure_too = matching._matched(first, second, 32)
     assert len(heights) == 8 and max(heights) == 50 + 2 * MATCHING.band_margin_rows
     assert (sure != sure_too).mean() < 0.01 and (np.abs(at_once - banded)[sure & sure_too] > 0.5).mean() < 0.002
+
+
+def test_it_looks_as_far_as_it_is_told() -> None:
+    """OpenCV looks at 16 places more, or not: what is just within reach must not be what it leaves out."""
+    pair = scene("sideways")
+    field = SparseMap.over_reference(
+        Field(lambda points: pair.depth(points) + 0.05), pair.view, *pair.cameras, MARGIN
+    )  # some ten px off everywhere
+    lines = pair.lines(field)
+    along, counts = search(lines, field, *pair.views(), 1.0, 12.0)
+    right = pair.truth(lines)
+    within = (np.abs(right) > 8.5) & (np.abs(right) < 12) & pair.visible(lines)
+    assert within.sum() > 2000, "else there is nothing to seek"
+    assert ((counts > 0) & (np.abs(along - right) < 1))[within].mean() > 0.4

@@ -182,3 +182,27 @@ def test_strip_by_strip_it_comes_to_the_same(monkeypatch: pytest.MonkeyPatch) ->
         found.append(polished(pair, lines, start, slack=True, views=views))
     for name in ("along", "across", "likeness", "evidence"):
         np.testing.assert_allclose(*(getattr(one, name) for one in found), atol=2e-3, err_msg=name)
+
+
+def test_contrast_is_evened_out_by_no_more_than_a_factor_of_two() -> None:
+    """What is all but plain in one picture is its noise: that is not blown up to what the other one shows."""
+    pair = scene("sideways")
+    lines = pair.lines(pair.field(truth=True))
+    here, still = inner(pair, lines), np.zeros(lines.shape, np.float32)
+
+    def steepness(faded: float, faded_too: float) -> float:
+        """Gray levels per px along the lines that the target is taken to show."""
+        first, target = (
+            View.of(np.rint(128 + (picture - 128.0) * share).astype(np.uint8), None, 1.0)
+            for picture, share in ((pair.reference, faded), (pair.target, faded_too))
+        )
+        slopes = [cv2.Scharr(target.gray, cv2.CV_32F, 1 - k, k, scale=1 / 32) for k in (0, 1)]
+        second = cv2.merge([target.gray, *slopes])
+        at_nodes = first.at_nodes(first.gray, lines)
+        found = polish_module._compared(lines, *at_nodes, target, second, still, still)
+        return float(np.median(np.abs(found.slope[here])))
+
+    usual = steepness(1.0, 1.0)
+    assert steepness(1.0, 0.7) == pytest.approx(usual, rel=0.15)
+    assert steepness(1.0, 0.1) == pytest.approx(0.2 * usual, rel=0.15)
+    assert steepness(0.1, 1.0) == pytest.approx(0.5 * usual, rel=0.15)

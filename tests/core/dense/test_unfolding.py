@@ -11,7 +11,7 @@ from edf_stitch.core.cameras.projective import homogeneous
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.dense import unfolding
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
-from edf_stitch.core.dense.unfolding import unfolded
+from edf_stitch.core.dense.unfolding import _areas, _hidden, _without_large_moves, unfolded
 from edf_stitch.core.field.folding import jacobian
 from edf_stitch.core.field.visibility import nearness_of, occluded
 from edf_stitch.core.raster.picture_map import PictureMap
@@ -144,3 +144,47 @@ def test_the_depth_order_is_that_of_the_undistorted_nodes(
     d = lines.inverse_depth + along * lines.depth_per_px
     ray = np.concatenate([lines.ideal, np.ones((*lines.shape, 1))], axis=-1) @ view.H_inf[2] + d * view.e_prime[2]
     assert np.allclose(asked[0], np.maximum(d, 0) / ray, rtol=1e-5)
+
+
+def test_the_area_of_any_node_is_that_of_the_whole_map() -> None:
+    """By central differences inside, by one step at the border, as for all nodes at once."""
+    x, y = np.random.default_rng(0).normal(size=(2, 7, 9)).astype(np.float32)
+    whole = jacobian(x, y).ravel()
+    assert np.allclose(_areas(x, y, np.arange(x.size)), whole, atol=1e-5)
+    some = np.array([0, 8, 13, 40, 62])
+    assert np.allclose(_areas(x, y, some), whole[some], atol=1e-5)
+
+
+@pytest.mark.parametrize("box, step", [((0, 0, *SIZE), 2.0), ((20, 10, 120, 100), 1.0), ((20, 10, 120, 100), 2.0)])
+def test_what_is_hidden_is_so_on_nodes_of_a_part_and_on_coarser_ones(
+    by_hand: SimpleNamespace, box: tuple[int, int, int, int], step: float
+) -> None:
+    camera = by_hand.camera(SIZE, 200.0)
+    view = by_hand.view(camera, camera, (0.0, 0, 0), (1, 0.1, 0.3))
+    sparse = SparseMap.over_reference(Field(lambda points: np.full(points.shape[:-1], FAR)), view, camera, camera, 10)
+
+    def found_on(lines: EpipolarLines) -> np.ndarray:
+        x, y = lines.ideal[..., 0], lines.ideal[..., 1]
+        card = (x > 59.2) & (x < 110.2) & (y > 34.2) & (y < 85.2)
+        along = ((np.where(card, NEAR, FAR) - lines.inverse_depth) / lines.depth_per_px).astype(np.float32)
+        return _hidden(lines, view, SIZE, along, *lines.target(along))
+
+    whole = found_on(EpipolarLines.over(sparse, (0, 0, *SIZE), 1.0))
+    part = whole[box[1] : box[1] + box[3], box[0] : box[0] + box[2]]
+    found = found_on(EpipolarLines.over(sparse, box, step))
+    size = found.shape[::-1]
+    share = cv2.resize(part.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    assert found.sum() > 0.7 * share.sum() > 100
+    assert not found[cv2.dilate(share, np.ones((3, 3))) == 0].any()
+    if step == 1:
+        assert (found != part).mean() < 0.002
+
+
+def test_patches_that_smoothing_moved_far_are_put_back() -> None:
+    start = noise((40, 50), 3.0, 2.0)
+    along = start.copy()
+    along[5:15, 5:15] += 2.0
+    along[25:35, 20:40] += np.where(np.arange(20) < 10, 1.0, 9.0)
+    found = _without_large_moves(along, start)
+    assert np.array_equal(found[:20], along[:20]) and np.array_equal(found[20:], start[20:])
+    assert np.array_equal(_without_large_moves(along[:20], start[:20]), along[:20])

@@ -20,7 +20,7 @@ from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.field.options import STRICT
 from edf_stitch.core.field.plane import fit_plane
 from edf_stitch.core.field.spline import SmoothingProblem
-from edf_stitch.core.field.strict import StrictField, fit_strict
+from edf_stitch.core.field.strict import StrictField, _supported, fit_strict
 from edf_stitch.core.field.transfer import inverse_depths, target_points
 from edf_stitch.core.raster.grid import Grid
 from edf_stitch.core.system.errors import DegenerateGeometry
@@ -471,8 +471,23 @@ def test_too_few_depths_are_refused() -> None:
         fit_strict(forward, Matches(centre + away, centre - 1.5 * away), SIZE, SIZE)
 
 
-def test_a_handful_of_matches_makes_a_field() -> None:
-    x, y, _ = some_matches(SIDE, planar, STRICT.min_centres + 2, 0.2, seed=6)
+@pytest.mark.parametrize("count", [STRICT.min_centres, STRICT.min_centres + 2])
+def test_a_handful_of_matches_makes_a_field(count: int) -> None:
+    x, y, _ = some_matches(SIDE, planar, count, 0.2, seed=6)
     field = fit_strict(SIDE, Matches(x, y), SIZE, SIZE)
     assert np.isfinite(field.on_grid(Grid.over(0, 0, *SIZE)).inverse_depth).all()
     assert error_px(field, x, planar).max() < 1.5
+
+
+@pytest.mark.parametrize("together, kept", [(4, True), (3, False)])
+def test_three_of_the_eight_nearest_that_agree_protect_a_point(together: int, kept: bool) -> None:
+    """A few points close together before a wall: each has one neighbour fewer than they are."""
+    wall = np.stack(np.meshgrid(np.arange(10.0), np.arange(10.0)), axis=-1).reshape(-1, 2) * 10
+    thing = np.array([[45.0, 45], [46, 45], [45, 46], [46, 46]])[:together]
+    x, g = np.vstack([wall, thing]), np.r_[np.zeros(100), np.full(together, 0.02)]
+    sensitivity = np.full(len(x), 1000.0)  # so 20 px before it
+    found = _supported(x, g, sensitivity, 1.0)
+    assert (found[100:] == kept).all() and found[:100].all()
+    assert _supported(x, g, sensitivity, 30.0).all(), "within the tolerance all agree"
+    assert _supported(x, g, 0.01 * sensitivity, 1.0).all(), "as it is seen, not in depth"
+    assert not _supported(x[:8], g[:8], sensitivity[:8], 1.0).any(), "eight have no eight neighbours"

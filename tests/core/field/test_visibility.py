@@ -13,7 +13,7 @@ from edf_stitch.core.cameras.projective import homogeneous, infinite_homography
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.field import folding, visibility
 from edf_stitch.core.field.folding import turned_over, turning
-from edf_stitch.core.field.visibility import BESIDE, by_agreement, occluded
+from edf_stitch.core.field.visibility import BESIDE, _folded_blocks, by_agreement, occluded
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
@@ -267,3 +267,66 @@ def test_doubt_alone_hides_nothing() -> None:
     assert np.array_equal(by_agreement(told, warp.maps[1], unsure, ~everywhere), told), "beyond the reference: nothing"
     nothing = np.zeros(SHAPE, bool)
     assert not by_agreement(nothing, warp.maps[1], unsure, everywhere).any()
+
+
+def test_a_wall_at_infinity_is_hidden_by_what_stands_before_it() -> None:
+    """Points that are infinitely far off own nothing, and are hidden all the same."""
+    warp, hidden = SIDEWAYS.truth()
+    d = whole(warp.depth)
+    wall = np.isclose(d, 0.1)
+    far = SIDEWAYS.warp(1 / np.where(wall, 1e-9, d))
+    found = SIDEWAYS.occluded(far)
+    assert found.sum() > 0.8 * hidden.sum() and wall[found].mean() > 0.5
+
+
+# --- which part of the target folds fall on -------------------------------------------------------------------------
+
+
+def folded_by_hand(picture_map: PictureMap, mirrored: bool) -> np.ndarray:
+    """Cell by cell: both triangles of each, and the blocks that its corners' bounding box touches, grown by one."""
+    blocks = np.zeros((picture_map.size[1] // 16 + 1, picture_map.size[0] // 16 + 1), np.uint8)
+    at = np.stack([picture_map.x, picture_map.y], axis=-1).astype(float)
+    sign, last = -1 if mirrored else 1, np.array(picture_map.size) - 1
+
+    def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+        (x, y), (u, v) = b - a, c - a
+        return sign * (x * v - y * u)
+
+    for i in range(at.shape[0] - 1):
+        for j in range(at.shape[1] - 1):
+            corners = at[i, j], at[i, j + 1], at[i + 1, j], at[i + 1, j + 1]
+            if turn(*corners[:3]) <= 0 or turn(corners[3], corners[2], corners[1]) <= 0:
+                low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
+                if (high >= 0).all() and (low <= last).all():
+                    (x0, y0), (x1, y1) = ((np.clip(end, 0, last) + 0.5).astype(int) // 16 for end in (low, high))
+                    blocks[y0 : y1 + 1, x0 : x1 + 1] = 1
+    return cv2.dilate(blocks, np.ones((3, 3), np.uint8)) > 0
+
+
+@pytest.mark.parametrize("strip", [10**6, 60])
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_folds_fall_on_the_blocks_that_their_cells_touch(
+    monkeypatch: pytest.MonkeyPatch, seed: int, mirrored: bool, strip: int
+) -> None:
+    monkeypatch.setattr(visibility, "STRIP", strip)
+    random = np.random.default_rng(seed)
+    y, x = np.mgrid[0:30, 0:40] * 9.0 - 12 + random.normal(0, 1.7, (2, 30, 40))
+    x[3, 5] = y[3, 5] = np.nan
+    x, y = ((320 - x if mirrored else x).astype(np.float32), y.astype(np.float32))
+    picture_map = PictureMap(x, y, (321, 230))
+    found = _folded_blocks(picture_map)
+    assert np.array_equal(found[:15, :21], folded_by_hand(picture_map, mirrored)[:15, :21])
+    assert 0.02 < found.mean() < 0.6
+
+
+@pytest.mark.parametrize("fold, counts", [
+    ((-9.0, 5, 0, 9), True), ((-9.0, 5, -0.5, 9), False), ((99.0, 5, 120, 9), True), ((99.5, 5, 120, 9), False),
+    ((5, -9.0, 9, 0), True), ((5, -9.0, 9, -0.5), False), ((5, 79.0, 9, 90), True), ((5, 79.5, 9, 90), False),
+])  # fmt: skip
+def test_a_fold_that_touches_the_last_line_of_the_target_counts(fold: tuple, counts: bool) -> None:
+    """left, top, right, bottom of a cell that a map flattens, between others that it does not."""
+    left, top, right, bottom = fold
+    x, y = np.array([[left, right], [left, right]], np.float32), np.array([[top, top], [bottom, bottom]], np.float32)
+    x[1, 1], y[1, 1] = left, top
+    assert _folded_blocks(PictureMap(x, y, (100, 80))).any() == counts

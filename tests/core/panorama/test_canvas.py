@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.panorama.canvas import MAX_REACH, bounding_canvas, expected_reach
+from edf_stitch.core.panorama.canvas import MAX_REACH, _area_ratio, border, bounding_canvas, expected_reach
 from edf_stitch.core.raster.grid import Grid
 from edf_stitch.core.system.errors import OutputTooLarge
 
@@ -138,3 +138,34 @@ def test_a_panorama_of_too_many_pixels_is_refused_with_its_size() -> None:
     size = (40_000, 26_000)
     with pytest.raises(OutputTooLarge, match=r"4\d{4}×2\d{4} pixels, 1000 million at most: use smaller pictures"):
         bounding_canvas(shifted(0, 0), (0, 0, *size), [size], np.array([0.0, 0, *size]))
+
+
+# --- the outline of a picture, and areas ---------------------------------------------------------------------------
+
+
+def test_the_border_goes_once_round_the_picture_from_its_first_pixel() -> None:
+    """Clockwise as seen, side by side, each point as far along its side as it is along the outline."""
+    points = border((101, 51))
+    assert points[0].tolist() == [0, 0] and len(np.unique(points, axis=0)) == len(points)
+    count = len(points) // 4
+    for k, (corner, along) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
+        assert points[k * count].tolist() == [100 * corner, 50 * along], "a corner"
+    steps = np.diff(np.vstack([points, points[:1]]), axis=0)
+    for part, (dx, dy) in zip(np.split(steps, 4), ((100, 0), (0, 50), (-100, 0), (0, -50)), strict=True):
+        assert np.allclose(part, np.array([dx, dy]) / count)
+
+
+@pytest.mark.parametrize("matrix", [(1, 0, 0, 1), (0.5, 0.2, -0.1, 2), (-1, 0, 0.5, 0.25), (0, 3, 2, 0)])
+def test_an_area_is_in_target_pixels_for_each_of_the_canvas(matrix: tuple[float, float, float, float]) -> None:
+    a, b, c, d = matrix
+    grid = grid_with_step(5, 0, 0, 60, 40)
+    x, y = np.moveaxis(grid.points, -1, 0)
+    target = np.stack([a * x + b * y, c * x + d * y], axis=-1)
+    assert np.allclose(_area_ratio(target, 5), abs(a * d - b * c))
+    target[3, 4] = np.nan
+    assert np.isinf(_area_ratio(target, 5)[3, 5]) and np.isinf(_area_ratio(target, 5)[2, 4])
+
+
+def test_an_outline_within_reach_gets_a_margin_of_a_tenth_of_the_longer_side() -> None:
+    reach, cut = expected_reach([corners(150, -40, 300, 100)], (200, 150), [(300, 100)])
+    assert not cut and np.allclose(reach, (0, -40 - 20, 450 + 20, 150))

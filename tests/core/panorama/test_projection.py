@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.projective import homogeneous, rotation_from_vector
 from edf_stitch.core.choices import PROJECTIONS
-from edf_stitch.core.panorama.projection import Projection, extent, round_projection
+from edf_stitch.core.panorama.projection import STEEPEST, Projection, extent, round_projection
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -155,3 +155,16 @@ def test_a_pole_just_inside_takes_the_whole_width(sign: float) -> None:
     limits = projection.limits
     assert (left, right) == (limits[0], limits[2])
     assert (bottom == limits[3]) if sign > 0 else (top == limits[1])
+
+
+@pytest.mark.parametrize("focal", [100.3, 57.9, 200.0])
+def test_a_cylinder_has_the_pixels_whose_centres_lie_within_a_turn_and_below_its_steepest(focal: float) -> None:
+    projection = Projection("cylindrical", focal, (0.0, 0.0), np.eye(3), np.diag([focal, focal, 1.0]))
+    left, top, right, bottom = projection.limits
+    for inside, outside, most, at in (
+        (left, left - 1, np.pi, projection.headings),
+        (right - 1, right, np.pi, projection.headings),
+        (top, top - 1, np.arctan(STEEPEST), projection.elevations),
+        (bottom - 1, bottom, np.arctan(STEEPEST), projection.elevations),
+    ):
+        assert abs(at(inside)) <= most + 1e-12 < abs(at(outside))

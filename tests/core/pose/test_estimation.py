@@ -22,8 +22,9 @@ from edf_stitch.core.cameras.projective import (
     sampson_residuals,
 )
 from edf_stitch.core.cameras.two_view import TwoView
-from edf_stitch.core.pose.estimation import estimate
+from edf_stitch.core.pose.estimation import _least_truncated, _poses_of_plane, estimate
 from edf_stitch.core.pose.options import ESTIMATION
+from edf_stitch.core.pose.refinement import Pose
 from edf_stitch.core.system.errors import DegenerateGeometry, NoOverlap, TooFewMatches
 
 from ..point_scenes import FOCAL, SIZE, spoiled, turned_by, unit
@@ -541,3 +542,67 @@ def test_another_seed_gives_nearly_the_same() -> None:
     one, other = (estimate(truth.matches, known(), known(), seed=seed) for seed in range(2))
     assert rotation_angle(one.R, other.R) < expected_errors(truth, 0.8)[0]
     assert np.mean(one.inliers != other.inliers) < 0.03
+
+
+# --- which pose is taken -------------------------------------------------------------------------------------------
+
+
+def sideways(t: tuple[float, ...] = (1.0, 0, 0), lower: float = 0.0) -> Pose:
+    """Two parallel cameras side by side: epipolar lines are rows, `lower` px lower in the target."""
+    K, K_prime = intrinsics(FOCAL), intrinsics(FOCAL)
+    K_prime[1, 2] += lower
+    return Pose(K, K_prime, np.eye(3), np.array(t))
+
+
+def in_rows(off: np.ndarray) -> Matches:
+    """Points in front of `sideways` cameras, each `off` px (N,) below its line."""
+    random = np.random.default_rng(0)
+    x = random.uniform((100, 100), (1000, 800), (len(off), 2))
+    return Matches(x, x + np.column_stack([random.uniform(20, 80, len(off)), off]))
+
+
+def test_a_pose_that_most_matches_fit_sharply_beats_one_that_all_fit_vaguely() -> None:
+    """Three in five lie on the lines of one pose, the others √8 px off them; halfway, all are √2 px off. A Sampson
+    distance is 1/√2 of that, for both pictures may err."""
+    off = np.where(np.arange(100) < 60, 0.0, np.sqrt(8))
+    everything = np.ones(100, bool)
+    sharp, vague = (sideways(), everything, 0.1), (sideways(lower=np.sqrt(2)), everything, 1.0)
+    for refined in ([sharp, vague], [vague, sharp]):
+        assert _least_truncated(in_rows(off), refined) is sharp
+
+
+def test_of_two_poses_with_the_same_lines_the_one_that_has_the_points_in_front_is_taken() -> None:
+    everything = np.ones(50, bool)
+    front, behind = (sideways(), everything, 0.5), (sideways((-1.0, 0, 0)), everything, 0.1)
+    for refined in ([front, behind], [behind, front]):
+        assert _least_truncated(in_rows(np.full(50, 0.1)), refined) is front
+
+
+def test_of_the_poses_of_a_plane_those_that_have_it_in_front_are_left() -> None:
+    truth = scene("a frontal plane", 2, 100, 0.0)
+    layout = OTHERS["a frontal plane"]
+    H = truth.K_prime @ (truth.R + layout.baseline * np.outer(truth.t, layout.plane)) @ np.linalg.inv(truth.K)
+    poses = _poses_of_plane(truth.matches, H, known(), known())
+    assert len(poses) == 2
+    for pose in poses:
+        assert np.abs(sampson_residuals(pose.F, truth.matches.x, truth.matches.y)).max() < 1e-6
+    assert min(rotation_angle(pose.R, truth.R) + np.linalg.norm(pose.t - truth.t) for pose in poses) < 1e-6
+
+
+def test_where_no_pose_has_most_of_a_plane_its_homography_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    truth = scene("a plane", 0, 100)
+    with_pose = estimate(truth.matches, known(), known())
+    assert with_pose.model == "plane" and np.isfinite(with_pose.t).all()
+    found = Pose(with_pose.K, with_pose.K_prime, with_pose.R, with_pose.t)
+    few = np.arange(100) < 60
+    monkeypatch.setattr("edf_stitch.core.pose.estimation._fit_pose", lambda *_: (found, few, 0.5, False))
+    view = estimate(truth.matches, known(), known())
+    assert view.model == "plane" and np.isnan(view.t).all() and not view.e_prime.any() and view.inliers.sum() > 90
+
+
+@pytest.mark.parametrize("focal", [600.0, 3500.0, 5000.0])
+def test_a_focal_length_far_from_the_usual_one_is_found(focal: float) -> None:
+    """From the assumed one alone the search would end in another valley, with a focal length less than half of it."""
+    truth = scene("to the side, turned", 0, 300, 0.2, focals=(focal, focal))
+    view = estimate(truth.matches, unknown(), unknown())
+    assert view.K[0, 0] == pytest.approx(focal, rel=0.05) and view.inliers.all()

@@ -337,3 +337,17 @@ def test_matches_carry_their_weights_and_whose_they_are() -> None:
         assert part.given and part.scale == 2.0 and plain.subset(keep).weight is None
     few = ours.thinned(4)
     assert few.weights.tolist() == [0, 3, 6, 9] and few.given and ours.thinned(10) is ours
+
+
+@pytest.mark.parametrize("stronger", [0, 1])
+def test_of_the_last_round_the_strongest_are_taken(stronger: int) -> None:
+    """Two cells with twenty points each, of which seventeen are wanted: eight of each and one more of the stronger."""
+    random = np.random.default_rng(2)
+    cell = np.arange(40) % 2
+    points = random.uniform((10, 10), (85, 85), (40, 2)) + np.column_stack([100 * cell, np.zeros(40)])
+    strength = random.uniform(0, 1, 40) + 5 * (cell == stronger)
+    chosen = spread_evenly(points, strength, (100, 200), 17)
+    assert np.bincount(cell[chosen]).tolist() == [9 - stronger, 8 + stronger]
+    for one in (0, 1):
+        best = np.flatnonzero(cell == one)[np.argsort(-strength[cell == one])]
+        assert set(chosen[cell[chosen] == one]) == set(best[: 8 + (one == stronger)])

@@ -10,6 +10,7 @@ from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import homogeneous, infinite_homography, project
+from edf_stitch.core.pose import options
 from edf_stitch.core.pose.focal import KnownFocal, focal_warnings, known_focal
 from edf_stitch.core.pose.refinement import Pose, focal_deviations, refine_pose
 
@@ -171,3 +172,17 @@ def test_a_focal_length_that_moved_far_from_what_the_file_says_is_warned_of() ->
 def test_a_guess_cannot_be_contradicted_nor_can_what_is_given() -> None:
     for cam in (assumed(), camera()):
         assert focal_warnings(pose_with(2000.0, 2000.0), cam, cam) == []
+
+
+@pytest.mark.parametrize("seed, worse", [(1, "longer"), (8, "shorter")])
+def test_the_spread_is_that_of_the_focal_length_that_moves_infinity_more(seed: int, worse: str) -> None:
+    """Of one longer by two deviations and one as much shorter, each with the pose that goes with it."""
+    matches, true = scene(CONVERGING, seed, options.FOCAL.spread_matches)
+    about, found = known(matches, true, camera(FOCAL, 0.1))
+    away = {}
+    for side, change in (("longer", 2 * about.deviation), ("shorter", -2 * about.deviation)):
+        other = camera(found.K[0, 0] * np.exp(change))
+        there, _ = refine_pose(matches, replace(found, K=other.K, K_prime=other.K), other, other, 0.5)
+        away[side] = moved_infinity(there, found)
+    assert max(away, key=away.__getitem__) == worse and max(away.values()) > 1.03 * min(away.values())
+    assert about.h_inf_spread == pytest.approx(away[worse], rel=5e-3)
