@@ -190,7 +190,8 @@ def test_the_spread_is_that_of_the_focal_length_that_moves_infinity_more(seed: i
 def test_a_focal_length_that_was_held_is_as_sure_as_the_less_sure_of_the_two() -> None:
     matches, true = scene(SYMMETRIC, noise=0.1)
     sure, unsure, given = camera(FOCAL, 0.02, "EXIF"), camera(FOCAL, 0.1, "EXIF"), camera()
-    (one, other, both) = (held_focal(matches, true, *two, 0.1) for two in ((sure, unsure), (unsure, sure), (sure, sure)))
+    pairs = (sure, unsure), (unsure, sure), (sure, sure)
+    one, other, both = (held_focal(matches, true, *pair, 0.1) for pair in pairs)
     assert one.deviation == other.deviation == 0.1 and both.deviation == 0.02 and one.source == "EXIF"
     assert one.h_inf_spread == pytest.approx(other.h_inf_spread) and one.h_inf_spread > 3 * both.h_inf_spread > 15
     assert held_focal(matches, true, given, given, 0.1) == KnownFocal("test", 0.0, 0.0)
