@@ -267,6 +267,16 @@ def test_what_a_line_is_follows_the_picture_and_the_noise() -> None:
             refuse_without_spread(Matches(matches.x, matches.y, scale), F_TRUE, size, SIZE)
 
 
+def test_a_strip_is_measured_by_the_shorter_side_of_its_own_picture() -> None:
+    long, square = (4000, 900), (4000, 4000)
+    for turned in (False, True):
+        matches = on_a_line(24.0, turned=turned)
+        own, other = (SIZE, long) if turned else (long, SIZE)
+        refuse_without_spread(matches, F_TRUE, own, other)
+        with pytest.raises(DegenerateGeometry):
+            refuse_without_spread(matches, F_TRUE, *((SIZE, square) if turned else (square, SIZE)))
+
+
 # --- parallax ------------------------------------------------------------------------------------------------------
 
 
