@@ -35,7 +35,6 @@ from .pose import features
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
 from .pose.options import ESTIMATION
-from .raster.resizing import resized_points
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, TooFewMatches
 from .system.threads import in_order
@@ -225,17 +224,12 @@ def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
 
 
 def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, ...]) -> Matches:
-    """Matches from a file or array, moved to the scale of the work, without those in masked parts."""
-    sizes = frame.full_sizes
-    matches = read_matches(source, *sizes)
-    x, y = (
-        resized_points(points, size, camera.size)
-        for points, camera, size in zip((matches.x, matches.y), cameras, sizes, strict=True)
-    )
-    seen = _shown(frame.pictures[0], x) & _shown(frame.pictures[1], y)
+    """Matches from a file or array, at the scale of the work, without those in masked parts."""
+    matches = read_matches(source, frame.full_sizes[0], frame.full_sizes[1], (cameras[0].size, cameras[1].size))
+    seen = _shown(frame.pictures[0], matches.x) & _shown(frame.pictures[1], matches.y)
     if not seen.any():
         raise NoOverlap("all the given matches lie in parts of the pictures that are masked or transparent")
-    return replace(matches, x=x, y=y).subset(seen)
+    return matches.subset(seen)
 
 
 def _shown(picture: Picture, points: NDArray[np.float64]) -> NDArray[np.bool_]:

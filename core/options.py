@@ -21,8 +21,9 @@ class StitchOptions:
 
     field: one of FIELDS; fade: what it ends in outside the overlap, one of FADES; camera: what is known of the cameras;
     matches: to be used as given instead of searched for, a file or (N, 4 or 5) rows x, y, x2, y2[, weight] in px of the
-    full pictures; ignore: for each picture, the reference first, a mask of what is to be kept out, a file or array,
-    white = ignored, or None (which those that are not named get, too);
+    full pictures, or the file beside a report, whose matches count as found; ignore: for each picture, the reference
+    first, a mask of what is to be kept out, a file or array, white = ignored, or None (which those that are not named
+    get, too);
     projection: one of PROJECTIONS; level: how a cylindrical or equirectangular panorama is turned, one of LEVELS or
     yaw, pitch, roll of the reference camera in degrees (see `levelling`); scale: both pictures are resized by this
     first, at most 1; crop: what of the panorama is kept (see `crop_box`); dense: whether every pixel of the overlap is

@@ -80,7 +80,7 @@ class StitchResult:
 
     @property
     def used_matches(self) -> Matches:
-        """The matches that the field stands on, in px of the full pictures: given back, they make the same field."""
+        """The matches that the field stands on, in px of the full pictures."""
         edge = self.edges[0]
         used = edge.matches.subset(np.flatnonzero(edge.two_view.inliers)[self.field.fit.inliers_used])
         x, y = (

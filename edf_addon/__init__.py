@@ -11,22 +11,16 @@ from typing import Any
 
 import bpy
 
-from . import (
-    command,
-    mask_painting,
-    match_editing,
-    match_pointing,
-    operators,
-    overlays,
-    panels,
-    presets,
-    properties,
-    take_along,
-)
+from . import properties
+from .jobs import command, modal
+from .operators import mask_painting, match_editing, match_pointing, pictures, scene_objects, stitch
+from .overlays import drawing
+from .panels import presets, sidebar
 
 # Registered in this order, unregistered in the opposite one; each has register() and unregister().
-ROOMS = (
-    properties, operators, match_editing, match_pointing, mask_painting, take_along, presets, panels, overlays,
+REGISTERED = (
+    properties, modal, stitch, pictures, match_editing, match_pointing, mask_painting, scene_objects, presets, sidebar,
+    drawing,
 )  # fmt: skip
 _commands: list[Any] = []
 _registered: list[Any] = []
@@ -36,9 +30,9 @@ def register() -> None:
     """Switch everything on. Blender warns about what is registered twice, so a second call does nothing."""
     if _registered:
         return
-    for room in ROOMS:
-        room.register()
-        _registered.append(room)
+    for module in REGISTERED:
+        module.register()
+        _registered.append(module)
     _commands.append(bpy.utils.register_cli_command("edf", command.run))
     # bpy as a Python module crashes on its way out when a command is still registered by then.
     atexit.register(unregister)

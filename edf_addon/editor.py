@@ -6,15 +6,24 @@ from typing import Any
 
 import bpy
 
-from . import photo, properties, result
+from . import properties
+from .bridge import images, ownership, photo, result
 
 REFERENCE, TARGET, PANORAMA = "reference", "target", "panorama"
 
 
-def panorama(context: Any) -> bpy.types.Image | None:
-    """The panorama that is meant: the one that the editor shows, else the one that was stitched last."""
-    image = getattr(context.space_data, "image", None)
-    if image is not None and result.read(image) is not None:
+def shown(context: Any) -> bpy.types.Image | None:
+    """What the Image Editor shows that the context is of."""
+    return getattr(context.space_data, "image", None)
+
+
+def panorama(context: Any, name: str = "") -> bpy.types.Image | None:
+    """The panorama that is meant: the named image; else the one that the editor shows, else the one that was stitched
+    last. Raises Unusable for a name that is none's."""
+    if name:
+        return images.named(name)
+    image = shown(context)
+    if result.read(image) is not None:
         return image
     last = properties.settings_of(context.scene).result
     return last if last is not None and result.read(last) is not None else None
@@ -39,10 +48,29 @@ def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:
     return PANORAMA if image == settings.seam_mask or result.read(image) is not None else None
 
 
-def orientation(settings: Any, side: str) -> int:
-    """How a picture of the stitch is stored, as in EXIF; masks lie as their pictures do."""
-    picture = None if side == PANORAMA else getattr(settings, side)
-    return 1 if picture is None else photo.orientation(picture)
+def beneath(settings: Any, image: bpy.types.Image | None) -> bpy.types.Image | None:
+    """What a mask of the panel is painted over; any other image itself."""
+    if image is not None and image == settings.seam_mask:
+        return settings.result
+    for side in (REFERENCE, TARGET):
+        if image is not None and image == getattr(settings, f"ignore_{side}"):
+            return getattr(settings, side)
+    return image
+
+
+def side_in(panorama: bpy.types.Image | None, picture: bpy.types.Image | None) -> str | None:
+    """What a picture is in a panorama, by the panorama's own pictures, whatever is chosen now; None where it has no
+    part in it."""
+    if panorama is None or picture is None:
+        return None
+    own = ownership.pictures(panorama)
+    return PANORAMA if picture == panorama else ownership.SIDES[own.index(picture)] if picture in own else None
+
+
+def orientation(settings: Any, image: bpy.types.Image) -> int:
+    """How an image is stored, as in EXIF; masks lie as their pictures do."""
+    picture = beneath(settings, image)
+    return 1 if picture is None or result.read(picture) is not None else photo.orientation(picture)
 
 
 def all_spaces(context: Any) -> list[tuple[bpy.types.Area, bpy.types.SpaceImageEditor]]:

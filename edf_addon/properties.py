@@ -17,7 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import idnames, status
+from . import idnames, pair, status
 
 CAMERA_SOURCES = (
     ("AUTOMATIC", "Automatic", "From the photographs' EXIF; without it, estimated from the matches"),
@@ -119,12 +119,13 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
     """bpy.types.Scene.edf_stitch."""
 
     reference: PointerProperty(
-        name="Reference", type=bpy.types.Image,
+        name="Reference", type=bpy.types.Image, update=pair.chosen,
         description="The picture whose place and plane the panorama keeps: the one that looks at the scene more "
         "squarely",
     )
     target: PointerProperty(
-        name="Target", type=bpy.types.Image, description="The picture that is bent to meet the reference"
+        name="Target", type=bpy.types.Image, description="The picture that is bent to meet the reference",
+        update=pair.chosen,
     )
     result: PointerProperty(name="Panorama", type=bpy.types.Image, description="What was stitched last")
 
@@ -228,6 +229,12 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         "searching for new ones",
     )
     matches: CollectionProperty(type=EDF_PG_match)
+    matches_reference: PointerProperty(
+        name="Matches' Reference", type=bpy.types.Image, description="The picture that the list's matches lie in"
+    )
+    matches_target: PointerProperty(
+        name="Matches' Target", type=bpy.types.Image, description="The picture that the list's matches lead to"
+    )
     match_index: IntProperty(name="Active Match", default=-1, options={"SKIP_SAVE"}, update=look_again)
 
     take_layers: BoolProperty(
@@ -284,8 +291,8 @@ VALUES = ("dense", "exposure", "seed")
 PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))
 # What is no setting: what is stitched, what came of it, and how it is looked at.
-NO_SETTINGS = frozenset({"name", "reference", "target", "result", "matches", "match_index", "overlay",
-                         "overlay_opacity", "show_matches", "show_epipolar"})  # fmt: skip
+NO_SETTINGS = frozenset({"name", "reference", "target", "result", "matches", "matches_reference", "matches_target",
+                         "match_index", "overlay", "overlay_opacity", "show_matches", "show_epipolar"})  # fmt: skip
 
 
 def options_of(settings: Any, scale: float | None = None) -> dict[str, Any]:
@@ -310,7 +317,7 @@ def names_of_settings(settings: Any) -> list[str]:
 
 
 def keep(settings: Any) -> dict[str, Any]:
-    """All settings, JSON-ready; images and cameras by name."""
+    """All settings, JSON-ready; images and cameras by name, for whoever reads them."""
     kept = {}
     for name in names_of_settings(settings):
         value = getattr(settings, name)
@@ -322,14 +329,17 @@ def keep(settings: Any) -> dict[str, Any]:
     return kept
 
 
-def restore(settings: Any, kept: dict[str, Any]) -> None:
-    """Settings that `keep` gave, perhaps in an earlier version: what is not there any more, or not yet, is left out."""
+def pointers(settings: Any) -> dict[str, bpy.types.ID | None]:
+    """The images and cameras among the settings."""
+    names = names_of_settings(settings)
+    return {name: getattr(settings, name) for name in names if settings.bl_rna.properties[name].type == "POINTER"}
+
+
+def restore(settings: Any, kept: dict[str, Any], chosen: dict[str, bpy.types.ID]) -> None:
+    """Settings that `keep` gave, perhaps in an earlier version: what is not there any more, or not yet, is left out.
+    chosen: the images and cameras among them."""
     for name in set(names_of_settings(settings)) & set(kept):
-        value = kept[name]
-        prop = settings.bl_rna.properties[name]
-        if prop.type == "POINTER" and value is not None:
-            kind = bpy.data.images if prop.fixed_type.identifier == "Image" else bpy.data.objects
-            value = kind.get(value)
+        value = chosen.get(name) if settings.bl_rna.properties[name].type == "POINTER" else kept[name]
         try:
             setattr(settings, name, value)
         except (TypeError, ValueError):  # a choice that this version does not offer

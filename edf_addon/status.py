@@ -26,6 +26,12 @@ def begin() -> None:
     now.__dict__.update(Status(running=True, stage="read").__dict__)
 
 
+def say(message: str) -> None:
+    """Something happened that is no work; what goes on is not talked over."""
+    if not now.running:
+        end(message)
+
+
 def end(message: str, failed: bool = False) -> None:
     """Work is over."""
     now.__dict__.update(Status(message=message, failed=failed).__dict__)

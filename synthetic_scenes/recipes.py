@@ -57,8 +57,8 @@ class Recipe:
     """A world, two cameras in it, and what is right about them.
 
     world: a function of `worlds`; model: the one that must be chosen; focal_determined: whether two pictures tell the
-    focal length at all (DESIGN 4); hdr: float pictures instead of 8 bit; gain: what the target's exposure and white
-    balance multiply its linear R, G, B by.
+    focal length at all (docs/method.md, 3); hdr: float pictures instead of 8 bit; gain: what the target's exposure and
+    white balance multiply its linear R, G, B by.
     """
 
     name: str

@@ -1,6 +1,6 @@
 """Runs inside Blender, or with bpy as a module: builds a world and renders it through given cameras.
 
-`python -m ….render JOB.json FOLDER`; in Blender, `main()` with the two behind `--`. The job names a world, a seed, the
+The command line ends with `-- JOB.json FOLDER` (`blender_process` writes it). The job names a world, a seed, the
 samples a pixel and two cameras. Into the folder go, for the reference, the target and the wide reference camera, a
 multilayer EXR (Combined, Depth, Position) each, and cameras.json: the cameras as Blender had them, and some rays cast
 through them. What is true of the pictures is computed elsewhere, without bpy, from these files alone.
@@ -28,10 +28,10 @@ RAYS = 400
 WIDEST = 1.0
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main() -> None:
     """Renders a job."""
-    given = sys.argv[sys.argv.index("--") + 1 :] if arguments is None else arguments
-    job, folder = json.loads(Path(given[0]).read_text("utf-8")), Path(given[1])
+    job_file, folder = map(Path, sys.argv[sys.argv.index("--") + 1 :])
+    job = json.loads(job_file.read_text("utf-8"))
     WORLDS[job["world"]](Stage(job["seed"]))
     _settings(job["samples"])
     reference, target = (_camera(entry) for entry in job["cameras"])
@@ -135,4 +135,4 @@ def _reach(reference: SceneCamera, target: SceneCamera) -> tuple[int, int, int, 
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from ..core.raster.arrays import Array
+if TYPE_CHECKING:  # Blender renders with these, and has no OpenCV
+    from ..core.raster.arrays import Array
 
 
 @dataclass(frozen=True)

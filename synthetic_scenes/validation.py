@@ -25,7 +25,7 @@ from ..core.batch.units import read_json
 from ..core.output.outputs import json_bytes
 from ..core.system.errors import BadRequest, UnwritableOutput
 from ..core.system.output_files import OutputFiles
-from .blender_process import LAST_LINES, render_command
+from .blender_process import LAST_LINES, find_blender
 from .recipes import SIZES, SUITES, parse_scene
 from .scene_process import SCHEMA, file_name
 from .thresholds import Verdict, judge
@@ -114,7 +114,7 @@ def run_validation(request: ValidationRequest, tell: Tell) -> Validation:
             "everything again, or choose another folder"
         )
     OutputFiles(overwrite=True).check_folder(folder, report_names)
-    render_command()
+    find_blender()
     done = _found(request, mark) if request.resume else {}
     # what failed may do better now
     todo = [scene for scene in request.own_scenes if done.get(scene, {}).get("status") != "done"]

@@ -1,6 +1,7 @@
-"""How core/ is laid out, in figures: `python tests/house.py` prints them, `test_house.py` holds them.
+"""How core/ and edf_addon/ are laid out, in figures: `python tests/house.py` prints them, `test_house.py` holds them.
 
-Imports inside functions and under TYPE_CHECKING do not count: they put no module on top of another.
+In core, imports inside functions and under TYPE_CHECKING do not count: they put no module on top of another. In the
+add-on those inside functions do: they are late only so that Blender starts sooner.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "core"
+ADDON = ROOT / "edf_addon"
 
 # Which rooms each may import, itself left out. Rooms stand in the order of the data.
 BELOW_POSE = ("system", "raster", "pictures", "cameras")
@@ -38,6 +40,22 @@ MAY_IMPORT = {
     "alignment": (*BELOW_MEASURE, "options", "fields"),
     "pipeline": (*BELOW_MEASURE, "measure", "options", "alignment"),
 }
+# The same for the add-on. What lies beside its rooms is known to all of them, or to those after it.
+BESIDE = ("idnames", "pair", "properties", "status", "editor", "explain")
+ADDON_MAY_IMPORT = {
+    "idnames": (),
+    "status": (),
+    "explain": (),
+    "pair": ("status",),
+    "properties": ("idnames", "pair", "status"),
+    "bridge": (),
+    "editor": ("bridge", "properties"),
+    "jobs": ("bridge", "pair", "properties", "status", "explain"),
+    "scene": ("bridge", "properties", "editor"),
+    "overlays": ("bridge", "scene", "idnames", "properties", "editor"),
+    "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "pair", "properties", "editor"),
+    "panels": ("bridge", "jobs", "scene", "overlays", "operators", *BESIDE),
+}
 # Names of the first layout that only its builders knew (modules, classes, functions), and what they are called now.
 RENAMED = {
     "light": "lazy", "Light": "LazyImage", "tone": "log_encoding", "relief": "refined_depth", "Relief": "RefinedDepth",
@@ -53,7 +71,7 @@ Graph = dict[str, set[str]]
 
 
 def modules(core: Path = CORE) -> dict[str, Path]:
-    """Every module of core by its name: `room/module`, or `module` directly in core."""
+    """Every module by its name: `room/module`, or `module` directly in core (or in the add-on)."""
     paths = (path for path in core.rglob("*.py") if path.name != "__init__.py")
     return {path.relative_to(core).with_suffix("").as_posix(): path for path in sorted(paths)}
 
@@ -63,10 +81,11 @@ def room_of(module: str) -> str:
     return module.partition("/")[0]
 
 
-def imports(core: Path = CORE) -> Graph:
-    """Which modules of core each module imports when it is loaded."""
+def imports(core: Path = CORE, late: bool = False) -> Graph:
+    """Which modules of core each module imports when it is loaded; late: inside functions too."""
     known = modules(core)
-    return {name: set(_imported(name, ast.parse(path.read_text("utf-8")), known)) for name, path in known.items()}
+    trees = {name: ast.parse(path.read_text("utf-8")) for name, path in known.items()}
+    return {name: set(_imported(name, tree, known, late)) for name, tree in trees.items()}
 
 
 def by_room(graph: Graph) -> Graph:
@@ -77,9 +96,12 @@ def by_room(graph: Graph) -> Graph:
     return rooms
 
 
-def _imported(name: str, tree: ast.Module, known: Iterable[str]) -> Iterable[str]:
-    late = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) or _is_type_checking(node)]
-    skipped = {id(inner) for node in late for inner in ast.walk(node)}
+def _imported(name: str, tree: ast.Module, known: Iterable[str], late: bool) -> Iterable[str]:
+    kept_out = [
+        node for node in ast.walk(tree)
+        if _is_type_checking(node) or isinstance(node, ast.FunctionDef) and not late
+    ]  # fmt: skip
+    skipped = {id(inner) for node in kept_out for inner in ast.walk(node)}
     folder = name.split("/")[:-1]
     for node in ast.walk(tree):
         if not isinstance(node, ast.ImportFrom) or id(node) in skipped or not 1 <= node.level <= len(folder) + 1:
@@ -146,6 +168,9 @@ def main() -> None:
         print(f"circles between {what}: {len(loops)}", *(" -> ".join(loop) for loop in loops), sep="\n  ")
         if not loops:
             print(f"longest chain of imports between {what}: {floors(of)}")
+    rooms = by_room(imports(ADDON, late=True))
+    print(f"rooms of the add-on: {len([room for room in rooms if (ADDON / room).is_dir()])}")
+    print(f"longest chain of imports between them: {floors(rooms)}")
     names = old_names()
     print(f"names of the first layout: {len(names)}", *names, sep="\n  ")
 

@@ -66,6 +66,58 @@ def test_arrows_run_one_way(path):
             assert is_lazy and (path, target) == door, f"{home} -> {target}"
 
 
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_what_ships_leaves_pythons_search_for_modules_alone(path):
+    """Blender's extension platform refuses what edits sys.path or sys.modules; reading sys.path is fine."""
+    assert not edits_of_the_search(path.read_text("utf-8"))
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "sys.modules['a'] = b",
+        "del sys.modules['a']",
+        "sys.modules.pop('a')",
+        "sys.path += [a]",
+        "sys.path[:0] = a",
+        "sys.path.insert(0, a)",
+        "sys.meta_path.append(a)",
+        "from sys import path",
+        "site.addsitedir(a)",
+        "setattr(sys, 'path', a)",
+    ],
+)
+def test_an_edit_of_the_search_is_seen(code):
+    assert edits_of_the_search(code)
+    assert not edits_of_the_search("a = [entry for entry in sys.path if entry]\nb = 'bpy' in sys.modules")
+
+
+def edits_of_the_search(code: str) -> list[str]:
+    """Statements and calls that change where, or as what, Python finds modules."""
+    state = {f"sys.{name}" for name in ("path", "modules", "meta_path", "path_hooks", "path_importer_cache")}
+    found = []
+    for node in ast.walk(ast.parse(code)):
+        targets: list[ast.expr] = []
+        if isinstance(node, ast.Assign | ast.Delete):
+            targets = node.targets
+        elif isinstance(node, ast.AugAssign | ast.AnnAssign):
+            targets = [node.target]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            # reading has no methods but `get`
+            targets = [] if node.func.attr == "get" else [node.func.value]
+            found += [ast.unparse(node)] * (ast.unparse(node.func) in ("site.addsitedir", "site.addpackage"))
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("setattr", "delattr"):
+            found += [ast.unparse(node)] * (ast.unparse(node.args[0]) == "sys")
+        elif isinstance(node, ast.ImportFrom) and node.module == "sys":
+            found += [ast.unparse(node)] * bool({f"sys.{alias.name}" for alias in node.names} & state)
+        for target in targets:
+            while isinstance(target, ast.Subscript):
+                target = target.value
+            if ast.unparse(target) in state:
+                found.append(ast.unparse(node))
+    return found
+
+
 def test_core_works_where_bpy_cannot_be_imported():
     code = "import sys; sys.modules['bpy'] = None; import edf_stitch.core.pipeline; print(edf_stitch.stitch)"
     assert "stitch" in run_python(code)
@@ -152,6 +204,21 @@ def test_core_has_no_circle_of_imports():
     assert house.circles({"a": {"b"}, "b": {"c"}, "c": {"a"}}), "a circle is seen where there is one"
 
 
+def test_the_add_ons_modules_stand_in_rooms_that_import_what_the_table_allows():
+    """What lies beside the rooms is named; an import inside a function counts like any other."""
+    graph = house.imports(house.ADDON, late=True)
+    rooms = house.by_room(graph)
+    assert set(rooms) == set(house.ADDON_MAY_IMPORT)
+    folders = {room for room in rooms if (house.ADDON / room).is_dir()}
+    assert set(rooms) - folders == set(house.BESIDE) and all(name.count("/") <= 1 for name in graph)
+    for room, imported in rooms.items():
+        assert not imported - set(house.ADDON_MAY_IMPORT[room]), room
+    for room in folders:
+        tree = ast.parse((house.ADDON / room / "__init__.py").read_text("utf-8"))
+        assert ast.get_docstring(tree) and len(tree.body) == 1, room
+    assert not house.circles(graph) and not house.circles(rooms)
+
+
 def test_names_of_the_first_layout_are_gone():
     assert not house.old_names()
 
@@ -159,3 +226,17 @@ def test_names_of_the_first_layout_are_gone():
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_no_file_is_over_400_lines(path):
     assert len(path.read_text("utf-8").splitlines()) <= 400
+
+
+def test_the_method_names_modules_that_are_there():
+    """docs/method.md goes along when a module moves, and the sections that the code cites are there."""
+    method = (ROOT / "docs" / "method.md").read_text("utf-8")
+    named = set(re.findall(r"`(\w+/\w+\.py)`", method))
+    assert len(named) > 40 and not {name for name in named if not (ROOT / "core" / name).is_file()}
+    sections = set(re.findall(r"^## (\d+)\.", method, re.MULTILINE))
+    tests = [path for path in sorted((ROOT / "tests").rglob("*.py")) if path != Path(__file__)]
+    for path in [*SOURCES, *tests]:
+        text = path.read_text("utf-8")
+        for cited in re.findall(r"docs/method\.md, (\d+(?: and \d+)*)", text):
+            assert set(cited.split(" and ")) <= sections, path
+        assert not re.search(r"\bDESIGN\b", text), f"{path} cites what is not in the repository"

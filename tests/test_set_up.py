@@ -146,7 +146,7 @@ def test_a_zip_is_of_one_platform_and_twice_the_same(tmp_path, monkeypatch):
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
     assert manifest["platforms"] == ["windows-x64"]
     assert {f"./{name}" for name in names if name.endswith(".whl")} == set(manifest["wheels"])
-    assert {"LICENSE", "__init__.py", "__main__.py", "core/system/errors.py", "edf_addon/command.py"} <= names
+    assert {"LICENSE", "__init__.py", "__main__.py", "core/system/errors.py", "edf_addon/jobs/command.py"} <= names
     assert not [name for name in names if name.startswith((".", "tests/")) or name in ("setup.py", "pyproject.toml")]
 
 

@@ -7,12 +7,13 @@ tried against Camera.calc_matrix_camera in every version from 4.2 to 5.2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import Array
+if TYPE_CHECKING:  # Blender renders with these, and has no OpenCV
+    from ..raster.arrays import Array
 
 _BLENDERS_AXES = np.diag([1.0, -1.0, -1.0])
 

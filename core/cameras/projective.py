@@ -7,12 +7,13 @@ Multiple View Geometry, 2nd ed., chapters 9 (F, epipoles, pose from E), 11.4 (Sa
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import Array
+if TYPE_CHECKING:  # Blender renders with these, and has no OpenCV
+    from ..raster.arrays import Array
 
 # The third homogeneous coordinate of a point in front of its camera, relative to the larger of the other two.
 LEAST_AHEAD = 1e-6

@@ -12,7 +12,7 @@ from ..raster.arrays import Array
 
 @dataclass(frozen=True)
 class TwoView:
-    """The geometry of a pair: a canvas point p at inverse depth d is seen at x' ~ H_inf p + d e' in the target.
+    """The geometry of a pair: a canvas point p at inverse depth d is seen at H_inf p + d e' (docs/method.md, 2).
 
     Attributes
     ----------

@@ -45,7 +45,8 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
 
     control = parser.add_argument_group("control")
     control.add_argument(
-        "--matches", type=Path, metavar="FILE.csv", help="x,y,x2,y2[,weight] in px: used as given, nothing is searched"
+        "--matches", type=Path, metavar="FILE.csv",
+        help="x,y,x2,y2[,weight] in px: used as given, nothing is searched; a report's own: as they were found",
     )
     control.add_argument(
         "--ignore-ref", type=Path, metavar="MASK", help="a picture, white where REF is to be ignored altogether"

@@ -30,7 +30,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command; returns its exit code (DESIGN 5: 0, 1, 2, 3, 4, 130)."""
+    """Runs the command; returns its exit code (README: 0, 1, 2, 3, 4, 130)."""
     with messages_may_be_lost():
         code = _run(argv)
         try:
@@ -160,7 +160,7 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
     files = parser.add_argument_group("files")
     files.add_argument(
         "--report", type=Path, metavar="FILE.json",
-        help="everything that was measured and decided; FILE.matches.csv: the matches, as --matches takes them",
+        help="everything that was measured and decided; FILE.matches.csv: all matches, as --matches takes them",
     )  # fmt: skip
     files.add_argument(
         "--layers", type=Path, metavar="DIR",

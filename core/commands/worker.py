@@ -3,14 +3,15 @@
 FOLDER/job.json says what to do; everything made lies in FOLDER afterwards, with result.json as its index. stdout
 carries one JSON object a line: {"stage", "share"} while working, at the end {"done": true} or {"error", "kind",
 "exit_code"}. The work ends on SIGINT (Windows: CTRL_BREAK) and when stdin closes, so that it never outlives whoever
-started it; FOLDER goes then too. Exit status as the command's (DESIGN 5).
+started it; FOLDER goes then too. Exit status as the command's.
 
 job.json: `reference`, `target`: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as shown; "exif_of": a
 file whose EXIF (orientation included) belongs to the array. `options`: fields of StitchOptions, their `camera` those of
 CameraRequest. `cameras`: {"reference", "target"}: {"lens": fields of BlenderLens but the resolution, "matrix_world"}.
 `masks`: {"reference", "target"}: .npy of pictures, rows as shown; {"seam"}: over the whole panorama. `matches`: .npy
-(N, 5) x, y, x2, y2, weight; weight 0 leaves a match out. `take`: which of "layers", "masks", "depth" to leave as
-pictures. Relative paths start at FOLDER. Or `try` alone: load the libraries, and no more.
+(N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as result.json had it in matches.file. `take`:
+which of "layers", "masks", "depth" to leave as pictures. Relative paths start at FOLDER. Or `try` alone: load the
+libraries, and no more.
 """
 
 from __future__ import annotations
@@ -117,10 +118,11 @@ def _work(folder: Path, stop: _Stop) -> None:
     if job.get("cameras"):
         camera = {"cameras": cameras_of(job["cameras"], pictures)}
     masks = job.get("masks", {})
-    rows = _array(folder / job["matches"]) if job.get("matches") else None
+    matches = folder / job["matches"] if job.get("matches") else None
+    rows = _array(matches) if matches is not None and matches.suffix == ".npy" else None
     options = StitchOptions(
         **{key: _tuples(value) for key, value in job["options"].items()}, camera=CameraRequest(**camera),
-        matches=None if rows is None else rows[rows[:, 4] > 0],
+        matches=matches if rows is None else rows[rows[:, 4] > 0],
         ignore=tuple(_mask(folder, masks.get(side), turn) for side, turn in zip(SIDES, turns, strict=True)),
         mask=_mask(folder, masks.get("seam"), 1),
         cache=default_folder(),

@@ -124,12 +124,9 @@ def _hidden(
     lines: EpipolarLines, two_view: TwoView, target_size: tuple[int, int], along: Plane, x: Plane, y: Plane
 ) -> NDArray[np.bool_]:
     """The nodes (h, w) that are occluded in the target; along (h, w) px: their moves, x, y (h, w): their target px."""
-    rows, columns = lines.shape
-    left, top, width, height = lines.box
-    sx, sy = width / columns, height / rows
-    # x'₃ of H_inf p + d e' at the nodes
-    row = two_view.H_inf[2] @ np.array([[sx, 0, left + (sx - 1) / 2], [0, sy, top + (sy - 1) / 2], [0, 0, 1]])
-    infinite = (row[0] * np.arange(columns))[None, :] + (row[1] * np.arange(rows)[:, None] + row[2])
+    # x'₃ of H_inf p + d e' at the nodes, whose ideal pixels p are without the lens
+    row = two_view.H_inf[2]
+    infinite = lines.ideal[..., 0] * row[0] + (lines.ideal[..., 1] * row[1] + row[2])
     depth = (lines.inverse_depth + along * lines.depth_per_px).astype(np.float32)
     with np.errstate(invalid="ignore", divide="ignore"):
         nearness = nearness_of(depth, depth * np.float32(two_view.e_prime[2]) + infinite.astype(np.float32))

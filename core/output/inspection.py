@@ -20,6 +20,7 @@ from ..pipeline import StitchResult
 from ..raster.arrays import Array
 from ..raster.colour import encode
 from ..raster.resizing import size_change
+from .match_table import match_file
 
 # Pixels along the longer side of the pictures that lie over the panorama, and nodes along that of the depth grid.
 LONGEST_SIDE = 1600
@@ -67,7 +68,7 @@ def match_errors(result: StitchResult, rows: NDArray[np.float64]) -> NDArray[np.
 
 def match_rows(result: StitchResult) -> dict[str, Any]:
     """All matches that were found: `rows` (N, 4) full px to a thousandth, `weights`, `states` (USED: the field stands
-    on it, LEFT_OUT: it contradicts the others), `errors` as `match_errors`."""
+    on it, LEFT_OUT: it contradicts the others), `errors` as `match_errors`; `file`: see `match_file`, as text."""
     edge, back = result.edges[0], [np.linalg.inv(S) for S in scales(result)]
     found = edge.matches
     x, y = homogeneous(found.x) @ back[edge.i].T, homogeneous(found.y) @ back[edge.j].T
@@ -76,12 +77,12 @@ def match_rows(result: StitchResult) -> dict[str, Any]:
     used[np.flatnonzero(edge.two_view.inliers)[result.field.fit.inliers_used]] = True
     return {
         "rows": rows.round(3), "weights": np.ones(len(found)) if found.weights is None else found.weights,
-        "states": _states(used), "errors": match_errors(result, rows).round(3),
+        "states": _states(used), "errors": match_errors(result, rows).round(3), "file": match_file(result).decode(),
     }  # fmt: skip
 
 
 def given_rows(result: StitchResult, rows: NDArray[np.float64]) -> dict[str, Any]:
-    """The same of the matches (N, 5) that were given, all of them and in their order."""
+    """The same, but no `file`, of the matches (N, 5) that were given, all of them and in their order."""
     used = result.used_matches
     places = {_place(row) for row in np.column_stack([used.x, used.y])}
     is_used = np.array([_place(row) in places for row in rows[:, :4]]) & (rows[:, 4] > 0)

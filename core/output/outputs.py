@@ -18,11 +18,11 @@ from ..measure.report import plain
 from ..panorama.layers import Layer
 from ..pictures.encoding import encode_picture, output_bits
 from ..pipeline import StitchResult
-from ..pose.match_files import matches_csv
 from ..raster.arrays import cut
 from ..raster.colour import decode
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
+from .match_table import match_file
 
 # What the layers' folder and the warp's file are to be read as (docs/formats.md).
 LAYERS_FORMAT, WARP_FORMAT = 2, 2
@@ -126,9 +126,9 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
 def add_report(
     result: StitchResult, warnings: list[str], report: Path, matches: Path, timing: Path, files: OutputFiles
 ) -> None:
-    """Stages the report with these warnings, the matches that were used, and the seconds."""
+    """Stages the report with these warnings, the matches, and the seconds."""
     files.add(report, json_bytes({**result.report, "warnings": warnings}))
-    files.add(matches, matches_csv(result.used_matches))
+    files.add(matches, match_file(result))
     files.add(timing, json_bytes({"seconds": result.seconds}))
 
 

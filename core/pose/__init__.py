@@ -2,5 +2,5 @@
 
 The way in: `features.detect`, `features.match` and `estimation.estimate`. Tuning values stand in `options`.
 
-May import system, raster, pictures and cameras.
+Method: docs/method.md, 3. May import system, raster, pictures and cameras.
 """

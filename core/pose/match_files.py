@@ -1,52 +1,117 @@
-"""Matches that the user gives, as a CSV file or an array; and matches as a CSV file."""
+"""Matches that the user gives, as a CSV file or an array; and matches as a CSV file.
+
+A file that a stitch wrote holds all the matches that were found, and says of each what became of it. Read back, they
+count as found and go through the same estimation, so that they make the same panorama. A file without that column holds
+the user's own matches, which are used as they are.
+"""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.matches import Matches
+from ..raster.resizing import resized_points
 from ..system.errors import BadRequest
 from ..system.text_files import read_lines
 
 COLUMNS = ("x", "y", "x2", "y2")
 WEIGHT = "weight"
+# What became of a match that was found, and the px that its noise is measured in.
+STATE, NOISE = "state", "noise_px"
+USED, NOT_BY_GEOMETRY, NOT_BY_FIELD = STATES = "used", "left out by the geometry", "left out by the field"
+# The same points in px of the pictures that were worked on, where that was not their full size: there and back, the
+# last digit of a float may change.
+WORKED = ("worked_x", "worked_y", "worked_x2", "worked_y2")
+KNOWN = (*COLUMNS, WEIGHT, STATE, NOISE, *WORKED)
+# A point in px of the full picture that lies within this, px, of the one worked on has not been moved since.
+SAME_POINT = 1e-6
 _LAYOUT = "each line holds x,y,x2,y2 or x,y,x2,y2,weight"
 
+Size = tuple[int, int]
 
-def read_matches(source: str | Path | NDArray[Any], size: tuple[int, int], size_prime: tuple[int, int]) -> Matches:
-    """The user's matches, with `weight` (N,) float64 above 0 and `given` True.
+
+class _Table(NamedTuple):
+    """The rows of a file or array: points (N, 4), weight (N,), state (N) of a file that has it, noise (N,), worked
+    (N, 4), NaN where the file has none; and what to call each row."""
+
+    points: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    state: list[str] | None
+    noise: NDArray[np.float64]
+    worked: NDArray[np.float64]
+    places: list[str]
+
+
+def read_matches(
+    source: str | Path | NDArray[Any], size: Size, size_prime: Size, worked: tuple[Size, Size] | None = None
+) -> Matches:
+    """The user's matches, with `weight` (N,) float64 above 0 and `given` True; or those that a stitch found.
 
     source: a CSV file in UTF-8, x,y in the reference ↔ x2,y2 in the target in px of the upright pictures, pixel centres
     integer, optionally a weight (1 where there is none, 0 leaves the match out); separated by commas, semicolons or
     white space; a header may name the columns in any order, among others, and lines starting with # are left out. Or
-    an array (N, 4) or (N, 5) of the same. size, size_prime: (W, H) px of the reference and the target. Of several
-    matches between the same two points the first is kept.
+    an array (N, 4) or (N, 5) of the same. size, size_prime: (W, H) px of the reference and the target. worked: sizes
+    of the two that the matches are wanted in, where that is another. Of several matches between the same two points
+    the first is kept, unless they were found (the file has a column `state`, see `matches_csv`): those come back as
+    they were, `given` False, but for those that were used and have a weight of 0 by now.
     Raises BadRequest (content) with the line, UnreadableImage (file).
     """
-    if isinstance(source, np.ndarray):
-        rows, places = _from_array(source)
+    table = _from_array(source) if isinstance(source, np.ndarray) else _from_file(Path(source))
+    _check(table, size, size_prime)
+    if table.state is None:
+        weight = table.weight
+        kept = np.flatnonzero(weight > 0)
+        _, first = np.unique(table.points[kept], axis=0, return_index=True)
+        kept = kept[np.sort(first)]
     else:
-        rows, places = _from_file(Path(source))
-    _check(rows, places, size, size_prime)
-    rows = rows[rows[:, 4] > 0]
-    if not len(rows):
+        weight = np.where([state == USED for state in table.state], table.weight, 1.0)
+        kept = np.flatnonzero(weight > 0)
+    if not len(kept):
         raise BadRequest(f"{_whole(source)}: every match has weight 0, which leaves it out; give some a weight above 0")
-    _, first = np.unique(rows[:, :4], axis=0, return_index=True)
-    rows = rows[np.sort(first)]
-    x, y, weight = (np.ascontiguousarray(part) for part in (rows[:, :2], rows[:, 2:4], rows[:, 4]))
-    return Matches(x, y, weight=weight, given=True)
+    points = table.points[kept]
+    if worked is not None:
+        points = np.hstack([
+            resized_points(points[:, part], full, small)
+            for part, full, small in zip((slice(2), slice(2, 4)), (size, size_prime), worked, strict=True)
+        ])  # fmt: skip
+        exact = table.worked[kept]
+        points = np.where(np.abs(points - exact) < SAME_POINT, exact, points)
+    x, y = (np.ascontiguousarray(part) for part in (points[:, :2], points[:, 2:]))
+    if table.state is None:
+        return Matches(x, y, weight=weight[kept], given=True)
+    found = Matches(x, y, float(table.noise[kept].max()))
+    return found if (weight[kept] == 1).all() else replace(found, weight=weight[kept])
 
 
-def matches_csv(matches: Matches) -> bytes:
-    """The matches as a CSV file that `read_matches` reads back to the same floats."""
-    rows = np.column_stack([matches.x, matches.y, matches.weights]).tolist()
-    lines = [",".join((*COLUMNS, WEIGHT)), *(",".join(map(repr, row)) for row in rows)]
+def matches_csv(
+    matches: Matches, states: Sequence[str] | None = None, worked: Matches | None = None
+) -> bytes:
+    """The matches as a CSV file that `read_matches` reads back to the same floats.
+
+    states: what became of each match that was found (of STATES); those that were left out have weight 0, which is how
+    a program that knows no states reads it. worked: the same matches in px of the pictures that were worked on, where
+    that was not their full size.
+    """
+    weight = matches.weights
+    if states is not None:
+        weight = np.where([state == USED for state in states], weight, 0.0)
+    names: list[str] = [*COLUMNS, WEIGHT]
+    columns = [*matches.x.T.tolist(), *matches.y.T.tolist(), weight.tolist()]
+    cells = [[repr(value) for value in column] for column in columns]
+    if states is not None:
+        names += [STATE, NOISE]
+        cells += [list(states), [repr(float(matches.scale))] * len(matches)]
+    if worked is not None:
+        names += WORKED
+        cells += [[repr(value) for value in column] for column in (*worked.x.T.tolist(), *worked.y.T.tolist())]
+    lines = [",".join(names), *map(",".join, zip(*cells, strict=True))]
     return ("\n".join(lines) + "\n").encode()
 
 
@@ -54,8 +119,7 @@ def _whole(source: str | Path | NDArray[Any]) -> str:
     return "the array of matches" if isinstance(source, np.ndarray) else str(source)
 
 
-def _from_array(array: NDArray[Any]) -> tuple[NDArray[np.float64], list[str]]:
-    """Rows (N, 5) with weights, and what to call each of them."""
+def _from_array(array: NDArray[Any]) -> _Table:
     if array.ndim != 2 or array.shape[1] not in (4, 5) or not len(array) or array.dtype.kind not in "iuf":
         raise BadRequest(
             f"the array of matches has the shape {array.shape} and {array.dtype} values: N × 4 (x, y, x2, y2) or N × 5 "
@@ -63,13 +127,14 @@ def _from_array(array: NDArray[Any]) -> tuple[NDArray[np.float64], list[str]]:
         )
     rows = np.ones((len(array), 5))
     rows[:, : array.shape[1]] = array
-    return rows, [f"the array of matches, row {number} (the first is 0)" for number in range(len(array))]
+    places = [f"the array of matches, row {number} (the first is 0)" for number in range(len(array))]
+    return _Table(rows[:, :4], rows[:, 4], None, np.ones(len(array)), np.full((len(array), 4), np.nan), places)
 
 
-def _from_file(path: Path) -> tuple[NDArray[np.float64], list[str]]:
-    """Rows (N, 5) with weights, and what to call each of them."""
+def _from_file(path: Path) -> _Table:
     rows: list[list[float]] = []
     places: list[str] = []
+    states: list[str] = []
     columns: tuple[str, ...] = ()
     for number, cells in _lines(path):
         place = f"{path}, line {number}"
@@ -83,11 +148,15 @@ def _from_file(path: Path) -> tuple[NDArray[np.float64], list[str]]:
         if len(cells) != len(columns):
             raise BadRequest(f"{place}: {_counted(cells)} where the lines before have {len(columns)}; {_LAYOUT}")
         named = dict(zip(columns, cells, strict=True))
-        rows.append([_number(named.get(name, "1"), name, place) for name in (*COLUMNS, WEIGHT)])
+        defaults = dict.fromkeys((*COLUMNS, WEIGHT, NOISE), "1") | dict.fromkeys(WORKED, "nan")
+        rows.append([_number(named.get(name, default), name, place) for name, default in defaults.items()])
         places.append(place)
+        if STATE in named:
+            states.append(_state(named[STATE], place))
     if not rows:
         raise BadRequest(f"{path}: no matches in it; {_LAYOUT}, one line for each match")
-    return np.array(rows, np.float64), places
+    table = np.array(rows, np.float64)
+    return _Table(table[:, :4], table[:, 4], states or None, table[:, 5], table[:, 6:], places)
 
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
@@ -123,10 +192,10 @@ def _header(cells: list[str], place: str) -> tuple[str, ...]:
             f"{place}: the header names {_listed(cells)} and lacks {', '.join(missing)}; it must name x, y, x2 and y2, "
             "or be left out"
         )
-    for name in (*COLUMNS, WEIGHT):
+    for name in KNOWN:
         if names.count(name) > 1:
             raise BadRequest(f"{place}: the header names the column {name} {names.count(name)} times; name it once")
-    return tuple(name if name in (*COLUMNS, WEIGHT) else f"column {at}" for at, name in enumerate(names))
+    return tuple(name if name in KNOWN else f"column {at}" for at, name in enumerate(names))
 
 
 def _number(cell: str, name: str, place: str) -> float:
@@ -136,6 +205,15 @@ def _number(cell: str, name: str, place: str) -> float:
         raise BadRequest(f"{place}: {name} is empty; a number is needed")
     decimal = " with a point for decimals" if "," in cell else ""
     raise BadRequest(f"{place}: {name} is {_shortened(cell)}; a number{decimal} is needed")
+
+
+def _state(cell: str, place: str) -> str:
+    if cell in STATES:
+        return cell
+    raise BadRequest(
+        f"{place}: the {STATE} is {_shortened(cell)}; of matches that were found it is {', '.join(STATES[:-1])} or "
+        f"{STATES[-1]}; matches of your own have no such column"
+    )
 
 
 def _counted(cells: list[str]) -> str:
@@ -150,24 +228,25 @@ def _shortened(cell: str) -> str:
     return repr(cell if len(cell) <= 30 else cell[:29] + "…")
 
 
-def _check(rows: NDArray[np.float64], places: list[str], size: tuple[int, int], size_prime: tuple[int, int]) -> None:
-    """Raises BadRequest for the first row (of N, 5) with a value that is not finite, a negative weight or a point
+def _check(table: _Table, size: Size, size_prime: Size) -> None:
+    """Raises BadRequest for the first row with a value that is not finite, a negative weight, no noise, or a point
     outside its picture."""
 
     def refuse(bad: NDArray[np.bool_], found: str, needed: str) -> NoReturn:
         more = int(bad.sum()) - 1
         also = f" (and {more} more line{'s' if more > 1 else ''})" if more else ""
-        raise BadRequest(f"{places[int(bad.argmax())]}: {found}{also}; {needed}")
+        raise BadRequest(f"{table.places[int(bad.argmax())]}: {found}{also}; {needed}")
 
-    for column, name in enumerate((*COLUMNS, WEIGHT)):
-        bad = ~np.isfinite(rows[:, column])
+    for name, values in zip((*COLUMNS, WEIGHT, NOISE), (*table.points.T, table.weight, table.noise), strict=True):
+        bad = ~np.isfinite(values)
         if bad.any():
-            refuse(bad, f"{name} is {rows[bad.argmax(), column]}", "correct it, or leave the line out")
-    bad = rows[:, 4] < 0
-    if bad.any():
-        refuse(bad, f"the weight is {rows[bad.argmax(), 4]:g}", "0 leaves a match out, larger counts more")
+            refuse(bad, f"{name} is {values[bad.argmax()]}", "correct it, or leave the line out")
+    if (bad := table.weight < 0).any():
+        refuse(bad, f"the weight is {table.weight[bad.argmax()]:g}", "0 leaves a match out, larger counts more")
+    if (bad := table.noise <= 0).any():
+        refuse(bad, f"{NOISE} is {table.noise[bad.argmax()]:g}", "it is a length above 0")
     for name, columns, (width, height) in (("reference", (0, 1), size), ("target", (2, 3), size_prime)):
-        points = rows[:, columns]
+        points = table.points[:, columns]
         # pixel centres are integers: the picture's own edges lie half a pixel beyond the outer centres
         bad = ((points < -0.5) | (points > np.array([width, height]) - 0.5)).any(axis=1)
         if bad.any():

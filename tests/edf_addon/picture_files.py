@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import load_picture
-from edf_stitch.edf_addon import command
+from edf_stitch.edf_addon.jobs import command
 
 _WRITE = """
 import sys, numpy as np

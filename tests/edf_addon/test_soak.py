@@ -13,10 +13,11 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from edf_stitch.edf_addon import job, modal, status  # noqa: E402
+from edf_stitch.edf_addon import status  # noqa: E402
+from edf_stitch.edf_addon.jobs import job, modal  # noqa: E402
 
 from .conftest import leftovers  # noqa: E402
-from .test_stitching import Modal, event  # noqa: E402
+from .jobs.test_stitching import Modal, event  # noqa: E402
 
 pytestmark = [pytest.mark.slow, pytest.mark.soak, pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")]
 

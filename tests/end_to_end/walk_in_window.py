@@ -183,7 +183,7 @@ def show(area: bpy.types.Area, image: bpy.types.Image) -> None:
 
 def open_only(*names: str) -> None:
     """Sub-panels remember whether they are open, where no script reaches: others with their looks take their place."""
-    _, *originals = sys.modules[f"{ADD_ON}.edf_addon.panels"].CLASSES
+    _, *originals = sys.modules[f"{ADD_ON}.edf_addon.panels.sidebar"].PANELS
     for panel in instead or originals:
         bpy.utils.unregister_class(panel)
     instead[:] = [

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from edf_stitch.synthetic_scenes.blender_process import (
     BLENDER_VARIABLE,
-    IN_BLENDER,
     RenderFailed,
-    render_command,
+    find_blender,
     run_job,
+    write_package,
 )
 
 
@@ -26,22 +29,53 @@ def fake_blender(folder: Path, script: str) -> Path:
 
 def test_the_blender_that_was_named_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(BLENDER_VARIABLE, "/opt/blender")
-    command = render_command()
-    assert command[0] == "/opt/blender" and "--factory-startup" in command and str(IN_BLENDER) in command
-    assert command[-2:] == ["--", "render"]
-    assert command.index("--python-exit-code") < command.index("--python"), "Blender reads from left to right"
+    assert find_blender() == "/opt/blender"
 
 
 def test_without_one_bpy_renders_and_without_that_a_blender_on_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(BLENDER_VARIABLE, raising=False)
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: name)
-    assert "python" in render_command()[0]
+    assert not find_blender()
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     monkeypatch.setattr(shutil, "which", lambda name: f"/usr/bin/{name}")
-    assert render_command()[0] == "/usr/bin/blender"
+    assert find_blender() == "/usr/bin/blender"
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(RenderFailed, match=BLENDER_VARIABLE):
-        render_command()
+        find_blender()
+
+
+def test_blender_is_told_what_to_run_and_where_the_package_lies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And nothing of the Python around it: with another NumPy on its path, Blender's own would not be found."""
+    script = 'printf "%s\\n" "$@" "PYTHON $PYTHONPATH $PYTHONHOME" > "$LAST/said"; echo "{}" > "$LAST/cameras.json"'
+    monkeypatch.setenv(BLENDER_VARIABLE, str(fake_blender(tmp_path, script)))
+    monkeypatch.setenv("PYTHONPATH", "elsewhere")
+    monkeypatch.setenv("PYTHONHOME", "elsewhere")
+    run_job({}, tmp_path)
+    *command, python = (tmp_path / "said").read_text("utf-8").splitlines()
+    assert python.split() == ["PYTHON", str(tmp_path / "package.zip")]
+    assert command[-3:] == ["--", str(tmp_path / "job.json"), str(tmp_path)]
+    assert {"-b", "--factory-startup", "--python-use-system-env"} <= set(command)
+    assert command.index("--python-exit-code") < command.index("--python-expr"), "Blender reads from left to right"
+
+
+def test_what_renders_needs_no_library_but_numpy(tmp_path: Path) -> None:
+    """A whole Blender has neither OpenCV nor SciPy; here Python is kept from finding them."""
+    pytest.importorskip("bpy")
+    write_package(tmp_path / "package.zip")
+    code = (
+        "import sys\n"
+        "for name in ('cv2', 'scipy', 'poselib', 'OpenEXR', 'tqdm'): sys.modules[name] = None\n"
+        "import edf_stitch.synthetic_scenes.render as render\n"
+        "print(render.__file__)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code], capture_output=True, text=True, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "package.zip")},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "package.zip" in done.stdout
 
 
 def test_a_job_is_handed_over_with_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

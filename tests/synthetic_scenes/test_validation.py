@@ -66,7 +66,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return ""
 
     monkeypatch.setattr(validation._Running, "scene", measure)
-    monkeypatch.setattr(validation, "render_command", lambda: ["blender"])
+    monkeypatch.setattr(validation, "find_blender", lambda: "blender")
     return scenes
 
 

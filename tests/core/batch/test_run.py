@@ -198,12 +198,12 @@ def stop_at(number: int, original: Callable, trouble: type[BaseException]) -> Ca
 
 
 @pytest.mark.parametrize("trouble", [KeyboardInterrupt, Cancelled])
-@pytest.mark.parametrize("where", ["stitch", "edf_stitch.core.output.outputs.matches_csv"])
+@pytest.mark.parametrize("where", ["stitch", "edf_stitch.core.output.outputs.match_file"])
 def test_an_interrupted_batch_is_resumed(
     work: Path, said: Callable, quick: list, monkeypatch: pytest.MonkeyPatch, trouble: type[BaseException], where: str
 ) -> None:
     assert run(work, "--quiet", out="whole") == 0
-    target = (batch, "stitch") if where == "stitch" else (sys.modules[where.rpartition(".")[0]], "matches_csv")
+    target = (batch, "stitch") if where == "stitch" else (sys.modules[where.rpartition(".")[0]], "match_file")
     with monkeypatch.context() as patch:
         patch.setattr(*target, stop_at(2, getattr(*target), trouble))
         assert run(work) == 130

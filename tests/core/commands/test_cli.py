@@ -308,7 +308,7 @@ def test_trouble_in_the_middle_is_told_in_a_line(
     pictures: list[str], tmp_path: Path, said: Callable, monkeypatch: pytest.MonkeyPatch, trouble: BaseException,
     code: int | None, word: str,
 ) -> None:
-    """No bare traceback reaches a user (DESIGN 6), not even for a mistake of ours."""
+    """No bare traceback reaches a user, not even for a mistake of ours."""
 
     def stitch(*_: object, **__: object) -> None:
         raise trouble

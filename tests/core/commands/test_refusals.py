@@ -1,4 +1,4 @@
-"""What the command refuses (DESIGN 6): each with its exit code, what was found, what to do, and nothing left behind.
+"""What the command refuses: each with its exit code, what was found, what to do, and nothing left behind.
 
 Options and the plain cases (missing, not a picture, an output that exists) are in test_cli.py.
 """

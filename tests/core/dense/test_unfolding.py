@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.projective import homogeneous
 from edf_stitch.core.cameras.two_view import TwoView
+from edf_stitch.core.dense import unfolding
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
 from edf_stitch.core.dense.unfolding import _areas, _hidden, _without_large_moves, unfolded
 from edf_stitch.core.field.folding import jacobian
@@ -120,6 +121,29 @@ def test_a_node_behind_the_target_hurts_nobody(made: tuple[TwoView, EpipolarLine
     along[50:80, 100:140] = noise((30, 40), 1.5, 1.0)
     found = unfolded(broken, view, SIZE, along, np.zeros_like(along))
     assert np.isfinite(found).all() and noisy(view, broken, found) <= 1
+
+
+@pytest.mark.parametrize("step", [1.0, 2.0])
+def test_the_depth_order_is_that_of_the_undistorted_nodes(
+    by_hand: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, step: float
+) -> None:
+    """What hides what is decided by depth in front of the target: that of a node's ideal pixel, not of its raw one."""
+    cameras = by_hand.camera(SIZE, 200.0, (-0.3,)), by_hand.camera(SIZE, 200.0)
+    view = by_hand.view(*cameras, (0.0, 20, 0), (-1, 0.05, 0.1))
+    sparse = SparseMap.over_reference(Field(lambda points: np.full(points.shape[:-1], FAR)), view, *cameras, 10)
+    lines = EpipolarLines.over(sparse, (10, 20, 120, 80), step)
+    asked = []
+
+    def ask(picture_map: PictureMap, nearness: np.ndarray) -> np.ndarray:
+        asked.append(nearness)
+        return occluded(picture_map, nearness)
+
+    monkeypatch.setattr(unfolding, "occluded", ask)
+    along = noise(lines.shape, 3.0, 1.0)
+    unfolded(lines, view, SIZE, along, np.zeros_like(along))
+    d = lines.inverse_depth + along * lines.depth_per_px
+    ray = np.concatenate([lines.ideal, np.ones((*lines.shape, 1))], axis=-1) @ view.H_inf[2] + d * view.e_prime[2]
+    assert np.allclose(asked[0], np.maximum(d, 0) / ray, rtol=1e-5)
 
 
 def test_the_area_of_any_node_is_that_of_the_whole_map() -> None:

@@ -230,7 +230,7 @@ def test_pixels_of_another_size_give_the_same_spline(seed: int, exponent: float,
 
 
 def test_smoothing_is_counted_in_square_units_of_the_scale() -> None:
-    """λ·scale² is what counts: DESIGN's λ = 0.001·W·H px² is 0.001 with √(W·H) as the unit."""
+    """λ·scale² is what counts: the method's λ = 0.001·W·H px² is 0.001 with √(W·H) as the unit."""
     points, noise = some_points(6, 50), some_noise(6, 50)
     values = wavy(points)
     in_units = SmoothingProblem.build(points, noise, UNIT).solve(values, 1e-3)[0]

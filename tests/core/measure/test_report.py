@@ -145,7 +145,7 @@ def test_alignment_is_the_distance_from_the_map_to_the_matches(result: StitchRes
 
 
 def test_a_strict_field_is_reported_to_lie_on_its_epipolar_lines(strict: StitchResult) -> None:
-    """It does by construction (DESIGN 1), so anything above float32 pixels is made up here."""
+    """It does by construction (docs/method.md, 2), so anything above float32 pixels is made up here."""
     measured = strict.report["measured"]
     assert measured["off_line_mean_px"] < 1e-3 and measured["projectivity_own_px"] < 1e-3
     # another F from the same matches differs, but not by much

@@ -1,4 +1,4 @@
-"""What a stitch leaves on disk: the files that were asked for, with the meaning DESIGN 5 gives them, or nothing."""
+"""What a stitch leaves on disk: the files that were asked for, with the meaning of docs/formats.md, or nothing."""
 
 from __future__ import annotations
 
@@ -378,8 +378,19 @@ def test_timing_stands_beside_the_report_and_only_then() -> None:
 def test_the_matches_stand_beside_the_report_as_they_are_given(small_result: StitchResult, written: Path) -> None:
     assert OutputRequest(Path("out.png")).matches is None
     assert OutputRequest(Path("out.png"), report=Path("a/b.c.json")).matches == Path("a/b.c.matches.csv")
-    back, used = read_matches(written / "report.matches.csv", (240, 180), (240, 180)), small_result.used_matches
-    for ours, theirs in ((back.x, used.x), (back.y, used.y), (back.weights, used.weights)):
-        assert np.array_equal(ours, theirs)
+    back, found = read_matches(written / "report.matches.csv", (240, 180), (240, 180)), small_result.edges[0].matches
+    assert np.array_equal(back.x, found.x) and np.array_equal(back.y, found.y)
+    assert (back.scale, back.weight, back.given) == (found.scale, None, False)
+    lines = (written / "report.matches.csv").read_text("utf-8").splitlines()
+    states = [line.split(",")[5] for line in lines[1:]]
     report = json.loads((written / "report.json").read_text("utf-8"))
-    assert len(back) == report["field"]["centres"] <= report["matches"]["inliers"] <= report["matches"]["found"]
+    assert states.count("used") == report["field"]["centres"]
+    assert len(states) - states.count("left out by the geometry") == report["matches"]["inliers"]
+    assert len(states) == report["matches"]["found"] > report["matches"]["inliers"]
+
+
+def test_without_its_states_the_file_of_matches_holds_the_used_ones(small_result: StitchResult, written: Path) -> None:
+    """As a program reads it that knows the first five columns: what was left out has no weight."""
+    rows = np.genfromtxt(written / "report.matches.csv", delimiter=",", skip_header=1, usecols=range(5))
+    back, used = read_matches(rows, (240, 180), (240, 180)), small_result.used_matches
+    assert back.given and np.array_equal(back.x, used.x) and np.array_equal(back.y, used.y)

@@ -1,4 +1,4 @@
-"""The backward map lies on the epipolar lines, means what DESIGN 5 says, and fetches pixels without spoiling them."""
+"""The backward map lies on the epipolar lines, means what docs/formats.md says, and does not spoil pixels."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_every_canvas_pixel_lies_on_its_epipolar_line(by_hand: SimpleNamespace, 
 
 @pytest.mark.parametrize("stand", STANDS)
 def test_the_map_is_h_inf_p_plus_inverse_depth_times_e(by_hand: SimpleNamespace, stand: str) -> None:
-    """DESIGN 5, as somebody who reads the .npz computes it."""
+    """As somebody who reads the .npz computes it, by docs/formats.md."""
     warp, scene = made(by_hand, stand)
     p = canvas_points(warp).reshape(-1, 2)
     ray = np.column_stack([p, np.ones(len(p))]) @ scene.view.H_inf.T

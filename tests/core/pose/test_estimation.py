@@ -318,7 +318,7 @@ CAMERAS = {"known": known(), "EXIF": from_exif(), "unknown": unknown()}
 @pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS.keys())
 @pytest.mark.parametrize("noise, outliers", [(0.0, 0.0), (0.5, 0.4)])
 def test_pictures_from_one_place_are_a_rotation(camera: Camera, noise: float, outliers: float) -> None:
-    """DESIGN 4: H_inf alone; t = e' = 0, F = NaN."""
+    """docs/method.md, 3: H_inf alone; t = e' = 0, F = NaN."""
     truth = scene("one place", 1, 300, noise, outliers)
     view = estimate(truth.matches, camera, camera)
     assert view.model == "rotation" and "one rotation explains" in view.why
@@ -370,7 +370,7 @@ def test_a_plane_seen_by_cameras_that_are_known_has_a_pose(name: str, camera: Ca
 
 @pytest.mark.parametrize("cameras", [(unknown(), unknown()), (from_exif(), unknown())], ids=["both", "one of them"])
 def test_a_plane_seen_by_cameras_that_are_not_known_is_a_homography(cameras: tuple[Camera, Camera]) -> None:
-    """DESIGN 4: H_inf holds it, e' = 0, F, R, t = NaN, and that depth is meaningless is said."""
+    """docs/method.md, 3: H_inf holds it, e' = 0, F, R, t = NaN, and that depth is meaningless is said."""
     truth = scene("a plane", 1, 300, 0.5, 0.3)
     view = estimate(truth.matches, *cameras)
     assert view.model == "plane" and "one homography explains" in view.why

@@ -18,7 +18,8 @@ from ..point_scenes import FOCAL, SIZE, turned_by, unit
 
 ASSUMED_SIGMA, EXIF_SIGMA = INTRINSICS.assumed_sigma, INTRINSICS.exif_sigma
 
-# R and t of target cameras, each half a unit or more away: what they tell of the focal length follows from DESIGN 4
+# R and t of target cameras, each half a unit or more away: what they tell of the focal length follows from
+# docs/method.md, 3
 CONVERGING = (turned_by(8, -15, 5), 0.8 * unit(1, -0.4, 0.3))
 PARALLEL = (np.eye(3), 0.6 * unit(1, 0, 0))
 # axes that meet at equal distances: the centre (½, 0, z) and its mirror image
@@ -87,7 +88,7 @@ def test_what_the_matches_determine_is_theirs_and_needs_no_warning() -> None:
 
 @pytest.mark.parametrize("layout", [PARALLEL, SYMMETRIC], ids=["parallel axes", "axes that meet midway"])
 def test_what_they_do_not_determine_is_said_with_its_spread(layout: tuple[np.ndarray, np.ndarray]) -> None:
-    """DESIGN 4: every focal length explains such a pair."""
+    """docs/method.md, 3: every focal length explains such a pair."""
     matches, true = scene(layout)
     about, found = known(matches, true, assumed())
     assert about.source == "not determined by the matches, assumed 0.9 of the longer side"

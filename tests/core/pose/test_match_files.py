@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.matches import Matches
-from edf_stitch.core.pose.match_files import matches_csv, read_matches
+from edf_stitch.core.pose.match_files import matches_csv, read_matches, resized_points
 from edf_stitch.core.system.errors import BadRequest, UnreadableImage
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -171,3 +172,66 @@ def test_what_is_written_is_read_to_the_same_floats(tmp_path: Path, rows: list[t
     for ours, theirs in ((x, back.x), (y, back.y), (weight, back.weight)):
         assert np.array_equal(ours, theirs)
     assert matches_csv(back) == written
+
+
+# --- matches that were found ----------------------------------------------------------------------------------------
+
+HEADER = "x,y,x2,y2,weight,state,noise_px\n"
+
+
+def test_found_matches_come_back_as_found(tmp_path: Path) -> None:
+    """All of them, doubles too, and none of them given; what was left out has a weight of 0 for other programs."""
+    x, y = np.array([[0.1, 2.0], [0.1, 2.0], [7.0, 8.0]]), np.array([[3.0, 1 / 3], [3.0, 1 / 3], [9.0, 10.0]])
+    written = matches_csv(Matches(x, y, 1.25), ["used", "left out by the field", "left out by the geometry"])
+    assert written.decode().splitlines()[:3] == [
+        HEADER.strip(), "0.1,2.0,3.0,0.3333333333333333,1.0,used,1.25",
+        "0.1,2.0,3.0,0.3333333333333333,0.0,left out by the field,1.25",
+    ]  # fmt: skip
+    back = read(tmp_path, written)
+    assert np.array_equal(back.x, x) and np.array_equal(back.y, y)
+    assert (back.scale, back.weight, back.given) == (1.25, None, False)
+
+
+def test_what_was_used_can_be_switched_off_or_made_to_count_more(tmp_path: Path) -> None:
+    rows = "1,2,3,4,0,used,1\n5,6,7,8,2.5,used,1\n9,10,11,12,0,left out by the field,1\n"
+    matches = read(tmp_path, HEADER + rows)
+    assert matches.x.tolist() == [[5, 6], [9, 10]] and matches.weights.tolist() == [2.5, 1] and not matches.given
+
+
+@pytest.mark.parametrize(("row", "said"), [
+    ("1,2,3,4,1,good,1", "line 2: the state is 'good'; .*used, left out by the geometry or left out by the field"),
+    ("1,2,3,4,1,used,0", "line 2: noise_px is 0"), ("1,2,3,4,1,used,nan", "line 2: noise_px is nan"),
+    ("1,2,3,4,0,used,1", "every match has weight 0"),
+])  # fmt: skip
+def test_a_wrong_state_is_told(tmp_path: Path, row: str, said: str) -> None:
+    with pytest.raises(BadRequest, match=said):
+        read(tmp_path, HEADER + row)
+
+
+@given(st.lists(st.tuples(*[st.floats(0, 190)] * 4), min_size=1, max_size=20), st.sampled_from([0.6, 0.37, 0.99]))
+@settings(max_examples=50, deadline=None)
+def test_at_another_scale_the_same_floats_come_back(rows: list[tuple[float, ...]], scale: float) -> None:
+    """Read in px of the pictures that were worked on, wherever rounding there and back would have led."""
+    sizes = [(round(scale * width), round(scale * height)) for width, height in (SIZE, SIZE_PRIME)]
+    small = scale * np.array(rows)
+    x, y = (resized_points(one, now, full)
+            for one, now, full in zip((small[:, :2], small[:, 2:]), sizes, (SIZE, SIZE_PRIME), strict=True))
+    worked = Matches(np.ascontiguousarray(small[:, :2]), np.ascontiguousarray(small[:, 2:]))
+    written = matches_csv(Matches(x, y), ["used"] * len(small), worked)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "matches.csv")
+        path.write_bytes(written)
+        back = read_matches(path, SIZE, SIZE_PRIME, (sizes[0], sizes[1]))
+        full = read_matches(path, SIZE, SIZE_PRIME)
+    assert np.array_equal(np.hstack([back.x, back.y]), small)
+    assert np.array_equal(full.x, x) and np.array_equal(full.y, y)
+
+
+def test_a_match_that_was_moved_since_lies_where_it_was_moved_to(tmp_path: Path) -> None:
+    """And so do all where the pictures are worked on at another size than then."""
+    header = HEADER.strip() + ",worked_x,worked_y,worked_x2,worked_y2\n"
+    path = tmp_path / "matches.csv"
+    path.write_text(header + "1.5,2.5,3.5,4.5,1,used,1,0.5,1,1.5,2\n7.5,2.5,3.5,4.5,1,used,1,0.5,1,1.5,2\n", "utf-8")
+    half = read_matches(path, SIZE, SIZE_PRIME, ((320, 240), (160, 100)))
+    assert half.x.tolist() == [[0.5, 1], [3.5, 1]]
+    assert read_matches(path, SIZE, SIZE_PRIME, (SIZE, SIZE_PRIME)).x.tolist() == [[1.5, 2.5], [7.5, 2.5]]

@@ -474,7 +474,7 @@ def test_the_focal_deviation_is_in_proportion_to_the_noise_but_not_below_the_sys
 
 @pytest.mark.parametrize("log_sigma", [0.05, ASSUMED_SIGMA])
 def test_where_the_matches_say_nothing_the_prior_is_left(log_sigma: float) -> None:
-    """Axes that are parallel: every focal length explains the matches (DESIGN 4)."""
+    """Axes that are parallel: every focal length explains the matches (docs/method.md, 3)."""
     matches, true = scene(11, 300, noise=0.0, R=np.eye(3), t=SIDEWAYS)
     cam = camera(FOCAL, log_sigma)
     with_prior, alone = focal_deviations(matches, true, cam, cam, 1.0, False)
@@ -484,7 +484,7 @@ def test_where_the_matches_say_nothing_the_prior_is_left(log_sigma: float) -> No
 
 
 def test_a_second_free_focal_length_leaves_the_first_less_sure() -> None:
-    """Axes in one plane tell a common focal length but not two (DESIGN 4)."""
+    """Axes in one plane tell a common focal length but not two (docs/method.md, 3)."""
     level = rotation_from_vector(np.radians([0.0, -15, 0]))
     matches, true = scene(11, 300, noise=0.0, R=level, t=np.array([0.9, 0, 0.436]))
     cam = camera(FOCAL, 0.3)

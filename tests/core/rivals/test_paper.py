@@ -33,7 +33,7 @@ def paper_of(two_view: TwoView, matches: Matches, fade: str = "plane") -> PaperF
 
 
 class Problem:
-    """A small problem in raw px, as DESIGN writes it down."""
+    """A small problem in raw px, as docs/method.md writes it down."""
 
     def __init__(self, seed: int, count: int, smoothing: float = 1e-3) -> None:
         random = np.random.default_rng(seed)
@@ -187,7 +187,7 @@ def moved(two_view: TwoView, by: tuple[float, float]) -> TwoView:
 
 
 def test_it_depends_on_where_the_targets_origin_lies() -> None:
-    """u = (e'₁, e'₂) does, unless e'₃ = 0: why DESIGN fixes the origin. Strict does not."""
+    """u = (e'₁, e'₂) does, unless e'₃ = 0: why docs/method.md fixes the origin. Strict does not."""
     by = np.array([900.0, -2500.0])
     for name, depends in (("to the side, turned", True), ("epipole at infinity", False)):
         x, y, _ = some_matches(VIEWS[name], curved, 300, 0.5)

@@ -36,7 +36,7 @@ def test_it_reproduces_its_matches() -> None:
 
 
 def test_both_components_of_the_spline_are_thin_plates() -> None:
-    """(Φ + 8πλ) w + M a = g and Mᵀ w = 0 for each (DESIGN 1)."""
+    """(Φ + 8πλ) w + M a = g and Mᵀ w = 0 for each (docs/method.md, 4)."""
     field, matches = rew_of()
     spline, kept = field.spline, matches.subset(field.fit.inliers_used)
     assert isinstance(spline, ThinPlateSpline) and spline.weights.shape == (len(kept), 2)

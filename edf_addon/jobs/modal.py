@@ -1,0 +1,195 @@
+"""What every operator with long work is: modal from a window, which stays free; blocking from a script and in `-b`."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from .. import status
+from ..bridge.images import Unusable
+from . import health, job
+
+# Seconds between two looks at the worker.
+TICK = 0.1
+
+_current: job.Job | None = None
+
+
+def is_working() -> bool:
+    """Whether a worker is at it; there is one at a time."""
+    return _current is not None
+
+
+def cancel() -> None:
+    """Ask the worker to stop, whoever started it."""
+    if _current is not None:
+        _current.cancel()
+        status.now.cancelling = True
+
+
+def stop(words: str) -> None:
+    """End the work at once, without a result: a file is loaded, the extension is switched off, Blender quits."""
+    if _current is not None:
+        _end()
+        status.end(words)
+
+
+def _end() -> None:
+    global _current
+    if _current is not None:
+        _current.close()
+        _current = None
+
+
+class LongWork:
+    """A mix-in for operators: `prepare` makes the job, `finish` takes its result into the file."""
+
+    _job: job.Job
+    _timer: Any = None
+
+    def prepare(self, context: bpy.types.Context, folder: Path) -> dict[str, Any]:
+        """The job (core/commands/worker.py), with all its files in `folder`. Raises Unusable."""
+        raise NotImplementedError
+
+    def finish(self, context: bpy.types.Context, folder: Path, result: dict[str, Any]) -> str:
+        """Takes the files of a finished job; returns words for the status."""
+        raise NotImplementedError
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return not is_working()
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Blocks until it is done, failed, or interrupted by Ctrl-C."""
+        if not self._start(context):
+            return {"CANCELLED"}
+        while (outcome := self._look()) is None:
+            try:
+                time.sleep(TICK / 4)
+            except KeyboardInterrupt:
+                cancel()
+        return self._take(context, outcome)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Returns at once; `modal` looks after the worker."""
+        if context.window is None or bpy.app.background:
+            return self.execute(context)
+        if not self._start(context):
+            return {"CANCELLED"}
+        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Everything but the timer and ESC goes on to the editors."""
+        if _current is not self._job:  # stopped by somebody else
+            self._forget_timer(context)
+            return {"CANCELLED"}
+        if event.type == "ESC" and event.value == "PRESS":
+            cancel()
+            return {"RUNNING_MODAL"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        outcome = self._look()
+        redraw(context)
+        if outcome is None:
+            return {"PASS_THROUGH"}
+        self._forget_timer(context)
+        return self._take(context, outcome)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender ends the operator: another file is loaded, or the window closes."""
+        if _current is self._job:
+            stop("Cancelled. Nothing was changed.")
+        self._forget_timer(context)
+
+    def _look(self) -> job.Outcome | None:
+        outcome = self._job.poll()
+        status.now.stage, status.now.share = self._job.stage, self._job.share
+        return outcome
+
+    def _start(self, context: bpy.types.Context) -> bool:
+        global _current
+        if is_working():
+            self.report({"ERROR"}, "EDF Stitch is still at work: wait for it, or cancel it.")  # type: ignore[attr-defined]
+            return False
+        folder = None
+        try:
+            folder = job.new_folder(bpy.app.tempdir)
+            request = self.prepare(context, folder)
+            self._job = _current = job.start(request, folder)
+        except Exception as error:
+            if folder is not None:
+                job.remove(folder)
+            return self._refuse(_in_words(error))
+        status.begin()
+        return True
+
+    def _refuse(self, words: str) -> bool:
+        words = job.sentence(words)
+        status.end(words, failed=True)
+        self.report({"ERROR"}, words)  # type: ignore[attr-defined]
+        return False
+
+    def _take(self, context: bpy.types.Context, outcome: job.Outcome) -> set[str]:
+        """The end of a job, whatever it was; its folder goes in any case."""
+        words, failed = outcome.words, outcome.kind not in (job.DONE, job.CANCELLED)
+        try:
+            if outcome.kind == job.DONE:
+                health.forget()
+                words = self.finish(context, self._job.folder, outcome.result)
+        except Exception as error:
+            words, failed = job.sentence(f"the panorama cannot be taken over: {_in_words(error)}"), True
+        finally:
+            _end()
+        if outcome.kind == health.BROKEN:
+            health.remember(words)
+        status.end(words, failed)
+        redraw(context)
+        self.report({"ERROR" if failed else "INFO"}, words)  # type: ignore[attr-defined]
+        return {"FINISHED"} if outcome.kind == job.DONE and not failed else {"CANCELLED"}
+
+    def _forget_timer(self, context: bpy.types.Context) -> None:
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+
+
+def _in_words(error: Exception) -> str:
+    """What went wrong on Blender's side; a traceback is for the console only."""
+    if isinstance(error, (Unusable, OSError)):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "not enough memory for pictures of this size"
+    traceback.print_exception(error)
+    return f"internal error, please report it: {type(error).__name__}: {error}"
+
+
+def redraw(context: bpy.types.Context) -> None:
+    """The panels that show what goes on, in every window."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR":
+                area.tag_redraw()
+
+
+@bpy.app.handlers.persistent
+def _before_loading(*_: Any) -> None:
+    stop("Cancelled, because another file was opened.")
+
+
+def register() -> None:
+    """Watch for files being opened."""
+    bpy.app.handlers.load_pre.append(_before_loading)
+
+
+def unregister() -> None:
+    """End whatever is at work."""
+    stop("Cancelled. Nothing was changed.")
+    health.stop()
+    if _before_loading in bpy.app.handlers.load_pre:
+        bpy.app.handlers.load_pre.remove(_before_loading)

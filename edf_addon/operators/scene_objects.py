@@ -1,0 +1,142 @@
+"""What an artist takes along from a panorama: its cameras, its surface, its World."""
+
+# No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
+
+from .. import editor, idnames
+from ..bridge import ownership
+from ..scene import take_along
+
+ROLES = (
+    ("REFERENCE", "Reference", "The camera that took the reference"),
+    ("TARGET", "Target", "The camera that took the target"),
+    ("PANORAMA", "Panorama", "The reference's camera with a sensor as large as the panorama"),
+)
+_BASELINE = {
+    "name": "Baseline", "default": 1.0, "min": 1e-4, "soft_max": 100.0, "unit": "LENGTH", "precision": 3,
+    "options": {"SKIP_SAVE"},
+    "description": "Distance between the two cameras in the scene; pictures alone do not tell it",
+}  # fmt: skip
+
+
+class _OfAPanorama:
+    """Operators that need a finished stitch."""
+
+    needs_depth = False
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        reason = take_along.lacking(editor.panorama(context), cls.needs_depth)
+        if reason:
+            cls.poll_message_set(reason)  # type: ignore[attr-defined]
+        return not reason
+
+
+class EDF_OT_create_cameras(_OfAPanorama, bpy.types.Operator):  # noqa: N801
+    """Put the cameras of this panorama into the scene, with the pictures as their backgrounds"""
+
+    bl_idname = idnames.Operator.CREATE_CAMERAS
+    bl_label = "Create Cameras"
+    bl_options = {"REGISTER", "UNDO"}
+
+    baseline: FloatProperty(**_BASELINE)
+    look: BoolProperty(
+        name="Look Through the Panorama's", default=True,
+        description="Make the panorama's camera the scene's, and the render size that of the panorama",
+    )
+
+    def execute(self, context: Any) -> set[str]:
+        image = editor.panorama(context)
+        if not self.properties.is_property_set("baseline"):
+            self.baseline = take_along.usual_baseline(image)
+        try:
+            made = take_along.create_cameras(context.scene, image, self.baseline)
+        except ValueError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for words in ownership.changes(image):
+            self.report({"WARNING"}, words)
+        if "PANORAMA" not in made:
+            words = "Blender has cylindrical lenses from 4.3 on: the panorama's own camera is left out"
+            self.report({"WARNING"}, words)
+        elif self.look:
+            take_along.look_through(context.scene, made["PANORAMA"])
+        if "TARGET" not in made:
+            self.report({"WARNING"}, "The target's camera is not known: one plane does not tell where it stood")
+        return {"FINISHED"}
+
+
+class EDF_OT_depth_mesh(_OfAPanorama, bpy.types.Operator):  # noqa: N801
+    """Lay the panorama on a grid that stands as far away as it was found to be, seen from the panorama's camera"""
+
+    bl_idname = idnames.Operator.DEPTH_MESH
+    bl_label = "Depth Mesh"
+    bl_options = {"REGISTER", "UNDO"}
+    needs_depth = True
+
+    baseline: FloatProperty(**_BASELINE)
+    farthest: FloatProperty(
+        name="Farthest", description="Where the surface ends, sky included, in multiples of its median depth",
+        default=20.0, min=1.1, soft_max=100.0,
+    )
+
+    def execute(self, context: Any) -> set[str]:
+        image = editor.panorama(context)
+        if not self.properties.is_property_set("baseline"):
+            self.baseline = take_along.usual_baseline(image)
+        try:
+            take_along.depth_mesh(context.scene, image, self.baseline, self.farthest)
+        except ValueError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class EDF_OT_look_through(_OfAPanorama, bpy.types.Operator):  # noqa: N801
+    """Make this camera the scene's, with the render size of its picture, and look through it in the 3D views"""
+
+    bl_idname = idnames.Operator.LOOK_THROUGH
+    bl_label = "Look Through"
+    bl_options = {"REGISTER", "UNDO"}
+
+    role: EnumProperty(name="Camera", items=ROLES, default="PANORAMA")
+
+    def execute(self, context: Any) -> set[str]:
+        camera = take_along.find(editor.panorama(context), self.role)
+        if camera is None:
+            self.report({"ERROR"}, f"There is no camera of the {self.role.lower()}; create the cameras first")
+            return {"CANCELLED"}
+        take_along.look_through(context.scene, camera)
+        for window in context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D":
+                    area.spaces.active.region_3d.view_perspective = "CAMERA"
+        return {"FINISHED"}
+
+
+class EDF_OT_use_as_world(bpy.types.Operator):  # noqa: N801
+    """Surround the scene with this panorama, as the reference camera saw it: an equirectangular one in the World"""
+
+    bl_idname = idnames.Operator.USE_AS_WORLD
+    bl_label = "Use as World"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        reason = take_along.no_world(editor.panorama(context))
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def execute(self, context: Any) -> set[str]:
+        take_along.use_as_world(context.scene, editor.panorama(context))
+        return {"FINISHED"}
+
+
+CLASSES = (EDF_OT_create_cameras, EDF_OT_depth_mesh, EDF_OT_look_through, EDF_OT_use_as_world)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

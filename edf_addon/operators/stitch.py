@@ -1,0 +1,153 @@
+"""Stitching, previews, stitching again. Operators are thin: settings → job → worker → image."""
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import StringProperty
+
+from .. import editor, idnames, pair, properties
+from ..bridge import images, ownership, result
+from ..jobs import modal, stitching
+
+
+class _Stitching(modal.LongWork):
+    """What the three share that stitch. kind: of image that comes out of it."""
+
+    kind = "panorama"
+
+    def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
+        job, self.memory = stitching.make_job(context, folder)
+        return job
+
+    def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
+        return stitching.take_over(context, folder, found, self.memory, self.kind)
+
+
+class EDF_OT_stitch(_Stitching, bpy.types.Operator):  # noqa: N801
+    """Stitch the target into the reference's plane, as a new image. ESC cancels"""
+
+    bl_idname = idnames.Operator.STITCH
+    bl_label = "Stitch"
+    bl_options = {"UNDO"}
+
+    reference: StringProperty(name="Reference", description="Name of the image to choose first", options={"SKIP_SAVE"})
+    target: StringProperty(name="Target", description="Name of the image to choose first", options={"SKIP_SAVE"})
+
+    def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
+        settings = properties.settings_of(context.scene)
+        named = {side: images.named(name) for side in ownership.SIDES if (name := getattr(self, side))}
+        with pair.choosing(settings):
+            for side, image in named.items():
+                setattr(settings, side, image)
+        return super().prepare(context, folder)
+
+
+class EDF_OT_preview(_Stitching, bpy.types.Operator):  # noqa: N801
+    """Stitch at reduced size, to see soon what the settings do. The image of the last preview is replaced"""
+
+    bl_idname = idnames.Operator.PREVIEW
+    bl_label = "Preview"
+    bl_options = {"UNDO"}
+    kind = "preview"
+
+    def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
+        scale = properties.settings_of(context.scene).preview_scale
+        job, self.memory = stitching.make_job(context, folder, scale)
+        return job
+
+
+class EDF_OT_restitch(_Stitching, bpy.types.Operator):  # noqa: N801
+    """Stitch the pictures of a panorama again, with its settings and its matches"""
+
+    bl_idname = idnames.Operator.RESTITCH
+    bl_label = "Stitch Again"
+    bl_options = {"UNDO"}
+
+    image: StringProperty(name="Panorama", description="Whose; the one that is shown, or was made last, where empty")
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        return not modal.is_working() and editor.panorama(context) is not None
+
+    def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
+        settings = properties.settings_of(context.scene)
+        for words in bring_back(context, editor.panorama(context, self.image)):
+            self.report({"WARNING"}, words)
+        settings.edited_matches = True
+        return super().prepare(context, folder)
+
+
+class EDF_OT_restore(bpy.types.Operator):  # noqa: N801
+    """Bring the settings, pictures and matches of a panorama back, to change one thing and stitch again"""
+
+    bl_idname = idnames.Operator.RESTORE
+    bl_label = "Restore Settings"
+    bl_options = {"REGISTER", "UNDO"}
+
+    image: StringProperty(name="Panorama", description="Whose; the one that is shown, or was made last, where empty")
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        return editor.panorama(context) is not None
+
+    def execute(self, context: Any) -> set[str]:
+        try:
+            changes = bring_back(context, editor.panorama(context, self.image))
+        except images.Unusable as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for words in changes:
+            self.report({"WARNING"}, words)
+        return {"FINISHED"}
+
+
+class EDF_OT_cancel(bpy.types.Operator):  # noqa: N801
+    """Stop the work; nothing is changed"""
+
+    bl_idname = idnames.Operator.CANCEL
+    bl_label = "Cancel"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, _context: Any) -> bool:
+        return modal.is_working()
+
+    def execute(self, _context: Any) -> set[str]:
+        modal.cancel()
+        return {"FINISHED"}
+
+
+class EDF_OT_reset(bpy.types.Operator):  # noqa: N801
+    """Set everything back to its default; the pictures and the panorama stay"""
+
+    bl_idname = idnames.Operator.RESET
+    bl_label = "Reset Settings"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: Any) -> set[str]:
+        settings = properties.settings_of(context.scene)
+        for name in properties.names_of_settings(settings):
+            settings.property_unset(name)
+        return {"FINISHED"}
+
+
+def bring_back(context: Any, image: bpy.types.Image | None) -> list[str]:
+    """Settings, pictures and matches of a panorama; returns what has changed since, in words. Raises Unusable."""
+    settings = properties.settings_of(context.scene)
+    found = result.read(image)
+    if image is None or found is None:
+        raise images.Unusable("this image carries no settings: it is no panorama that was stitched here")
+    if lost := ownership.missing(image):
+        raise images.Unusable("; ".join(lost))
+    with pair.choosing(settings):
+        settings.reference, settings.target = ownership.pictures(image)
+        properties.restore(settings, found["settings"], ownership.chosen(image))
+        stitching.fill_matches(settings, found["matches"], edited=False)
+    return ownership.changes(image) + ownership.camera_changes(image, context)
+
+
+CLASSES = (EDF_OT_stitch, EDF_OT_preview, EDF_OT_restitch, EDF_OT_restore, EDF_OT_cancel, EDF_OT_reset)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

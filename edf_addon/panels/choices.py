@@ -1,0 +1,100 @@
+"""How to stitch: camera, field, output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+from .. import editor, idnames, properties
+from ..bridge import photo
+from ..idnames import Operator
+from .rows import Row, SubPanel, rows, words
+
+
+def _camera_is(*sources: str) -> Callable[[Any], bool]:
+    return lambda settings: settings.camera in sources
+
+
+def _own_lens(*sources: str) -> Callable[[Any], bool]:
+    return lambda settings: settings.own_lens and settings.camera in sources
+
+
+def _pack_why_not(settings: Any) -> str:
+    return "" if settings.fake_user else "Images without a fake user may be dropped on save, packed or not"
+
+
+def _is_round(settings: Any) -> bool:
+    return settings.projection != "PERSPECTIVE"
+
+
+def _projection_why_not(settings: Any) -> str:
+    if _is_round(settings) and settings.field not in properties.ROUND_FIELDS:
+        return "A round panorama needs a field that knows depth everywhere: Slack or Strict"
+    return ""
+
+
+CAMERA = (
+    Row("camera"),
+    Row("focal", shown=_camera_is("FOCAL")),
+    Row("sensor", shown=_camera_is("FOCAL")),
+    Row("focal35", shown=_camera_is("FOCAL35")),
+    Row("focal_px", shown=_camera_is("FOCAL_PX")),
+    Row("own_lens", shown=_camera_is("FOCAL", "FOCAL35", "FOCAL_PX"), text="Two Lenses"),
+    Row("target_focal", shown=_own_lens("FOCAL"), text="Target"),
+    Row("target_sensor", shown=_own_lens("FOCAL"), text="Sensor Width"),
+    Row("target_focal35", shown=_own_lens("FOCAL35"), text="Target"),
+    Row("target_focal_px", shown=_own_lens("FOCAL_PX"), text="Target"),
+    Row("reference_camera", shown=_camera_is("CAMERAS"), text="Reference"),
+    Row("target_camera", shown=_camera_is("CAMERAS"), text="Target"),
+)
+FIELD = (Row("field"), Row("fade"), Row("dense"))
+OUTPUT = (
+    Row("projection", why_not=_projection_why_not),
+    Row("level", shown=_is_round),
+    Row("level_angles", shown=lambda settings: _is_round(settings) and settings.level == "ANGLES"),
+    Row("blend"),
+    Row("seam", why_not=lambda settings: "An average has no seam" if settings.blend == "LINEAR" else ""),
+    Row("exposure"),
+    Row("holes", why_not=lambda settings: "An average has no holes" if settings.blend == "LINEAR" else ""),
+    Row("crop"),
+    Row("crop_box", shown=lambda settings: settings.crop == "BOX"),
+    Row("scale"),
+    Row("seed"),
+)
+KEEP = (Row("fake_user"), Row("pack", why_not=_pack_why_not))
+TAKE = (Row("take_layers"), Row("take_masks"), Row("take_depth"))
+
+
+class EDF_PT_camera(SubPanel, bpy.types.Panel):  # noqa: N801
+    bl_idname = idnames.Panel.CAMERA
+    bl_label = "Camera"
+
+    def draw_rows(self, context: Any, settings: Any, width: float) -> None:
+        rows(self.layout, settings, CAMERA, width)
+        if settings.camera == "AUTOMATIC":
+            for side in (editor.REFERENCE, editor.TARGET):
+                words(self.layout, photo.camera_words(getattr(settings, side), side), width, "CAMERA_DATA")
+
+
+class EDF_PT_field(SubPanel, bpy.types.Panel):  # noqa: N801
+    bl_idname = idnames.Panel.FIELD
+    bl_label = "Field"
+
+    def draw_rows(self, context: Any, settings: Any, width: float) -> None:
+        rows(self.layout, settings, FIELD, width)
+
+
+class EDF_PT_output(SubPanel, bpy.types.Panel):  # noqa: N801
+    bl_idname = idnames.Panel.OUTPUT
+    bl_label = "Output"
+
+    def draw_rows(self, context: Any, settings: Any, width: float) -> None:
+        rows(self.layout, settings, OUTPUT, width)
+        self.layout.column(heading="Images").prop(settings, "fake_user")
+        rows(self.layout, settings, KEEP[1:], width)
+        column = self.layout.column(heading="Also Make")
+        for row in TAKE:
+            column.prop(settings, row.name)
+        self.layout.operator(Operator.RESET, icon="LOOP_BACK")

@@ -1,0 +1,216 @@
+"""What a stitch leaves in the scene: cameras with the pictures behind them, the panorama as a surface with depth."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+from mathutils import Matrix
+
+from .. import editor
+from ..bridge import compat, ownership, photo
+
+RIG, MESH = "RIG", "MESH"
+# What an object is to which panorama, as custom properties of it.
+OF, ROLE = "edf_stitch_panorama", "edf_stitch_role"
+# How a background has to be shown whose pixels are stored so, by EXIF's orientation: turned (degrees) after being
+# mirrored. Tried in a window: a background turns clockwise.
+TURNS = {
+    1: (0, False), 2: (0, True), 3: (180, False), 4: (180, True), 5: (-90, True), 6: (90, False), 7: (90, True),
+    8: (-90, False),
+}  # fmt: skip
+def no_world(image: bpy.types.Image | None) -> str:
+    """Why an image cannot surround a scene; "" where it can."""
+    if image is None:
+        return "Stitch a panorama first"
+    if editor.known(image)["report"]["canvas"]["projection"]["kind"] != "equirectangular":
+        return "Only an equirectangular panorama can surround the scene: choose that projection, and stitch"
+    return ""
+
+
+def lacking(image: bpy.types.Image | None, depth: bool = False) -> str:
+    """Why nothing can be taken along from an image; "" where it can."""
+    if image is None:
+        return "Stitch a panorama first"
+    if depth and not editor.known(image)["has_depth"]:
+        return "This panorama has no depth: its pictures were taken from one place, or show one plane only"
+    return ""
+
+
+def known_baseline(known: dict[str, Any]) -> float | None:
+    """How far apart the scene's own cameras stood, where a panorama's pictures were taken with them."""
+    if known["cameras"] is None:
+        return None
+    reference, target = (Matrix(camera["matrix_world"]).translation for camera in known["cameras"])
+    return (target - reference).length
+
+
+def usual_baseline(image: bpy.types.Image) -> float:
+    """As far as this panorama's cameras stand apart already, else as those did that took its pictures, else 1."""
+    rig = find(image, RIG)
+    return rig["baseline"] if rig is not None else known_baseline(editor.known(image)) or 1.0
+
+
+def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> dict[str, bpy.types.Object]:
+    """The cameras of a panorama, by role; those that are there already are set anew. The panorama's own is missing
+    where Blender has no lens like it. Raises ValueError."""
+    from . import scene_geometry
+
+    reference, target = ownership.pictures(image)
+    pictures = {"REFERENCE": reference, "TARGET": target, "PANORAMA": image}
+    rig = _rig(scene, image, baseline)
+    made = {}
+    for placed in scene_geometry.placed_cameras(editor.known(image), baseline):
+        role, lens = placed.name.upper(), placed.lens
+        if isinstance(lens, scene_geometry.RoundLens) and lens.kind == "cylindrical" and not compat.sees_cylinders():
+            continue
+        camera = find(image, role) or _link(scene, image, role, bpy.data.cameras.new(f"{placed.name} of {image.name}"))
+        data = camera.data
+        if isinstance(lens, scene_geometry.RoundLens):
+            compat.make_panoramic(data, lens.kind, lens.headings, lens.elevations)
+        else:
+            data.type = "PERSP"
+            data.sensor_fit, data.sensor_width, data.lens = lens.sensor_fit, lens.sensor_width, lens.lens
+            data.shift_x, data.shift_y = lens.shift_x, lens.shift_y
+        data.clip_start, data.clip_end = 0.01 * baseline, 1e4 * baseline
+        _put_behind(data, pictures[role])
+        camera["resolution"] = lens.resolution
+        camera.parent, camera.matrix_parent_inverse = rig, Matrix()
+        camera.matrix_basis = Matrix(placed.matrix_world.tolist())
+        made[role] = camera
+    return made
+
+
+def depth_mesh(
+    scene: bpy.types.Scene, image: bpy.types.Image, baseline: float, farthest: float
+) -> bpy.types.Object:
+    """The panorama as a surface; one that is there already gets new vertices. Raises ValueError."""
+    from . import scene_geometry
+
+    surface = scene_geometry.depth_mesh(editor.known(image), baseline, farthest)
+    rig, there = _rig(scene, image, baseline), find(image, MESH)
+    mesh = bpy.data.meshes.new(f"Depth of {image.name}") if there is None else there.data
+    mesh.clear_geometry()
+    mesh.from_pydata(surface.vertices.tolist(), [], surface.faces.tolist())
+    uvs = mesh.uv_layers.new(name="Panorama")
+    uvs.data.foreach_set("uv", surface.uvs[surface.faces.ravel()].ravel())
+    mesh.validate()
+    if not mesh.materials:
+        mesh.materials.append(emission(image))
+    object_ = there or _link(scene, image, MESH, mesh)
+    object_.parent, object_.matrix_parent_inverse, object_.matrix_basis = rig, Matrix(), Matrix()
+    return object_
+
+
+def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
+    """Make it the scene's camera, and the render size that of its picture: a camera has none of its own."""
+    scene.camera = camera
+    scene.render.resolution_x, scene.render.resolution_y = camera["resolution"]
+    scene.render.resolution_percentage = 100
+    scene.render.pixel_aspect_x = scene.render.pixel_aspect_y = 1.0
+
+
+def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
+    """Gives the scene a World that shows the panorama where its rig's cameras see it, or those of a new rig would."""
+    import numpy as np
+
+    from ...core.cameras.blender_world import world_rotation
+    from . import scene_geometry
+
+    known = editor.known(image)
+    rig = find(image, RIG)
+    stands = _place_of_rig(known) if rig is None else rig.matrix_world
+    camera = np.array(stands) @ scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(known))
+    turn = world_rotation(camera, scene_geometry.matrix(known["report"]["canvas"]["projection"]["rotation"]))
+    world = bpy.data.worlds.new(image.name)
+    tree = compat.node_tree(world)
+    nodes, link = tree.nodes, tree.links.new
+    nodes.clear()
+    kinds = ("TexCoord", "Mapping", "TexEnvironment", "Background", "OutputWorld")
+    where, mapping, texture, background, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
+    for number, node in enumerate((where, mapping, texture, background, output)):
+        node.location = (220 * number - 800, 0)
+    texture.image = image
+    mapping.inputs["Rotation"].default_value = Matrix(turn.tolist()).to_euler("XYZ")
+    link(where.outputs["Generated"], mapping.inputs["Vector"])
+    link(mapping.outputs["Vector"], texture.inputs["Vector"])
+    link(texture.outputs["Color"], background.inputs["Color"])
+    link(background.outputs["Background"], output.inputs["Surface"])
+    scene.world = world
+
+
+def emission(image: bpy.types.Image) -> bpy.types.Material:
+    """A material that shows an image as it is, whatever the lights; transparent where the image is."""
+    material = bpy.data.materials.new(image.name)
+    tree = compat.node_tree(material)
+    nodes, link = tree.nodes, tree.links.new
+    nodes.clear()
+    kinds = ("TexImage", "Emission", "BsdfTransparent", "MixShader", "OutputMaterial")
+    texture, shine, clear, mix, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
+    for node, place in zip((texture, shine, clear, mix, output), ((-600, 0), (-300, -60), (-300, 60), (0, 0), (200, 0)),
+                           strict=True):  # fmt: skip
+        node.location = place
+    texture.image, texture.extension = image, "EXTEND"
+    link(texture.outputs["Color"], shine.inputs["Color"])
+    link(texture.outputs["Alpha"], mix.inputs[0])
+    link(clear.outputs[0], mix.inputs[1])
+    link(shine.outputs[0], mix.inputs[2])
+    link(mix.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def find(image: bpy.types.Image | None, role: str) -> bpy.types.Object | None:
+    """The object that is `role` to a panorama, if it is still there."""
+    return next((one for one in bpy.data.objects if one.get(OF) == image and one.get(ROLE) == role), None)
+
+
+def _rig(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> bpy.types.Object:
+    """The empty that everything of a panorama hangs on: moved, turned or scaled, all goes along and stays right."""
+    rig = find(image, RIG)
+    if rig is None:
+        rig = _link(scene, image, RIG, None)
+        rig.empty_display_size = 0.2 * baseline
+        rig.matrix_world = _place_of_rig(editor.known(image))
+    rig["baseline"] = baseline
+    return rig
+
+
+def _place_of_rig(known: dict[str, Any]) -> Matrix:
+    """Where a new rig stands: its reference camera where the scene's own stood that took the picture, if one did."""
+    from . import scene_geometry
+
+    if known["cameras"] is None:
+        return Matrix()
+    here = scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(known))
+    return Matrix(known["cameras"][0]["matrix_world"]).normalized() @ Matrix(here.tolist()).inverted()
+
+
+def _link(scene: bpy.types.Scene, image: bpy.types.Image, role: str, data: Any) -> bpy.types.Object:
+    """A new object in the panorama's own collection."""
+    name = data.name if data is not None else f"Rig of {image.name}"
+    made = bpy.data.objects.new(name, data)
+    made[OF], made[ROLE] = image, role
+    collection = next((one for one in bpy.data.collections if one.get(OF) == image), None)
+    if collection is None:
+        collection = bpy.data.collections.new(image.name)
+        collection[OF] = image
+    if collection.name not in scene.collection.children:
+        scene.collection.children.link(collection)
+    collection.objects.link(made)
+    return made
+
+
+def _put_behind(data: bpy.types.Camera, image: bpy.types.Image | None) -> None:
+    """Show an image behind everything that the camera sees."""
+    data.background_images.clear()
+    if image is None:
+        return
+    behind = data.background_images.new()
+    behind.image, behind.alpha, behind.display_depth = image, 1.0, "BACK"
+    turn, behind.use_flip_x = TURNS[photo.orientation(image)]
+    behind.rotation = math.radians(turn)
+    # turned by a quarter, an image is fitted into the frame before it is turned
+    behind.frame_method = "FIT" if turn % 180 else "STRETCH"
+    behind.scale = max(image.size) / max(1, min(image.size)) if turn % 180 else 1.0
+    data.show_background_images = True

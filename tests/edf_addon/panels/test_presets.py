@@ -1,0 +1,50 @@
+"""Presets: settings under a name, and back; by the files that Blender's own mechanism writes."""
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from edf_stitch.edf_addon import properties  # noqa: E402
+from edf_stitch.edf_addon.panels import presets  # noqa: E402
+
+
+@pytest.fixture
+def resources(tmp_path, monkeypatch):
+    """A presets folder of its own."""
+    original = bpy.utils.user_resource
+    monkeypatch.setattr(
+        bpy.utils, "user_resource",
+        lambda kind, path="", create=False: (
+            _made(tmp_path / path) if kind == "SCRIPTS" else original(kind, path=path, create=create)
+        ),
+    )  # fmt: skip
+    return tmp_path
+
+
+def _made(folder):
+    folder.mkdir(parents=True, exist_ok=True)
+    return str(folder)
+
+
+def test_a_preset_brings_back_what_it_was_made_of_and_nothing_else(blender, resources):
+    settings = blender.settings
+    settings.reference = bpy.data.images.new("a", 8, 8)
+    settings.field, settings.camera, settings.focal, settings.crop = "STRICT", "FOCAL", 35.5, "BOX"
+    settings.crop_box, settings.take_depth = (1, 2, 30, 40), True
+    bpy.ops.edf.preset_add(name="Plates")
+    files = list(resources.rglob("*.py"))
+    assert [file.name for file in files] == ["Plates.py"]
+    bpy.ops.edf.reset()
+    settings.show_matches = True
+    settings.reference = bpy.data.images.new("b", 8, 8)
+    bpy.ops.script.execute_preset(filepath=str(files[0]), menu_idname="EDF_MT_presets")
+    assert (settings.field, settings.camera, settings.crop) == ("STRICT", "FOCAL", "BOX")
+    assert settings.focal == pytest.approx(35.5) and tuple(settings.crop_box) == (1, 2, 30, 40) and settings.take_depth
+    assert settings.reference.name == "b" and settings.show_matches
+
+
+def test_a_preset_holds_every_setting_and_no_picture():
+    held = set(presets.names())
+    assert {*properties.CHOICES, *properties.VALUES, "camera", "crop", "focal", "take_layers", "pack"} <= held
+    assert not held & {"reference", "target", "result", "matches", "ignore_reference", "reference_camera",
+                       "edited_matches"}  # fmt: skip
