@@ -19,6 +19,7 @@ from edf_stitch.core.cameras.projective import (
     sampson_residuals,
 )
 from edf_stitch.core.pose.fundamental import (
+    explained_by,
     fit_homography,
     fundamental_candidates,
     refuse_chance,
@@ -344,3 +345,12 @@ def test_neither_order_nor_direction_decides(kind: str, off_plane: float) -> Non
     assert parallax(enlarged, (3 * SIZE[0], 3 * SIZE[1])) == seen
     F, homography = fundamental_candidates(matches, 0)[0], fit_homography(matches, 0)
     assert shows_parallax(matches, -4 * F, homography, SIZE) == seen
+
+
+def test_whatever_poselib_fails_at_opencv_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In place of its F one that sends every point to a line far away."""
+    far = np.array([[0, 0, 0], [0, 0, 0], [0, 1e-5, 1.0]])
+    monkeypatch.setattr("edf_stitch.core.pose.fundamental.robust_fundamental", lambda *_: far)
+    truth = scene("general", 0, 300, 0.5, 0.3)
+    on, sigma = explained_by(fundamental_candidates(truth.matches, 0)[0], truth.matches)
+    assert on.sum() > 180 and sigma < 1
