@@ -154,7 +154,7 @@ def fit_and_warp(
     progress("warp", 0.0)
     # a rival's geometry is as little as it knows
     views = views_of(field.two_view, cameras)
-    refined = None if dense is None else dense.relief
+    refined = None if dense is None else dense.refined
     warp = build_warp(field, views, _projection(options, views, frames[0]), refined)
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense)

@@ -211,10 +211,10 @@ def test_frames_of_other_sizes_are_refused(clip: list[Pair], quick: StitchOption
 def test_a_pair_is_refined_and_a_clip_says_why_not(clip: list[Pair], quick: StitchOptions) -> None:
     asked, said = replace(quick, dense=True), []
     pair = align([frame_of(clip[0], asked)], asked, lambda stage, _: said.append(stage))
-    assert pair.dense is not None and pair.dense.relief is not None and pair.warp.confidence is not None
+    assert pair.dense is not None and pair.dense.refined is not None and pair.warp.confidence is not None
     assert list(dict.fromkeys(said)) == ["features", "geometry", "field", "dense", "warp"]
     several = align([frame_of(one, asked) for one in clip[:2]], asked, silent)
-    assert several.dense is not None and several.dense.relief is None and "swims" in several.dense.why
+    assert several.dense is not None and several.dense.refined is None and "swims" in several.dense.why
     plain = align([frame_of(one, quick) for one in clip[:2]], quick, silent)
     assert plain.dense is None and np.array_equal(several.warp.maps[1].x, plain.warp.maps[1].x, equal_nan=True)
 
