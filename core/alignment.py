@@ -34,13 +34,11 @@ from .pictures.picture import Picture, resized
 from .pose import features
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
-from .pose.options import ESTIMATION
+from .pose.options import ESTIMATION, FEATURES
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, TooFewMatches
 from .system.threads import in_order
 
-# With fewer points of detail than this a picture is to blame, not the pair.
-SCARCE = 100
 # Called with a stage's name and how much of it is done.
 ReportProgress = Callable[[str, float], None]
 
@@ -197,7 +195,7 @@ def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:
     found = []
-    most = (features.FEATURES.preview_budget, features.FEATURES.preview_pixels) if quick else ()
+    most = (FEATURES.preview_budget, FEATURES.preview_pixels) if quick else ()
     for i, frame in enumerate(frames):
         seen = []
         for keypoints in in_order(lambda p: features.detect(p.view, p.alpha, *most), frame.pictures):
@@ -214,7 +212,7 @@ def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
     """Raises TooFewMatches where there are few because one picture has hardly any points of detail; else it is the
     pair's fault, which `estimate` says."""
     for number, (picture, count) in enumerate(zip(frame.pictures, details, strict=True)):
-        if count < SCARCE:
+        if count < FEATURES.scarce_points:
             width, height = size_of(picture)
             raise TooFewMatches(
                 f"only {matches} matching points found, at least {ESTIMATION.min_matches} needed: the "

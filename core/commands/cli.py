@@ -17,7 +17,8 @@ from typing import NoReturn
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
 from .arguments import add_options, options_from
-from .messages import _MOST_WARNINGS, print_summary, progress_shown, say
+from .messages import print_summary, progress_shown, say
+from .options import MESSAGES
 
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
@@ -259,7 +260,7 @@ def _stitch(args: argparse.Namespace) -> int:
         check(outputs, files, [path.name for path in args.pictures])
         with progress_shown(args.quiet) as show:
             result = stitch(args.pictures, options, progress=show)
-            show("write", 0.98)
+            show("write", MESSAGES.written_share)
             warnings = [*result.warnings, *write(result, outputs, files)]
         _too_late_to_interrupt()
     for warning in warnings:
@@ -286,8 +287,8 @@ def _batch(args: argparse.Namespace) -> int:
     request = BatchRequest(args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard)
 
     def tell(outcome: Outcome, number: int, count: int) -> None:
-        more = len(outcome.warnings) - _MOST_WARNINGS
-        for warning in (*outcome.warnings[:_MOST_WARNINGS], *[f"{more} more in {request.summary}"] * (more > 0)):
+        more = len(outcome.warnings) - MESSAGES.max_warnings
+        for warning in (*outcome.warnings[:MESSAGES.max_warnings], *[f"{more} more in {request.summary}"] * (more > 0)):
             say(f"edf: warning: {outcome.name}: {warning}")
         if outcome.exit_code or not args.quiet:
             say(f"edf: [{number}/{count}] {outcome.name}: {outcome.in_words(args.verbose)}")

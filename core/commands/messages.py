@@ -6,9 +6,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-# Of one item; every frame of a clip may have its own.
-_MOST_WARNINGS = 5
-
 
 def say(line: str) -> None:
     """A line on stderr, above the bar where there is one."""

@@ -28,9 +28,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from .options import WORKER
+
 SIDES = ("reference", "target")
-# Of the whole work; the rest is encoding what the window wants to have.
-STITCH_SHARE = 0.9
 # All that a stitch may load sooner or later, besides the standard library.
 LIBRARIES = ("numpy", "cv2", "scipy.linalg", "scipy.optimize", "poselib", "OpenEXR", "exifread")
 
@@ -128,7 +128,7 @@ def _work(folder: Path, stop: _Stop) -> None:
         cache=default_folder(),
     )  # fmt: skip
     result = stitch(
-        pictures, options, lambda stage, share: _say({"stage": stage, "share": share * STITCH_SHARE}),
+        pictures, options, lambda stage, share: _say({"stage": stage, "share": share * WORKER.stitch_share}),
         lambda: stop.asked,  # where Python swallowed the interruption, as it does in what tidies up after an object
     )  # fmt: skip
     _write(folder, result.spread_out(), rows, job.get("take", []), turns)
@@ -194,7 +194,8 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
     def add(name: str, data: bytes, suffix: str = kind) -> None:
         files[name] = f"{name.replace(' ', '_')}{suffix}"
         (folder / files[name]).write_bytes(data)
-        _say({"stage": "write", "share": min(0.99, STITCH_SHARE + 0.01 * len(files))})
+        share = min(WORKER.max_share, WORKER.stitch_share + WORKER.file_share * len(files))
+        _say({"stage": "write", "share": share})
 
     def picture(pixels: Any, alpha: Any) -> bytes:
         return encode_picture(pixels, alpha, result.bits, kind, result.pictures[0].icc, result.pictures[0].exif)[0]

@@ -21,10 +21,9 @@ from ..raster.arrays import Array
 from ..raster.colour import encode
 from ..raster.resizing import size_change
 from .match_table import match_file
+from .options import INSPECTION
 
-# Pixels along the longer side of the pictures that lie over the panorama, and nodes along that of the depth grid.
-LONGEST_SIDE = 1600
-LONGEST_GRID = 160
+# What the window is told of each match: the field stands on it, or it contradicts the others.
 USED, LEFT_OUT = "USED", "LEFT_OUT"
 
 
@@ -117,12 +116,12 @@ def heat_map(result: StitchResult) -> tuple[NDArray[np.uint8], tuple[float, floa
     """The slide as a picture (h, w, 4) uint8 RGBA, reduced, transparent where the target shows nothing; and the px that
     its blue and its red end stand for."""
     layer = result.layers[result.edges[0].j]
-    far, shows = _reduced(displacement_px(result)), _reduced((layer.alpha > 0).astype(np.float32)) > 0.5
+    far, shows = _reduced(displacement_px(result)), _reduced((layer.alpha > 0).astype(np.float32)) > INSPECTION.shown
     shows &= np.isfinite(far)
     if not shows.any():
         return np.zeros((*far.shape, 4), np.uint8), (0.0, 0.0)
-    low, high = (float(value) for value in np.percentile(far[shows], (1, 99)))
-    share = np.clip((np.nan_to_num(far) - low) / max(high - low, 1e-6), 0, 1)
+    low, high = (float(value) for value in np.percentile(far[shows], INSPECTION.colour_range))
+    share = np.clip((np.nan_to_num(far) - low) / max(high - low, INSPECTION.min_range_px), 0, 1)
     colours = cv2.applyColorMap(np.rint(share * 255).astype(np.uint8), cv2.COLORMAP_TURBO)[..., ::-1]
     return np.dstack([colours, np.where(shows, 255, 0).astype(np.uint8)]), (low, high)
 
@@ -133,8 +132,8 @@ def difference(result: StitchResult) -> NDArray[np.uint8]:
     edge = result.edges[0]
     pair = result.layers[edge.i], result.layers[edge.j]
     layers = [encode(_reduced(layer.pixels), 8) for layer in pair]
-    both = (pair[0].alpha > 0.5) & (pair[1].alpha > 0.5)
-    shows = _reduced(both.astype(np.float32)) > 0.999
+    both = (pair[0].alpha > INSPECTION.shown) & (pair[1].alpha > INSPECTION.shown)
+    shows = _reduced(both.astype(np.float32)) > INSPECTION.compared
     apart = cv2.absdiff(*layers).reshape(*shows.shape, -1)
     return np.dstack([np.repeat(apart, 3 // apart.shape[2], axis=2), np.where(shows, 255, 0).astype(np.uint8)])
 
@@ -144,7 +143,7 @@ def depth_grid(result: StitchResult) -> dict[str, Any]:
     (whether the panorama shows something there), both row by row from the top."""
     height, width = result.panorama.alpha.shape
     longest = max(width, height)
-    columns, rows = (max(2, round(LONGEST_GRID * side / longest)) for side in (width, height))
+    columns, rows = (max(2, round(INSPECTION.longest_grid * side / longest)) for side in (width, height))
     x, y = (np.rint(np.linspace(0, side - 1, n)).astype(int) for side, n in ((width, columns), (height, rows)))
     depth = result.warp.inverse_depth[np.ix_(y, x)].ravel()
     return {
@@ -161,7 +160,7 @@ def has_depth(result: StitchResult) -> bool:
 
 def _reduced(values: NDArray) -> NDArray:
     height, width = values.shape[:2]
-    factor = LONGEST_SIDE / max(width, height)
+    factor = INSPECTION.longest_side / max(width, height)
     if factor >= 1:
         return values
     size = max(1, round(width * factor)), max(1, round(height * factor))
