@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -221,7 +222,7 @@ def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
             )
 
 
-def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, ...]) -> Matches:
+def _given(source: Path | NDArray[Any], frame: Frame, cameras: tuple[Camera, ...]) -> Matches:
     """Matches from a file or array, at the scale of the work, without those in masked parts."""
     matches = read_matches(source, frame.full_sizes[0], frame.full_sizes[1], (cameras[0].size, cameras[1].size))
     seen = _shown(frame.pictures[0], matches.x) & _shown(frame.pictures[1], matches.y)
@@ -234,4 +235,5 @@ def _shown(picture: Picture, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     if picture.alpha is None:
         return np.ones(len(points), bool)
     column, row = np.clip(np.rint(points).astype(int), 0, np.array(size_of(picture)) - 1).T
-    return picture.alpha[row, column] > 0
+    opaque: NDArray[np.bool_] = picture.alpha[row, column] > 0
+    return opaque

@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .cameras.sources import CameraRequest
 from .choices import BLENDS, CROPS, FADES, FIELDS, HOLES, LEVELS, PROJECTIONS, ROUND_FIELDS, SEAMS, Crop, Level
@@ -39,8 +41,8 @@ class StitchOptions:
     field: str = "slack"
     fade: str = "plane"
     camera: CameraRequest = CameraRequest()
-    matches: Path | np.ndarray | None = None
-    ignore: tuple[Path | np.ndarray | None, ...] = ()
+    matches: Path | NDArray[Any] | None = None
+    ignore: tuple[Path | NDArray[Any] | None, ...] = ()
     projection: str = "perspective"
     level: Level = "auto"
     scale: float = 1.0
@@ -48,14 +50,14 @@ class StitchOptions:
     dense: bool = True
     blend: str = "multiband"
     seam: str = "graphcut"
-    mask: Path | np.ndarray | None = None
+    mask: Path | NDArray[Any] | None = None
     exposure: bool = True
     holes: str = "transparent"
     seed: int = 0
     measure: bool = True
     cache: Path | None = dataclasses.field(default=None, compare=False)
 
-    def ignored(self, number: int) -> Path | np.ndarray | None:
+    def ignored(self, number: int) -> Path | NDArray[Any] | None:
         """The mask of what is to be kept out of picture `number`."""
         return self.ignore[number] if number < len(self.ignore) else None
 

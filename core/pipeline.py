@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .alignment import Alignment, Frame, align, prepare
 from .cameras.camera import Camera
@@ -34,7 +35,7 @@ from .system.progress import Progress
 from .system.threads import in_order
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
-Source = str | Path | np.ndarray | Picture
+Source = str | Path | NDArray[Any] | Picture
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,8 @@ class StitchResult:
     pictures: tuple[Picture, ...]
     layers: tuple[Layer, ...]
     warp: Warp
-    occluded: tuple[np.ndarray, ...]
-    labels: np.ndarray | None
+    occluded: tuple[NDArray[np.bool_], ...]
+    labels: NDArray[np.int16] | None
     decided: tuple[Decided, ...]
     edges: tuple[Edge, ...]
     views: tuple[View, ...]
@@ -69,12 +70,12 @@ class StitchResult:
     full_sizes: tuple[tuple[int, int], ...]
 
     @property
-    def pixels(self) -> np.ndarray:
+    def pixels(self) -> NDArray[np.float32]:
         """The panorama's light (H, W, C) float32, scene-linear."""
         return self.panorama.pixels
 
     @property
-    def alpha(self) -> np.ndarray:
+    def alpha(self) -> NDArray[np.float32]:
         """The panorama's alpha (H, W) float32, straight."""
         return self.panorama.alpha.astype(np.float32)
 
@@ -107,7 +108,7 @@ class StitchResult:
         )  # fmt: skip
 
     @property
-    def confidence(self) -> np.ndarray:
+    def confidence(self) -> NDArray[np.float32]:
         """(H, W) float32, 0..1: how sure dense refinement is of a pixel of the warp's canvas; 0 where it said
         nothing."""
         confidence = self.warp.confidence
@@ -115,7 +116,7 @@ class StitchResult:
         return np.zeros(shape, np.float32) if confidence is None else confidence
 
     @property
-    def inpainted(self) -> np.ndarray:
+    def inpainted(self) -> NDArray[np.bool_]:
         """(H, W) bool: what no picture saw and was filled because that was asked for."""
         filled = np.zeros(self.layers[0].alpha.shape, bool)
         asked = self.report["options"]
@@ -244,7 +245,7 @@ def _picture(source: Source) -> Picture:
     return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
 
 
-def _on_canvas(painted: np.ndarray, canvas: Canvas) -> np.ndarray:
+def _on_canvas(painted: NDArray[np.int8], canvas: Canvas) -> NDArray[np.int8]:
     """What was painted over the whole panorama, on the canvas: of a sphere the part that the pictures cover."""
     left, top, width, height = canvas.whole
     return cut(painted_over(painted, (width, height)), (-left, -top, canvas.width, canvas.height))

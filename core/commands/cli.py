@@ -59,7 +59,7 @@ def _run(argv: Sequence[str] | None) -> int:
     before = {number: signal.signal(number, interrupt) for number in _STOPPING} if main_thread else {}
     try:
         args = _parser().parse_args(argv)
-        return args.run(args)
+        return int(args.run(args))
     except SystemExit as leaving:
         return int(leaving.code or 0)
     except (KeyboardInterrupt, Exception) as error:

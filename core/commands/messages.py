@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 def say(line: str) -> None:
@@ -17,7 +18,7 @@ def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
 
-def print_summary(report: dict, seconds: dict[str, float]) -> None:
+def print_summary(report: dict[str, Any], seconds: dict[str, float]) -> None:
     view, field, measured = report["two_view"], report["field"], report["measured"]
     focal = ", ".join(f"{value:.1f}" for value in view["focal_px"])
 

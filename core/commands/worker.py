@@ -233,7 +233,9 @@ def _png(values: Any) -> bytes:
     """uint8 (H, W) or RGBA (H, W, 4): values, not light, so without a profile or a curve."""
     import cv2
 
-    return cv2.imencode(".png", values if values.ndim == 2 else cv2.cvtColor(values, cv2.COLOR_RGBA2BGRA))[1].tobytes()
+    stored = values if values.ndim == 2 else cv2.cvtColor(values, cv2.COLOR_RGBA2BGRA)
+    png: bytes = cv2.imencode(".png", stored)[1].tobytes()
+    return png
 
 
 def _painted(further: Any, shows: Any) -> Any:

@@ -62,7 +62,8 @@ def match_errors(result: StitchResult, rows: NDArray[np.float64]) -> NDArray[np.
     edge, scale = result.edges[0], scales(result)
     x, y = homogeneous(rows[:, :2]) @ scale[edge.i].T, homogeneous(rows[:, 2:4]) @ scale[edge.j].T
     error = look_up(result.warp, x[:, :2], result.cameras[edge.i], edge.j) - y[:, :2]
-    return np.linalg.norm(error / np.diag(scale[edge.j])[:2], axis=1)
+    distance: Array = np.linalg.norm(error / np.diag(scale[edge.j])[:2], axis=1)
+    return distance
 
 
 def match_rows(result: StitchResult) -> dict[str, Any]:
@@ -109,7 +110,8 @@ def displacement_px(result: StitchResult) -> NDArray[np.float32]:
     infinite = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, result.cameras[0])
     far = distort(np.stack(transfer(view, infinite, np.zeros(1)), axis=-1), view.camera)
     moved = np.hypot(picture_map.x - far[..., 0], picture_map.y - far[..., 1])
-    return (moved / scales(result)[number][0, 0]).astype(np.float32)
+    in_full_px: NDArray[np.float32] = (moved / scales(result)[number][0, 0]).astype(np.float32)
+    return in_full_px
 
 
 def heat_map(result: StitchResult) -> tuple[NDArray[np.uint8], tuple[float, float]]:
@@ -158,10 +160,11 @@ def has_depth(result: StitchResult) -> bool:
     return bool(np.isfinite(t).all() and t.any())
 
 
-def _reduced(values: NDArray) -> NDArray:
+def _reduced(values: NDArray[Any]) -> NDArray[Any]:
     height, width = values.shape[:2]
     factor = INSPECTION.longest_side / max(width, height)
     if factor >= 1:
         return values
     size = max(1, round(width * factor)), max(1, round(height * factor))
-    return cv2.resize(values, size, interpolation=cv2.INTER_AREA).reshape(size[1], size[0], *values.shape[2:])
+    reduced: NDArray[Any] = cv2.resize(values, size, interpolation=cv2.INTER_AREA)
+    return reduced.reshape(size[1], size[0], *values.shape[2:])

@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..measure.report import plain
 from ..panorama.layers import Layer
@@ -162,13 +163,14 @@ def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result
         )
 
 
-def _label_bytes(labels: np.ndarray, count: int) -> bytes:
+def _label_bytes(labels: NDArray[np.int16], count: int) -> bytes:
     """A gray PNG of each pixel's picture (H, W), its number + 1, 0 for none: of 16 bits for more than 254 pictures."""
     values = (labels + 1).astype(np.uint8 if count < 255 else np.uint16)
-    return cv2.imencode(".png", values)[1].tobytes()
+    png: bytes = cv2.imencode(".png", values)[1].tobytes()
+    return png
 
 
-def _mask_bytes(mask: np.ndarray, shown: np.ndarray | None = None) -> bytes:
+def _mask_bytes(mask: NDArray[Any], shown: NDArray[np.bool_] | None = None) -> bytes:
     """A gray PNG of a mask or of shares 0..1 (H, W), 1 white, plain numbers and no light; transparent where nothing is
     shown (H, W)."""
     levels = np.rint(255 * mask.astype(np.float32)).astype(np.uint8)
@@ -188,7 +190,7 @@ def warp_bytes(result: StitchResult) -> bytes:
     e_prime = np.stack([view.e_prime for view in views])
     if not np.isfinite(warp.inverse_depth).any():
         e_prime[1:] = np.nan  # a field without depth slides nothing: inside, its e' is 0
-    arrays: dict[str, np.ndarray] = {
+    arrays: dict[str, NDArray[Any]] = {
         "format": np.array(WARP_FORMAT), "canvas": np.array([canvas.width, canvas.height]),
         "offset": np.array(canvas.offset, np.int64), "inverse_depth": warp.inverse_depth,
         "K": np.stack([view.K for view in views]), "R": np.stack([view.R for view in views]),
@@ -213,13 +215,13 @@ def warp_bytes(result: StitchResult) -> bytes:
     return npz_bytes(arrays)
 
 
-def npz_bytes(arrays: dict[str, np.ndarray]) -> bytes:
+def npz_bytes(arrays: dict[str, NDArray[Any]]) -> bytes:
     """An .npz file of arrays, the same bytes whenever it is made (numpy.savez puts the time of day into it)."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
         for name, array in arrays.items():
             with archive.open(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
+                np.save(member, np.asarray(array, order="C"), allow_pickle=False)
     return buffer.getvalue()
 
 
