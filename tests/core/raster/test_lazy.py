@@ -65,7 +65,7 @@ def test_what_each_kind_is() -> None:
     frame = np.zeros((H, W, channels), np.float32)
     frame[5:14, 7:19] = placed.light
     assert np.array_equal(whole(placed), frame)
-    assert np.array_equal(whole(cut), np.where(cut.from_second[..., None], cut.second, cut.first))
+    assert np.array_equal(whole(cut), np.where(cut.chosen[..., None], cut.added, cut.before))
     changed = np.zeros((H, W), bool)
     changed[6:15, 8:25] = evened.touched
     differs = (whole(evened) != evened.light).any(axis=2)
@@ -74,7 +74,7 @@ def test_what_each_kind_is() -> None:
     frame = patched.light.copy()
     frame[6:15, 8:25][patched.touched] = patched.patch[patched.touched]
     assert np.array_equal(whole(patched), frame)
-    first, second = mixed.first, mixed.second
+    first, second = mixed.before, mixed.layer
     alone = (first.alpha > 0) & (second.alpha == 0)
     assert np.array_equal(whole(mixed)[alone], first.light[alone])
     both = (first.alpha > 0) & (second.alpha > 0)
