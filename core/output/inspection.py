@@ -1,7 +1,8 @@
-"""What a window shows of a finished stitch: each match with its error, the overlap's difference, how far points slide,
-and the inverse depth on a coarse grid. Small beside the panorama, and in px of the full pictures.
+"""What a window shows of a finished stitch: each match with its error, the difference of the pictures in the overlap,
+how far parallax moves each pixel, and the inverse depth on a coarse grid. Points are in px of the full pictures.
 
-A whole sphere's warp and layers are to be spread over it before (`StitchResult.spread_out`).
+Results with a whole sphere are to be passed through `StitchResult.spread_out` before, so that all arrays have the
+panorama's size.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ USED, LEFT_OUT = "USED", "LEFT_OUT"
 
 
 def scales(result: StitchResult) -> list[Array]:
-    """For each picture the matrix S (3, 3) that brings px of the full picture to px of the one that was worked on."""
+    """For each picture the matrix S (3, 3) from px of the full picture to px of the one that was worked on."""
     out = []
     for full, camera in zip(result.full_sizes, result.cameras, strict=True):
         factor, shift = size_change(full, camera.size)
@@ -39,10 +40,20 @@ def scales(result: StitchResult) -> list[Array]:
 
 
 def full_geometry(result: StitchResult) -> dict[str, Any]:
-    """Where things lie, JSON-ready up to arrays: `full_sizes` (W, H); `F`, `K`, `K_prime`, `R`, `t`, `distortion`,
-    `distortion_prime` (5,) in px of the full upright pictures; `S` (3, 3): from those of the reference to the canvas;
-    `canvas` (W, H) px; `K_canvas` (3, 3). The canvas of a round panorama is none of a pinhole camera: S and K_canvas
-    are NaN there, and the report's `canvas.projection` says what it shows."""
+    """Cameras and canvas in px of the full upright pictures.
+
+    Parameters
+    ----------
+    result : StitchResult
+
+    Returns
+    -------
+    dict
+        JSON-ready but for arrays. `full_sizes`: (W, H) of each picture. `F`, `K`, `K_prime`, `R`, `t`, `model`: the
+        geometry of the pair. `distortion`, `distortion_prime` (5,). `canvas`: (W, H) px. `S` (3, 3): from px of the
+        reference to the canvas. `K_canvas` (3, 3): intrinsics of the canvas. A cylinder or sphere is no pinhole image:
+        S and K_canvas are NaN there, and the report's `canvas.projection` says what the canvas shows.
+    """
     edge, canvas = result.edges[0], result.canvas
     view, scale = edge.two_view, scales(result)
     S, S_prime = scale[edge.i], scale[edge.j]
@@ -57,8 +68,8 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
 
 
 def match_errors(result: StitchResult, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far (N,) in full target px the map leads from x', for rows (N, ≥ 4) x, y, x', y' of full px; NaN where the
-    panorama does not show x."""
+    """Distance (N,), in px of the full target, between where the map sees x and its match x'; rows (N, ≥ 4): x, y, x',
+    y' in px of the full pictures. NaN where the panorama does not show x."""
     edge, scale = result.edges[0], scales(result)
     x, y = homogeneous(rows[:, :2]) @ scale[edge.i].T, homogeneous(rows[:, 2:4]) @ scale[edge.j].T
     error = look_up(result.warp, x[:, :2], result.cameras[edge.i], edge.j) - y[:, :2]
@@ -67,8 +78,18 @@ def match_errors(result: StitchResult, rows: NDArray[np.float64]) -> NDArray[np.
 
 
 def match_rows(result: StitchResult) -> dict[str, Any]:
-    """All matches that were found: `rows` (N, 4) full px to a thousandth, `weights`, `states` (USED: the field stands
-    on it, LEFT_OUT: it contradicts the others), `errors` as `match_errors`; `file`: see `match_file`, as text."""
+    """All matches that were found, for the window's list.
+
+    Parameters
+    ----------
+    result : StitchResult
+
+    Returns
+    -------
+    dict
+        `rows` (N, 4): x, y, x', y' in px of the full pictures, to a thousandth. `weights` (N,). `states`: USED or
+        LEFT_OUT, for each. `errors` (N,): see `match_errors`. `file`: see `match_file`, as text.
+    """
     edge, back = result.edges[0], [np.linalg.inv(S) for S in scales(result)]
     found = edge.matches
     x, y = homogeneous(found.x) @ back[edge.i].T, homogeneous(found.y) @ back[edge.j].T
@@ -82,7 +103,7 @@ def match_rows(result: StitchResult) -> dict[str, Any]:
 
 
 def given_rows(result: StitchResult, rows: NDArray[np.float64]) -> dict[str, Any]:
-    """The same, but no `file`, of the matches (N, 5) that were given, all of them and in their order."""
+    """As `match_rows`, without `file`, of matches that were given: rows (N, 5) x, y, x', y', weight, in their order."""
     used = result.used_matches
     places = {_place(row) for row in np.column_stack([used.x, used.y])}
     is_used = np.array([_place(row) in places for row in rows[:, :4]]) & (rows[:, 4] > 0)
@@ -93,6 +114,7 @@ def given_rows(result: StitchResult, rows: NDArray[np.float64]) -> dict[str, Any
 
 
 def _place(row: NDArray[np.float64]) -> tuple[float, ...]:
+    """A match's points to a thousandth px, by which it is found again after it went through other sizes."""
     return tuple(np.round(row, 3).tolist())
 
 
@@ -101,8 +123,8 @@ def _states(used: NDArray[np.bool_]) -> list[str]:
 
 
 def displacement_px(result: StitchResult) -> NDArray[np.float32]:
-    """How far (H, W) in full px of a further picture each canvas pixel lies from where it would be seen if it were
-    infinitely far; 0 where the model knows no depth, NaN behind its camera."""
+    """Distance (H, W), in px of the full target, between where each canvas pixel is seen and where it would be seen at
+    infinity; 0 for a model without depth, NaN behind the camera."""
     warp, number = result.warp, result.edges[0].j
     view, picture_map = result.views[number], warp.maps[number].arrays()
     if not view.e_prime.any():
@@ -115,8 +137,8 @@ def displacement_px(result: StitchResult) -> NDArray[np.float32]:
 
 
 def heat_map(result: StitchResult) -> tuple[NDArray[np.uint8], tuple[float, float]]:
-    """The slide as a picture (h, w, 4) uint8 RGBA, reduced, transparent where the target shows nothing; and the px that
-    its blue and its red end stand for."""
+    """`displacement_px` as a reduced picture (h, w, 4) uint8 RGBA, transparent where the target shows nothing; and the
+    px that the blue and the red end of its scale stand for."""
     layer = result.layers[result.edges[0].j]
     far, shows = _reduced(displacement_px(result)), _reduced((layer.alpha > 0).astype(np.float32)) > INSPECTION.shown
     shows &= np.isfinite(far)
@@ -129,8 +151,8 @@ def heat_map(result: StitchResult) -> tuple[NDArray[np.uint8], tuple[float, floa
 
 
 def difference(result: StitchResult) -> NDArray[np.uint8]:
-    """|reference − warped target| of the display-encoded layers, (h, w, 4) uint8 RGBA, reduced; opaque where both
-    show."""
+    """|reference − warped target| of the display-encoded layers as a reduced picture (h, w, 4) uint8 RGBA, opaque where
+    both show something."""
     edge = result.edges[0]
     pair = result.layers[edge.i], result.layers[edge.j]
     layers = [encode(_reduced(layer.pixels), 8) for layer in pair]
@@ -141,8 +163,18 @@ def difference(result: StitchResult) -> NDArray[np.uint8]:
 
 
 def depth_grid(result: StitchResult) -> dict[str, Any]:
-    """The inverse depth at nodes over the canvas, corner to corner: `columns`, `rows`, `inverse_depth` and `shows`
-    (whether the panorama shows something there), both row by row from the top."""
+    """The inverse depth d (docs/method.md) at nodes of a grid from corner to corner of the canvas.
+
+    Parameters
+    ----------
+    result : StitchResult
+
+    Returns
+    -------
+    dict
+        `columns`, `rows`: nodes in either direction. `inverse_depth` and `shows` (1 where the panorama is not
+        transparent): one value for each node, row by row from the top.
+    """
     height, width = result.panorama.alpha.shape
     longest = max(width, height)
     columns, rows = (max(2, round(INSPECTION.longest_grid * side / longest)) for side in (width, height))
@@ -155,12 +187,13 @@ def depth_grid(result: StitchResult) -> dict[str, Any]:
 
 
 def has_depth(result: StitchResult) -> bool:
-    """Whether the model says where things stand: the cameras' places are known and differ."""
+    """Whether inverse depth means something: the cameras' positions are known and differ."""
     t = np.stack([view.t for view in result.views])
     return bool(np.isfinite(t).all() and t.any())
 
 
 def _reduced(values: NDArray[Any]) -> NDArray[Any]:
+    """An image (H, W, …) averaged down to `InspectionOptions.longest_side`; as it is where it is no larger."""
     height, width = values.shape[:2]
     factor = INSPECTION.longest_side / max(width, height)
     if factor >= 1:
