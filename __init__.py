@@ -9,7 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .core.pipeline import StitchOptions, stitch
+    from .core.options import StitchOptions
+    from .core.pipeline import stitch
     from .core.system.errors import StitchError
 
     __version__: str

@@ -1,7 +1,7 @@
 """How pictures lie on the reference: from pictures to matches, geometry, field and maps.
 
-Everything that is decided before a pixel is fetched. Several frames of fixed cameras share one alignment: their matches
-are pooled, so that a clip does not swim.
+Everything that is decided before pixels are blended. Frames of a clip, whose cameras stand still, share one alignment:
+their matches are pooled, so that the panorama does not wobble from frame to frame. The method: docs/method.md.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,23 +35,35 @@ from .pictures.picture import Picture, resized
 from .pose import features
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
-from .pose.options import ESTIMATION
+from .pose.options import ESTIMATION, FEATURES
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, TooFewMatches
 from .system.threads import in_order
 
-# With fewer points of detail than this a picture is to blame, not the pair.
-SCARCE = 100
-# Called with a stage's name and how much of it is done.
+# Called with a stage's name and the share of that stage that is done.
 ReportProgress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """Where every canvas pixel is seen in each picture, and why.
+    """Where every canvas pixel is seen in each picture, and what that follows from.
 
-    cameras: as known before; edges: pairs of pictures with their matches and geometry; views: what follows from them
-    for each picture; field; dense: its refinement, None where none was asked for; warp; warnings in plain words.
+    Attributes
+    ----------
+    cameras : tuple of Camera
+        As they were known before estimation.
+    edges : tuple of Edge
+        Pairs of pictures with their matches and geometry.
+    views : tuple of View
+        Each picture's place relative to the reference, as its edges have it.
+    field : Field
+        The displacement field.
+    warp : Warp
+        The maps from the canvas to each picture.
+    warnings : tuple of str
+        In plain words.
+    dense : Dense or None
+        Dense refinement of the field; None where it was not asked for.
     """
 
     cameras: tuple[Camera, ...]
@@ -64,8 +77,17 @@ class Alignment:
 
 @dataclass(frozen=True)
 class Frame:
-    """Pictures as they are worked on, the reference first, without what is masked and at the scale asked for; their
-    full sizes; and what was painted over the panorama (see `masks.read_painted`)."""
+    """The pictures of one panorama, made ready.
+
+    Attributes
+    ----------
+    pictures : tuple of Picture
+        The reference first, scaled, and without what is masked.
+    full_sizes : tuple of (W, H)
+        px of the pictures as they came.
+    painted : ndarray (H, W) int8 or None
+        What was painted over the panorama (see `masks.read_painted`).
+    """
 
     pictures: tuple[Picture, ...]
     full_sizes: tuple[tuple[int, int], ...]
@@ -87,9 +109,12 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions) -> Frame:
 
 @dataclass(frozen=True)
 class Geometry:
-    """How the cameras stood, before any field: what all fields of the same pictures have in common.
+    """What was found before any field was fitted: all fields of the same pictures share it.
 
-    cameras, edges, warnings: as in `Alignment`.
+    Attributes
+    ----------
+    cameras, edges, warnings
+        As in `Alignment`.
     """
 
     cameras: tuple[Camera, ...]
@@ -98,15 +123,53 @@ class Geometry:
 
 
 def align(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Alignment:
-    """Aligns the pictures of each frame with its reference; all frames share their cameras, hence one alignment.
+    """Finds how the pictures of frames lie on their reference.
 
-    Raises StitchError and its kinds.
+    Parameters
+    ----------
+    frames : sequence of Frame
+        Of the same cameras, none of which moved: their matches are pooled, and they share the alignment.
+    options : StitchOptions
+    progress : callable
+        progress(stage, share of that stage that is done).
+
+    Returns
+    -------
+    Alignment
+
+    Raises
+    ------
+    StitchError
+        And its kinds: too few matches, no overlap, a geometry that explains nothing.
     """
     return fit_and_warp(estimate_geometry(frames, options, progress), frames, options, progress)
 
 
 def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Geometry:
-    """Matches and geometry of frames that share their cameras. Raises StitchError and its kinds."""
+    """The first half of `align`: finds or reads matches, and estimates the geometry of the cameras from them.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        Of the same cameras.
+    options : StitchOptions
+        What is known of cameras and matches; preview, seed and cache. The field does not matter.
+    progress : callable
+        As for `align`.
+
+    Returns
+    -------
+    Geometry
+
+    Raises
+    ------
+    BadRequest
+        Frames of different sizes, or cameras and matches that do not fit the pictures.
+    UnreadableImage
+        A file of cameras or matches that cannot be read.
+    TooFewMatches, NoOverlap, DegenerateGeometry
+        There is no geometry to rely on.
+    """
     pictures, sizes = frames[0].pictures, frames[0].full_sizes
     if any(frame.full_sizes != sizes for frame in frames):
         raise BadRequest("the frames of a clip differ in size: one alignment is for one camera each")
@@ -134,7 +197,30 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
 def fit_and_warp(
     geometry: Geometry, frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress
 ) -> Alignment:
-    """Field and maps of the frames whose geometry is known. Raises StitchError and its kinds."""
+    """The second half of `align`: fits the displacement field, refines it, and builds the maps.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Of these frames.
+    frames : sequence of Frame
+        Only a single one is refined: a clip keeps one smooth field.
+    options : StitchOptions
+        Field, fade, dense, projection and level; seed and cache.
+    progress : callable
+        As for `align`.
+
+    Returns
+    -------
+    Alignment
+
+    Raises
+    ------
+    DegenerateGeometry
+        The matches determine no field.
+    NoOverlap, OutputTooLarge, BadRequest
+        There is no canvas for it (see `build_warp`).
+    """
     cameras = geometry.cameras
     (edge,) = geometry.edges
     progress("field", 0.0)
@@ -152,9 +238,9 @@ def fit_and_warp(
         )  # fmt: skip
 
     progress("warp", 0.0)
-    # a rival's geometry is as little as it knows
+    # the field's own geometry: a rival knows no depth, so its views have none
     views = views_of(field.two_view, cameras)
-    refined = None if dense is None else dense.relief
+    refined = None if dense is None else dense.refined
     warp = build_warp(field, views, _projection(options, views, frames[0]), refined)
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense)
@@ -196,8 +282,9 @@ def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> 
 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:
+    """Features matched in each frame and pooled, in px of the pictures as worked on; quick: a preview's few."""
     found = []
-    most = (features.FEATURES.preview_budget, features.FEATURES.preview_pixels) if quick else ()
+    most = (FEATURES.preview_budget, FEATURES.preview_pixels) if quick else ()
     for i, frame in enumerate(frames):
         seen = []
         for keypoints in in_order(lambda p: features.detect(p.view, p.alpha, *most), frame.pictures):
@@ -214,7 +301,7 @@ def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
     """Raises TooFewMatches where there are few because one picture has hardly any points of detail; else it is the
     pair's fault, which `estimate` says."""
     for number, (picture, count) in enumerate(zip(frame.pictures, details, strict=True)):
-        if count < SCARCE:
+        if count < FEATURES.scarce_points:
             width, height = size_of(picture)
             raise TooFewMatches(
                 f"only {matches} matching points found, at least {ESTIMATION.min_matches} needed: the "
@@ -223,7 +310,7 @@ def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
             )
 
 
-def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, ...]) -> Matches:
+def _given(source: Path | NDArray[Any], frame: Frame, cameras: tuple[Camera, ...]) -> Matches:
     """Matches from a file or array, at the scale of the work, without those in masked parts."""
     matches = read_matches(source, frame.full_sizes[0], frame.full_sizes[1], (cameras[0].size, cameras[1].size))
     seen = _shown(frame.pictures[0], matches.x) & _shown(frame.pictures[1], matches.y)
@@ -233,7 +320,9 @@ def _given(source: Path | np.ndarray, frame: Frame, cameras: tuple[Camera, ...])
 
 
 def _shown(picture: Picture, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which points (N, 2) px lie where the picture is not transparent (N,)."""
     if picture.alpha is None:
         return np.ones(len(points), bool)
     column, row = np.clip(np.rint(points).astype(int), 0, np.array(size_of(picture)) - 1).T
-    return picture.alpha[row, column] > 0
+    opaque: NDArray[np.bool_] = picture.alpha[row, column] > 0
+    return opaque

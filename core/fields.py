@@ -19,10 +19,31 @@ def fit_field(
     name: str, fade: str, two_view: TwoView, matches: Matches, size: tuple[int, int], target_size: tuple[int, int],
     seed: int = 0,
 ) -> Field:  # fmt: skip
-    """The field called `name` (one of FIELDS), fitted to inlier matches; sizes (W, H) px; fade: `plane` or `infinity`.
+    """Fits a displacement field to the inlier matches of a pair.
 
-    Its `two_view` is what its map is built on: the given one, of a rival as little as it knows. Raises
-    DegenerateGeometry.
+    Parameters
+    ----------
+    name : str
+        One of FIELDS.
+    fade : str
+        What it fades to outside the overlap, one of FADES.
+    two_view : TwoView
+    matches : Matches
+        Inliers, ideal px.
+    size, target_size : (W, H)
+        px of the reference and of the target.
+    seed : int
+        Of random choices.
+
+    Returns
+    -------
+    Field
+        Its `two_view` is what its map is built on: the given one, or what a rival knows of it.
+
+    Raises
+    ------
+    DegenerateGeometry
+        The matches determine no such field.
     """
     if name == "homography":
         return fit_one_homography(two_view, matches, seed)

@@ -5,42 +5,75 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .cameras.sources import CameraRequest
 from .choices import BLENDS, CROPS, FADES, FIELDS, HOLES, LEVELS, PROJECTIONS, ROUND_FIELDS, SEAMS, Crop, Level
 from .system.errors import BadRequest
 
+# Below a fiftieth of its side a photograph has too few pixels for features.
 LEAST_SCALE = 0.02
 
 
 @dataclass(frozen=True)
 class StitchOptions:
-    """The defaults are right for two photographs of one camera.
+    """What a user may decide about a stitch; the defaults are right for two photographs of one camera.
 
-    field: one of FIELDS; fade: what it ends in outside the overlap, one of FADES; camera: what is known of the cameras;
-    matches: to be used as given instead of searched for, a file or (N, 4 or 5) rows x, y, x2, y2[, weight] in px of the
-    full pictures, or the file beside a report, whose matches count as found; ignore: for each picture, the reference
-    first, a mask of what is to be kept out, a file or array, white = ignored, or None (which those that are not named
-    get, too);
-    projection: one of PROJECTIONS; level: how a cylindrical or equirectangular panorama is turned, one of LEVELS or
-    yaw, pitch, roll of the reference camera in degrees (see `levelling`); scale: both pictures are resized by this
-    first, at most 1; crop: what of the panorama is kept (see `crop_box`); dense: whether every pixel of the overlap is
-    sought along its epipolar line; blend: one of BLENDS; seam: one of SEAMS, of no matter for `linear`; mask: what an
-    artist painted over the whole panorama, a file or array, black = from the reference, white = from the target, gray
-    or transparent = the seam decides; exposure: whether the target's is matched to the reference's; holes: what becomes
-    of what neither camera saw because something near hid it, one of HOLES (an average has none); seed: of every random
-    choice; measure: whether the report also compares the pictures in the overlap and holds matches back to see
-    how far the field can be trusted; cache: the folder where features, geometry and fields are kept for the next stitch
-    of the same pictures, None for nowhere (the outcome is the same).
+    Attributes
+    ----------
+    field : str, default "slack"
+        The displacement field, one of FIELDS.
+    fade : str, default "plane"
+        What the field fades to outside the overlap, one of FADES.
+    camera : CameraRequest
+        What is known of the cameras. By default nothing: EXIF is asked, or the focal length estimated.
+    matches : Path or ndarray (N, 4 or 5), optional
+        Matches instead of those that are found: a file, or rows x, y, x2, y2[, weight] in px of the full pictures. They
+        are used as given; those of a report's own file count as found.
+    ignore : tuple of (Path, ndarray or None), default empty
+        For each picture, the reference first, a mask of what is kept out of everything, white = ignored. None, and what
+        is not named: nothing.
+    projection : str, default "perspective"
+        The surface that the panorama lies on, one of PROJECTIONS.
+    level : str or (yaw, pitch, roll), default "auto"
+        How a cylindrical or equirectangular panorama is turned: one of LEVELS, or the reference camera's angles in
+        degrees (see `levelling`).
+    scale : float, default 1
+        Factor by which all pictures are resized first, from LEAST_SCALE to 1.
+    crop : str or (left, top, width, height), default "full"
+        What is kept of the panorama: one of CROPS, or a box in px of it (see `crop_box`).
+    dense : bool, default True
+        Whether every pixel of the overlap is searched for along its epipolar line.
+    blend : str, default "multiband"
+        How the pictures are blended, one of BLENDS.
+    seam : str, default "graphcut"
+        How the seam between them is found, one of SEAMS; `linear` blending has none.
+    mask : Path or ndarray, optional
+        Painted over the whole panorama: black = from the reference, white = from the target, gray or transparent = the
+        seam decides.
+    exposure : bool, default True
+        Whether the target's exposure and white balance are matched to the reference's.
+    holes : str, default "transparent"
+        What becomes of pixels that no camera saw because something near hid them, one of HOLES. `linear` blending has
+        no holes.
+    seed : int, default 0
+        Of every random choice, 0 to 2³¹ − 1.
+    measure : bool, default True
+        Whether the report also compares the pictures in the overlap, and holds matches back to see how far the field
+        can be trusted.
+    cache : Path, optional
+        Folder where features, geometry and fields are kept for the next stitch of the same pictures; the outcome is the
+        same. None: they are not kept.
     """
 
     field: str = "slack"
     fade: str = "plane"
     camera: CameraRequest = CameraRequest()
-    matches: Path | np.ndarray | None = None
-    ignore: tuple[Path | np.ndarray | None, ...] = ()
+    matches: Path | NDArray[Any] | None = None
+    ignore: tuple[Path | NDArray[Any] | None, ...] = ()
     projection: str = "perspective"
     level: Level = "auto"
     scale: float = 1.0
@@ -48,14 +81,14 @@ class StitchOptions:
     dense: bool = True
     blend: str = "multiband"
     seam: str = "graphcut"
-    mask: Path | np.ndarray | None = None
+    mask: Path | NDArray[Any] | None = None
     exposure: bool = True
     holes: str = "transparent"
     seed: int = 0
     measure: bool = True
     cache: Path | None = dataclasses.field(default=None, compare=False)
 
-    def ignored(self, number: int) -> Path | np.ndarray | None:
+    def ignored(self, number: int) -> Path | NDArray[Any] | None:
         """The mask of what is to be kept out of picture `number`."""
         return self.ignore[number] if number < len(self.ignore) else None
 

@@ -1,4 +1,8 @@
-"""`stitch()`: the one way in. The stages stand here in the order of the data."""
+"""From pictures to a panorama: `stitch()`, and its three stages for those who need them apart.
+
+`read_frame` reads the pictures, `alignment.align` finds how they lie on the reference, `compose` makes one picture of
+them. A clip aligns many frames at once and composes each; a comparison composes one frame by several fields.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .alignment import Alignment, Frame, align, prepare
 from .cameras.camera import Camera
@@ -34,21 +39,51 @@ from .system.progress import Progress
 from .system.threads import in_order
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
-Source = str | Path | np.ndarray | Picture
+Source = str | Path | NDArray[Any] | Picture
 
 
 @dataclass(frozen=True)
 class StitchResult:
-    """A finished panorama and everything it was made of. Tuples hold one entry for each picture, the reference first.
+    """A finished panorama and everything it was made of.
 
-    panorama: what is shown on `canvas`, its light worked out where it is asked for (see `lazy`), as arrays `pixels`
-    (H, W, C) float32 scene-linear and alpha (H, W), straight. On `warp.canvas`, which is the same, but of a whole
-    sphere the part that the pictures cover (see `spread`): the layers, the warp, occluded (H, W) bool (what a picture
-    cannot see though the map falls inside it) and labels (H, W) (which picture a pixel comes from, −1 none; None
-    without a seam). What was decided about each picture on the whole canvas; the edges with all matches, before inlier
-    choice; views; field; the cameras as known before; `report`: a JSON-ready dict; `seconds` by stage. Scale and crop
-    are done: pixels are those of the panorama and of the pictures as they were worked on; `full_sizes` (W, H): of the
-    pictures as they came.
+    Tuples hold one entry for each picture, the reference first. Scale and crop are done: px are those of the panorama,
+    and of the pictures as they were worked on. `warp`, `layers`, `occluded` and `labels` lie on `warp.canvas` (H, W).
+    That is `canvas`, but of a whole sphere only the part that the pictures cover (see `spread`).
+
+    Attributes
+    ----------
+    panorama : Layer
+        What `canvas` shows. Its light is a lazy image, worked out where it is asked for.
+    canvas : Canvas
+        Size and place of the panorama.
+    pictures : tuple of Picture
+        As they were worked on: scaled, and without what was masked.
+    layers : tuple of Layer
+        Each picture on the canvas, before exposure and blending.
+    warp : Warp
+        The maps from the canvas to each picture, with inverse depth and confidence.
+    occluded : tuple of ndarray (H, W) bool
+        What a picture cannot see though its map falls inside it.
+    labels : ndarray (H, W) int16 or None
+        Which picture a pixel comes from, −1 for none; None without a seam.
+    decided : tuple of Decided
+        What was decided about each picture, on the uncropped canvas.
+    edges : tuple of Edge
+        Pairs of pictures with their geometry and all matches, before inliers were chosen.
+    views : tuple of View
+        Each picture's place relative to the reference.
+    field : Field
+        The displacement field.
+    cameras : tuple of Camera
+        As they were known before estimation.
+    warnings : tuple of str
+        In plain words.
+    report : dict
+        What was measured and decided, JSON-ready (docs/formats.md).
+    seconds : dict of float
+        Wall time of each stage, s.
+    full_sizes : tuple of (W, H)
+        px of the pictures as they came.
     """
 
     panorama: Layer
@@ -56,8 +91,8 @@ class StitchResult:
     pictures: tuple[Picture, ...]
     layers: tuple[Layer, ...]
     warp: Warp
-    occluded: tuple[np.ndarray, ...]
-    labels: np.ndarray | None
+    occluded: tuple[NDArray[np.bool_], ...]
+    labels: NDArray[np.int16] | None
     decided: tuple[Decided, ...]
     edges: tuple[Edge, ...]
     views: tuple[View, ...]
@@ -69,12 +104,12 @@ class StitchResult:
     full_sizes: tuple[tuple[int, int], ...]
 
     @property
-    def pixels(self) -> np.ndarray:
+    def pixels(self) -> NDArray[np.float32]:
         """The panorama's light (H, W, C) float32, scene-linear."""
         return self.panorama.pixels
 
     @property
-    def alpha(self) -> np.ndarray:
+    def alpha(self) -> NDArray[np.float32]:
         """The panorama's alpha (H, W) float32, straight."""
         return self.panorama.alpha.astype(np.float32)
 
@@ -91,7 +126,7 @@ class StitchResult:
 
     @property
     def spread(self) -> Box:
-        """The panorama's place on the canvas of warp and layers: `within` this they have its size."""
+        """The panorama's box on the canvas of warp and layers, px; it may reach beyond that."""
         (x, y), (left, top) = self.warp.canvas.offset, self.canvas.offset
         return x - left, y - top, self.canvas.width, self.canvas.height
 
@@ -107,7 +142,7 @@ class StitchResult:
         )  # fmt: skip
 
     @property
-    def confidence(self) -> np.ndarray:
+    def confidence(self) -> NDArray[np.float32]:
         """(H, W) float32, 0..1: how sure dense refinement is of a pixel of the warp's canvas; 0 where it said
         nothing."""
         confidence = self.warp.confidence
@@ -115,7 +150,7 @@ class StitchResult:
         return np.zeros(shape, np.float32) if confidence is None else confidence
 
     @property
-    def inpainted(self) -> np.ndarray:
+    def inpainted(self) -> NDArray[np.bool_]:
         """(H, W) bool: what no picture saw and was filled because that was asked for."""
         filled = np.zeros(self.layers[0].alpha.shape, bool)
         asked = self.report["options"]
@@ -181,7 +216,28 @@ def check_count(count: int) -> None:
 
 
 def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
-    """The pictures, in one colour space. Raises UnreadableImage, BadRequest, NoOverlap (one picture twice)."""
+    """Reads the pictures of one panorama and brings them into one colour space.
+
+    Parameters
+    ----------
+    sources : sequence of (str, Path, ndarray or Picture)
+        The first is the reference.
+    options : StitchOptions
+        Their scale and masks.
+
+    Returns
+    -------
+    Frame
+
+    Raises
+    ------
+    UnreadableImage
+        A file is no picture, or damaged.
+    BadRequest
+        A wrong number of pictures, or a mask that does not fit.
+    NoOverlap
+        The same picture twice.
+    """
     check_count(len(sources))
     pictures = in_same_colour_space(list(in_order(_picture, sources)))
     views = [picture.view for picture in pictures]
@@ -194,8 +250,29 @@ def compose(
     frame: Frame, alignment: Alignment, options: StitchOptions, progress: Stopwatch,
     decided: Sequence[Decided] | None = None, keep: bool = False,
 ) -> StitchResult:  # fmt: skip
-    """The panorama of pictures by an alignment, which may come from other frames of the same cameras, as may what was
-    decided about exposure and seam. decided, keep: see `composed`."""
+    """Makes one panorama of aligned pictures.
+
+    Parameters
+    ----------
+    frame : Frame
+    alignment : Alignment
+        Of these pictures, or of other frames of the same cameras.
+    options : StitchOptions
+    progress : Stopwatch
+    decided : sequence of Decided, optional
+        Exposure and seam that were decided about other frames of the same cameras, to be kept to.
+    keep : bool
+        Whether to keep what the seams were cut by, for `pooled_decision`.
+
+    Returns
+    -------
+    StitchResult
+
+    Raises
+    ------
+    BadRequest
+        A crop that the panorama does not hold, or a painted mask that does not fit.
+    """
     pictures, whole = frame.pictures, alignment.warp
     progress("warp", 0.5)
     layers = tuple(layer_of(picture, one) for picture, one in zip(pictures, whole.maps, strict=True))
@@ -223,7 +300,7 @@ def compose(
 
 
 class Stopwatch:
-    """Reports each stage, lets it be cancelled, and keeps its seconds."""
+    """A progress callable that also keeps the seconds of each stage (`seconds`), and raises Cancelled where asked."""
 
     def __init__(self, progress: Progress) -> None:
         self.seconds: dict[str, float] = {}
@@ -239,16 +316,18 @@ class Stopwatch:
 
 
 def _picture(source: Source) -> Picture:
+    """A picture, read where it is not one yet."""
     if isinstance(source, Picture):
         return source
     return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
 
 
-def _on_canvas(painted: np.ndarray, canvas: Canvas) -> np.ndarray:
+def _on_canvas(painted: NDArray[np.int8], canvas: Canvas) -> NDArray[np.int8]:
     """What was painted over the whole panorama, on the canvas: of a sphere the part that the pictures cover."""
     left, top, width, height = canvas.whole
     return cut(painted_over(painted, (width, height)), (-left, -top, canvas.width, canvas.height))
 
 
 def _named(picture: Picture) -> list[str]:
+    """The warnings about a picture, each with its name."""
     return [f"{picture.name}: {warning}" for warning in picture.warnings]

@@ -58,7 +58,7 @@ SHORT = 20
 # What takes its arguments in any order; what reports progress and is no part of the result; strip sizes and the like.
 SYMMETRIC = {"min", "max", "minimum", "maximum", "hypot", "absdiff", "multiply", "add"}
 OBVIOUS = {"isinstance", "zip", "map", "resize", "zeros", "full", "empty", "array", "ones"}  # another order would crash
-REPORTS = {"steps", "progress", "report", "print"}
+REPORTS = {"progress", "report", "print"}
 KEPT_KEYWORDS = {"strict", "copy", "iterations", "max_nfev", "keepdims"}
 # Sides of a comparison that are whole numbers: others are never met exactly.
 WHOLE = re.compile(r"^\d+$|len\(|\.size|\.sum\(|shape|[-+] 1\b")

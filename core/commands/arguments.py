@@ -15,8 +15,30 @@ if TYPE_CHECKING:
 
 
 def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> None:
-    """Adds everything that decides about a panorama; where files go is each command's own, as is `--field` where one
-    command stitches with several."""
+    """Adds everything that decides about a panorama, group by group; where files go is each command's own.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+    with_field : bool
+        Whether `--field` is among them; not where one command stitches with several.
+    """
+    _add_cameras(parser)
+    _add_control(parser)
+    how = parser.add_argument_group("how")
+    if with_field:
+        how.add_argument(
+            "--field", default="slack", type=_choice(FIELDS), metavar="FIELD",
+            help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), "
+            "paper, or one that knows no depth: rew, apap, homography",
+        )  # fmt: skip
+    _add_alignment(how)
+    _add_composition(how)
+    _add_repetition(how)
+
+
+def _add_cameras(parser: argparse.ArgumentParser) -> None:
+    """What is known of the cameras."""
     camera = parser.add_argument_group(
         "cameras", "One value serves both pictures; two are for REF,TARGET. Without any: EXIF, or an estimate."
     )
@@ -25,29 +47,26 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         "--focal-mm", type=_numbers, default=(), metavar="F[,F2]", help="focal length in mm (with --sensor-mm)"
     )
     camera.add_argument(
-        "--sensor-mm",
-        type=_numbers,
-        default=(),
-        metavar="W[,W2]",
+        "--sensor-mm", type=_numbers, default=(), metavar="W[,W2]",
         help="width of the sensor in mm, along the longer side",
-    )
+    )  # fmt: skip
     camera.add_argument("--focal35", type=_numbers, default=(), metavar="F[,F2]", help="35 mm equivalent focal length")
     camera.add_argument(
-        "--principal",
-        type=_numbers,
-        default=(),
-        metavar="X,Y[,X2,Y2]",
+        "--principal", type=_numbers, default=(), metavar="X,Y[,X2,Y2]",
         help="principal point in pixels (default: the middle)",
-    )
+    )  # fmt: skip
     camera.add_argument(
         "--cameras", type=Path, metavar="FILE.json", help="per picture K, optionally distortion, R and t"
     )
 
+
+def _add_control(parser: argparse.ArgumentParser) -> None:
+    """What of the pictures takes part, and what of the panorama is kept."""
     control = parser.add_argument_group("control")
     control.add_argument(
         "--matches", type=Path, metavar="FILE.csv",
         help="x,y,x2,y2[,weight] in px: used as given, nothing is searched; a report's own: as they were found",
-    )
+    )  # fmt: skip
     control.add_argument(
         "--ignore-ref", type=Path, metavar="MASK", help="a picture, white where REF is to be ignored altogether"
     )
@@ -60,51 +79,35 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         help="full (default), inscribed (the largest full rectangle), reference (its frame), or X,Y,W,H in px",
     )  # fmt: skip
 
-    how = parser.add_argument_group("how")
-    if with_field:
-        how.add_argument(
-            "--field",
-            default="slack",
-            type=_choice(FIELDS),
-            metavar="FIELD",
-            help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), "
-            "paper, or one that knows no depth: rew, apap, homography",
-        )
+
+def _add_alignment(how: argparse._ArgumentGroup) -> None:
+    """How the pictures are brought onto the canvas, and what canvas that is."""
     how.add_argument(
-        "--fade",
-        default="plane",
-        type=_choice(FADES),
-        metavar="FADE",
+        "--fade", default="plane", type=_choice(FADES), metavar="FADE",
         help="what it fades to outside the overlap: plane (default; the one that carries on beyond the border) or "
         "infinity",
-    )
+    )  # fmt: skip
     how.add_argument(
-        "--dense",
-        action=argparse.BooleanOptionalAction,
-        default=True,
+        "--dense", action=argparse.BooleanOptionalAction, default=True,
         help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
-    )
+    )  # fmt: skip
     how.add_argument(
-        "--projection",
-        default="perspective",
-        type=_choice(PROJECTIONS),
-        metavar="PROJECTION",
+        "--projection", default="perspective", type=_choice(PROJECTIONS), metavar="PROJECTION",
         help="perspective (default: REF keeps every pixel), cylindrical, or equirectangular (the whole sphere)",
-    )
+    )  # fmt: skip
     how.add_argument(
-        "--level",
-        default="auto",
-        metavar="LEVEL",
+        "--level", default="auto", metavar="LEVEL",
         help="of the other two: auto (default: the horizon by how the cameras were held), none, or YAW,PITCH,ROLL of "
         "REF in degrees (right, up, clockwise); write --level=-5,0,0 where it begins with a minus",
-    )
+    )  # fmt: skip
+
+
+def _add_composition(how: argparse._ArgumentGroup) -> None:
+    """How one picture is made of them."""
     how.add_argument(
-        "--blend",
-        default="multiband",
-        type=_choice(BLENDS),
-        metavar="BLEND",
+        "--blend", default="multiband", type=_choice(BLENDS), metavar="BLEND",
         help="multiband (default: light evened out across the seam, detail cut), feather, or linear (plain average)",
-    )
+    )  # fmt: skip
     how.add_argument(
         "--seam", default="graphcut", type=_choice(SEAMS), metavar="SEAM",
         help="graphcut (default: where the pictures look most alike) or none (midway between their borders)",
@@ -121,6 +124,10 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         "--holes", default="transparent", type=_choice(HOLES), metavar="HOLES",
         help="what neither camera saw behind something near: transparent (default) or inpaint (filled smoothly)",
     )  # fmt: skip
+
+
+def _add_repetition(how: argparse._ArgumentGroup) -> None:
+    """What another stitch of the same pictures takes from this one: what was kept, and the random choices."""
     how.add_argument(
         "--cache", action=argparse.BooleanOptionalAction, default=True,
         help="keep features, geometry and field for the next stitch of the same pictures (default; EDF_CACHE: where)",

@@ -17,7 +17,8 @@ from typing import NoReturn
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
 from .arguments import add_options, options_from
-from .messages import _MOST_WARNINGS, print_summary, progress_shown, say
+from .messages import print_summary, progress_shown, say
+from .options import MESSAGES
 
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
@@ -30,7 +31,19 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command; returns its exit code (README: 0, 1, 2, 3, 4, 130)."""
+    """Runs the command and returns its exit code.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments after the program's name; those of the process by default.
+
+    Returns
+    -------
+    int
+        0 done, 1 a threshold of the validation missed, 2 a wrong call, 3 pictures that cannot be stitched, 4 a file
+        that cannot be read or written, 130 interrupted.
+    """
     with messages_may_be_lost():
         code = _run(argv)
         try:
@@ -43,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    # before NumPy loads: BLAS gives other bytes with other thread counts, and the same call owes the same bytes
+    # before NumPy loads: results of BLAS depend on its thread count, and the same call must give the same bytes
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     asked_to_stop = False
 
@@ -52,17 +65,17 @@ def _run(argv: Sequence[str] | None) -> int:
         asked_to_stop = True
         raise KeyboardInterrupt
 
-    # a farm ends a job with SIGTERM: leave as cleanly as after Ctrl-C; and a shell starts background jobs with SIGINT
-    # ignored: whoever sends one to a stitch wants it to stop
+    # A render farm ends a job with SIGTERM: that must leave as little behind as Ctrl-C. A shell starts background jobs
+    # with SIGINT ignored: here it stops them all the same.
     main_thread = threading.current_thread() is threading.main_thread()
     before = {number: signal.signal(number, interrupt) for number in _STOPPING} if main_thread else {}
     try:
         args = _parser().parse_args(argv)
-        return args.run(args)
+        return int(args.run(args))
     except SystemExit as leaving:
         return int(leaving.code or 0)
     except (KeyboardInterrupt, Exception) as error:
-        # a library that is interrupted while it loads makes an ImportError of it
+        # a library that is interrupted while it loads raises ImportError instead
         return _report_error(KeyboardInterrupt() if asked_to_stop else error)
     finally:
         for number, handler in before.items():
@@ -79,7 +92,7 @@ def _report_error(error: BaseException) -> int:
         sentence, code = "not enough memory for pictures of this size; use smaller ones", StitchError.exit_code
     elif isinstance(error, OSError):
         return _stream_lost(error)
-    else:  # a bug or a library's refusal: the user gets a sentence all the same
+    else:  # a bug, or a library's error: a sentence is more use than a traceback
         sentence = f"internal error, please report it: {type(error).__name__}: {error}"
         code = StitchError.exit_code
     print(f"edf: {sentence}", file=sys.stderr)
@@ -87,13 +100,14 @@ def _report_error(error: BaseException) -> int:
 
 
 def _stream_lost(error: OSError) -> int:
-    """Files have their own errors by then: what is left is the output of this command, or the system's own places."""
+    """Reports an OSError that is not about a named file, which would be an UnwritableOutput: mostly of stdout or of a
+    temporary folder. Returns the exit code."""
     print(f"edf: cannot be read or written: {error.filename or 'the output'}: {error.strerror}", file=sys.stderr)
     return UnwritableOutput.exit_code
 
 
 def _too_late_to_interrupt() -> None:
-    """All is made and only has to be put in place: whoever interrupts now would be told that nothing was written."""
+    """Ignores signals while finished files are put in place: the message would say that nothing was written."""
     if threading.current_thread() is threading.main_thread():
         for number in _STOPPING:
             signal.signal(number, signal.SIG_IGN)
@@ -246,7 +260,7 @@ def _add_loudness(parser: argparse.ArgumentParser) -> None:
 def _stitch(args: argparse.Namespace) -> int:
     from ..system.output_files import OutputFiles, undisturbed
 
-    with undisturbed():  # NumPy prints a traceback of its own where a signal breaks into its loading
+    with undisturbed():  # interrupted while it loads, NumPy prints a traceback
         from ..output.outputs import OutputRequest, check, write
         from ..pipeline import check_count, stitch
         from ..system.memory import use_again
@@ -259,7 +273,7 @@ def _stitch(args: argparse.Namespace) -> int:
         check(outputs, files, [path.name for path in args.pictures])
         with progress_shown(args.quiet) as show:
             result = stitch(args.pictures, options, progress=show)
-            show("write", 0.98)
+            show("write", MESSAGES.written_share)
             warnings = [*result.warnings, *write(result, outputs, files)]
         _too_late_to_interrupt()
     for warning in warnings:
@@ -286,8 +300,8 @@ def _batch(args: argparse.Namespace) -> int:
     request = BatchRequest(args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard)
 
     def tell(outcome: Outcome, number: int, count: int) -> None:
-        more = len(outcome.warnings) - _MOST_WARNINGS
-        for warning in (*outcome.warnings[:_MOST_WARNINGS], *[f"{more} more in {request.summary}"] * (more > 0)):
+        more = len(outcome.warnings) - MESSAGES.max_warnings
+        for warning in (*outcome.warnings[:MESSAGES.max_warnings], *[f"{more} more in {request.summary}"] * (more > 0)):
             say(f"edf: warning: {outcome.name}: {warning}")
         if outcome.exit_code or not args.quiet:
             say(f"edf: [{number}/{count}] {outcome.name}: {outcome.in_words(args.verbose)}")

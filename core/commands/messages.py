@@ -5,9 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-
-# Of one item; every frame of a clip may have its own.
-_MOST_WARNINGS = 5
+from typing import Any
 
 
 def say(line: str) -> None:
@@ -20,7 +18,8 @@ def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
 
-def print_summary(report: dict, seconds: dict[str, float]) -> None:
+def print_summary(report: dict[str, Any], seconds: dict[str, float]) -> None:
+    """What was decided and measured, from a stitch's report, and its seconds by stage; for --verbose."""
     view, field, measured = report["two_view"], report["field"], report["measured"]
     focal = ", ".join(f"{value:.1f}" for value in view["focal_px"])
 
@@ -47,7 +46,7 @@ def print_summary(report: dict, seconds: dict[str, float]) -> None:
 
 @contextmanager
 def progress_shown(quiet: bool) -> Iterator[Callable[[str, float], None]]:
-    """A bar on a terminal, one plain line for each stage elsewhere, nothing when quiet."""
+    """A progress callable: a bar on a terminal, one plain line for each stage elsewhere, nothing when quiet."""
     if quiet:
         yield lambda stage, total: None
     elif sys.stderr.isatty():

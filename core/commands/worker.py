@@ -28,9 +28,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from .options import WORKER
+
 SIDES = ("reference", "target")
-# Of the whole work; the rest is encoding what the window wants to have.
-STITCH_SHARE = 0.9
 # All that a stitch may load sooner or later, besides the standard library.
 LIBRARIES = ("numpy", "cv2", "scipy.linalg", "scipy.optimize", "poselib", "OpenEXR", "exifread")
 
@@ -44,17 +44,17 @@ def main(folder: Path) -> int:
             signal.signal(getattr(signal, name), stop)
     try:
         return _status(folder, stop)
-    except BrokenPipeError:  # nobody listens: the parent has ended, and stdin was not yet found closed
+    except BrokenPipeError:  # the parent has ended, and the thread has not seen stdin close yet
         stop.orphaned = True
         return 130
     finally:
-        # here and not in the thread that noticed: only now nothing writes or reads there any more
+        # here and not in the thread that noticed: only now is the folder no longer in use
         if stop.orphaned:
             shutil.rmtree(folder, ignore_errors=True)
 
 
 class _Stop:
-    """The handler of signals that ask to stop. It breaks into the work once, and never into what tidies up after it."""
+    """The handler of signals that ask to stop. It interrupts the work once, and never the cleaning up after it."""
 
     def __init__(self) -> None:
         self.asked = self.orphaned = False
@@ -68,6 +68,7 @@ class _Stop:
 
 
 def _status(folder: Path, stop: _Stop) -> int:
+    """Does the job and reports its end; returns the exit status."""
     try:
         threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
         try:
@@ -75,7 +76,7 @@ def _status(folder: Path, stop: _Stop) -> int:
         finally:
             stop.may_break_in = False
     except (KeyboardInterrupt, Exception) as error:
-        # a library that is interrupted while it loads makes an ImportError of it
+        # a library that is interrupted while it loads raises ImportError instead
         return _report_error(KeyboardInterrupt() if stop.asked else error)
     _say({"done": True})
     return 0
@@ -96,9 +97,10 @@ def _report_error(error: BaseException) -> int:
 
 
 def _work(folder: Path, stop: _Stop) -> None:
+    """Reads the job, stitches, and writes everything asked for."""
     from ..system.output_files import undisturbed
 
-    with undisturbed():  # NumPy prints a traceback of its own where a signal breaks into its loading
+    with undisturbed():  # interrupted while it loads, NumPy prints a traceback
         from ..cameras.sources import CameraRequest
         from ..options import StitchOptions
         from ..pipeline import stitch
@@ -128,14 +130,27 @@ def _work(folder: Path, stop: _Stop) -> None:
         cache=default_folder(),
     )  # fmt: skip
     result = stitch(
-        pictures, options, lambda stage, share: _say({"stage": stage, "share": share * STITCH_SHARE}),
-        lambda: stop.asked,  # where Python swallowed the interruption, as it does in what tidies up after an object
+        pictures, options, lambda stage, share: _say({"stage": stage, "share": share * WORKER.stitch_share}),
+        lambda: stop.asked,  # Python swallows a KeyboardInterrupt inside a finalizer
     )  # fmt: skip
     _write(folder, result.spread_out(), rows, job.get("take", []), turns)
 
 
 def cameras_of(entries: dict[str, Any], pictures: tuple[Any, ...]) -> dict[str, Any]:
-    """What CameraRequest.cameras takes, of Blender's cameras (see job.json) and the upright pictures they took."""
+    """Blender's cameras in the form that `CameraRequest.cameras` takes.
+
+    Parameters
+    ----------
+    entries : dict
+        `cameras` of job.json.
+    pictures : tuple of Picture
+        The upright pictures that they took, reference and target.
+
+    Returns
+    -------
+    dict
+        K, R and t by the pictures' names; by side where both have the same name.
+    """
     import numpy as np
 
     from ..alignment import size_of
@@ -146,7 +161,7 @@ def cameras_of(entries: dict[str, Any], pictures: tuple[Any, ...]) -> dict[str, 
         lens = BlenderLens(**{**entries[side]["lens"], "resolution": size_of(picture)})
         R, t = pose_of(np.array(entries[side]["matrix_world"], np.float64))
         table[side] = {"K": lens.intrinsics, "R": R, "t": t}
-    # by the pictures' names, which come first: a reference may well be called "target"
+    # names are looked up before sides, and a reference may well be called "target"
     names = [picture.name for picture in pictures]
     return table if names[0] == names[1] else dict(zip(names, table.values(), strict=True))
 
@@ -171,6 +186,7 @@ def _picture(folder: Path, entry: dict[str, Any]) -> tuple[Any, int]:
 
 
 def _mask(folder: Path, name: str | None, orientation: int) -> Any:
+    """A job's mask (H, W), turned upright; None without a name."""
     from ..pictures.decoding import turn
 
     return None if name is None else turn(_array(folder / name)[..., None], orientation)[..., 0]
@@ -194,7 +210,8 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
     def add(name: str, data: bytes, suffix: str = kind) -> None:
         files[name] = f"{name.replace(' ', '_')}{suffix}"
         (folder / files[name]).write_bytes(data)
-        _say({"stage": "write", "share": min(0.99, STITCH_SHARE + 0.01 * len(files))})
+        share = min(WORKER.max_share, WORKER.stitch_share + WORKER.file_share * len(files))
+        _say({"stage": "write", "share": share})
 
     def picture(pixels: Any, alpha: Any) -> bytes:
         return encode_picture(pixels, alpha, result.bits, kind, result.pictures[0].icc, result.pictures[0].exif)[0]
@@ -229,15 +246,17 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
 
 
 def _png(values: Any) -> bytes:
-    """uint8 (H, W) or RGBA (H, W, 4): values, not light, so without a profile or a curve."""
+    """A PNG of uint8 values (H, W) or RGBA (H, W, 4) that are no light: without a profile or a display curve."""
     import cv2
 
-    return cv2.imencode(".png", values if values.ndim == 2 else cv2.cvtColor(values, cv2.COLOR_RGBA2BGRA))[1].tobytes()
+    stored = values if values.ndim == 2 else cv2.cvtColor(values, cv2.COLOR_RGBA2BGRA)
+    png: bytes = cv2.imencode(".png", stored)[1].tobytes()
+    return png
 
 
 def _painted(further: Any, shows: Any) -> Any:
-    """A seam in the form of a painted one: RGBA (H, W, 4), white from a further picture, transparent where
-    nothing shows."""
+    """A seam in the form that a painted one has: RGBA (H, W, 4), white where the target is shown, transparent where
+    nothing is."""
     import numpy as np
 
     gray, alpha = (np.where(mask, 255, 0).astype(np.uint8) for mask in (further, shows))
@@ -245,11 +264,12 @@ def _painted(further: Any, shows: Any) -> Any:
 
 
 def _unless_opaque(alpha: Any) -> Any:
+    """Alpha (H, W), or None where it is 1 everywhere and need not be stored."""
     return None if alpha.min() >= 1.0 else alpha
 
 
 def _tuples(value: Any) -> Any:
-    """JSON knows lists where options are tuples."""
+    """A value of JSON, which has lists where options have tuples."""
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -263,7 +283,8 @@ def _fail(kind: str, words: str, exit_code: int) -> int:
 
 
 def _end_with_parent(stop: _Stop) -> None:
-    # not sys.stdin.buffer: Python aborts on its way out when a thread still holds that one's lock
+    """Waits for stdin to close, which it does when the parent ends, and interrupts the work then."""
+    # not sys.stdin.buffer: Python aborts at exit if a thread still holds the lock of that one
     while os.read(0, 4096):
         pass
     stop.orphaned = True

@@ -132,7 +132,7 @@ def run_comparison(
         files.check_folder(request.folder, FILES)
         outcomes = []
         for number, pair in enumerate(request.pairs):
-            progress = _Steps(show, cancelled, number, len(request.pairs), len(request.fields))
+            progress = _Meter(show, cancelled, number, len(request.pairs), len(request.fields))
             outcomes.append(_outcome(pair, request.fields, options, truths, progress))
             if tell is not None:
                 tell(_in_words(outcomes[-1].entry, number + 1, len(request.pairs)))
@@ -156,7 +156,7 @@ def run_comparison(
     return summary, next((outcome.exit_code for outcome in outcomes if outcome.exit_code), 0)
 
 
-class _Steps:
+class _Meter:
     """The progress of the work on one pair, in pieces: its geometry, then each field."""
 
     def __init__(
@@ -180,7 +180,7 @@ class _Steps:
 
 
 def _outcome(
-    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Steps
+    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Meter
 ) -> PairOutcome:
     """Processes a pair. Raises Cancelled only: any other failure becomes its outcome."""
     entry: dict[str, Any] = {
@@ -200,7 +200,7 @@ def _outcome(
 
 
 def _compared(
-    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Steps,
+    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Meter,
     entry: dict[str, Any],
 ) -> PairOutcome:  # fmt: skip
     truth = truths(pair.folder) if truths is not None and pair.folder is not None else None

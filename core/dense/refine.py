@@ -38,12 +38,21 @@ from .unfolding import unfolded
 class Dense:
     """The result of dense refinement.
 
-    relief: the refinement, or None, and then `why` says why not; reach_px: largest move along the lines that was
-    searched; found: share of the overlap that was matched; moved_px, across_px: RMS of the moves along the lines and
-    across them.
+    Attributes
+    ----------
+    refined : RefinedDepth or None
+        None where nothing was refined.
+    why : str
+        Why not, in plain words; empty where it was.
+    reach_px : float
+        Largest move along the epipolar lines that was searched, px of the pictures as searched.
+    found : float
+        Share of the overlap that was matched, 0 to 1.
+    moved_px, across_px : float
+        RMS of the moves along the lines and across them, px.
     """
 
-    relief: RefinedDepth | None
+    refined: RefinedDepth | None
     why: str
     reach_px: float = 0.0
     found: float = 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -56,19 +58,23 @@ def turned_over(turns: NDArray[np.int8]) -> NDArray[np.bool_]:
 
     That is how a map jumps back from the rim of a near thing that it knows too little of to know what the rim hides.
     """
-    out = turns == -1
+    out: NDArray[np.bool_] = turns == -1
     # where one picture is a mirror image, not being mirrored is what stands out
     return out if 2 * int(out.sum()) <= int((turns != NO_TURN).sum()) else turns == 1
 
 
-def jacobian(x: NDArray, y: NDArray) -> NDArray:
+def jacobian(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
     """Area (H, W) that a map's (x, y) takes up for each of its pixels, by central differences; its sign changes where
     the map turns over. NaN beside what is not finite."""
-    return np.gradient(x, axis=1) * np.gradient(y, axis=0) - np.gradient(x, axis=0) * np.gradient(y, axis=1)
+    (x_down, x_right), (y_down, y_right) = np.gradient(x), np.gradient(y)
+    area: NDArray[Any] = x_right * y_down - x_down * y_right
+    return area
 
 
-def cell_areas(x: NDArray, y: NDArray) -> NDArray:
+def cell_areas(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
     """Signed area (H − 1, W − 1) that a map (x, y) (H, W) spans between each pixel and its right and lower neighbours;
     its sign changes where the map turns over. NaN beside what is not finite."""
-    turn: NDArray = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1])
-    return turn - (x[1:, :-1] - x[:-1, :-1]) * (y[:-1, 1:] - y[:-1, :-1])
+    first = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1])
+    second = (x[1:, :-1] - x[:-1, :-1]) * (y[:-1, 1:] - y[:-1, :-1])
+    area: NDArray[Any] = first - second
+    return area

@@ -7,6 +7,7 @@ division. So the depth order is in map and depth already; a z-buffer over the pi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -53,8 +54,8 @@ def occluded(picture_map: PictureMap, nearness: AnyImage) -> NDArray[np.bool_]:
         found[rivals] = _apart(picture_map, points[rivals], points[claimed[rivals]], LEAVES_CELL * 2.0**level)
     hidden.ravel()[points[found]] = True
     # pixels between the samples of what hides them
-    closed = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
-    return closed & picture_map.inside()
+    closed: NDArray[np.uint8] = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    return (closed > 0) & picture_map.inside()
 
 
 def by_agreement(
@@ -178,7 +179,8 @@ def _folded_blocks(picture_map: PictureMap) -> NDArray[np.bool_]:
         for at, sign in (((y0, x0), 1), ((y0, x1 + 1), -1), ((y1 + 1, x0), -1), ((y1 + 1, x1 + 1), 1)):
             np.add.at(counts, at, sign)
     covered = counts.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
-    return cv2.dilate(covered.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    wider: NDArray[np.uint8] = cv2.dilate(covered.astype(np.uint8), np.ones((3, 3), np.uint8))
+    return wider > 0
 
 
 def _mirrored(picture_map: PictureMap) -> bool:
@@ -191,7 +193,7 @@ def _mirrored(picture_map: PictureMap) -> bool:
     return bool((turn < 0).sum() > (turn > 0).sum())
 
 
-def nearness_of(inverse_depth: NDArray, depth_in_view: NDArray[np.float32]) -> NDArray[np.float32]:
+def nearness_of(inverse_depth: NDArray[Any], depth_in_view: NDArray[np.float32]) -> NDArray[np.float32]:
     """Baselines per distance in front of a picture's camera: d / x'₃, 0 at infinity and beyond; NaN without depth.
 
     depth_in_view: x'₃ of H_inf p + d e', before the division.
@@ -223,7 +225,8 @@ def _levels(picture_map: PictureMap, top: int, rows: int, points: NDArray[np.int
         for part, length in ((first, step[first]), (last, step[last]), (middle, shorter)):
             np.maximum(longest[part], length, out=longest[part])
     longer_than = np.float32(MARGIN) ** 2 * 4.0 ** np.arange(COARSEST)
-    return np.searchsorted(longer_than, longest.ravel()[points - low * x.shape[1]]).astype(np.uint8)
+    levels: NDArray[np.intp] = np.searchsorted(longer_than, longest.ravel()[points - low * x.shape[1]])
+    return levels.astype(np.uint8)
 
 
 def _along(axis: int, part: slice) -> tuple[slice, ...]:
@@ -277,4 +280,5 @@ def _offset(
 
 
 def _distance(home: NDArray[np.float32], picture_map: PictureMap, at: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.hypot(*_offset(home, picture_map, at))
+    distance: NDArray[np.float32] = np.hypot(*_offset(home, picture_map, at))
+    return distance

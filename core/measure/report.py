@@ -133,7 +133,7 @@ def _measured(
     # pixels are compared in the reference's own frame, where only one of the two pictures is resampled
     flat = warp
     if warp.canvas.projection is not None:
-        refinement = None if alignment.dense is None else alignment.dense.relief
+        refinement = None if alignment.dense is None else alignment.dense.refined
         flat = build_map(field, alignment.views, Canvas(*cameras[0].size, (0, 0)), refinement)
     return measured | overlap_quality(pictures, flat, edge.j) | {
         "projectivity_own_px": projectivity(two_view.F, shown),
@@ -195,7 +195,7 @@ def _picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:
 
 
 def _dense_entry(dense: Dense | None) -> dict[str, Any]:
-    if dense is None or dense.relief is None:
+    if dense is None or dense.refined is None:
         return {"used": False, "why": "not asked for" if dense is None else dense.why}
     return {
         "used": True, "reach_px": dense.reach_px, "found": dense.found, "moved_px": dense.moved_px,

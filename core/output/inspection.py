@@ -1,7 +1,8 @@
-"""What a window shows of a finished stitch: each match with its error, the overlap's difference, how far points slide,
-and the inverse depth on a coarse grid. Small beside the panorama, and in px of the full pictures.
+"""What a window shows of a finished stitch: each match with its error, the difference of the pictures in the overlap,
+how far parallax moves each pixel, and the inverse depth on a coarse grid. Points are in px of the full pictures.
 
-A whole sphere's warp and layers are to be spread over it before (`StitchResult.spread_out`).
+Results with a whole sphere are to be passed through `StitchResult.spread_out` before, so that all arrays have the
+panorama's size.
 """
 
 from __future__ import annotations
@@ -21,15 +22,14 @@ from ..raster.arrays import Array
 from ..raster.colour import encode
 from ..raster.resizing import size_change
 from .match_table import match_file
+from .options import INSPECTION
 
-# Pixels along the longer side of the pictures that lie over the panorama, and nodes along that of the depth grid.
-LONGEST_SIDE = 1600
-LONGEST_GRID = 160
+# What the window is told of each match: the field stands on it, or it contradicts the others.
 USED, LEFT_OUT = "USED", "LEFT_OUT"
 
 
 def scales(result: StitchResult) -> list[Array]:
-    """For each picture the matrix S (3, 3) that brings px of the full picture to px of the one that was worked on."""
+    """For each picture the matrix S (3, 3) from px of the full picture to px of the one that was worked on."""
     out = []
     for full, camera in zip(result.full_sizes, result.cameras, strict=True):
         factor, shift = size_change(full, camera.size)
@@ -40,10 +40,20 @@ def scales(result: StitchResult) -> list[Array]:
 
 
 def full_geometry(result: StitchResult) -> dict[str, Any]:
-    """Where things lie, JSON-ready up to arrays: `full_sizes` (W, H); `F`, `K`, `K_prime`, `R`, `t`, `distortion`,
-    `distortion_prime` (5,) in px of the full upright pictures; `S` (3, 3): from those of the reference to the canvas;
-    `canvas` (W, H) px; `K_canvas` (3, 3). The canvas of a round panorama is none of a pinhole camera: S and K_canvas
-    are NaN there, and the report's `canvas.projection` says what it shows."""
+    """Cameras and canvas in px of the full upright pictures.
+
+    Parameters
+    ----------
+    result : StitchResult
+
+    Returns
+    -------
+    dict
+        JSON-ready but for arrays. `full_sizes`: (W, H) of each picture. `F`, `K`, `K_prime`, `R`, `t`, `model`: the
+        geometry of the pair. `distortion`, `distortion_prime` (5,). `canvas`: (W, H) px. `S` (3, 3): from px of the
+        reference to the canvas. `K_canvas` (3, 3): intrinsics of the canvas. A cylinder or sphere is no pinhole image:
+        S and K_canvas are NaN there, and the report's `canvas.projection` says what the canvas shows.
+    """
     edge, canvas = result.edges[0], result.canvas
     view, scale = edge.two_view, scales(result)
     S, S_prime = scale[edge.i], scale[edge.j]
@@ -58,17 +68,28 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
 
 
 def match_errors(result: StitchResult, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far (N,) in full target px the map leads from x', for rows (N, ≥ 4) x, y, x', y' of full px; NaN where the
-    panorama does not show x."""
+    """Distance (N,), in px of the full target, between where the map sees x and its match x'; rows (N, ≥ 4): x, y, x',
+    y' in px of the full pictures. NaN where the panorama does not show x."""
     edge, scale = result.edges[0], scales(result)
     x, y = homogeneous(rows[:, :2]) @ scale[edge.i].T, homogeneous(rows[:, 2:4]) @ scale[edge.j].T
     error = look_up(result.warp, x[:, :2], result.cameras[edge.i], edge.j) - y[:, :2]
-    return np.linalg.norm(error / np.diag(scale[edge.j])[:2], axis=1)
+    distance: Array = np.linalg.norm(error / np.diag(scale[edge.j])[:2], axis=1)
+    return distance
 
 
 def match_rows(result: StitchResult) -> dict[str, Any]:
-    """All matches that were found: `rows` (N, 4) full px to a thousandth, `weights`, `states` (USED: the field stands
-    on it, LEFT_OUT: it contradicts the others), `errors` as `match_errors`; `file`: see `match_file`, as text."""
+    """All matches that were found, for the window's list.
+
+    Parameters
+    ----------
+    result : StitchResult
+
+    Returns
+    -------
+    dict
+        `rows` (N, 4): x, y, x', y' in px of the full pictures, to a thousandth. `weights` (N,). `states`: USED or
+        LEFT_OUT, for each. `errors` (N,): see `match_errors`. `file`: see `match_file`, as text.
+    """
     edge, back = result.edges[0], [np.linalg.inv(S) for S in scales(result)]
     found = edge.matches
     x, y = homogeneous(found.x) @ back[edge.i].T, homogeneous(found.y) @ back[edge.j].T
@@ -82,7 +103,7 @@ def match_rows(result: StitchResult) -> dict[str, Any]:
 
 
 def given_rows(result: StitchResult, rows: NDArray[np.float64]) -> dict[str, Any]:
-    """The same, but no `file`, of the matches (N, 5) that were given, all of them and in their order."""
+    """As `match_rows`, without `file`, of matches that were given: rows (N, 5) x, y, x', y', weight, in their order."""
     used = result.used_matches
     places = {_place(row) for row in np.column_stack([used.x, used.y])}
     is_used = np.array([_place(row) in places for row in rows[:, :4]]) & (rows[:, 4] > 0)
@@ -93,6 +114,7 @@ def given_rows(result: StitchResult, rows: NDArray[np.float64]) -> dict[str, Any
 
 
 def _place(row: NDArray[np.float64]) -> tuple[float, ...]:
+    """A match's points to a thousandth px, by which it is found again after it went through other sizes."""
     return tuple(np.round(row, 3).tolist())
 
 
@@ -101,8 +123,8 @@ def _states(used: NDArray[np.bool_]) -> list[str]:
 
 
 def displacement_px(result: StitchResult) -> NDArray[np.float32]:
-    """How far (H, W) in full px of a further picture each canvas pixel lies from where it would be seen if it were
-    infinitely far; 0 where the model knows no depth, NaN behind its camera."""
+    """Distance (H, W), in px of the full target, between where each canvas pixel is seen and where it would be seen at
+    infinity; 0 for a model without depth, NaN behind the camera."""
     warp, number = result.warp, result.edges[0].j
     view, picture_map = result.views[number], warp.maps[number].arrays()
     if not view.e_prime.any():
@@ -110,41 +132,52 @@ def displacement_px(result: StitchResult) -> NDArray[np.float32]:
     infinite = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, result.cameras[0])
     far = distort(np.stack(transfer(view, infinite, np.zeros(1)), axis=-1), view.camera)
     moved = np.hypot(picture_map.x - far[..., 0], picture_map.y - far[..., 1])
-    return (moved / scales(result)[number][0, 0]).astype(np.float32)
+    in_full_px: NDArray[np.float32] = (moved / scales(result)[number][0, 0]).astype(np.float32)
+    return in_full_px
 
 
 def heat_map(result: StitchResult) -> tuple[NDArray[np.uint8], tuple[float, float]]:
-    """The slide as a picture (h, w, 4) uint8 RGBA, reduced, transparent where the target shows nothing; and the px that
-    its blue and its red end stand for."""
+    """`displacement_px` as a reduced picture (h, w, 4) uint8 RGBA, transparent where the target shows nothing; and the
+    px that the blue and the red end of its scale stand for."""
     layer = result.layers[result.edges[0].j]
-    far, shows = _reduced(displacement_px(result)), _reduced((layer.alpha > 0).astype(np.float32)) > 0.5
+    far, shows = _reduced(displacement_px(result)), _reduced((layer.alpha > 0).astype(np.float32)) > INSPECTION.shown
     shows &= np.isfinite(far)
     if not shows.any():
         return np.zeros((*far.shape, 4), np.uint8), (0.0, 0.0)
-    low, high = (float(value) for value in np.percentile(far[shows], (1, 99)))
-    share = np.clip((np.nan_to_num(far) - low) / max(high - low, 1e-6), 0, 1)
+    low, high = (float(value) for value in np.percentile(far[shows], INSPECTION.colour_range))
+    share = np.clip((np.nan_to_num(far) - low) / max(high - low, INSPECTION.min_range_px), 0, 1)
     colours = cv2.applyColorMap(np.rint(share * 255).astype(np.uint8), cv2.COLORMAP_TURBO)[..., ::-1]
     return np.dstack([colours, np.where(shows, 255, 0).astype(np.uint8)]), (low, high)
 
 
 def difference(result: StitchResult) -> NDArray[np.uint8]:
-    """|reference − warped target| of the display-encoded layers, (h, w, 4) uint8 RGBA, reduced; opaque where both
-    show."""
+    """|reference − warped target| of the display-encoded layers as a reduced picture (h, w, 4) uint8 RGBA, opaque where
+    both show something."""
     edge = result.edges[0]
     pair = result.layers[edge.i], result.layers[edge.j]
     layers = [encode(_reduced(layer.pixels), 8) for layer in pair]
-    both = (pair[0].alpha > 0.5) & (pair[1].alpha > 0.5)
-    shows = _reduced(both.astype(np.float32)) > 0.999
+    both = (pair[0].alpha > INSPECTION.shown) & (pair[1].alpha > INSPECTION.shown)
+    shows = _reduced(both.astype(np.float32)) > INSPECTION.compared
     apart = cv2.absdiff(*layers).reshape(*shows.shape, -1)
     return np.dstack([np.repeat(apart, 3 // apart.shape[2], axis=2), np.where(shows, 255, 0).astype(np.uint8)])
 
 
 def depth_grid(result: StitchResult) -> dict[str, Any]:
-    """The inverse depth at nodes over the canvas, corner to corner: `columns`, `rows`, `inverse_depth` and `shows`
-    (whether the panorama shows something there), both row by row from the top."""
+    """The inverse depth d (docs/method.md) at nodes of a grid from corner to corner of the canvas.
+
+    Parameters
+    ----------
+    result : StitchResult
+
+    Returns
+    -------
+    dict
+        `columns`, `rows`: nodes in either direction. `inverse_depth` and `shows` (1 where the panorama is not
+        transparent): one value for each node, row by row from the top.
+    """
     height, width = result.panorama.alpha.shape
     longest = max(width, height)
-    columns, rows = (max(2, round(LONGEST_GRID * side / longest)) for side in (width, height))
+    columns, rows = (max(2, round(INSPECTION.longest_grid * side / longest)) for side in (width, height))
     x, y = (np.rint(np.linspace(0, side - 1, n)).astype(int) for side, n in ((width, columns), (height, rows)))
     depth = result.warp.inverse_depth[np.ix_(y, x)].ravel()
     return {
@@ -154,15 +187,17 @@ def depth_grid(result: StitchResult) -> dict[str, Any]:
 
 
 def has_depth(result: StitchResult) -> bool:
-    """Whether the model says where things stand: the cameras' places are known and differ."""
+    """Whether inverse depth means something: the cameras' positions are known and differ."""
     t = np.stack([view.t for view in result.views])
     return bool(np.isfinite(t).all() and t.any())
 
 
-def _reduced(values: NDArray) -> NDArray:
+def _reduced(values: NDArray[Any]) -> NDArray[Any]:
+    """An image (H, W, …) averaged down to `InspectionOptions.longest_side`; as it is where it is no larger."""
     height, width = values.shape[:2]
-    factor = LONGEST_SIDE / max(width, height)
+    factor = INSPECTION.longest_side / max(width, height)
     if factor >= 1:
         return values
     size = max(1, round(width * factor)), max(1, round(height * factor))
-    return cv2.resize(values, size, interpolation=cv2.INTER_AREA).reshape(size[1], size[0], *values.shape[2:])
+    reduced: NDArray[Any] = cv2.resize(values, size, interpolation=cv2.INTER_AREA)
+    return reduced.reshape(size[1], size[0], *values.shape[2:])

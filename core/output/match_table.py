@@ -11,8 +11,18 @@ from ..raster.resizing import resized_points
 
 
 def match_file(result: StitchResult) -> bytes:
-    """All matches of a stitch in px of the full pictures, in their order, as a CSV file (see `matches_csv`); of those
-    that were found, what became of each."""
+    """The content of the matches' file: all matches of a stitch, in their order.
+
+    Parameters
+    ----------
+    result : StitchResult
+
+    Returns
+    -------
+    bytes
+        A CSV file (see `matches_csv`) in px of the full pictures. For matches that were found, not given, it also says
+        what became of each.
+    """
     edge = result.edges[0]
     matches, full_sizes = edge.matches, edge.pair(result.full_sizes)
     sizes = tuple(camera.size for camera in edge.pair(result.cameras))
@@ -24,6 +34,7 @@ def match_file(result: StitchResult) -> bytes:
 
 
 def _states(result: StitchResult) -> list[str]:
+    """What became of each match: used, left out by the geometry, or by the field."""
     edge = result.edges[0]
     inliers = np.flatnonzero(edge.two_view.inliers)
     used = result.field.fit.inliers_used

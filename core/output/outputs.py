@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..measure.report import plain
 from ..panorama.layers import Layer
@@ -24,11 +25,12 @@ from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
 from .match_table import match_file
 
-# What the layers' folder and the warp's file are to be read as (docs/formats.md).
+# Versions of the layers' folder and of the warp's file (docs/formats.md).
 LAYERS_FORMAT, WARP_FORMAT = 2, 2
-# Which picture each pixel comes from, and the same in the form that --mask takes; only where there is a seam.
+# Files of a layers' folder. Which picture each pixel comes from, and the same in the form that --mask takes: only where
+# there is a seam.
 LABELS, SEAM = "labels", "seam"
-# What was filled though neither picture saw it; only where that is asked for.
+# What was filled in though neither picture saw it: only where that is asked for.
 INPAINTED = "inpainted"
 CONFIDENCE, CANVAS = "confidence", "canvas.json"
 _NOT_IN_NAMES = re.compile(r"[^\w.() +-]")
@@ -36,7 +38,19 @@ _NOT_IN_NAMES = re.compile(r"[^\w.() +-]")
 
 @dataclass(frozen=True)
 class OutputRequest:
-    """Where the results go: the panorama always, the others where a path is given."""
+    """Where the results go.
+
+    Attributes
+    ----------
+    panorama : Path
+        Its suffix says the format.
+    report : Path, optional
+        .json; matches and seconds go beside it.
+    layers : Path, optional
+        A folder.
+    warp : Path, optional
+        .npz.
+    """
 
     panorama: Path
     report: Path | None = None
@@ -45,18 +59,33 @@ class OutputRequest:
 
     @property
     def timing(self) -> Path | None:
-        """Seconds stand in a file of their own beside the report, which is the same for the same input."""
+        """Seconds have a file of their own beside the report, so that the report is the same for the same input."""
         return None if self.report is None else self.report.with_name(self.report.stem + ".timing.json")
 
     @property
     def matches(self) -> Path | None:
-        """The matches stand beside the report, in the form that --matches takes."""
+        """The matches lie beside the report, in the form that --matches takes."""
         return None if self.report is None else self.report.with_name(self.report.stem + ".matches.csv")
 
 
 def check(request: OutputRequest, files: OutputFiles, pictures: Sequence[str]) -> None:
-    """Asks before the work on pictures of these names whether everything could be written. Raises BadRequest or
-    UnwritableOutput."""
+    """Checks, before the work begins, that everything asked for could be written.
+
+    Parameters
+    ----------
+    request : OutputRequest
+    files : OutputFiles
+        What is written through later.
+    pictures : sequence of str
+        Names of the pictures' files, after which their layers are called.
+
+    Raises
+    ------
+    BadRequest
+        A format that is not written, one file for two outputs, or layers of other pictures in the folder.
+    UnwritableOutput
+        The system does not let it be written, or it exists and is not to be replaced.
+    """
     output_bits((8,), request.panorama.suffix)
     if request.warp is not None and request.warp.suffix.lower() != ".npz":
         raise BadRequest(f"the warp is written as .npz, not {request.warp.suffix or 'a file of no kind'}")
@@ -74,7 +103,7 @@ def check(request: OutputRequest, files: OutputFiles, pictures: Sequence[str]) -
 
 
 def _refuse_other_layers(folder: Path, names: Sequence[str]) -> None:
-    """Layers of other pictures would be taken for some of these: one number, one picture."""
+    """Raises BadRequest if the folder holds layers of other pictures: two files of one number would be ambiguous."""
     others = sorted(path.name for path in folder.glob("[0-9][0-9]_*.*") if path.suffix in (".png", ".exr"))
     strange = [name for name in others if name not in names]
     if strange:
@@ -85,15 +114,16 @@ def _refuse_other_layers(folder: Path, names: Sequence[str]) -> None:
 
 
 def layer_stem(number: int, name: str) -> str:
-    """What a picture's layer is called: its number, and its own name as far as every file system takes it."""
+    """File name of a picture's layer without suffix: its number, and its name in characters that any file system
+    takes."""
     return f"{number:02d}_{_NOT_IN_NAMES.sub('_', Path(name).stem)}"
 
 
 def layer_files(
     pictures: Sequence[str], suffixes: Sequence[str] = (".png",), seam: bool = True, inpainted: bool = True
 ) -> list[str]:
-    """The files of a layers' folder, by the names of the pictures; without those that only a seam has, or only filled
-    holes."""
+    """Names of all files of a layers' folder, for pictures of these names; seam, inpainted: whether to count the files
+    that only a stitch with a seam, or with filled holes, has."""
     out = [layer_stem(number, name) + suffix for number, name in enumerate(pictures) for suffix in suffixes]
     masks = [_occluded(number) for number in range(1, len(pictures))] + [CONFIDENCE]
     masks += [LABELS, SEAM] if seam else []
@@ -106,7 +136,24 @@ def _occluded(number: int) -> str:
 
 
 def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> list[str]:
-    """Stages every requested file; returns warnings about what a file kind could not hold."""
+    """Encodes every requested file and stages it; `files` puts all in place together when it is closed.
+
+    Parameters
+    ----------
+    result : StitchResult
+    request : OutputRequest
+    files : OutputFiles
+
+    Returns
+    -------
+    list of str
+        Warnings about what a format could not hold, which are in the report too.
+
+    Raises
+    ------
+    UnwritableOutput
+        A panorama that its format cannot hold, or a file that cannot be written.
+    """
     reference = result.pictures[0]
     alpha = None if result.panorama.alpha.min() >= 1.0 else result.panorama.alpha
     data, warned = encode_picture(
@@ -126,7 +173,7 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
 def add_report(
     result: StitchResult, warnings: list[str], report: Path, matches: Path, timing: Path, files: OutputFiles
 ) -> None:
-    """Stages the report with these warnings, the matches, and the seconds."""
+    """Stages the report, with these warnings in place of its own; the matches; and the seconds."""
     files.add(report, json_bytes({**result.report, "warnings": warnings}))
     files.add(matches, match_file(result))
     files.add(timing, json_bytes({"seconds": result.seconds}))
@@ -155,6 +202,7 @@ def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
 
 
 def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result: StitchResult) -> None:
+    """Stages one layer as .png, and as .exr too where a picture is of floats, which a PNG clips."""
     icc, exif = result.pictures[0].icc, result.pictures[0].exif
     for bits, suffix in ((result.bits, ".png"), (32, ".exr"))[: 2 if result.bits == 32 else 1]:
         files.add_to_folder(
@@ -162,33 +210,46 @@ def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result
         )
 
 
-def _label_bytes(labels: np.ndarray, count: int) -> bytes:
-    """A gray PNG of each pixel's picture (H, W), its number + 1, 0 for none: of 16 bits for more than 254 pictures."""
+def _label_bytes(labels: NDArray[np.int16], count: int) -> bytes:
+    """A gray PNG of which picture each pixel (H, W) comes from: its number + 1, 0 for none; 16-bit beyond 254
+    pictures."""
     values = (labels + 1).astype(np.uint8 if count < 255 else np.uint16)
-    return cv2.imencode(".png", values)[1].tobytes()
+    png: bytes = cv2.imencode(".png", values)[1].tobytes()
+    return png
 
 
-def _mask_bytes(mask: np.ndarray, shown: np.ndarray | None = None) -> bytes:
-    """A gray PNG of a mask or of shares 0..1 (H, W), 1 white, plain numbers and no light; transparent where nothing is
-    shown (H, W)."""
+def _mask_bytes(mask: NDArray[Any], shown: NDArray[np.bool_] | None = None) -> bytes:
+    """A gray PNG of a mask, or of values 0 to 1 (H, W) without a display curve, 1 = white; transparent where not
+    `shown` (H, W)."""
     levels = np.rint(255 * mask.astype(np.float32)).astype(np.uint8)
     alpha = None if shown is None else shown.astype(np.float32)
     return encode_picture(decode(levels[..., None]), alpha, 8, ".png")[0]
 
 
 def warp_bytes(result: StitchResult) -> bytes:
-    """The .npz of docs/formats.md: x ~ H_inf p + inverse_depth e_prime for canvas pixels p + offset; NaN for what a
-    model lacks.
+    """The content of the warp's file: geometry and maps, from which each layer can be made again.
 
-    A round panorama has p = K r for unit rays r (see `projection`) and no offset, but projection (its name), focal (px
-    per radian), centre (canvas px of the direction ahead) and rotation (from its axes to the reference camera's).
+    Canvas pixel p + offset is seen at x ~ H_inf p + inverse_depth e_prime. On a cylinder or sphere p = K r for the unit
+    ray r of the pixel instead; there is no offset, but `projection` (its name), `focal` (px per radian), `centre`
+    (canvas px of the direction ahead) and `rotation` (from its axes to the reference camera's). docs/formats.md lists
+    every key.
+
+    Parameters
+    ----------
+    result : StitchResult
+
+    Returns
+    -------
+    bytes
+        An .npz file; NaN stands for what a model does not know. The same result gives the same bytes.
     """
     views, warp = result.views, result.warp.within(result.spread)
     canvas = warp.canvas
     e_prime = np.stack([view.e_prime for view in views])
     if not np.isfinite(warp.inverse_depth).any():
-        e_prime[1:] = np.nan  # a field without depth slides nothing: inside, its e' is 0
-    arrays: dict[str, np.ndarray] = {
+        # inside, e' is 0 without depth; in a file that would say that all cameras stand in one place
+        e_prime[1:] = np.nan
+    arrays: dict[str, NDArray[Any]] = {
         "format": np.array(WARP_FORMAT), "canvas": np.array([canvas.width, canvas.height]),
         "offset": np.array(canvas.offset, np.int64), "inverse_depth": warp.inverse_depth,
         "K": np.stack([view.K for view in views]), "R": np.stack([view.R for view in views]),
@@ -198,7 +259,7 @@ def warp_bytes(result: StitchResult) -> bytes:
         "edges": np.array([(edge.i, edge.j) for edge in result.edges]),
     }  # fmt: skip
     for number, one in enumerate(warp.maps):
-        if number or canvas.projection is not None:  # on its own plane the reference lies where offset says
+        if number or canvas.projection is not None:  # in a flat panorama the reference is only shifted, by `offset`
             picture_map = one.arrays()
             arrays |= {
                 f"map_x_{number:02d}": picture_map.x, f"map_y_{number:02d}": picture_map.y,
@@ -213,13 +274,13 @@ def warp_bytes(result: StitchResult) -> bytes:
     return npz_bytes(arrays)
 
 
-def npz_bytes(arrays: dict[str, np.ndarray]) -> bytes:
-    """An .npz file of arrays, the same bytes whenever it is made (numpy.savez puts the time of day into it)."""
+def npz_bytes(arrays: dict[str, NDArray[Any]]) -> bytes:
+    """An .npz file of arrays: the same arrays give the same bytes, while numpy.savez stores the time of day."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
         for name, array in arrays.items():
             with archive.open(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
+                np.save(member, np.asarray(array, order="C"), allow_pickle=False)
     return buffer.getvalue()
 
 

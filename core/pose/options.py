@@ -20,6 +20,8 @@ class FeatureOptions:
     side: int = 16_000
     # px a side; below, OpenCV's pyramid has no level to stand on.
     least_side: int = 8
+    # Features below which a picture itself is to blame for too few matches, and not the pair.
+    scarce_points: int = 100
     # Features of a picture; matching takes time with the square of it.
     budget: int = 8000
     # px and features for a preview: a third of the time, and at 1 MP the map's error grows by 3 to 19 %.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +71,7 @@ class PictureMap:
         return PictureMap(x, y, self.size)
 
 
-def falls_inside(x: NDArray, y: NDArray, size: tuple[int, int]) -> NDArray[np.bool_]:
+def falls_inside(x: NDArray[Any], y: NDArray[Any], size: tuple[int, int]) -> NDArray[np.bool_]:
     """Where pixels x, y (…) lie inside a picture of (W, H) px; NaN lies outside."""
     with np.errstate(invalid="ignore"):
         return (x >= 0) & (y >= 0) & (x <= size[0] - 1) & (y <= size[1] - 1)

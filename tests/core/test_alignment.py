@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from edf_stitch.core import alignment
 from edf_stitch.core.alignment import Alignment, Frame, align, prepare, size_of
 from edf_stitch.core.cameras.projective import rotation_angle
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.picture import picture_from_array, resized
 from edf_stitch.core.pipeline import Stopwatch, compose
 from edf_stitch.core.pose import features
+from edf_stitch.core.pose.options import FEATURES
 from edf_stitch.core.system.errors import BadRequest, NoOverlap, TooFewMatches
 from edf_stitch.core.system.progress import Progress
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry
@@ -211,10 +213,10 @@ def test_frames_of_other_sizes_are_refused(clip: list[Pair], quick: StitchOption
 def test_a_pair_is_refined_and_a_clip_says_why_not(clip: list[Pair], quick: StitchOptions) -> None:
     asked, said = replace(quick, dense=True), []
     pair = align([frame_of(clip[0], asked)], asked, lambda stage, _: said.append(stage))
-    assert pair.dense is not None and pair.dense.relief is not None and pair.warp.confidence is not None
+    assert pair.dense is not None and pair.dense.refined is not None and pair.warp.confidence is not None
     assert list(dict.fromkeys(said)) == ["features", "geometry", "field", "dense", "warp"]
     several = align([frame_of(one, asked) for one in clip[:2]], asked, silent)
-    assert several.dense is not None and several.dense.relief is None and "swims" in several.dense.why
+    assert several.dense is not None and several.dense.refined is None and "swims" in several.dense.why
     plain = align([frame_of(one, quick) for one in clip[:2]], quick, silent)
     assert plain.dense is None and np.array_equal(several.warp.maps[1].x, plain.warp.maps[1].x, equal_nan=True)
 
@@ -230,7 +232,7 @@ def test_each_stage_is_told_and_features_climb(clip: list[Pair], quick: StitchOp
 def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
     small_pair: Pair, quick: StitchOptions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(features, "FEATURES", replace(features.FEATURES, preview_budget=500))
+    monkeypatch.setattr(alignment, "FEATURES", replace(FEATURES, preview_budget=500))
     frame = frame_of(small_pair, quick)
     real = features.detect
     asked: list[tuple[int, ...]] = []
@@ -241,7 +243,7 @@ def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
 
     monkeypatch.setattr(features, "detect", detect)
     found = {blend: align([frame], replace(quick, blend=blend), silent) for blend in ("feather", "linear")}
-    assert asked == [(), (), (500, features.FEATURES.preview_pixels), (500, features.FEATURES.preview_pixels)]
+    assert asked == [(), (), (500, FEATURES.preview_pixels), (500, FEATURES.preview_pixels)]
     points = np.stack(np.meshgrid(np.linspace(60, 180, 7), np.linspace(30, 150, 7)), axis=-1).reshape(-1, 2)
     away = np.linalg.norm(found["feather"].field.predict(points) - found["linear"].field.predict(points), axis=1)
     few, many = (len(found[blend].edges[0].matches) for blend in ("linear", "feather"))

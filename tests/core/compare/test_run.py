@@ -93,12 +93,12 @@ def test_a_field_that_fails_stops_no_other(
 ) -> None:
     real = run_module.fit_and_warp
 
-    def lay(registration, frames, options, steps):
+    def fit(geometry, frames, options, progress):
         if options.field == "apap":
             raise DegenerateGeometry("nothing to hold on to")
-        return real(registration, frames, options, steps)
+        return real(geometry, frames, options, progress)
 
-    monkeypatch.setattr(run_module, "fit_and_warp", lay)
+    monkeypatch.setattr(run_module, "fit_and_warp", fit)
     summary, code = compared(folder, tmp_path, fields=("apap", "homography"))
     fields = summary["pairs"][0]["fields"]
     assert code == 0 and fields["apap"]["message"] == "nothing to hold on to" and fields["homography"]["figures"]

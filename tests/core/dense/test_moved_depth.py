@@ -1,4 +1,4 @@
-"""What a relief says between its nodes, and that it ends in nothing."""
+"""What refined depth says between its nodes, and that it ends in nothing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..line_scenes import Scene, scene
 
 
 @pytest.fixture(params=[1.0, 2.75])
-def relief(request: pytest.FixtureRequest) -> RefinedDepth:
+def refined(request: pytest.FixtureRequest) -> RefinedDepth:
     """7×9 nodes of numbers, 0 at the rim."""
     values = np.random.default_rng(3).normal(size=(7, 9, 4)).astype(np.float32)
     values[[0, -1]] = values[:, [0, -1]] = 0
@@ -23,16 +23,15 @@ def relief(request: pytest.FixtureRequest) -> RefinedDepth:
     return RefinedDepth(start, (request.param, request.param), values[..., 0], values[..., 1:3], values[..., 3])
 
 
-def test_a_plane_is_what_its_nodes_say_linear_between_them_and_nothing_outside(relief: RefinedDepth) -> None:
+def test_a_plane_is_what_its_nodes_say_linear_between_them_and_nothing_outside(refined: RefinedDepth) -> None:
     xs, ys = np.arange(-12.0, 40.0), np.arange(0.0, 40.0)
-    for part, (values, name) in zip(
-        relief.over(xs, ys), ((relief.inverse_depth, "d"), (relief.shift, "s"), (relief.confidence, "c")), strict=True
-    ):
+    planes = (refined.inverse_depth, "d"), (refined.shift, "s"), (refined.confidence, "c")
+    for part, (values, name) in zip(refined.over(xs, ys), planes, strict=True):
         assert part.dtype == np.float32 and part.shape == (len(ys), len(xs), *values.shape[2:])
         for y, line in zip(ys, part, strict=True):
-            v = (y - relief.start[1]) / relief.step[1]
+            v = (y - refined.start[1]) / refined.step[1]
             for x, got in zip(xs, line, strict=True):
-                u = (x - relief.start[0]) / relief.step[0]
+                u = (x - refined.start[0]) / refined.step[0]
                 if not (0 <= u <= 8 and 0 <= v <= 6):
                     assert not np.any(got), name
                     continue
@@ -45,19 +44,19 @@ def test_a_plane_is_what_its_nodes_say_linear_between_them_and_nothing_outside(r
                 assert got == pytest.approx(expected, abs=1e-5), name
 
 
-def test_strips_of_a_plane_are_the_plane(relief: RefinedDepth) -> None:
+def test_strips_of_a_plane_are_the_plane(refined: RefinedDepth) -> None:
     xs, ys = np.arange(-12.0, 40.0), np.arange(0.0, 40.0)
-    whole = relief.over(xs, ys)
+    whole = refined.over(xs, ys)
     for cut in (3, 11, 17):
-        for part, first, second in zip(whole, relief.over(xs, ys[:cut]), relief.over(xs, ys[cut:]), strict=True):
+        for part, first, second in zip(whole, refined.over(xs, ys[:cut]), refined.over(xs, ys[cut:]), strict=True):
             assert np.array_equal(part, np.concatenate([first, second]))
 
 
-def test_scattered_points_get_the_same(relief: RefinedDepth) -> None:
+def test_scattered_points_get_the_same(refined: RefinedDepth) -> None:
     """To the 1/32 of a node that OpenCV's interpolation is good for."""
     xs, ys = np.arange(-2.0, 15.0), np.arange(12.0, 24.0)
-    for plane, points in zip(relief.over(xs, ys), relief.at(*np.meshgrid(xs, ys)), strict=True):
-        assert np.abs(plane - points).max() < (1e-6 if relief.step[0] == 1 else 0.15)
+    for plane, points in zip(refined.over(xs, ys), refined.at(*np.meshgrid(xs, ys)), strict=True):
+        assert np.abs(plane - points).max() < (1e-6 if refined.step[0] == 1 else 0.15)
 
 
 # --- made of moves --------------------------------------------------------------------------------------------------
@@ -67,7 +66,7 @@ def test_scattered_points_get_the_same(relief: RefinedDepth) -> None:
 def made(
     request: pytest.FixtureRequest,
 ) -> tuple[Scene, SparseMap, EpipolarLines, np.ndarray, np.ndarray, RefinedDepth]:
-    """Moves of some px on a part of the picture: pair, field, lines, along, across, relief."""
+    """Moves of some px on a part of the picture: pair, field, lines, along, across, refined."""
     pair = scene(request.param)
     sparse = pair.field(shift=(0.3, 0.2))
     lines = EpipolarLines.over(sparse, (40, 30, 120, 90), 1.5)
@@ -83,9 +82,9 @@ def everywhere(lines: EpipolarLines) -> tuple[np.ndarray, np.ndarray]:
 
 def test_on_its_nodes_it_does_what_the_moves_do(made: tuple) -> None:
     """As inverse depth along the line, and as a shift beside it: x' = π(H_inf p + (d + more) e') + shifts."""
-    pair, sparse, lines, along, across, relief = made
+    pair, sparse, lines, along, across, refined = made
     x, y = lines.nodes
-    more, shift, sure = relief.at(x, y)
+    more, shift, sure = refined.at(x, y)
     sent = target_points(pair.view, lines.ideal, lines.inverse_depth + more.astype(float)) + lines.shift + shift
     meant = np.stack(lines.target(along, across), axis=-1)
     rim = BEYOND.confidence_erosion // 2
@@ -96,18 +95,18 @@ def test_on_its_nodes_it_does_what_the_moves_do(made: tuple) -> None:
 
 
 def test_beyond_its_nodes_it_goes_on_smoothly_and_ends_in_nothing(made: tuple) -> None:
-    pair, sparse, lines, along, across, relief = made
-    for part in (relief.inverse_depth[..., None], relief.shift, relief.confidence[..., None]):
+    pair, sparse, lines, along, across, refined = made
+    for part in (refined.inverse_depth[..., None], refined.shift, refined.confidence[..., None]):
         for rim in (part[0], part[-1], part[:, 0], part[:, -1]):
             assert not rim.any()
-    margin = (relief.confidence.shape[0] - lines.shape[0]) // 2
+    margin = (refined.confidence.shape[0] - lines.shape[0]) // 2
     inner = np.s_[margin:-margin, margin:-margin]
-    assert margin >= 6 and (relief.confidence > 0).sum() == lines.depth_per_px.size, "sure of nothing beyond"
-    known = relief.inverse_depth[inner]
+    assert margin >= 6 and (refined.confidence > 0).sum() == lines.depth_per_px.size, "sure of nothing beyond"
+    known = refined.inverse_depth[inner]
     steps = max(np.abs(np.diff(known, axis=k)).max() for k in (0, 1))
     for k in (0, 1):
-        assert np.abs(np.diff(relief.inverse_depth, axis=k)).max() < 4 * steps + known.max() / margin * 2
-    beside = relief.inverse_depth[margin - 1, margin:-margin] / relief.inverse_depth[margin, margin:-margin]
+        assert np.abs(np.diff(refined.inverse_depth, axis=k)).max() < 4 * steps + known.max() / margin * 2
+    beside = refined.inverse_depth[margin - 1, margin:-margin] / refined.inverse_depth[margin, margin:-margin]
     assert np.abs(beside - 1).max() < 0.25, "no step at the border"
 
 
@@ -133,10 +132,10 @@ def test_what_nobody_is_sure_of_does_not_go_on_beyond_the_border() -> None:
     confidence = np.zeros(lines.shape, np.float32)
     confidence[:, 40:75] = 0.9
     along, across = np.where(confidence > 0, np.float32(1), np.float32(12)), np.zeros(lines.shape, np.float32)
-    relief = build_refinement(lines, sparse, along, across, confidence, np.ones(lines.shape, bool))
-    rows, columns = (np.array(relief.confidence.shape) - lines.shape) // 2
-    per_px = relief.inverse_depth[rows + 45, columns + 57] / 1.0  # of a px along the lines, on the mast
-    moved = relief.inverse_depth / per_px
+    refined = build_refinement(lines, sparse, along, across, confidence, np.ones(lines.shape, bool))
+    rows, columns = (np.array(refined.confidence.shape) - lines.shape) // 2
+    per_px = refined.inverse_depth[rows + 45, columns + 57] / 1.0  # of a px along the lines, on the mast
+    moved = refined.inverse_depth / per_px
     mast = moved[rows - 8 : rows + 8, columns + 50 : columns + 66]
     assert mast.min() > 0.5 and mast.max() < 1.2
     sky = moved[:, columns + 15]

@@ -107,7 +107,7 @@ def test_the_difference_is_black_where_the_pictures_agree(half: StitchResult):
 def test_the_depth_grid_reaches_from_corner_to_corner(half: StitchResult):
     grid = inspection.depth_grid(half)
     columns, rows = grid["columns"], grid["rows"]
-    assert max(columns, rows) == inspection.LONGEST_GRID and abs(columns / rows - 200 / 150) < 0.02
+    assert max(columns, rows) == inspection.INSPECTION.longest_grid and abs(columns / rows - 200 / 150) < 0.02
     depth = np.array(grid["inverse_depth"]).reshape(rows, columns)
     for y, x in ((0, 0), (-1, -1), (0, -1)):
         assert depth[y, x] == pytest.approx(half.warp.inverse_depth[y, x], rel=1e-4)

@@ -420,8 +420,8 @@ def test_depth_and_confidence_are_the_same_whatever_part_is_asked_for(by_hand: S
     camera = by_hand.camera((1203, 1001), 900.0)
     view = by_hand.view(camera, camera, *STANDS["sideways"])
     nodes = np.random.default_rng(2).normal(scale=0.01, size=(30, 40, 4)).astype(np.float32)
-    relief = RefinedDepth((100.5, 200.5), (20.0, 20.0), nodes[..., 0], nodes[..., 1:3], np.abs(nodes[..., 3]))
-    warp = build_map(wavy(by_hand), views_of(view, (camera, camera)), Canvas(1203, 1001, (17, -5)), relief)
+    refined = RefinedDepth((100.5, 200.5), (20.0, 20.0), nodes[..., 0], nodes[..., 1:3], np.abs(nodes[..., 3]))
+    warp = build_map(wavy(by_hand), views_of(view, (camera, camera)), Canvas(1203, 1001, (17, -5)), refined)
     assert warp.lazy_confidence is not None and warp.confidence is not None
     for plane, all_of_it in ((warp.depth, warp.inverse_depth), (warp.lazy_confidence, warp.confidence)):
         assert all_of_it[300:500, 300:500].any()

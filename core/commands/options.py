@@ -1,0 +1,37 @@
+"""What was chosen in telling how the work goes on: each value with its unit, and why it is what it is.
+
+Imports nothing heavy: the command line reads it before NumPy loads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class MessageOptions:
+    """What the commands say while they work (`cli`, `messages`)."""
+
+    max_warnings: int = 5
+    """Warnings shown of one item of a batch: every frame of a clip may have its own. All stand in its report."""
+
+    written_share: float = 0.98
+    """Share of a stitch that is done when its files are to be written."""
+
+
+@dataclass(frozen=True)
+class WorkerOptions:
+    """What the worker tells the window (`worker`)."""
+
+    stitch_share: float = 0.9
+    """Share of its work that the stitch is; the rest is encoding what the window wants to have."""
+
+    file_share: float = 0.01
+    """Share that each encoded file adds."""
+
+    max_share: float = 0.99
+    """The share told at most before everything is done."""
+
+
+MESSAGES = MessageOptions()
+WORKER = WorkerOptions()
