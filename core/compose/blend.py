@@ -13,10 +13,8 @@ from ..raster.distance import distance_inside, distance_to_border
 from ..raster.lazy import AnyImage, LazyImage, Retouched
 from ..raster.log_encoding import log_decode, log_encode
 from .multiband import bands_for, correction
+from .options import BANDS
 from .overlap import Overlap
-
-# Blending in bands changes a tone by this share of itself and this much at most.
-HALF, DARK = np.float32(0.5), np.float32(0.02)
 
 
 def averaged(before: Layer, layer: Layer, count: NDArray) -> Layer:
@@ -136,7 +134,7 @@ def in_bands(before: Layer, layer: Layer, chosen: NDArray[np.bool_], overlap: Ov
     """Cut hard along the seam, and the light of the two evened out across it (see `multiband`)."""
     out = cut_hard(before, layer, chosen)
     bands = bands_for(out.alpha)
-    region = seam_region(chosen, out.alpha > 0, 4 << bands)
+    region = seam_region(chosen, out.alpha > 0, BANDS.margin_widths << bands)
     if region is None or overlap is None:
         return out
     shown = out.alpha[region] > 0
@@ -158,7 +156,7 @@ class Evened(Retouched):
         """See `Retouched`."""
         tones = log_encode(before)
         # what brighter neighbours differ by is too much for the dark: it stays dark, and no light turns negative
-        most = HALF * np.abs(tones) + DARK
+        most = BANDS.max_relative_change * np.abs(tones) + BANDS.max_dark_change
         after = log_decode(tones + np.clip(self.change[there][self.touched[there]], -most, most))
         return np.maximum(after, np.minimum(before, 0))
 

@@ -19,9 +19,10 @@ from ..raster.arrays import bounds, with_margin, without_specks
 from ..raster.lazy import AnyImage, Weighed, whole
 from ..raster.picture_map import PictureMap
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
-from .exposure import BLOCK, Exposure, match_exposure, pooled, unchanged
+from .exposure import Exposure, match_exposure, pooled, unchanged
 from .inpaint import holes_of, inpainted
 from .moving_things import times
+from .options import EXPOSURE
 from .overlap import Overlap, overlap_of
 from .seam import added_price, find_seam, known_labels, seam_cost
 from .wraparound import roll_for, rolled, rolled_layer, rolled_map
@@ -136,7 +137,7 @@ def _add(
     progress("exposure", 0.0)
     box = bounds((before.alpha > 0) & (layer.alpha > 0))
     # asked for twice unless decided, and let go before the cut: to fetch it again costs less than the room it takes
-    held = layer if decided or box is None else layer.keep(with_margin(box, BLOCK, before.alpha.shape))
+    held = layer if decided or box is None else layer.keep(with_margin(box, EXPOSURE.block_px, before.alpha.shape))
     if decided:
         exposure = decided.exposure
     elif options.exposure:

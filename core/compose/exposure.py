@@ -18,16 +18,7 @@ from ..raster.arrays import Part, bounds
 from ..raster.lazy import AnyImage, LazyImage
 from ..raster.options import PARTS
 from ..system.threads import in_order
-
-BLOCK = 8
-# Light (of white 1) from which pictures of 8 and 16 bits are taken for clipped: level 250 of 255, for JPEG rings.
-CLIPPED = 0.956
-# Blocks darker than this share of the median tell more about noise and flare than about exposure.
-DARK = 0.05
-# A block counts where so much of it can be seen in both; with fewer blocks than that nothing is known.
-LEAST_SHOWN, LEAST_BLOCKS = 0.5, 20
-# Beyond a factor of this it is not an exposure but two pictures of different light.
-LARGEST = 16.0
+from .options import EXPOSURE, OVERLAP
 
 
 @dataclass(frozen=True)
@@ -79,13 +70,14 @@ def match_exposure(
     clip.
     """
     channels = before.light.shape[2]
-    shown = (before.alpha > 1 - 1 / 255) & (layer.alpha > 1 - 1 / 255) & ~hidden
+    shown = (before.alpha > OVERLAP.opaque_alpha) & (layer.alpha > OVERLAP.opaque_alpha) & ~hidden
     box = bounds(shown)
     if box is None:
         return unchanged(channels)
+    block = EXPOSURE.block_px
     # whole blocks of the canvas
-    rows, columns = (slice(part.start - part.start % BLOCK, part.stop + -part.stop % BLOCK) for part in box)
-    at_once = BLOCK * max(1, PARTS.strip_pixels // (BLOCK * (columns.stop - columns.start)))
+    rows, columns = (slice(part.start - part.start % block, part.stop + -part.stop % block) for part in box)
+    at_once = block * max(1, PARTS.strip_pixels // (block * (columns.stop - columns.start)))
 
     def means_of(top: int) -> list[NDArray[np.float64]]:
         part = slice(top, min(rows.stop, top + at_once)), columns
@@ -93,20 +85,20 @@ def match_exposure(
         for light, unclipped in zip(pixels, floats, strict=True):
             if not unclipped:
                 for k in range(channels):
-                    counts = counts & (light[..., k] < CLIPPED)
+                    counts = counts & (light[..., k] < EXPOSURE.clipped_light)
         return [_block_means(light, counts) for light in pixels]
 
     parts = list(in_order(means_of, range(rows.start, rows.stop, at_once)))
     means_before, means = (np.concatenate(one) for one in zip(*parts, strict=True))
     bright = _bright(means_before) & _bright(means)
-    if bright.sum() < LEAST_BLOCKS:
+    if bright.sum() < EXPOSURE.min_blocks:
         return unchanged(channels)
     ratios = np.log(means_before[bright]) - np.log(means[bright])
     # what the eye would weigh: errors in tones, which grow about as the root of light
     weights = np.sqrt(means_before[bright].mean(axis=1))
     middle = np.array([_weighted_median(ratios[:, k], weights) for k in range(channels)])
     spread = np.median(np.abs(ratios - middle), axis=0)
-    if np.abs(middle).max() > np.log(LARGEST):
+    if np.abs(middle).max() > np.log(EXPOSURE.max_gain):
         return unchanged(channels)
     return Exposure(np.exp(middle).astype(np.float32), spread.astype(np.float32), int(bright.sum()))
 
@@ -121,14 +113,15 @@ def pooled(exposures: list[Exposure]) -> Exposure:
 
 
 def _block_means(pixels: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Means (N, C) of what is shown in blocks of BLOCK² px, of those blocks where enough is."""
-    height, width = (BLOCK * (side // BLOCK) for side in shown.shape)
+    """Means (N, C) of what is shown in square blocks, of those blocks where enough is."""
+    block = EXPOSURE.block_px
+    height, width = (block * (side // block) for side in shown.shape)
     if not height or not width:
         return np.zeros((0, pixels.shape[2]))
-    size = (width // BLOCK, height // BLOCK)
+    size = (width // block, height // block)
     weight = shown[:height, :width].astype(np.float32)
     share = cv2.resize(weight, size, interpolation=cv2.INTER_AREA)
-    enough = share >= LEAST_SHOWN
+    enough = share >= EXPOSURE.min_block_share
     means = [
         cv2.resize(pixels[:height, :width, k] * weight, size, interpolation=cv2.INTER_AREA)[enough] / share[enough]
         for k in range(pixels.shape[2])
@@ -139,7 +132,7 @@ def _block_means(pixels: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArr
 def _bright(means: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Blocks (N,) of which no channel is dark, beside the blocks in general."""
     typical = float(np.median(means.mean(axis=1))) if len(means) else 0.0
-    return means.min(axis=1, initial=np.inf) > max(DARK * typical, 0.0)
+    return means.min(axis=1, initial=np.inf) > max(EXPOSURE.min_brightness * typical, 0.0)
 
 
 def _weighted_median(values: NDArray[np.float64], weights: NDArray[np.float64]) -> float:

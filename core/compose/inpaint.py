@@ -13,9 +13,7 @@ from ..raster.arrays import Part, bounds, with_margin
 from ..raster.lazy import AnyImage, Retouched
 from ..raster.log_encoding import log_decode, log_encode
 from ..raster.pull_push import filled
-
-# Pixels around a hole that it is filled from, and what the near ones among them count beside the far ones.
-REACH, NEAR = 12, 1e-3
+from .options import INPAINT
 
 
 def holes_of(hidden: NDArray[np.bool_], before: Layer, layer: Layer) -> NDArray[np.bool_]:
@@ -33,11 +31,12 @@ def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage
     extent = bounds(holes)
     if extent is None:
         return panorama
-    box = with_margin(extent, REACH, holes.shape)
+    box = with_margin(extent, INPAINT.reach_px, holes.shape)
     missing = holes[box]
-    rim = cv2.dilate(missing.astype(np.uint8), np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8)) > 0
+    rim = cv2.dilate(missing.astype(np.uint8), _within_reach()) > 0
     beside = rim & ~missing & (panorama.alpha[box] > 0)
-    weight = beside * np.where(_far(inverse_depth[box], missing, beside), np.float32(1), np.float32(NEAR))
+    far = _far(inverse_depth[box], missing, beside)
+    weight = beside * np.where(far, np.float32(1), np.float32(INPAINT.near_weight))
     tones = filled(log_encode(panorama.light[box]), weight)
     at = box[0].start, box[1].start
     alpha = panorama.alpha.copy()
@@ -49,9 +48,14 @@ def _far(inverse_depth: NDArray, missing: NDArray[np.bool_], beside: NDArray[np.
     """Where (h, w) it is further away than halfway from what is missing to the nearest that lies beside it."""
     depth = np.nan_to_num(inverse_depth).astype(np.float32)
     behind = filled(depth[..., None], missing.astype(np.float32))[..., 0]
-    size = np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8)
-    nearest = cv2.dilate(np.where(beside, depth, depth.min()).astype(np.float32), size)
+    nearest = cv2.dilate(np.where(beside, depth, depth.min()).astype(np.float32), _within_reach())
     return depth <= (behind + np.maximum(nearest, behind)) / 2
+
+
+def _within_reach() -> NDArray[np.uint8]:
+    """The window of all pixels that a hole is filled from."""
+    side = 2 * INPAINT.reach_px + 1
+    return np.ones((side, side), np.uint8)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
-# Capacities are whole numbers; the dearest edge has this many units.
-UNITS = 10_000
+from .options import MIN_CUT
+
 # What is known of a pixel beforehand: comes from the first, the second, is to be decided, or is not there at all.
 FIRST, SECOND, FREE, NOWHERE = -1, 1, 0, 2
 
@@ -45,12 +45,12 @@ def min_cut(
 
     for step in (1, -1, width, -width):
         there = states[at + step]
-        units = 1 + np.rint((UNITS / 2) * (costs[at] + costs[at + step]))
+        units = 1 + np.rint((MIN_CUT.units / 2) * (costs[at] + costs[at + step]))
         connect(node[at[there == FREE]], node[at[there == FREE] + step], units[there == FREE])
         connect(source, node[at[there == FIRST]], units[there == FIRST])
         connect(node[at[there == SECOND]], sink, units[there == SECOND])
     if price is not None:
-        units = np.rint(UNITS * price.ravel()[free])
+        units = np.rint(MIN_CUT.units * price.ravel()[free])
         connect(source, np.flatnonzero(units > 0), units[units > 0])
         connect(np.flatnonzero(units < 0), sink, -units[units < 0])
     edges = np.concatenate(tails), np.concatenate(heads)

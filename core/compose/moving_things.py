@@ -15,18 +15,8 @@ from numpy.typing import NDArray
 from ..panorama.layers import Layer
 from ..raster.distance import distance_inside, distance_to_border
 from ..raster.picture_map import PictureMap
+from .options import MOVING_THINGS
 from .overlap import Overlap
-
-# It is looked for at so many px across the overlap at most: whatever is narrower than THIN of them is none.
-ACROSS, THIN = 1000, 4
-# It differs by so much in tones at least, and what differs less than that agrees.
-STRONG, ALIKE = 0.15, 0.08
-# A thing's surroundings: so many px round it, of which this share shows the same in both pictures.
-ROUND, AGREES = 5, 0.7
-# How many times as wide as the parallax round it: what is hidden behind a thing is as wide as that at most.
-WIDER = 2.0
-# More than this share of the overlap is no thing.
-LARGEST = 0.25
 
 
 def times(
@@ -36,7 +26,7 @@ def times(
     at that of the picture that is added; 0 where nothing moved. picture_map: the added picture's; hidden (H, W): what
     it cannot see."""
     rows, columns = overlap.box
-    step = -(-max(overlap.both.shape) // ACROSS)
+    step = -(-max(overlap.both.shape) // MOVING_THINGS.side_cells)
     size = tuple(-(-side // step) for side in overlap.both.shape[::-1])
     # of a cell what is true of most of it
     both, unseen = (
@@ -46,11 +36,13 @@ def times(
     seen = both & (cv2.dilate(unseen.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
     difference = cv2.resize(overlap.difference, size, interpolation=cv2.INTER_AREA).reshape(*size[::-1], -1)
     away = np.abs(cv2.blur(difference, (3, 3)).reshape(difference.shape)).max(axis=2)
-    same, apart = both & (away < ALIKE), (seen & (away > STRONG)).astype(np.uint8)
-    things = cv2.morphologyEx(apart, cv2.MORPH_OPEN, np.ones((THIN, THIN), np.uint8))
+    same = both & (away < MOVING_THINGS.max_same_difference)
+    apart = (seen & (away > MOVING_THINGS.min_difference)).astype(np.uint8)
+    thin, around = MOVING_THINGS.min_width_cells, MOVING_THINGS.surroundings_cells
+    things = cv2.morphologyEx(apart, cv2.MORPH_OPEN, np.ones((thin, thin), np.uint8))
     # head and legs of one are one
     count, labels, stats, _ = cv2.connectedComponentsWithStats(
-        cv2.morphologyEx(things, cv2.MORPH_CLOSE, np.ones((ROUND, ROUND), np.uint8)), connectivity=8
+        cv2.morphologyEx(things, cv2.MORPH_CLOSE, np.ones((around, around), np.uint8)), connectivity=8
     )
     here = np.s_[rows.start : rows.stop : step, columns.start : columns.stop : step]
     moves = [values[here] for values in (picture_map.x, picture_map.y)]
@@ -61,9 +53,9 @@ def times(
     out = np.zeros(labels.shape, np.int8)
     for label in range(1, count):
         left, top, width, height, area = stats[label]
-        if area > LARGEST * both.sum():
+        if area > MOVING_THINGS.max_area * both.sum():
             continue
-        part = np.s_[max(0, top - ROUND) : top + height + ROUND, max(0, left - ROUND) : left + width + ROUND]
+        part = np.s_[max(0, top - around) : top + height + around, max(0, left - around) : left + width + around]
         thing = labels[part] == label
         if _moving(thing, both[part], same[part], [values[part] for values in moves], step):
             whole = cv2.dilate(thing.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
@@ -77,10 +69,11 @@ def _moving(
     step: int,
 ) -> bool:
     """Whether the pictures agree all round a thing (h, w), on one surface, or nearly: then it moved."""
-    size = 2 * ROUND + 1
+    around = MOVING_THINGS.surroundings_cells
+    size = 2 * around + 1
     ring = (cv2.dilate(thing.astype(np.uint8), np.ones((size, size), np.uint8)) > 0) & ~thing & both
     agrees = ring & same
-    if agrees.sum() < AGREES * ring.sum() or agrees.sum() < 3 * ROUND:
+    if agrees.sum() < max(MOVING_THINGS.min_agreeing * ring.sum(), 3 * around):
         return False
     places = np.column_stack([*np.nonzero(agrees), np.ones(int(agrees.sum()))])
     targets = np.column_stack([values[agrees] for values in moves])
@@ -89,7 +82,7 @@ def _moving(
     left_over = targets - places @ np.linalg.lstsq(places, targets, rcond=None)[0]
     parallax = np.hypot(*np.ptp(left_over, axis=0)) / step
     across = 2 * float(distance_to_border(thing).max())
-    return across > WIDER * parallax
+    return across > MOVING_THINGS.min_widths_of_parallax * parallax
 
 
 def _in_box(values: NDArray[np.float32], corner: tuple[int, int], size: tuple[int, ...]) -> NDArray[np.float32]:

@@ -9,27 +9,21 @@ ghost: across it light is evened out and content is cut hard. Beyond the band ev
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import strips
+from ..raster.arrays import Plane, strips
 from ..raster.pull_push import expanded, pulled, pulled_weights, push, reduced
 from ..system.threads import each
-
-Plane: TypeAlias = NDArray[np.float32]
-# Tones less than this away from what they were are what they were.
-NOTHING = 1e-5
-# The width of the coarsest band, as a share of the canvas's diagonal.
-WIDTH = 1 / 50
-FEWEST, MOST = 3, 7
+from .options import BANDS
 
 
 def bands_for(canvas: NDArray) -> int:
     """How many bands a canvas (H, W, …) is blended in."""
-    return int(np.clip(np.rint(math.log2(WIDTH * math.hypot(canvas.shape[0], canvas.shape[1]))), FEWEST, MOST))
+    width = BANDS.coarsest_width * math.hypot(canvas.shape[0], canvas.shape[1])
+    return int(np.clip(np.rint(math.log2(width)), BANDS.min_bands, BANDS.max_bands))
 
 
 def correction(
@@ -63,7 +57,7 @@ def correction(
             # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
             whole = np.where(over, -whole, whole)
             np.clip(change, np.minimum(whole, 0), np.maximum(whole, 0), out=change)
-            change[np.abs(change) < NOTHING] = 0
+            change[np.abs(change) < BANDS.negligible_tone] = 0
             difference[rows, :, k] = change
 
         each(put, strips(blended.shape))

@@ -13,13 +13,7 @@ from ..raster.arrays import beside, bounds, shown_only, strips
 from ..raster.log_encoding import log_encode
 from ..raster.robust import NORMAL_MEDIAN
 from ..system.threads import each
-
-WHOLE = 1 - 1 / 255
-# Tones that differ by more than the pictures' general difference and this show different things.
-SAME_TONE, SAME_SIGMAS = 0.06, 4.0
-# Pixels around what the added picture cannot see in which its edge may still lie.
-EDGE = 3
-SAMPLES = 100_000
+from .options import OVERLAP
 
 
 @dataclass(frozen=True)
@@ -54,7 +48,8 @@ def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overla
         difference[rows] = shown_only(tones, both[rows])
 
     each(put, strips(difference.shape))
-    edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) > 0
+    side = 2 * OVERLAP.hidden_margin_px + 1
+    edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((side, side), np.uint8)) > 0
     same = both & ~edge
     return Overlap(box, both, difference, same & _alike(difference, same))
 
@@ -64,10 +59,10 @@ def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray
     places = np.flatnonzero(shown)
     if not places.size:
         return shown
-    sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // SAMPLES)]]
+    sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // OVERLAP.sample_pixels)]]
     middle = np.median(sample, axis=0)
     sigma = np.median(np.abs(sample - middle), axis=0) / NORMAL_MEDIAN
-    most = np.maximum(SAME_SIGMAS * sigma, SAME_TONE)
+    most = np.maximum(OVERLAP.same_sigmas * sigma, OVERLAP.same_tone)
     alike = np.empty(shown.shape, bool)
 
     def put(rows: slice) -> None:

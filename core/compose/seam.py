@@ -20,24 +20,8 @@ from ..raster.lazy import AnyImage, Placed
 from ..raster.picture_map import PictureMap
 from ..system.threads import each, in_order
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
-from .overlap import SAME_TONE, WHOLE, Overlap
-
-# Cells of the coarse cut, and pixels of a band, at most.
-COARSE, BANDED = 12_000, 80_000
-# Half the width of the band, in pixels of its level.
-BAND = 3
-# If less than the first share of what was there before is unshared, what lies deeper than the second share of its
-# largest distance to the border stays.
-SURROUNDED, CORE = 0.1, 0.2
-# Price (of 1, for opposite tones) of length alone; what differs costs twice as much at a step in depth by a pixel of
-# parallax, and where the warp is not sure at all: a sky without a depth is as good a place as any to cut through.
-LENGTH = 0.004
-# Price of the added picture where both could be shown, by how far across the overlap it comes (1: from corner to
-# corner): the reference is exact, the others are fetched by uncertain maps. Dearer, and the seam keeps to its border.
-WARPED = 0.1
-# Price of a pixel of what the added picture cannot see, for opposite tones: thinner than about eight, its border costs
-# more.
-GHOST = 0.5
+from .options import OVERLAP, SEAM
+from .overlap import Overlap
 
 
 def known_labels(
@@ -55,7 +39,7 @@ def known_labels(
     def put(rows: slice) -> tuple[int, int]:
         out, unseen = known[rows], hidden[rows]
         (shows_before, whole_before), (shows, whole) = (
-            (one.alpha[rows] > 0, one.alpha[rows] >= WHOLE) for one in (before, layer)
+            (one.alpha[rows] > 0, one.alpha[rows] >= OVERLAP.opaque_alpha) for one in (before, layer)
         )
         out[shows_before & shows] = FREE
         # a soft edge of one gives way to what the other shows whole
@@ -64,10 +48,10 @@ def known_labels(
         return int(shows_before.sum()), int((shows_before & ~shows).sum())
 
     shown, alone = np.sum(list(in_order(put, strips(known.shape))), axis=0).tolist()
-    if shown and alone < SURROUNDED * shown:
+    if shown and alone < SEAM.surrounded_share * shown:
         # all round it is the added picture: the cheapest cut would leave nothing of what was there before
         inner = distance_to_border(before.alpha > 0)
-        known[(known == FREE) & (inner > CORE * inner.max())] = FIRST
+        known[(known == FREE) & (inner > SEAM.kept_depth * inner.max())] = FIRST
     if painted is not None:
         known[(painted < 0) & (before.alpha > 0)] = FIRST
         known[(painted > 0) & (layer.alpha > 0)] = SECOND
@@ -106,9 +90,9 @@ def _cost(
     if confidence is not None:
         warned += 1 - confidence[box]
     cost = away * away
-    cost /= away + np.float32(SAME_TONE)
+    cost /= away + np.float32(OVERLAP.same_tone)
     cost *= warned
-    cost += np.float32(LENGTH)
+    cost += np.float32(SEAM.length_price)
     return np.minimum(cost, np.float32(1), out=cost)
 
 
@@ -144,8 +128,8 @@ def added_price(
         misplaced -= times
     price = np.zeros(misplaced.shape, np.float32)
     where = misplaced != 0
-    price[where] = np.float32(GHOST) * np.abs(overlap.difference[where]).mean(axis=1) * misplaced[where]
-    price += np.float32(WARPED / math.hypot(*price.shape))
+    price[where] = np.float32(SEAM.ghost_price) * np.abs(overlap.difference[where]).mean(axis=1) * misplaced[where]
+    price += np.float32(SEAM.added_price / math.hypot(*price.shape))
     return price
 
 
@@ -162,7 +146,7 @@ def find_seam(
     if not free:
         return out
     # around the box as far as a coarse cell: what lies there on either side is what the cut holds on to
-    reach = 2 << max(0, math.ceil(math.log(free / COARSE, 4)))
+    reach = 2 << max(0, math.ceil(math.log(free / SEAM.coarse_cells, 4)))
     wider = [
         slice(max(0, part.start - reach), min(side, part.stop + reach))
         for part, side in zip(box, known.shape, strict=True)
@@ -175,18 +159,18 @@ def find_seam(
 def _cut(known: NDArray[np.int8], cost: AnyImage, price: AnyImage) -> NDArray[np.bool_]:
     """The cut at one level, from that at half the size where this one is too large to be cut at once."""
     free = known == FREE
-    if free.sum() <= COARSE:
+    if free.sum() <= SEAM.coarse_cells:
         return _cut_within(known, cost, price, free)
     # four pixels have a cell's area, but two its side
     coarse = _cut(_halved_labels(known), _halved(cost, free), 2 * _halved(price, free))
     labels = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[: known.shape[0], : known.shape[1]]
     labels = np.where(known == FREE, labels, known == SECOND)
-    for reach in (BAND, 1):
+    for reach in (SEAM.band_half_width_px, 1):
         settled = np.where(labels, np.int8(SECOND), np.int8(FIRST))
         near = _near_border(labels, known != NOWHERE, reach)
         settled[near] = known[near]
         settled[known == NOWHERE] = NOWHERE
-        if (settled == FREE).sum() <= BANDED:
+        if (settled == FREE).sum() <= SEAM.band_pixels:
             return _cut_within(settled, cost, price, free)
     return labels
 

@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 
 from ..raster.picture_map import PictureMap
 from ..system.threads import each
-from .visibility import STRIP
+from .options import FOLDING
 
-# What is occluded is known to 3 px.
-RIM = np.ones((7, 7), np.uint8)
 # In place of -1, 0 or 1: see `turning`.
 NO_TURN = 2
 
@@ -24,7 +22,8 @@ def folds(turns: NDArray[np.int8], hidden: NDArray[np.bool_] | None = None) -> f
     """
     counts = turns != NO_TURN
     if hidden is not None:
-        counts &= cv2.dilate(hidden.astype(np.uint8), RIM) == 0
+        side = 2 * FOLDING.hidden_margin_px + 1
+        counts &= cv2.dilate(hidden.astype(np.uint8), np.ones((side, side), np.uint8)) == 0
     back, flat, on = (int(np.count_nonzero(counts & (turns == way))) for way in (-1, 0, 1))
     total = back + flat + on
     # the median's own way is the right one: what most pixels do, or nearly
@@ -37,7 +36,7 @@ def turning(picture_map: PictureMap) -> NDArray[np.int8]:
     show its picture, or nothing is known to the right or below."""
     height, width = picture_map.shape
     out = np.full((height, width), NO_TURN, np.int8)
-    rows = max(1, STRIP // width)
+    rows = max(1, FOLDING.strip_pixels // width)
 
     def put(top: int) -> None:
         bottom = min(top + rows, height - 1)

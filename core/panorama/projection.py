@@ -19,9 +19,7 @@ import numpy as np
 
 from ..cameras.projective import homogeneous, inverse_intrinsics
 from ..raster.arrays import Array
-
-# A cylinder grows without end towards zenith and nadir: tan φ where it is cut off (72°).
-STEEPEST = 3.0
+from .options import PROJECTION
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +49,7 @@ class Projection:
         if self.sphere is not None:
             left, top, width, height = self.sphere
             return np.array([left, top, left + width, top + height], np.float64)
-        across, up = np.floor(np.pi * self.focal), np.floor(STEEPEST * self.focal)
+        across, up = np.floor(np.pi * self.focal), np.floor(PROJECTION.max_cylinder_slope * self.focal)
         return np.array([-across, -up, across + 1, up + 1])
 
     def headings(self, u: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -48,7 +50,7 @@ def found(
 
 @pytest.mark.parametrize("across", [1000, 120])
 def test_who_moved_belongs_to_the_picture_that_is_alone_nearer_by(across: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(moving_things, "ACROSS", across)
+    monkeypatch.setattr(moving_things, "MOVING_THINGS", replace(moving_things.MOVING_THINGS, side_cells=across))
     reference, target = ground(), ground()
     reference[WALKER], target[FAR] = 0.02, 0.9
     when = found(reference, target)
