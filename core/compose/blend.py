@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from .options import BANDS
 from .overlap import Overlap
 
 
-def averaged(before: Layer, layer: Layer, count: NDArray) -> Layer:
+def averaged(before: Layer, layer: Layer, count: NDArray[Any]) -> Layer:
     """All pictures count alike wherever they show something: the plain average of the literature, which hides nothing.
 
     count (H, W): how many of them `before` is the average of.
@@ -179,8 +180,8 @@ def seam_region(
 
 
 def _on_region(
-    values: NDArray, box: tuple[slice, slice], region: tuple[slice, slice]
-) -> NDArray:
+    values: NDArray[Any], box: tuple[slice, slice], region: tuple[slice, slice]
+) -> NDArray[Any]:
     """Values of a box of the canvas, as those of a region of it; 0 where the box does not reach."""
     out = np.zeros((*(part.stop - part.start for part in region), *values.shape[2:]), values.dtype)
     low = [max(part.start, other.start) for part, other in zip(box, region, strict=True)]

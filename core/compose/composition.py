@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,7 +112,7 @@ class _Added:
     warp: Warp
     options: StitchOptions
     floats: tuple[bool, bool]
-    count: NDArray | None
+    count: NDArray[Any] | None
 
 
 @dataclass(frozen=True)

@@ -126,13 +126,15 @@ def _block_means(pixels: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArr
         cv2.resize(pixels[:height, :width, k] * weight, size, interpolation=cv2.INTER_AREA)[enough] / share[enough]
         for k in range(pixels.shape[2])
     ]
-    return np.stack(means, axis=-1).astype(np.float64)
+    stacked: NDArray[np.float64] = np.stack(means, axis=-1).astype(np.float64)
+    return stacked
 
 
 def _bright(means: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Blocks (N,) of which no channel is dark, beside the blocks in general."""
     typical = float(np.median(means.mean(axis=1))) if len(means) else 0.0
-    return means.min(axis=1, initial=np.inf) > max(EXPOSURE.min_brightness * typical, 0.0)
+    bright: NDArray[np.bool_] = means.min(axis=1, initial=np.inf) > max(EXPOSURE.min_brightness * typical, 0.0)
+    return bright
 
 
 def _weighted_median(values: NDArray[np.float64], weights: NDArray[np.float64]) -> float:

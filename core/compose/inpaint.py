@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import Part, bounds, with_margin
+from ..raster.arrays import Part, bounds, dilated, with_margin
 from ..raster.lazy import AnyImage, Retouched
 from ..raster.log_encoding import log_decode, log_encode
 from ..raster.pull_push import filled
@@ -19,7 +20,8 @@ from .options import INPAINT
 def holes_of(hidden: NDArray[np.bool_], before: Layer, layer: Layer) -> NDArray[np.bool_]:
     """Where (H, W) no camera saw anything: what is hidden (H, W) from that of the picture that is added, where the
     panorama before shows nothing."""
-    return hidden & (before.alpha == 0) & (layer.alpha > 0)
+    holes: NDArray[np.bool_] = hidden & (before.alpha == 0) & (layer.alpha > 0)
+    return holes
 
 
 def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage) -> Layer:
@@ -33,8 +35,7 @@ def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage
         return panorama
     box = with_margin(extent, INPAINT.reach_px, holes.shape)
     missing = holes[box]
-    rim = cv2.dilate(missing.astype(np.uint8), _within_reach()) > 0
-    beside = rim & ~missing & (panorama.alpha[box] > 0)
+    beside = dilated(missing, INPAINT.reach_px) & ~missing & (panorama.alpha[box] > 0)
     far = _far(inverse_depth[box], missing, beside)
     weight = beside * np.where(far, np.float32(1), np.float32(INPAINT.near_weight))
     tones = filled(log_encode(panorama.light[box]), weight)
@@ -44,18 +45,14 @@ def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage
     return Layer(Patched(panorama.light, at, missing, log_decode(tones)), alpha)
 
 
-def _far(inverse_depth: NDArray, missing: NDArray[np.bool_], beside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _far(inverse_depth: NDArray[Any], missing: NDArray[np.bool_], beside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Where (h, w) it is further away than halfway from what is missing to the nearest that lies beside it."""
     depth = np.nan_to_num(inverse_depth).astype(np.float32)
     behind = filled(depth[..., None], missing.astype(np.float32))[..., 0]
-    nearest = cv2.dilate(np.where(beside, depth, depth.min()).astype(np.float32), _within_reach())
-    return depth <= (behind + np.maximum(nearest, behind)) / 2
-
-
-def _within_reach() -> NDArray[np.uint8]:
-    """The window of all pixels that a hole is filled from."""
     side = 2 * INPAINT.reach_px + 1
-    return np.ones((side, side), np.uint8)
+    nearest = cv2.dilate(np.where(beside, depth, depth.min()).astype(np.float32), np.ones((side, side), np.uint8))
+    far: NDArray[np.bool_] = depth <= (behind + np.maximum(nearest, behind)) / 2
+    return far
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,4 +63,5 @@ class Patched(Retouched):
 
     def anew(self, before: NDArray[np.float32], there: Part) -> NDArray[np.float32]:
         """See `Retouched`."""
-        return self.patch[there][self.touched[there]]
+        pixels: NDArray[np.float32] = self.patch[there][self.touched[there]]
+        return pixels

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
@@ -24,7 +26,7 @@ def min_cut(
     free pixels to the power of 1.5 or so: keep them below 20000 in a block, or in a narrow band.
     """
     free = np.flatnonzero(known == FREE)
-    out = known == SECOND
+    out: NDArray[np.bool_] = known == SECOND
     if not free.size:
         return out
     count, (source, sink) = free.size, (free.size, free.size + 1)
@@ -34,11 +36,11 @@ def min_cut(
     at = free + width + 1 + 2 * (free // known.shape[1])
     node = np.full(states.size, -1, np.int32)
     node[at] = np.arange(count, dtype=np.int32)
-    tails: list[NDArray] = []
-    heads: list[NDArray] = []
-    capacities: list[NDArray] = []
+    tails: list[NDArray[Any]] = []
+    heads: list[NDArray[Any]] = []
+    capacities: list[NDArray[Any]] = []
 
-    def connect(tail: NDArray | int, head: NDArray | int, units: NDArray) -> None:
+    def connect(tail: NDArray[Any] | int, head: NDArray[Any] | int, units: NDArray[Any]) -> None:
         for ends, end in ((tails, tail), (heads, head)):
             ends.append(np.broadcast_to(np.asarray(end, np.int32), units.shape))
         capacities.append(units.astype(np.int32))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
+from ..raster.arrays import dilated
 from ..raster.distance import distance_inside, distance_to_border
 from ..raster.picture_map import PictureMap
 from .options import MOVING_THINGS
@@ -33,7 +34,7 @@ def times(
         cv2.resize(np.ascontiguousarray(part).view(np.uint8), size, interpolation=cv2.INTER_AREA) > 0
         for part in (overlap.both, hidden[overlap.box])
     )
-    seen = both & (cv2.dilate(unseen.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0)
+    seen = both & ~dilated(unseen, 1)
     difference = cv2.resize(overlap.difference, size, interpolation=cv2.INTER_AREA).reshape(*size[::-1], -1)
     away = np.abs(cv2.blur(difference, (3, 3)).reshape(difference.shape)).max(axis=2)
     same = both & (away < MOVING_THINGS.max_same_difference)
@@ -58,10 +59,11 @@ def times(
         part = np.s_[max(0, top - around) : top + height + around, max(0, left - around) : left + width + around]
         thing = labels[part] == label
         if _moving(thing, both[part], same[part], [values[part] for values in moves], step):
-            whole = cv2.dilate(thing.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+            whole = dilated(thing, 1)
             far_before, far = (float(np.median(values[part][thing])) for values in near)
             out[part][whole & both[part]] = 1 if far < far_before else -1
-    return cv2.resize(out, overlap.both.shape[::-1], interpolation=cv2.INTER_NEAREST) * overlap.both
+    full: NDArray[np.int8] = cv2.resize(out, overlap.both.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    return full * overlap.both
 
 
 def _moving(
@@ -70,8 +72,7 @@ def _moving(
 ) -> bool:
     """Whether the pictures agree all round a thing (h, w), on one surface, or nearly: then it moved."""
     around = MOVING_THINGS.surroundings_cells
-    size = 2 * around + 1
-    ring = (cv2.dilate(thing.astype(np.uint8), np.ones((size, size), np.uint8)) > 0) & ~thing & both
+    ring = dilated(thing, around) & ~thing & both
     agrees = ring & same
     if agrees.sum() < max(MOVING_THINGS.min_agreeing * ring.sum(), 3 * around):
         return False
@@ -82,7 +83,7 @@ def _moving(
     left_over = targets - places @ np.linalg.lstsq(places, targets, rcond=None)[0]
     parallax = np.hypot(*np.ptp(left_over, axis=0)) / step
     across = 2 * float(distance_to_border(thing).max())
-    return across > MOVING_THINGS.min_widths_of_parallax * parallax
+    return bool(across > MOVING_THINGS.min_widths_of_parallax * parallax)
 
 
 def _in_box(values: NDArray[np.float32], corner: tuple[int, int], size: tuple[int, ...]) -> NDArray[np.float32]:

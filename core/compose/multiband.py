@@ -9,6 +9,7 @@ ghost: across it light is evened out and content is cut hard. Beyond the band ev
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,7 +21,7 @@ from ..system.threads import each
 from .options import BANDS
 
 
-def bands_for(canvas: NDArray) -> int:
+def bands_for(canvas: NDArray[Any]) -> int:
     """How many bands a canvas (H, W, …) is blended in."""
     width = BANDS.coarsest_width * math.hypot(canvas.shape[0], canvas.shape[1])
     return int(np.clip(np.rint(math.log2(width)), BANDS.min_bands, BANDS.max_bands))
@@ -73,7 +74,8 @@ def _from_nearest(values: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArra
     )
     by_label = np.zeros(int(nearest.max()) + 1, bool)
     by_label[nearest[known]] = values[known]
-    return by_label[nearest]
+    nearest_values: NDArray[np.bool_] = by_label[nearest]
+    return nearest_values
 
 
 def _masked_bands(light: Plane, shares: list[Plane]) -> Plane:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import beside, bounds, shown_only, strips
+from ..raster.arrays import beside, bounds, dilated, shown_only, strips
 from ..raster.log_encoding import log_encode
 from ..raster.robust import NORMAL_MEDIAN
 from ..system.threads import each
@@ -48,9 +48,7 @@ def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overla
         difference[rows] = shown_only(tones, both[rows])
 
     each(put, strips(difference.shape))
-    side = 2 * OVERLAP.hidden_margin_px + 1
-    edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((side, side), np.uint8)) > 0
-    same = both & ~edge
+    same = both & ~dilated(hidden[box] & both, OVERLAP.hidden_margin_px)
     return Overlap(box, both, difference, same & _alike(difference, same))
 
 

@@ -8,13 +8,14 @@ many cells at any picture size, and each finer one only looks at a narrow band a
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import beside, bounds, strips, with_margin
+from ..raster.arrays import beside, bounds, dilated, strips, with_margin
 from ..raster.distance import distance_to_border
 from ..raster.lazy import AnyImage, Placed
 from ..raster.picture_map import PictureMap
@@ -141,7 +142,7 @@ def find_seam(
     known (H, W): see `known_labels`; cost and price (h, w): of a seam and of that picture, in the overlap's box of rows
     and columns.
     """
-    out = known == SECOND
+    out: NDArray[np.bool_] = known == SECOND
     free = int((known == FREE).sum())
     if not free:
         return out
@@ -152,7 +153,8 @@ def find_seam(
         for part, side in zip(box, known.shape, strict=True)
     ]
     here, at = (wider[0], wider[1]), (box[0].start - wider[0].start, box[1].start - wider[1].start)
-    out[here] = _cut(known[here], *(Placed(values, at, out[here].shape) for values in (cost, price)))
+    height, width = out[here].shape
+    out[here] = _cut(known[here], *(Placed(values, at, (height, width)) for values in (cost, price)))
     return out
 
 
@@ -163,8 +165,8 @@ def _cut(known: NDArray[np.int8], cost: AnyImage, price: AnyImage) -> NDArray[np
         return _cut_within(known, cost, price, free)
     # four pixels have a cell's area, but two its side
     coarse = _cut(_halved_labels(known), _halved(cost, free), 2 * _halved(price, free))
-    labels = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[: known.shape[0], : known.shape[1]]
-    labels = np.where(known == FREE, labels, known == SECOND)
+    finer = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[: known.shape[0], : known.shape[1]]
+    labels: NDArray[np.bool_] = np.where(known == FREE, finer, known == SECOND)
     for reach in (SEAM.band_half_width_px, 1):
         settled = np.where(labels, np.int8(SECOND), np.int8(FIRST))
         near = _near_border(labels, known != NOWHERE, reach)
@@ -179,7 +181,7 @@ def _cut_within(
     known: NDArray[np.int8], cost: AnyImage, price: AnyImage, free: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """The cut through what is FREE in `known`; free (h, w): where the cost is known."""
-    out = known == SECOND
+    out: NDArray[np.bool_] = known == SECOND
     box = bounds(known == FREE)
     if box is not None:
         part = with_margin(box, 2, known.shape)  # neighbours, and what their cost is continued from
@@ -189,9 +191,7 @@ def _cut_within(
 
 def _near_border(labels: NDArray[np.bool_], there: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
     """Where a pixel of the other label lies within `reach` px."""
-    size = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
-    near = [cv2.dilate((side & there).astype(np.uint8), size) for side in (labels, ~labels)]
-    return (near[0] & near[1]) > 0
+    return dilated(labels & there, reach) & dilated(~labels & there, reach)
 
 
 def _continued(cost: NDArray[np.float32], free: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -215,9 +215,10 @@ def _halved(cost: AnyImage, free: NDArray[np.bool_]) -> NDArray[np.float32]:
     return out
 
 
-def _cell_sums(values: NDArray) -> NDArray:
+def _cell_sums(values: NDArray[Any]) -> NDArray[Any]:
     even = np.pad(values, [(0, side % 2) for side in values.shape])
-    return even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2]
+    sums: NDArray[Any] = even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2]
+    return sums
 
 
 def _halved_labels(known: NDArray[np.int8]) -> NDArray[np.int8]:

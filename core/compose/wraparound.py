@@ -4,6 +4,7 @@ meet, and what is composed there goes on across that line."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,7 @@ def roll_for(canvas: Canvas, before: Layer, layer: Layer) -> int:
     return int(widest[len(widest) // 2]) % canvas.width
 
 
-def rolled(values: NDArray, columns: int) -> NDArray:
+def rolled(values: NDArray[Any], columns: int) -> NDArray[Any]:
     """An array (H, W, …) whose first column is the one of that number; the same object for 0."""
     return np.roll(values, -columns, axis=1) if columns else values
 

@@ -154,7 +154,8 @@ def _strips(rows: int) -> list[slice]:
 
 
 def _mean(values: Plane, side: int) -> Plane:
-    return cv2.blur(values, (side, side), borderType=cv2.BORDER_REFLECT_101)
+    mean: Plane = cv2.blur(values, (side, side), borderType=cv2.BORDER_REFLECT_101)
+    return mean
 
 
 def _mean_there(values: Plane, share: Plane | None) -> Plane:
@@ -181,10 +182,12 @@ def _smooth_step(wanted: Plane, evidence: Plane, step: float) -> Plane:
     width = max(1.0, POLISH.across_width * np.sqrt(rows * columns) / POLISH.across_step)
 
     def gathered(values: Plane) -> Plane:
-        return cv2.GaussianBlur(cv2.resize(values, small, interpolation=cv2.INTER_AREA), (0, 0), width)
+        smooth: Plane = cv2.GaussianBlur(cv2.resize(values, small, interpolation=cv2.INTER_AREA), (0, 0), width)
+        return smooth
 
     wanted, evidence = gathered(wanted), gathered(evidence)
     coarse = np.clip(
         wanted / (evidence + POLISH.across_damping * evidence.mean() + 1e-6), -POLISH.max_step_px, POLISH.max_step_px
     )
-    return cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_CUBIC)
+    step_across: Plane = cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_CUBIC)
+    return step_across

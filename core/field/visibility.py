@@ -7,12 +7,13 @@ division. So the depth order is in map and depth already; a z-buffer over the pi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import bounds, with_margin, without_specks
+from ..raster.arrays import bounds, dilated, with_margin, without_specks
 from ..raster.lazy import AnyImage
 from ..raster.picture_map import PictureMap
 from ..system.threads import in_order
@@ -44,7 +45,8 @@ def occluded(picture_map: PictureMap, nearness: AnyImage) -> NDArray[np.bool_]:
     hidden.ravel()[points[found]] = True
     # pixels between the samples of what hides them
     closed = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
-    return closed & picture_map.inside()
+    found_hidden: NDArray[np.bool_] = closed & picture_map.inside()
+    return found_hidden
 
 
 def by_agreement(
@@ -68,11 +70,11 @@ def by_agreement(
     sure = np.asarray(confidence[box])
     kept = hidden[box] & (sure <= VISIBILITY.agreed_confidence)
     alone = (shown[box] & part.inside() & (sure < VISIBILITY.alone_confidence)) | kept
-    grown = without_specks(kept).astype(np.uint8)
+    reached = without_specks(kept)
     for _ in range(reach):
-        grown = cv2.dilate(grown, np.ones((3, 3), np.uint8)) & alone
+        reached = dilated(reached, 1) & alone
     out = hidden.copy()
-    out[box] = kept | (grown > 0)
+    out[box] = kept | reached
     return out
 
 
@@ -168,7 +170,7 @@ def _folded_blocks(picture_map: PictureMap) -> NDArray[np.bool_]:
         for at, sign in (((y0, x0), 1), ((y0, x1 + 1), -1), ((y1 + 1, x0), -1), ((y1 + 1, x1 + 1), 1)):
             np.add.at(counts, at, sign)
     covered = counts.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
-    return cv2.dilate(covered.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    return dilated(covered, 1)
 
 
 def _mirrored(picture_map: PictureMap) -> bool:
@@ -181,7 +183,7 @@ def _mirrored(picture_map: PictureMap) -> bool:
     return bool((turn < 0).sum() > (turn > 0).sum())
 
 
-def nearness_of(inverse_depth: NDArray, depth_in_view: NDArray[np.float32]) -> NDArray[np.float32]:
+def nearness_of(inverse_depth: NDArray[Any], depth_in_view: NDArray[np.float32]) -> NDArray[np.float32]:
     """Baselines per distance in front of a picture's camera: d / x'₃, 0 at infinity and beyond; NaN without depth.
 
     depth_in_view: x'₃ of H_inf p + d e', before the division.
@@ -213,7 +215,9 @@ def _levels(picture_map: PictureMap, top: int, rows: int, points: NDArray[np.int
         for part, length in ((first, step[first]), (last, step[last]), (middle, shorter)):
             np.maximum(longest[part], length, out=longest[part])
     longer_than = np.float32(VISIBILITY.sampling_margin) ** 2 * 4.0 ** np.arange(VISIBILITY.coarsest_level)
-    return np.searchsorted(longer_than, longest.ravel()[points - low * x.shape[1]]).astype(np.uint8)
+    at_points = longest.ravel()[points - low * x.shape[1]]
+    levels: NDArray[np.uint8] = np.searchsorted(longer_than, at_points).astype(np.uint8)
+    return levels
 
 
 def _along(axis: int, part: slice) -> tuple[slice, ...]:
@@ -267,4 +271,5 @@ def _offset(
 
 
 def _distance(home: NDArray[np.float32], picture_map: PictureMap, at: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.hypot(*_offset(home, picture_map, at))
+    distance: NDArray[np.float32] = np.hypot(*_offset(home, picture_map, at))
+    return distance

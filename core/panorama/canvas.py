@@ -196,7 +196,8 @@ def border(size: tuple[int, int]) -> Array:
     width, height = size
     u = np.linspace(0, 1, CANVAS.outline_points, endpoint=False)
     around = [np.column_stack(p) for p in ((u, 0 * u), (0 * u + 1, u), (1 - u, 0 * u + 1), (0 * u, 1 - u))]
-    return np.concatenate(around) * np.array([width - 1.0, height - 1.0])
+    points: Array = np.concatenate(around) * np.array([width - 1.0, height - 1.0])
+    return points
 
 
 def _raw(point: Array, camera: Camera) -> Array:
@@ -216,4 +217,5 @@ def _area_ratio(places: Array, step: int) -> Array:
     """Picture pixels per canvas pixel, from differences between nodes."""
     dx, dy = np.gradient(places, step, axis=1), np.gradient(places, step, axis=0)
     with np.errstate(invalid="ignore"):
-        return np.nan_to_num(np.abs(dx[..., 0] * dy[..., 1] - dx[..., 1] * dy[..., 0]), nan=np.inf)
+        ratio: Array = np.nan_to_num(np.abs(dx[..., 0] * dy[..., 1] - dx[..., 1] * dy[..., 0]), nan=np.inf)
+    return ratio

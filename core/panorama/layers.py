@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,9 +98,9 @@ class Fetched(LazyImage):
     @staticmethod
     def of(
         picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32], inside: NDArray[np.bool_]
-    ) -> tuple[Fetched, NDArray]:
+    ) -> tuple[Fetched, NDArray[np.float32] | NDArray[np.bool_]]:
         """A picture through a map, and its alpha (H, W); inside (H, W): where the map falls inside the picture."""
-        alpha: NDArray = inside
+        alpha: NDArray[Any] = inside
         if picture.alpha is not None:
             fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
             alpha = inside * np.where(fetched > LAYER.min_alpha, np.minimum(fetched, 1.0), np.float32(0))

@@ -65,7 +65,8 @@ class Projection:
         """Unit rays (…, 3) in the reference camera's frame of points (…, 2) of the plane."""
         theta, phi = self.headings(points[..., 0]), self.elevations(points[..., 1])
         own = np.stack([np.cos(phi) * np.sin(theta), np.sin(phi), np.cos(phi) * np.cos(theta)], axis=-1)
-        return own @ self.rotation.T
+        rays: Array = own @ self.rotation.T
+        return rays
 
     def points(self, rays: Array) -> Array:
         """Points (…, 2) of the plane that show rays (…, 3) of any length, −π < θ ≤ π: the inverse of `rays`."""
@@ -73,7 +74,8 @@ class Projection:
         level = np.hypot(x, z)
         with np.errstate(divide="ignore"):
             rise = y / level if self.kind == "cylindrical" else np.arctan2(y, level)
-        return np.stack([np.arctan2(x, z), rise], axis=-1) * self.focal + np.array(self.centre)
+        points: Array = np.stack([np.arctan2(x, z), rise], axis=-1) * self.focal + np.array(self.centre)
+        return points
 
     def of_reference(self, points: Array) -> Array:
         """Points (…, 2) of the plane that show ideal pixels (…, 2) of the reference."""

@@ -48,4 +48,5 @@ def agreement(down: Array, normals: Array, lengths: Array, sigma: float) -> Arra
     are upright to within sigma (rad) and the rest anything, than if all are anything."""
     off = np.square(down @ normals.T)
     off *= -0.5 / sigma**2
-    return np.log1p(EDGES.upright_share * np.exp(off, out=off) / sigma) @ lengths
+    evidence: Array = np.log1p(EDGES.upright_share * np.exp(off, out=off) / sigma) @ lengths
+    return evidence
