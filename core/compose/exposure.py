@@ -1,8 +1,7 @@
-"""Exposure and white balance: one gain per channel, in scene-linear light, that makes a picture match the panorama
-before it was added.
+"""Exposure and white balance: one gain per channel, in scene-linear light, matches a picture to the panorama so far.
 
-That keeps its values. Measured on means over small blocks, which forgive an alignment that is a pixel off,
-and by a median, which forgives what moved.
+The gain is a median of ratios between means over small blocks: the means forgive an alignment that is a pixel off, the
+median forgives what moved. The panorama so far keeps its values.
 """
 
 from __future__ import annotations
@@ -23,8 +22,17 @@ from .options import EXPOSURE, OVERLAP
 
 @dataclass(frozen=True)
 class Exposure:
-    """gain (C,): a picture's light is multiplied by it; spread (C,): half of the blocks' own ratios lie within this
-    share of it; blocks: how many it was measured on, 0 where it is unknown and 1."""
+    """A measured gain.
+
+    Attributes
+    ----------
+    gain : (C,) float32 array
+        What a picture's light is multiplied by.
+    spread : (C,) float32 array
+        Median absolute deviation of the blocks' log ratios; NaN where the gain is unknown.
+    blocks : int
+        How many blocks were measured; 0 where the gain is unknown and taken for 1.
+    """
 
     gain: NDArray[np.float32]
     spread: NDArray[np.float32]
@@ -57,17 +65,28 @@ class Exposed(LazyImage):
 
 
 def unchanged(channels: int) -> Exposure:
-    """No compensation."""
+    """The exposure that changes nothing."""
     return Exposure(np.ones(channels, np.float32), np.full(channels, np.nan, np.float32), 0)
 
 
 def match_exposure(
     before: Layer, layer: Layer, hidden: NDArray[np.bool_], floats: tuple[bool, bool]
 ) -> Exposure:
-    """The gain per channel from what the panorama before and the layer that is added show of the same.
+    """Measure the gain per channel on what the panorama before and an added layer both show.
 
-    hidden (H, W): where the layer shows something else; floats: whether the two come from float pictures, which do not
-    clip.
+    Parameters
+    ----------
+    before, layer : Layer
+        On the same canvas.
+    hidden : (H, W) bool array
+        What the added picture cannot see, and so shows something else.
+    floats : (bool, bool)
+        Whether the two come from float pictures, which do not clip.
+
+    Returns
+    -------
+    Exposure
+        `unchanged` where too little is known, or where the light differs beyond what exposure explains.
     """
     channels = before.light.shape[2]
     shown = (before.alpha > OVERLAP.opaque_alpha) & (layer.alpha > OVERLAP.opaque_alpha) & ~hidden
@@ -94,7 +113,7 @@ def match_exposure(
     if bright.sum() < EXPOSURE.min_blocks:
         return unchanged(channels)
     ratios = np.log(means_before[bright]) - np.log(means[bright])
-    # what the eye would weigh: errors in tones, which grow about as the root of light
+    # errors count as the eye sees them: tones grow about as the root of light
     weights = np.sqrt(means_before[bright].mean(axis=1))
     middle = np.array([_weighted_median(ratios[:, k], weights) for k in range(channels)])
     spread = np.median(np.abs(ratios - middle), axis=0)
@@ -104,7 +123,7 @@ def match_exposure(
 
 
 def pooled(exposures: list[Exposure]) -> Exposure:
-    """One exposure for several frames of two fixed cameras: the middle of theirs."""
+    """The median of the exposures of several frames of fixed cameras."""
     known = [exposure for exposure in exposures if exposure.blocks]
     if not known:
         return exposures[0]
@@ -113,7 +132,7 @@ def pooled(exposures: list[Exposure]) -> Exposure:
 
 
 def _block_means(pixels: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Means (N, C) of what is shown in square blocks, of those blocks where enough is."""
+    """Means (N, C) over the blocks, of what is shown, where enough of a block is."""
     block = EXPOSURE.block_px
     height, width = (block * (side // block) for side in shown.shape)
     if not height or not width:
@@ -131,7 +150,7 @@ def _block_means(pixels: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArr
 
 
 def _bright(means: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Blocks (N,) of which no channel is dark, beside the blocks in general."""
+    """Which blocks (N,) have no channel that is dark compared with the median block."""
     typical = float(np.median(means.mean(axis=1))) if len(means) else 0.0
     bright: NDArray[np.bool_] = means.min(axis=1, initial=np.inf) > max(EXPOSURE.min_brightness * typical, 0.0)
     return bright

@@ -1,4 +1,4 @@
-"""Filling what no camera saw, where that is asked for: smoothly, from what lies behind; no detail is made up."""
+"""Filling holes that no camera saw, if asked for: smoothly, from what lies behind. No detail is invented."""
 
 from __future__ import annotations
 
@@ -18,17 +18,26 @@ from .options import INPAINT
 
 
 def holes_of(hidden: NDArray[np.bool_], before: Layer, layer: Layer) -> NDArray[np.bool_]:
-    """Where (H, W) no camera saw anything: what is hidden (H, W) from that of the picture that is added, where the
-    panorama before shows nothing."""
+    """Where (H, W) no camera saw anything: hidden (H, W) from the added picture, not shown by the panorama before."""
     holes: NDArray[np.bool_] = hidden & (before.alpha == 0) & (layer.alpha > 0)
     return holes
 
 
 def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage) -> Layer:
-    """A layer that shows something in its holes (H, W), too: a smooth continuation of what lies around them, opaque.
+    """Fill holes with a smooth continuation of what lies around them, opaque; all other pixels keep their bits.
 
-    inverse_depth (H, W): a hole is what something near hid, so it is filled from what is further away than halfway to
-    that. Everywhere else every pixel stays what it was.
+    Parameters
+    ----------
+    panorama : Layer
+    holes : (H, W) bool array
+        What is filled.
+    inverse_depth : (H, W) image
+        Of the canvas, 1 / baseline. Something near hid the hole, so it is filled from what lies further away than
+        halfway to that.
+
+    Returns
+    -------
+    Layer
     """
     extent = bounds(holes)
     if extent is None:
@@ -46,7 +55,7 @@ def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage
 
 
 def _far(inverse_depth: NDArray[Any], missing: NDArray[np.bool_], beside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Where (h, w) it is further away than halfway from what is missing to the nearest that lies beside it."""
+    """Where (h, w) depth lies beyond the middle between the hole's own and the nearest that lies `beside` it."""
     depth = np.nan_to_num(inverse_depth).astype(np.float32)
     behind = filled(depth[..., None], missing.astype(np.float32))[..., 0]
     side = 2 * INPAINT.reach_px + 1

@@ -1,4 +1,7 @@
-"""A minimal cut on a grid of pixels: which of two pictures each comes from, so that the border costs least."""
+"""A minimal cut on a grid of pixels: two labels with the cheapest border between them.
+
+Graph cuts for seams: Kwatra et al., Graphcut Textures, SIGGRAPH 2003.
+"""
 
 from __future__ import annotations
 
@@ -11,19 +14,32 @@ from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from .options import MIN_CUT
 
-# What is known of a pixel beforehand: comes from the first, the second, is to be decided, or is not there at all.
+# What is known of a pixel: comes from the first picture, from the second, is to be decided, or lies in neither.
 FIRST, SECOND, FREE, NOWHERE = -1, 1, 0, 2
 
 
 def min_cut(
     cost: NDArray[np.float32], known: NDArray[np.int8], price: NDArray[np.float32] | None = None
 ) -> NDArray[np.bool_]:
-    """Labels (H, W), True for the second picture, such that the sum over all borders between neighbours (4) of their
-    mean cost, plus the price of every free pixel of the second, is least.
+    """Minimise the cost of the border between two pictures plus the price of what is shown.
 
-    cost (H, W) in [0, 1]; known (H, W): FIRST, SECOND, FREE or NOWHERE (labelled False); price (H, W), none: 0; below 0
-    it is the first picture's that costs. Of equal cuts the one with the most of the first picture. Time grows with the
-    free pixels to the power of 1.5 or so: keep them below 20000 in a block, or in a narrow band.
+    A border between two of 4 neighbours costs their mean cost. Time grows with the free pixels to the power of about
+    1.5: keep them below 20 000 in a block, or in a narrow band.
+
+    Parameters
+    ----------
+    cost : (H, W) float32 array
+        In [0, 1].
+    known : (H, W) int8 array
+        FIRST, SECOND, FREE or NOWHERE.
+    price : (H, W) float32 array, optional
+        Of each free pixel that comes from the second picture; a negative one is paid if it comes from the first.
+
+    Returns
+    -------
+    (H, W) bool array
+        True for the second picture, False for the first and for NOWHERE. Of equally cheap cuts, the one that shows
+        most of the first picture.
     """
     free = np.flatnonzero(known == FREE)
     out: NDArray[np.bool_] = known == SECOND

@@ -1,4 +1,4 @@
-"""Where two layers show something at once, and how they differ there: what seam and blending look at."""
+"""Where two layers both show something, and how they differ there: what seam and blending go by."""
 
 from __future__ import annotations
 
@@ -20,9 +20,17 @@ from .options import OVERLAP
 class Overlap:
     """The part of the canvas in which both layers show something.
 
-    box: rows and columns of the canvas; both (h, w): where both show something; difference (h, w, C) float32: the added
-    picture's tones less those of the panorama before, 0 elsewhere; same (h, w): where they also show the same thing, so
-    that what remains of the difference is light, which may be blended, and not content, which must not.
+    Attributes
+    ----------
+    box : (slice, slice)
+        Rows and columns of the canvas.
+    both : (h, w) bool array
+        Where both show something.
+    difference : (h, w, C) float32 array
+        Tones of the added picture minus those of the panorama before, 0 elsewhere.
+    same : (h, w) bool array
+        Where they also show the same thing, so that the difference is one of light, which may be blended, and not of
+        content, which must not be.
     """
 
     box: tuple[slice, slice]
@@ -32,8 +40,10 @@ class Overlap:
 
 
 def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overlap | None:
-    """The overlap of the panorama before and a layer that is added; None where they do not meet. hidden (H, W): what
-    the added picture cannot see."""
+    """The overlap of the panorama before and an added layer, None where they do not meet.
+
+    hidden (H, W): what the added picture cannot see.
+    """
     both = (before.alpha > 0) & (layer.alpha > 0)
     box = bounds(both)
     if box is None:
@@ -53,7 +63,7 @@ def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overla
 
 
 def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Where the difference is about what it is in general."""
+    """Where (h, w) the difference is close to its median over what is `shown` (h, w)."""
     places = np.flatnonzero(shown)
     if not places.size:
         return shown
@@ -65,7 +75,7 @@ def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray
 
     def put(rows: slice) -> None:
         near, here = beside(rows, 1, len(difference))
-        # a little blurred: noise is no content
+        # blurred, since noise is no content
         blurred = cv2.blur(difference[near], (3, 3)).reshape(difference[near].shape)[here]
         within = [np.abs(blurred[..., k] - middle[k]) <= most[k] for k in range(len(most))]
         alike[rows] = np.logical_and.reduce(within)

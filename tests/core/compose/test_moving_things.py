@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.compose import moving_things
-from edf_stitch.core.compose.moving_things import times
+from edf_stitch.core.compose.moving_things import moving_labels
 from edf_stitch.core.compose.overlap import overlap_of
 from edf_stitch.core.compose.seam import added_price, find_seam, known_labels, seam_cost
 from edf_stitch.core.panorama.layers import Layer
@@ -44,7 +44,7 @@ def found(
     overlap = overlap_of(first, second, hidden)
     assert overlap is not None
     out = np.zeros((H, W), np.int8)
-    out[overlap.box] = times(overlap, picture_map or flat(), first, second, hidden)
+    out[overlap.box] = moving_labels(overlap, picture_map or flat(), first, second, hidden)
     return out
 
 
@@ -67,7 +67,7 @@ def test_who_walks_out_of_the_reference_is_seen_once() -> None:
     overlap = overlap_of(first, second, NOTHING)
     assert overlap is not None
     known, cost = known_labels(first, second, NOTHING), seam_cost(overlap, flat(), None)
-    when = times(overlap, flat(), first, second, NOTHING)
+    when = moving_labels(overlap, flat(), first, second, NOTHING)
     alone, together = (
         find_seam(known, cost, added_price(overlap, NOTHING, given), overlap.box) for given in (None, when)
     )
