@@ -1,8 +1,12 @@
-"""Two layers into one picture, in scene-linear float: in bands across a seam, feathered, or averaged."""
+"""Two layers into one picture, in scene-linear float: in bands across a seam, feathered, or averaged.
+
+`before` is the panorama so far, `layer` the added picture's layer on the same canvas.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +17,14 @@ from ..raster.distance import distance_inside, distance_to_border
 from ..raster.lazy import AnyImage, LazyImage, Retouched
 from ..raster.log_encoding import log_decode, log_encode
 from .multiband import bands_for, correction
+from .options import BANDS
 from .overlap import Overlap
 
-# Blending in bands changes a tone by this share of itself and this much at most.
-HALF, DARK = np.float32(0.5), np.float32(0.02)
 
+def averaged(before: Layer, layer: Layer, count: NDArray[Any]) -> Layer:
+    """The plain average of all pictures that show something, as papers have it: it hides no misalignment.
 
-def averaged(before: Layer, layer: Layer, count: NDArray) -> Layer:
-    """All pictures count alike wherever they show something: the plain average of the literature, which hides nothing.
-
-    count (H, W): how many of them `before` is the average of.
+    count (H, W): how many pictures `before` is the average of.
     """
     share = count.astype(np.float32)
     share /= share + 1
@@ -30,8 +32,10 @@ def averaged(before: Layer, layer: Layer, count: NDArray) -> Layer:
 
 
 def feathered(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Layer:
-    """Each counts by the distance to its own border, so that neither shows an edge; what the added picture cannot see
-    (hidden) stays as it was before."""
+    """Each weighted by the distance to its own border, so that neither shows an edge.
+
+    hidden (H, W): what the added picture cannot see, and what therefore stays as it was before.
+    """
     inner_before, inner = distance_to_border(before.alpha > 0), distance_to_border(layer.alpha > 0)
     share = inner_before / np.maximum(inner_before + inner, 1e-6)
     share[hidden & (before.alpha > 0)] = 1
@@ -39,30 +43,31 @@ def feathered(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Layer:
 
 
 def distance_labels(before: Layer, layer: Layer) -> NDArray[np.bool_]:
-    """The seam that distances alone give (H, W): True, for the added layer, where its border is further away."""
+    """The seam by distances alone (H, W): True, for the added layer, where its own border is further away."""
     return distance_to_border(before.alpha > 0) < distance_to_border(layer.alpha > 0)
 
 
 def feathered_across(before: Layer, layer: Layer, chosen: NDArray[np.bool_], overlap: Overlap | None) -> Layer:
-    """One gives way to the other over the width of the coarsest band (see `multiband`), where both show the same;
-    elsewhere they are cut hard along the seam. chosen (H, W): what comes from the added layer."""
+    """A linear ramp across the seam, as wide as the coarsest band (see `multiband`), where both show the same.
+
+    Elsewhere they are cut hard along the seam. chosen (H, W): what comes from the added layer.
+    """
     if overlap is None:
         return cut_hard(before, layer, chosen)
     share = np.where(chosen, np.float32(0), np.float32(1))
     here = chosen[overlap.box]
-    past = distance_inside(here) - distance_inside(~here)
-    ramp = np.clip(0.5 - past / np.float32(1 << bands_for(chosen)), 0, 1)
+    beyond_seam = distance_inside(here) - distance_inside(~here)
+    ramp = np.clip(0.5 - beyond_seam / np.float32(1 << bands_for(chosen)), 0, 1)
     share[overlap.box] = np.where(overlap.same, ramp, share[overlap.box])
     return mixed(before, layer, share)
 
 
 def mixed(before: Layer, layer: Layer, share: NDArray[np.float32]) -> Layer:
-    """One layer from two on the same canvas, straight alpha: share (H, W) is the weight of `before` where both show
-    something; where one shows nothing the other is taken as it is."""
+    """Two layers mixed where both show something, by share (H, W), the weight of `before`; else the one that does."""
     shown = before.alpha > 0
     both = shown & (layer.alpha > 0)
     alpha = np.where(shown, before.alpha, layer.alpha)
-    # what one picture shows whole is not seen through, however soft the other's edge
+    # where one is opaque so is the mix, however soft the other's edge
     np.maximum(alpha, layer.alpha, out=alpha, where=both)
     return Layer(Mixed(before, layer, share), alpha)
 
@@ -99,8 +104,7 @@ class Mixed(LazyImage):
 
 
 def cut_hard(before: Layer, layer: Layer, chosen: NDArray[np.bool_]) -> Layer:
-    """Each pixel bit for bit from the added layer where it is chosen (H, W), else as it was before; what one shows
-    whole is not seen through."""
+    """Each pixel bit for bit from the added layer where it is chosen (H, W), else from before; opaque where one is."""
     return Layer(Cut(before.light, layer.light, chosen), np.maximum(before.alpha, layer.alpha))
 
 
@@ -133,15 +137,15 @@ class Cut(LazyImage):
 
 
 def in_bands(before: Layer, layer: Layer, chosen: NDArray[np.bool_], overlap: Overlap | None) -> Layer:
-    """Cut hard along the seam, and the light of the two evened out across it (see `multiband`)."""
+    """Cut hard along the seam, with differences of light evened out across it in bands (see `multiband`)."""
     out = cut_hard(before, layer, chosen)
     bands = bands_for(out.alpha)
-    region = seam_region(chosen, out.alpha > 0, 4 << bands)
+    region = seam_region(chosen, out.alpha > 0, BANDS.margin_widths << bands)
     if region is None or overlap is None:
         return out
     shown = out.alpha[region] > 0
     parts = [_on_region(values, overlap.box, region) for values in (overlap.difference, overlap.same)]
-    del overlap  # as large as they are: the peak of memory is ahead
+    del overlap  # as large as these: the peak of memory is ahead
     same = parts.pop()
     change = correction(parts.pop(), same, chosen[region], shown, bands)
     touched = in_any_channel(change != 0) & shown
@@ -157,8 +161,8 @@ class Evened(Retouched):
     def anew(self, before: NDArray[np.float32], there: Part) -> NDArray[np.float32]:
         """See `Retouched`."""
         tones = log_encode(before)
-        # what brighter neighbours differ by is too much for the dark: it stays dark, and no light turns negative
-        most = HALF * np.abs(tones) + DARK
+        # bounded, so that bright neighbours' differences neither brighten the dark nor turn light negative
+        most = BANDS.max_relative_change * np.abs(tones) + BANDS.max_dark_change
         after = log_decode(tones + np.clip(self.change[there][self.touched[there]], -most, most))
         return np.maximum(after, np.minimum(before, 0))
 
@@ -166,7 +170,10 @@ class Evened(Retouched):
 def seam_region(
     chosen: NDArray[np.bool_], shown: NDArray[np.bool_], margin: int
 ) -> tuple[slice, slice] | None:
-    """Rows and columns that hold all borders of what is chosen and a margin (px); None where there are none."""
+    """Rows and columns that hold the whole seam and a margin (px); None without a seam.
+
+    chosen (H, W): what comes from one side; shown (H, W): borders of what is not shown do not count.
+    """
     borders = np.zeros(chosen.shape, bool)
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         borders[here] |= (chosen[here] != chosen[there]) & shown[here] & shown[there]
@@ -181,9 +188,9 @@ def seam_region(
 
 
 def _on_region(
-    values: NDArray, box: tuple[slice, slice], region: tuple[slice, slice]
-) -> NDArray:
-    """Values of a box of the canvas, as those of a region of it; 0 where the box does not reach."""
+    values: NDArray[Any], box: tuple[slice, slice], region: tuple[slice, slice]
+) -> NDArray[Any]:
+    """Values of a box of the canvas, as an array over a region of it; 0 where the box does not reach."""
     out = np.zeros((*(part.stop - part.start for part in region), *values.shape[2:]), values.dtype)
     low = [max(part.start, other.start) for part, other in zip(box, region, strict=True)]
     high = [min(part.stop, other.stop) for part, other in zip(box, region, strict=True)]

@@ -1,10 +1,13 @@
-"""How layers become a panorama: one picture after the other is added to what is there, the reference first. For each:
-what it cannot see, its exposure, the seam, and the blend across it."""
+"""From layers to a panorama: pictures are added one after the other to the reference (docs/method.md, 8).
+
+For each: what it cannot see, its exposure, the seam to the panorama so far (`before`), and the blend across it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +22,11 @@ from ..raster.arrays import bounds, with_margin, without_specks
 from ..raster.lazy import AnyImage, Weighed, whole
 from ..raster.picture_map import PictureMap
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
-from .exposure import BLOCK, Exposure, match_exposure, pooled, unchanged
+from .exposure import Exposure, match_exposure, pooled, unchanged
 from .inpaint import holes_of, inpainted
-from .moving_things import times
+from .min_cut import FREE, SECOND
+from .moving_things import moving_labels
+from .options import EXPOSURE
 from .overlap import Overlap, overlap_of
 from .seam import added_price, find_seam, known_labels, seam_cost
 from .wraparound import roll_for, rolled, rolled_layer, rolled_map
@@ -32,19 +37,30 @@ ReportProgress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Decided:
-    """What was decided about one picture before a pixel was mixed; the frames of a clip share it.
+    """What was decided about one picture before pixels are mixed; the frames of a clip share it.
 
-    hidden (H, W): what the picture cannot see, or would show mirrored; surely (H, W): that of it which the depth order
-    says by itself, which is what the seam goes by: more would leave it no way through leaves (`hidden` if that is not
-    kept); exposure: the picture's; chosen (H, W): what comes from it and not from the pictures before, None without a
-    seam; known, cost, price, box: what the seam was cut by (see `find_seam`), None if it was not or they are not kept;
-    roll: by how many columns those four are rolled (see `wraparound`); holes: pixels that it cannot see and that no
-    picture before shows: transparent or filled, but in an average; folds: `folding.folds` away from what is hidden
-    behind something near.
+    Attributes
+    ----------
+    hidden : (H, W) bool array
+        What the picture cannot see, or would show mirrored.
+    hidden_by_depth : (H, W) bool array
+        The part of it that the depth order alone tells, which the seam avoids: with all of it, foliage would leave the
+        seam no way through. `hidden` itself if not kept.
+    exposure : Exposure
+    chosen : (H, W) bool array or None
+        What comes from this picture and not from those before; None without a seam.
+    known, cost, price, box : arrays and slices, or None
+        What the seam was cut by (see `find_seam`), if it was and is kept.
+    roll : int
+        Columns by which these four are rolled (see `wraparound`).
+    holes : int
+        Pixels that the picture cannot see and none before it shows. They are transparent or filled.
+    folds : float
+        Share of the picture's map that is folded, away from what is hidden (see `folding.folds`).
     """
 
     hidden: NDArray[np.bool_]
-    surely: NDArray[np.bool_]
+    hidden_by_depth: NDArray[np.bool_]
     exposure: Exposure
     chosen: NDArray[np.bool_] | None = None
     known: NDArray[np.int8] | None = None
@@ -58,8 +74,18 @@ class Decided:
 
 @dataclass(frozen=True)
 class Composition:
-    """The panorama; the pictures' layers as they were exposed for it; what was decided about each; labels (H, W): which
-    picture a pixel comes from (0 the reference, −1 none), None without a seam."""
+    """A panorama and what it was made of.
+
+    Attributes
+    ----------
+    panorama : Layer
+    exposed : tuple of Layer
+        The pictures' layers with their exposure matched.
+    decided : tuple of Decided
+        One for each picture, the reference first.
+    labels : (H, W) int16 array or None
+        Which picture each pixel comes from: 0 the reference, −1 none; None without a seam.
+    """
 
     panorama: Layer
     exposed: tuple[Layer, ...]
@@ -72,11 +98,35 @@ def composed(
     painted: NDArray[np.int8] | None, progress: ReportProgress, decided: Sequence[Decided] | None = None,
     keep: bool = False,
 ) -> Composition:  # fmt: skip
-    """The panorama of layers, of which the first is the reference's and keeps its light.
+    """Compose layers into a panorama.
 
-    What no picture shows is transparent, and so is what only a picture that cannot see it would show, unless it is to
-    be inpainted. floats: which layers come from float pictures; painted (H, W): see `masks.read_painted`; decided: from
-    other frames of the same cameras, kept to; keep: what the seams were cut by, for `pooled_decision`.
+    What no picture shows is transparent, and so is what only a picture that cannot see it would show, unless holes are
+    to be inpainted.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        All on the same canvas. The first is the reference's and keeps its light.
+    warp : Warp
+        Of the same canvas.
+    views : sequence of View
+        What is known of the pictures, in the same order.
+    options : StitchOptions
+        Its exposure, seam, blend and holes.
+    floats : sequence of bool
+        Which layers come from float pictures, which do not clip.
+    painted : (H, W) int8 array or None
+        What an artist decided about the seam (see `known_labels`).
+    progress : callable
+        Called with a stage's name and the share of all stages of this name that is done.
+    decided : sequence of Decided, optional
+        Taken over instead of decided anew: from other frames of the same cameras.
+    keep : bool
+        Keep what the seams were cut by, for `pooled_decision`.
+
+    Returns
+    -------
+    Composition
     """
     out, shape = layers[0], layers[0].alpha.shape
     nothing = np.broadcast_to(np.False_, shape)
@@ -101,8 +151,11 @@ def composed(
 
 @dataclass(frozen=True)
 class _Added:
-    """A picture that is to be added: its layer, its map, how near it is to what (H, W) (see `Warp.nearness`); whether
-    what was there before, and it, come from float pictures; of how many pictures (H, W) an average was made so far."""
+    """A picture to be added.
+
+    nearness (H, W): see `Warp.nearness`; floats: whether the panorama before, and this picture, come from floats;
+    count (H, W): how many pictures the panorama before is the average of, None where none is made.
+    """
 
     layer: Layer
     picture_map: PictureMap
@@ -110,13 +163,13 @@ class _Added:
     warp: Warp
     options: StitchOptions
     floats: tuple[bool, bool]
-    count: NDArray | None
+    count: NDArray[Any] | None
 
 
 @dataclass(frozen=True)
 class _Step:
-    """The panorama with a picture added, the picture's layer as it was exposed, what was decided, and its holes (H, W),
-    empty where they are not to be filled."""
+    """The panorama with a picture added; its layer, exposed; what was decided; holes (H, W) to fill, empty if none are.
+    """
 
     panorama: Layer
     layer: Layer
@@ -128,71 +181,73 @@ def _add(
     before: Layer, added: _Added, painted: NDArray[np.int8] | None, progress: ReportProgress, decided: Decided | None,
     keep: bool,
 ) -> _Step:  # fmt: skip
-    """The panorama of what was there before and one picture more."""
+    """Add one picture to the panorama before."""
     options, layer = added.options, added.layer
     progress("occlusion", 0.0)
-    hidden, surely, folded = (decided.hidden, decided.surely, decided.folds) if decided else _unseen(before, added)
+    hidden, by_depth, folded = (
+        (decided.hidden, decided.hidden_by_depth, decided.folds) if decided else _hidden(before, added)
+    )
 
     progress("exposure", 0.0)
     box = bounds((before.alpha > 0) & (layer.alpha > 0))
-    # asked for twice unless decided, and let go before the cut: to fetch it again costs less than the room it takes
-    held = layer if decided or box is None else layer.keep(with_margin(box, BLOCK, before.alpha.shape))
+    # Exposure and overlap both read it. It is dropped before the seam: fetching again costs less than its memory.
+    fetched = layer if decided or box is None else layer.keep(with_margin(box, EXPOSURE.block_px, before.alpha.shape))
     if decided:
         exposure = decided.exposure
     elif options.exposure:
-        exposure = match_exposure(before, held, hidden, added.floats)
+        exposure = match_exposure(before, fetched, hidden, added.floats)
     else:
         exposure = unchanged(layer.light.shape[2])
-    held, layer = exposure.applied(held), exposure.applied(layer)
+    fetched, layer = exposure.applied(fetched), exposure.applied(layer)
 
     progress("seam", 0.0)
     if added.count is not None:
         progress("blend", 0.0)
-        found = Decided(hidden, surely, exposure, folds=folded)
-        return _Step(averaged(before, held, added.count), held, found, np.zeros(0, bool))
+        found = Decided(hidden, by_depth, exposure, folds=folded)
+        return _Step(averaged(before, fetched, added.count), fetched, found, np.zeros(0, bool))
     holes = holes_of(hidden, before, layer)
-    seen, held = (_without(one, holes) if holes.any() else one for one in (layer, held))
-    roll = decided.roll if decided else roll_for(added.warp.canvas, before, seen)
-    before, seen, surely_there = rolled_layer(before, roll), rolled_layer(seen, roll), rolled(surely, roll)
-    overlap = overlap_of(before, rolled_layer(held, roll), surely_there) if options.has_seam else None
-    del held
+    visible, fetched = (_without(one, holes) if holes.any() else one for one in (layer, fetched))
+    roll = decided.roll if decided else roll_for(added.warp.canvas, before, visible)
+    before, visible, rolled_hidden = rolled_layer(before, roll), rolled_layer(visible, roll), rolled(by_depth, roll)
+    overlap = overlap_of(before, rolled_layer(fetched, roll), rolled_hidden) if options.has_seam else None
+    del fetched
     if decided:
         found = decided
     else:
-        start = Decided(hidden, surely_there, exposure, roll=roll, holes=int(holes.sum()), folds=folded)
-        found = _with_seam(start, before, seen, overlap, added, None if painted is None else rolled(painted, roll))
+        start = Decided(hidden, rolled_hidden, exposure, roll=roll, holes=int(holes.sum()), folds=folded)
+        found = _with_seam(start, before, visible, overlap, added, None if painted is None else rolled(painted, roll))
         chosen = None if found.chosen is None else rolled(found.chosen, -roll)
-        found = replace(found, surely=surely, chosen=chosen)
+        found = replace(found, hidden_by_depth=by_depth, chosen=chosen)
         if not keep:
-            found = replace(found, surely=hidden, known=None, cost=None, price=None, box=None)
+            found = replace(found, hidden_by_depth=hidden, known=None, cost=None, price=None, box=None)
         del start
     if options.holes != "inpaint":
         holes = np.zeros(0, bool)
-    del surely, surely_there  # each as large as the canvas, and the bands need the room
+    del by_depth, rolled_hidden  # each as large as the canvas: the peak of memory is ahead
 
     progress("blend", 0.0)
     if found.chosen is None:
-        out = feathered(before, seen, rolled(hidden, roll))
+        out = feathered(before, visible, rolled(hidden, roll))
     else:
-        # the frames of a clip need not show the same everywhere
-        side = (rolled(found.chosen, roll) & (seen.alpha > 0)) | (before.alpha == 0)
+        # a decision taken over from another frame may choose pixels that this one does not show
+        side = (rolled(found.chosen, roll) & (visible.alpha > 0)) | (before.alpha == 0)
         blended = in_bands if options.blend == "multiband" else feathered_across
-        # handed over, not kept: the bands need the room
+        # handed over without a reference of our own, so that blending can free it at its peak of memory
         handed, overlap = [overlap], None
-        out = blended(before, seen, side, handed.pop())
+        out = blended(before, visible, side, handed.pop())
     return _Step(rolled_layer(out, -roll), layer, found, holes)
 
 
-def _unseen(before: Layer, added: _Added) -> tuple[NDArray[np.bool_], NDArray[np.bool_], float]:
-    """What (H, W) a picture cannot see, what of it the depth order says by itself, and its share of folds."""
-    surely = occluded(added.picture_map, added.nearness)
-    hidden = by_agreement(surely, added.picture_map, added.warp.lazy_confidence, before.alpha > 0)
-    surely &= hidden
+def _hidden(before: Layer, added: _Added) -> tuple[NDArray[np.bool_], NDArray[np.bool_], float]:
+    """What (H, W) a picture cannot see, the part of it that the depth order alone tells, and its share of folds."""
+    by_depth = occluded(added.picture_map, added.nearness)
+    hidden = by_agreement(by_depth, added.picture_map, added.warp.lazy_confidence, before.alpha > 0)
+    by_depth &= hidden
     turns = turning(added.picture_map)
     folded = folds(turns, hidden)
-    # what is mirrored comes from the pictures before, too, where they show anything
+    # the panorama before is right where the map mirrors the picture
     mirrored = turned_over(turns) & (before.alpha > 0)
-    return hidden | mirrored, surely | mirrored, folded
+    return hidden | mirrored, by_depth | mirrored, folded
 
 
 def _count(layers: Sequence[Layer]) -> NDArray[np.int16]:
@@ -214,12 +269,23 @@ def _labels(reference: Layer, decided: Sequence[Decided]) -> NDArray[np.int16] |
 
 
 def pooled_decision(decisions: Sequence[Sequence[Decided]]) -> tuple[Decided, ...]:
-    """One decision about each picture for several frames of the same cameras: its exposure in their middle, the seam
-    that is cheapest over all of them. decisions: of each frame, about each picture."""
+    """One decision about each picture for several frames of the same cameras.
+
+    Parameters
+    ----------
+    decisions : sequence of sequences of Decided
+        Of each frame, about each picture, made with `keep`.
+
+    Returns
+    -------
+    tuple of Decided
+        The median of the exposures, and the seam that is cheapest on average over the frames.
+    """
     return tuple(_pooled(about_one) for about_one in zip(*decisions, strict=True))
 
 
 def _pooled(decisions: Sequence[Decided]) -> Decided:
+    """The same about one picture, by the frames that overlap in the same box."""
     first = decisions[0]
     exposure = pooled([decision.exposure for decision in decisions])
     if first.known is None or first.box is None:
@@ -234,7 +300,7 @@ def _pooled(decisions: Sequence[Decided]) -> Decided:
 
 
 def _without(layer: Layer, holes: NDArray[np.bool_]) -> Layer:
-    """A layer that shows nothing in holes (H, W), and has no colour there either: files keep it under the alpha."""
+    """A layer that shows nothing in holes (H, W), black there: files keep colours below alpha 0."""
     alpha = np.where(holes, layer.alpha.dtype.type(0), layer.alpha)
     return Layer(Weighed(layer.light, alpha if alpha.dtype == bool else ~holes), alpha)
 
@@ -243,21 +309,22 @@ def _with_seam(
     so_far: Decided, before: Layer, layer: Layer, overlap: Overlap | None, added: _Added,
     painted: NDArray[np.int8] | None,
 ) -> Decided:
-    """What was decided, with the seam; layers, overlap and what is painted are rolled, the picture's map is not."""
+    """What was decided, with the seam. Layers, overlap and painted labels are rolled, the picture's map is not yet."""
     options = added.options
     if not options.has_seam:
         return so_far
     cuts = options.seam != "none" and overlap is not None
-    known = known_labels(before, layer, without_specks(so_far.surely) if cuts else so_far.surely, painted)
+    hidden = without_specks(so_far.hidden_by_depth) if cuts else so_far.hidden_by_depth
+    known = known_labels(before, layer, hidden, painted)
     if overlap is None:
-        return replace(so_far, chosen=known == 1)
+        return replace(so_far, chosen=known == SECOND)
     if options.seam == "none":
         nearest = distance_labels(before, layer)
-        return replace(so_far, chosen=np.where(known == 0, nearest, known == 1))
+        return replace(so_far, chosen=np.where(known == FREE, nearest, known == SECOND))
     picture_map, confidence = rolled_map(added.picture_map, so_far.roll), added.warp.lazy_confidence
     if confidence is not None and so_far.roll:
         confidence = rolled(whole(confidence), so_far.roll)
-    when = times(overlap, picture_map, before, layer, so_far.surely)
-    cost, price = seam_cost(overlap, picture_map, confidence), added_price(overlap, so_far.surely, when)
+    moving = moving_labels(overlap, picture_map, before, layer, so_far.hidden_by_depth)
+    cost, price = seam_cost(overlap, picture_map, confidence), added_price(overlap, so_far.hidden_by_depth, moving)
     chosen = find_seam(known, cost, price, overlap.box)
     return replace(so_far, chosen=chosen, known=known, cost=cost, price=price, box=overlap.box)

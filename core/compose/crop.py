@@ -26,11 +26,28 @@ def parse_crop(text: str) -> Crop:
 
 
 def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Box) -> Box:
-    """The part of the panorama that is kept: left, top, width, height in canvas px.
+    """The part of the panorama that is kept.
 
-    kind: one of CROPS, or a box in px of the whole panorama; whole: the whole panorama (see `Canvas.whole`); shows
-    (H, W): where the canvas shows something; reference_box: where the reference lies. Raises BadRequest, also for a box
-    that reaches outside the panorama, or lies beside both pictures.
+    Parameters
+    ----------
+    kind : Crop
+        One of CROPS, or (x, y, width, height) in px of the whole panorama.
+    whole : Box
+        The whole panorama in canvas px (see `Canvas.whole`).
+    shows : (H, W) bool array
+        Where the canvas shows something.
+    reference_box : Box
+        Where the reference lies, canvas px.
+
+    Returns
+    -------
+    Box
+        left, top, width, height in canvas px.
+
+    Raises
+    ------
+    BadRequest
+        The kind is not known, the panorama shows nothing, or a box reaches outside it or lies beside both pictures.
     """
     left, top, width, height = whole
     if kind == "full":
@@ -60,8 +77,8 @@ def largest_rectangle(shows: NDArray[np.bool_]) -> Box:
     """
     height, width = shows.shape
     column = np.arange(width, dtype=np.int64)
-    # For each pixel of a row: how far up its column is True, and the columns to which a rectangle of that height can
-    # be widened. Some pixel of its last row sees the largest rectangle like this, and each step is one row of NumPy.
+    # For each pixel of a row: how far its column is True upwards, and how far a rectangle of that height can be
+    # widened. The largest rectangle is found from some pixel of its last row; each step works on a whole row at once.
     up, left, right = np.zeros(width, np.int64), np.zeros(width, np.int64), np.full(width, width, np.int64)
     best, box = 0, (0, 0, 0, 0)
     for row, here in enumerate(shows):

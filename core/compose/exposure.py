@@ -1,8 +1,7 @@
-"""Exposure and white balance: one gain per channel, in scene-linear light, that makes a picture match the panorama
-before it was added.
+"""Exposure and white balance: one gain per channel, in scene-linear light, matches a picture to the panorama so far.
 
-That keeps its values. Measured on means over small blocks, which forgive an alignment that is a pixel off,
-and by a median, which forgives what moved.
+The gain is a median of ratios between means over small blocks: the means forgive an alignment that is a pixel off, the
+median forgives what moved. The panorama so far keeps its values.
 """
 
 from __future__ import annotations
@@ -18,22 +17,22 @@ from ..raster.arrays import Part, bounds
 from ..raster.lazy import AnyImage, LazyImage
 from ..raster.options import PARTS
 from ..system.threads import in_order
-
-BLOCK = 8
-# Light (of white 1) from which pictures of 8 and 16 bits are taken for clipped: level 250 of 255, for JPEG rings.
-CLIPPED = 0.956
-# Blocks darker than this share of the median tell more about noise and flare than about exposure.
-DARK = 0.05
-# A block counts where so much of it can be seen in both; with fewer blocks than that nothing is known.
-LEAST_SHOWN, LEAST_BLOCKS = 0.5, 20
-# Beyond a factor of this it is not an exposure but two pictures of different light.
-LARGEST = 16.0
+from .options import EXPOSURE, OVERLAP
 
 
 @dataclass(frozen=True)
 class Exposure:
-    """gain (C,): a picture's light is multiplied by it; spread (C,): half of the blocks' own ratios lie within this
-    share of it; blocks: how many it was measured on, 0 where it is unknown and 1."""
+    """A measured gain.
+
+    Attributes
+    ----------
+    gain : (C,) float32 array
+        What a picture's light is multiplied by.
+    spread : (C,) float32 array
+        Median absolute deviation of the blocks' log ratios; NaN where the gain is unknown.
+    blocks : int
+        How many blocks were measured; 0 where the gain is unknown and taken for 1.
+    """
 
     gain: NDArray[np.float32]
     spread: NDArray[np.float32]
@@ -66,26 +65,38 @@ class Exposed(LazyImage):
 
 
 def unchanged(channels: int) -> Exposure:
-    """No compensation."""
+    """The exposure that changes nothing."""
     return Exposure(np.ones(channels, np.float32), np.full(channels, np.nan, np.float32), 0)
 
 
 def match_exposure(
     before: Layer, layer: Layer, hidden: NDArray[np.bool_], floats: tuple[bool, bool]
 ) -> Exposure:
-    """The gain per channel from what the panorama before and the layer that is added show of the same.
+    """Measure the gain per channel on what the panorama before and an added layer both show.
 
-    hidden (H, W): where the layer shows something else; floats: whether the two come from float pictures, which do not
-    clip.
+    Parameters
+    ----------
+    before, layer : Layer
+        On the same canvas.
+    hidden : (H, W) bool array
+        What the added picture cannot see, and so shows something else.
+    floats : (bool, bool)
+        Whether the two come from float pictures, which do not clip.
+
+    Returns
+    -------
+    Exposure
+        `unchanged` where too little is known, or where the light differs beyond what exposure explains.
     """
     channels = before.light.shape[2]
-    shown = (before.alpha > 1 - 1 / 255) & (layer.alpha > 1 - 1 / 255) & ~hidden
+    shown = (before.alpha > OVERLAP.opaque_alpha) & (layer.alpha > OVERLAP.opaque_alpha) & ~hidden
     box = bounds(shown)
     if box is None:
         return unchanged(channels)
+    block = EXPOSURE.block_px
     # whole blocks of the canvas
-    rows, columns = (slice(part.start - part.start % BLOCK, part.stop + -part.stop % BLOCK) for part in box)
-    at_once = BLOCK * max(1, PARTS.strip_pixels // (BLOCK * (columns.stop - columns.start)))
+    rows, columns = (slice(part.start - part.start % block, part.stop + -part.stop % block) for part in box)
+    at_once = block * max(1, PARTS.strip_pixels // (block * (columns.stop - columns.start)))
 
     def means_of(top: int) -> list[NDArray[np.float64]]:
         part = slice(top, min(rows.stop, top + at_once)), columns
@@ -93,26 +104,26 @@ def match_exposure(
         for light, unclipped in zip(pixels, floats, strict=True):
             if not unclipped:
                 for k in range(channels):
-                    counts = counts & (light[..., k] < CLIPPED)
+                    counts = counts & (light[..., k] < EXPOSURE.clipped_light)
         return [_block_means(light, counts) for light in pixels]
 
     parts = list(in_order(means_of, range(rows.start, rows.stop, at_once)))
     means_before, means = (np.concatenate(one) for one in zip(*parts, strict=True))
     bright = _bright(means_before) & _bright(means)
-    if bright.sum() < LEAST_BLOCKS:
+    if bright.sum() < EXPOSURE.min_blocks:
         return unchanged(channels)
     ratios = np.log(means_before[bright]) - np.log(means[bright])
-    # what the eye would weigh: errors in tones, which grow about as the root of light
+    # errors count as the eye sees them: tones grow about as the root of light
     weights = np.sqrt(means_before[bright].mean(axis=1))
     middle = np.array([_weighted_median(ratios[:, k], weights) for k in range(channels)])
     spread = np.median(np.abs(ratios - middle), axis=0)
-    if np.abs(middle).max() > np.log(LARGEST):
+    if np.abs(middle).max() > np.log(EXPOSURE.max_gain):
         return unchanged(channels)
     return Exposure(np.exp(middle).astype(np.float32), spread.astype(np.float32), int(bright.sum()))
 
 
 def pooled(exposures: list[Exposure]) -> Exposure:
-    """One exposure for several frames of two fixed cameras: the middle of theirs."""
+    """The median of the exposures of several frames of fixed cameras."""
     known = [exposure for exposure in exposures if exposure.blocks]
     if not known:
         return exposures[0]
@@ -121,25 +132,28 @@ def pooled(exposures: list[Exposure]) -> Exposure:
 
 
 def _block_means(pixels: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Means (N, C) of what is shown in blocks of BLOCK² px, of those blocks where enough is."""
-    height, width = (BLOCK * (side // BLOCK) for side in shown.shape)
+    """Means (N, C) over the blocks, of what is shown, where enough of a block is."""
+    block = EXPOSURE.block_px
+    height, width = (block * (side // block) for side in shown.shape)
     if not height or not width:
         return np.zeros((0, pixels.shape[2]))
-    size = (width // BLOCK, height // BLOCK)
+    size = (width // block, height // block)
     weight = shown[:height, :width].astype(np.float32)
     share = cv2.resize(weight, size, interpolation=cv2.INTER_AREA)
-    enough = share >= LEAST_SHOWN
+    enough = share >= EXPOSURE.min_block_share
     means = [
         cv2.resize(pixels[:height, :width, k] * weight, size, interpolation=cv2.INTER_AREA)[enough] / share[enough]
         for k in range(pixels.shape[2])
     ]
-    return np.stack(means, axis=-1).astype(np.float64)
+    stacked: NDArray[np.float64] = np.stack(means, axis=-1).astype(np.float64)
+    return stacked
 
 
 def _bright(means: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Blocks (N,) of which no channel is dark, beside the blocks in general."""
+    """Which blocks (N,) have no channel that is dark compared with the median block."""
     typical = float(np.median(means.mean(axis=1))) if len(means) else 0.0
-    return means.min(axis=1, initial=np.inf) > max(DARK * typical, 0.0)
+    bright: NDArray[np.bool_] = means.min(axis=1, initial=np.inf) > max(EXPOSURE.min_brightness * typical, 0.0)
+    return bright
 
 
 def _weighted_median(values: NDArray[np.float64], weights: NDArray[np.float64]) -> float:

@@ -1,54 +1,63 @@
-"""Blending across a seam in several bands (Burt and Adelson, ACM TOG 1983): fine detail changes over within a pixel or
-two, broad light over as many as the coarsest band is wide.
+"""Blending across a seam in several bands (Burt and Adelson, ACM TOG 1983).
 
-What is blended is the *difference* of the two pictures, in tones, where they show the same; elsewhere it is continued
-smoothly from there. So a picture's border, a hole or a thing that only one of them sees leaves no dark fringe and no
-ghost: across it light is evened out and content is cut hard. Beyond the band every pixel stays bit for bit what it was.
+Fine detail changes over within a pixel or two, broad light over the width of the coarsest band. What is blended is the
+*difference* of the two pictures' tones where they show the same; elsewhere it is continued smoothly from there. So
+where only one picture sees a thing, light is evened out and content is cut hard: no dark fringe, no ghost. Beyond the
+band every pixel keeps its bits.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import strips
+from ..raster.arrays import Plane, strips
 from ..raster.pull_push import expanded, pulled, pulled_weights, push, reduced
 from ..system.threads import each
-
-Plane: TypeAlias = NDArray[np.float32]
-# Tones less than this away from what they were are what they were.
-NOTHING = 1e-5
-# The width of the coarsest band, as a share of the canvas's diagonal.
-WIDTH = 1 / 50
-FEWEST, MOST = 3, 7
+from .options import BANDS
 
 
-def bands_for(canvas: NDArray) -> int:
+def bands_for(canvas: NDArray[Any]) -> int:
     """How many bands a canvas (H, W, …) is blended in."""
-    return int(np.clip(np.rint(math.log2(WIDTH * math.hypot(canvas.shape[0], canvas.shape[1]))), FEWEST, MOST))
+    width = BANDS.coarsest_width * math.hypot(canvas.shape[0], canvas.shape[1])
+    return int(np.clip(np.rint(math.log2(width)), BANDS.min_bands, BANDS.max_bands))
 
 
 def correction(
     difference: NDArray[np.float32], same: NDArray[np.bool_], chosen: NDArray[np.bool_],
     shown: NDArray[np.bool_], bands: int,
 ) -> NDArray[np.float32]:
-    """What is to be added to the tones (h, w, C) of pictures cut hard along a seam, so that they blend.
+    """What is to be added to the tones of two pictures cut hard along a seam, so that they blend.
 
-    difference (h, w, C): tones of the added layer less those of before, where `same`; chosen (h, w): what comes from
-    the added layer, where anything is `shown`. The difference is written over.
+    Parameters
+    ----------
+    difference : (h, w, C) float32 array
+        Tones of the added layer minus those of the panorama before. Overwritten with the result.
+    same : (h, w) bool array
+        Where both show the same, so that the difference is one of light.
+    chosen : (h, w) bool array
+        What comes from the added layer.
+    shown : (h, w) bool array
+        Where anything is shown.
+    bands : int
+
+    Returns
+    -------
+    (h, w, C) float32 array
+        0 beyond the coarsest band.
     """
-    # one channel after the other: all at once would be the peak of a stitch's memory
+    # channel by channel: all at once would be the peak of a stitch's memory
     channels = range(difference.shape[2])
     weights = pulled_weights(same.astype(np.float32))
     for k in channels:
-        # on the far side of the seam: what the picture of this side would show there, had it the other's light
+        # continued beyond where both show the same
         difference[..., k] = push(pulled(difference[..., k] * weights[0], weights), weights)
     del weights
-    # a pixel's width to either side, or else the finest band is cut with a pair of scissors
+    # a pixel wide on either side, so that the finest band has no hard edge
     share = cv2.blur(_from_nearest(chosen, shown).astype(np.float32), (3, 3), borderType=cv2.BORDER_REPLICATE)
     shares = [share]
     while len(shares) <= bands and min(shares[-1].shape) > 2:
@@ -58,12 +67,12 @@ def correction(
         blended = _masked_bands(light, shares)
 
         def put(rows: slice, light: Plane = light, blended: Plane = blended, k: int = k) -> None:
-            change, whole, over = blended[rows], light[rows], chosen[rows]
-            change -= over * whole
-            # the bands of a pyramid overshoot: no pixel leaves what lies between the two pictures
-            whole = np.where(over, -whole, whole)
-            np.clip(change, np.minimum(whole, 0), np.maximum(whole, 0), out=change)
-            change[np.abs(change) < NOTHING] = 0
+            change, full, added = blended[rows], light[rows], chosen[rows]
+            change -= added * full
+            # bands overshoot: tones are held between those of the two pictures
+            full = np.where(added, -full, full)
+            np.clip(change, np.minimum(full, 0), np.maximum(full, 0), out=change)
+            change[np.abs(change) < BANDS.negligible_tone] = 0
             difference[rows, :, k] = change
 
         each(put, strips(blended.shape))
@@ -71,7 +80,7 @@ def correction(
 
 
 def _from_nearest(values: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Values (h, w) where known, elsewhere those of the nearest pixel that is."""
+    """Values (h, w) where known (h, w), elsewhere those of the nearest known pixel."""
     if known.all() or not known.any():
         return values
     _, nearest = cv2.distanceTransformWithLabels(
@@ -79,12 +88,12 @@ def _from_nearest(values: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArra
     )
     by_label = np.zeros(int(nearest.max()) + 1, bool)
     by_label[nearest[known]] = values[known]
-    return by_label[nearest]
+    nearest_values: NDArray[np.bool_] = by_label[nearest]
+    return nearest_values
 
 
 def _masked_bands(light: Plane, shares: list[Plane]) -> Plane:
-    """The sum of the Laplacian bands of `light` (h, w), each weighed by the Gaussian level of a share that goes with
-    it."""
+    """The sum of the Laplacian bands of light (h, w), each weighted by its level of a Gaussian pyramid of shares."""
     share, *smoother = shares
     if not smoother:
         return light * share

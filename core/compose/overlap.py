@@ -1,4 +1,4 @@
-"""Where two layers show something at once, and how they differ there: what seam and blending look at."""
+"""Where two layers both show something, and how they differ there: what seam and blending go by."""
 
 from __future__ import annotations
 
@@ -9,26 +9,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import beside, bounds, shown_only, strips
+from ..raster.arrays import beside, bounds, dilated, shown_only, strips
 from ..raster.log_encoding import log_encode
 from ..raster.robust import NORMAL_MEDIAN
 from ..system.threads import each
-
-WHOLE = 1 - 1 / 255
-# Tones that differ by more than the pictures' general difference and this show different things.
-SAME_TONE, SAME_SIGMAS = 0.06, 4.0
-# Pixels around what the added picture cannot see in which its edge may still lie.
-EDGE = 3
-SAMPLES = 100_000
+from .options import OVERLAP
 
 
 @dataclass(frozen=True)
 class Overlap:
     """The part of the canvas in which both layers show something.
 
-    box: rows and columns of the canvas; both (h, w): where both show something; difference (h, w, C) float32: the added
-    picture's tones less those of the panorama before, 0 elsewhere; same (h, w): where they also show the same thing, so
-    that what remains of the difference is light, which may be blended, and not content, which must not.
+    Attributes
+    ----------
+    box : (slice, slice)
+        Rows and columns of the canvas.
+    both : (h, w) bool array
+        Where both show something.
+    difference : (h, w, C) float32 array
+        Tones of the added picture minus those of the panorama before, 0 elsewhere.
+    same : (h, w) bool array
+        Where they also show the same thing, so that the difference is one of light, which may be blended, and not of
+        content, which must not be.
     """
 
     box: tuple[slice, slice]
@@ -38,8 +40,10 @@ class Overlap:
 
 
 def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overlap | None:
-    """The overlap of the panorama before and a layer that is added; None where they do not meet. hidden (H, W): what
-    the added picture cannot see."""
+    """The overlap of the panorama before and an added layer, None where they do not meet.
+
+    hidden (H, W): what the added picture cannot see.
+    """
     both = (before.alpha > 0) & (layer.alpha > 0)
     box = bounds(both)
     if box is None:
@@ -54,25 +58,24 @@ def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overla
         difference[rows] = shown_only(tones, both[rows])
 
     each(put, strips(difference.shape))
-    edge = cv2.dilate((hidden[box] & both).astype(np.uint8), np.ones((2 * EDGE + 1, 2 * EDGE + 1), np.uint8)) > 0
-    same = both & ~edge
+    same = both & ~dilated(hidden[box] & both, OVERLAP.hidden_margin_px)
     return Overlap(box, both, difference, same & _alike(difference, same))
 
 
 def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Where the difference is about what it is in general."""
+    """Where (h, w) the difference is close to its median over what is `shown` (h, w)."""
     places = np.flatnonzero(shown)
     if not places.size:
         return shown
-    sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // SAMPLES)]]
+    sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // OVERLAP.sample_pixels)]]
     middle = np.median(sample, axis=0)
     sigma = np.median(np.abs(sample - middle), axis=0) / NORMAL_MEDIAN
-    most = np.maximum(SAME_SIGMAS * sigma, SAME_TONE)
+    most = np.maximum(OVERLAP.same_sigmas * sigma, OVERLAP.same_tone)
     alike = np.empty(shown.shape, bool)
 
     def put(rows: slice) -> None:
         near, here = beside(rows, 1, len(difference))
-        # a little blurred: noise is no content
+        # blurred, since noise is no content
         blurred = cv2.blur(difference[near], (3, 3)).reshape(difference[near].shape)[here]
         within = [np.abs(blurred[..., k] - middle[k]) <= most[k] for k in range(len(most))]
         alike[rows] = np.logical_and.reduce(within)

@@ -1,9 +1,12 @@
-"""A whole sphere ends at ±180° on paper only: its columns are rolled so that the canvas ends where the pictures do not
-meet, and what is composed there goes on across that line."""
+"""Composing across ±180°, where the canvas of a whole sphere ends.
+
+Its columns are rolled so that the canvas ends where the pictures do not meet, and rolled back when they are blended.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +19,21 @@ from ..raster.picture_map import PictureMap
 
 
 def roll_for(canvas: Canvas, before: Layer, layer: Layer) -> int:
-    """By how many columns to the left a canvas that goes all round is rolled before it is composed; 0: it ends already
-    where nothing is shown, or does not go round.
+    """By how many columns to the left a canvas is rolled before it is composed.
 
-    It ends in the middle of the widest gap: where neither the panorama before nor the picture that is added shows
-    anything, else (round a pole) where the two have least in common.
+    Then it ends in the middle of the widest gap: where neither the panorama before nor the added picture shows
+    anything, else (around a pole) where the two overlap least.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    before, layer : Layer
+        The panorama before, and the added picture's layer.
+
+    Returns
+    -------
+    int
+        0 if the canvas is no whole sphere, or ends already where nothing is shown.
     """
     if canvas.projection is None or canvas.projection.sphere is None or canvas.width < canvas.whole[2]:
         return 0
@@ -28,7 +41,7 @@ def roll_for(canvas: Canvas, before: Layer, layer: Layer) -> int:
     crowd = np.logical_and(*shown).sum(axis=0) * (canvas.height + 1) + np.logical_or(*shown).sum(axis=0)
     if crowd[0] == crowd[-1] == 0:
         return 0
-    # the longest run of the least, round the end
+    # the longest run of columns with the least, also across the end
     least = np.flatnonzero(crowd == crowd.min())
     gaps = np.split(least, np.flatnonzero(np.diff(least) > 1) + 1)
     if len(gaps) > 1 and gaps[0][0] == 0 and gaps[-1][-1] == canvas.width - 1:
@@ -37,26 +50,26 @@ def roll_for(canvas: Canvas, before: Layer, layer: Layer) -> int:
     return int(widest[len(widest) // 2]) % canvas.width
 
 
-def rolled(values: NDArray, columns: int) -> NDArray:
-    """An array (H, W, …) whose first column is the one of that number; the same object for 0."""
+def rolled(values: NDArray[Any], columns: int) -> NDArray[Any]:
+    """An array (H, W, …) rolled to the left by so many columns; the same object for 0."""
     return np.roll(values, -columns, axis=1) if columns else values
 
 
 def rolled_layer(layer: Layer, columns: int) -> Layer:
-    """The same of a layer."""
+    """A layer, rolled likewise."""
     if not columns:
         return layer
     return Layer(WrappedImage(layer.light, columns % layer.alpha.shape[1]), rolled(layer.alpha, columns))
 
 
 def rolled_map(picture_map: PictureMap, columns: int) -> PictureMap:
-    """The same of a map."""
+    """A map, rolled likewise."""
     return PictureMap(rolled(picture_map.x, columns), rolled(picture_map.y, columns), picture_map.size)
 
 
 @dataclass(frozen=True, eq=False)
 class WrappedImage(LazyImage):
-    """Light whose first column is that of number `columns` (0 to W − 1) of another."""
+    """Light rolled to the left by 0 to W − 1 columns, read where it is asked for."""
 
     light: AnyImage
     columns: int

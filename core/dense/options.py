@@ -217,9 +217,69 @@ class BeyondOptions:
     twice their own size."""
 
 
+@dataclass(frozen=True)
+class PolishOptions:
+    """The last fraction of a pixel (`polish`; Lucas and Kanade, IJCAI 1981). Gray levels are 0 to 255."""
+
+    schedule: tuple[tuple[float, int], ...] = ((1.0, 2), (0.6, 1))
+    """σ in px that both pictures are blurred by, and Gauss-Newton steps at it: smoother ones reach further."""
+
+    window_px: int = 5
+    """px of the side of the window whose pixels move alike: the smallest that averages noise."""
+
+    surroundings_px: int = 15
+    """px of the side of the window over which gain and bias between the pictures are constant."""
+
+    strip_rows: int = 128
+    """Rows of nodes that a thread works on at once, so that they stay near the processor. No result depends on it."""
+
+    max_step_px: float = 1.0
+    """px that a node moves in a step at most: gradients hold no further."""
+
+    smoothness: float = 1.5
+    """λ of the edge-aware smoothing between the steps."""
+
+    half_evidence: float = 25.0
+    """Squared gradient, (gray levels per px)², at which a node counts about half among its neighbours."""
+
+    start_evidence: float = 15.0
+    """The same unit: what the moves count that polishing starts at."""
+
+    min_evidence: float = 10.0
+    """The same unit: what a node counts among its neighbours at least."""
+
+    damping: float = 1.0
+    """The same unit: added to what divides a step, so that it stays finite."""
+
+    min_confidence: float = 1e-4
+    """What a node counts in the smoothing at least, so that it has a solution everywhere."""
+
+    gain_noise: float = 25.0
+    """Variance in gray levels squared that noise has: below, the gain between the pictures tends to 1."""
+
+    max_gain: float = 2.0
+    """Factor of contrast, either way, that the pictures may differ by around a node."""
+
+    min_usual: float = 2.0
+    """Gray levels of difference that count half, at least: noise of a usual picture."""
+
+    usual_factor: float = 1.5
+    """The same in medians of the difference: about its standard deviation."""
+
+    across_width: float = 0.03
+    """Share of the picture's side, σ, over which moves across the lines vary: a lens bends slowly."""
+
+    across_step: int = 8
+    """Nodes between places where these moves are worked out: they are smooth."""
+
+    across_damping: float = 0.5
+    """Share of the mean evidence that is added to what divides these moves: where there is little, little is done."""
+
+
 REFINE = RefineOptions()
 MATCHING = MatchingOptions()
 LINES = LinesOptions()
 SMOOTHING = SmoothingOptions()
 UNFOLDING = UnfoldingOptions()
+POLISH = PolishOptions()
 BEYOND = BeyondOptions()

@@ -18,18 +18,7 @@ from ..system.threads import each
 from .edge_aware_smoothing import Smoother
 from .epipolar_lines import EpipolarLines
 from .matching import View
-
-# (blur of both pictures in px, steps at it)
-SCHEDULE = ((1.0, 2), (0.6, 1))
-# Rows of nodes that are worked on at once. Means of what has lost its local mean take two windows beside them.
-STRIP = 128
-WINDOW, SURROUNDINGS = 5, 15
-SMOOTHNESS = 1.5
-# squared gradient (gray levels per px) below which a place says little of its own; in the same unit what the search
-# itself is worth, and what counts at least between neighbours
-LITTLE_EVIDENCE, BELIEF, LEAST_BELIEF = 25.0, 15.0, 10.0
-# what is sought across the lines varies over this share of the picture's side, at most so many px
-ACROSS, COARSE = 0.03, 8
+from .options import POLISH
 
 
 @dataclass(frozen=True)
@@ -54,10 +43,10 @@ def polish(
     """
     across = np.zeros_like(along)
     start = along
-    smoother = Smoother.of(weights, SMOOTHNESS)
+    smoother = Smoother.of(weights, POLISH.smoothness)
     steps_px = target.gray.shape[1] / target.size[0], target.gray.shape[0] / target.size[1]
     share, wanted = np.empty_like(along), np.empty_like(along)
-    for blur, count in SCHEDULE:
+    for blur, count in POLISH.schedule:
         first, shown = reference.at_nodes(cv2.GaussianBlur(reference.gray, (0, 0), blur), lines)
         smooth = cv2.GaussianBlur(target.gray, (0, 0), blur)
         slopes = [cv2.Scharr(smooth, cv2.CV_32F, 1 - k, k, scale=steps_px[k] / 32) for k in (0, 1)]
@@ -67,20 +56,21 @@ def polish(
 
             def move(rows: slice, seen: _Compared = seen, along: Plane = along) -> None:
                 """What these rows want and how much that counts, into `wanted` and `share`."""
-                near, own = beside(rows, WINDOW // 2, len(along))
+                near, own = beside(rows, POLISH.window_px // 2, len(along))
                 told = seen.trust(near)
                 told *= seen.slope[near]
-                pull = _mean(told * seen.left[near], WINDOW)[own]
+                pull = _mean(told * seen.left[near], POLISH.window_px)[own]
                 told *= seen.slope[near]
-                evidence = _mean(told, WINDOW)[own]
-                pull += np.float32(BELIEF) * (start[rows] - along[rows])
-                pull /= evidence + np.float32(BELIEF + 1)
-                np.add(along[rows], np.clip(pull, -1, 1, out=pull), out=wanted[rows])
-                np.divide(evidence + np.float32(LEAST_BELIEF), evidence + np.float32(LITTLE_EVIDENCE), out=share[rows])
+                evidence = _mean(told, POLISH.window_px)[own]
+                pull += np.float32(POLISH.start_evidence) * (start[rows] - along[rows])
+                pull /= evidence + np.float32(POLISH.start_evidence + POLISH.damping)
+                np.add(along[rows], np.clip(pull, -POLISH.max_step_px, POLISH.max_step_px, out=pull), out=wanted[rows])
+                np.add(evidence, np.float32(POLISH.min_evidence), out=share[rows])
+                share[rows] /= evidence + np.float32(POLISH.half_evidence)
                 share[rows] *= known[rows]
 
             each(move, _strips(len(along)))
-            along = smoother.smoothed(wanted, share, floor=1e-4)
+            along = smoother.smoothed(wanted, share, floor=POLISH.min_confidence)
             if slack:
                 trust = seen.trust(slice(None)) * seen.aside
                 across = across + _smooth_step(trust * seen.left, trust * seen.aside, lines.step)
@@ -94,7 +84,7 @@ def likeness(lines: EpipolarLines, reference: View, target: View, along: Plane, 
     out = np.empty_like(along)
 
     def compare(rows: slice) -> None:
-        near, here = beside(rows, SURROUNDINGS, len(along))
+        near, here = beside(rows, POLISH.surroundings_px, len(along))
         fetched, there = target.sample(target.gray, *lines.target(along, across, near))
         there &= shown[near]
         a, b, share = _without_means(first[near], fetched, there)
@@ -134,15 +124,15 @@ def _compared(
     left, slope, aside, there = *(np.empty_like(along) for _ in range(3)), np.empty(along.shape, bool)
 
     def compare(rows: slice) -> None:
-        near, own = beside(rows, SURROUNDINGS, len(along))
+        near, own = beside(rows, POLISH.surroundings_px, len(along))
         fetched, both_seen = target.sample(second, *lines.target(along, across, near))
         both_seen &= shown[near]
         gray, gx, gy = cv2.split(fetched)
         a, b, share = _without_means(first[near], gray, both_seen)
         gain = _mean_there(a * b, share)[own]
-        gain += 25
-        gain /= _mean_there(b * b, share)[own] + 25
-        np.clip(gain, np.float32(0.5), np.float32(2), out=gain)
+        gain += POLISH.gain_noise
+        gain /= _mean_there(b * b, share)[own] + POLISH.gain_noise
+        np.clip(gain, np.float32(1 / POLISH.max_gain), np.float32(POLISH.max_gain), out=gain)
         there[rows] = both_seen[own]
         np.multiply(gain, b[own], out=left[rows])
         np.subtract(a[own], left[rows], out=left[rows])
@@ -155,21 +145,22 @@ def _compared(
     each(compare, _strips(len(along)))
     some = np.abs(left[::4, ::4][there[::4, ::4]])
     typical = float(np.median(some)) if some.size else 0.0
-    return _Compared(left, slope, aside, there, np.float32(max(2.0, 1.5 * typical)))
+    return _Compared(left, slope, aside, there, np.float32(max(POLISH.min_usual, POLISH.usual_factor * typical)))
 
 
 def _strips(rows: int) -> list[slice]:
     """Rows that are worked on at once, so that what is made of them stays near the processor."""
-    return [slice(top, min(top + STRIP, rows)) for top in range(0, rows, STRIP)]
+    return [slice(top, min(top + POLISH.strip_rows, rows)) for top in range(0, rows, POLISH.strip_rows)]
 
 
 def _mean(values: Plane, side: int) -> Plane:
-    return cv2.blur(values, (side, side), borderType=cv2.BORDER_REFLECT_101)
+    mean: Plane = cv2.blur(values, (side, side), borderType=cv2.BORDER_REFLECT_101)
+    return mean
 
 
 def _mean_there(values: Plane, share: Plane | None) -> Plane:
     """The mean of the surroundings of which a share (None: all) is seen, of values that are 0 elsewhere."""
-    mean = _mean(values, SURROUNDINGS)
+    mean = _mean(values, POLISH.surroundings_px)
     return mean if share is None else np.divide(mean, share, out=mean)
 
 
@@ -177,9 +168,9 @@ def _without_means(a: Plane, b: Plane, there: NDArray[np.bool_]) -> tuple[Plane,
     """Both without their local mean, 0 where they are not there, and the share of the surroundings that is: None where
     all is."""
     if there.all():
-        return a - _mean(a, SURROUNDINGS), b - _mean(b, SURROUNDINGS), None
+        return a - _mean(a, POLISH.surroundings_px), b - _mean(b, POLISH.surroundings_px), None
     weight = there.astype(np.float32)
-    share = np.maximum(_mean(weight, SURROUNDINGS), np.float32(1e-3))
+    share = np.maximum(_mean(weight, POLISH.surroundings_px), np.float32(1e-3))
     a, b = ((values - _mean_there(values * weight, share)) * weight for values in (a, b))
     return a, b, share
 
@@ -187,12 +178,16 @@ def _without_means(a: Plane, b: Plane, there: NDArray[np.bool_]) -> tuple[Plane,
 def _smooth_step(wanted: Plane, evidence: Plane, step: float) -> Plane:
     """A step across the lines: evidence gathered over a wide window; where there is little, little is done."""
     rows, columns = wanted.shape
-    small = max(1, columns // COARSE), max(1, rows // COARSE)
-    width = max(1.0, ACROSS * np.sqrt(rows * columns) / COARSE)
+    small = max(1, columns // POLISH.across_step), max(1, rows // POLISH.across_step)
+    width = max(1.0, POLISH.across_width * np.sqrt(rows * columns) / POLISH.across_step)
 
     def gathered(values: Plane) -> Plane:
-        return cv2.GaussianBlur(cv2.resize(values, small, interpolation=cv2.INTER_AREA), (0, 0), width)
+        smooth: Plane = cv2.GaussianBlur(cv2.resize(values, small, interpolation=cv2.INTER_AREA), (0, 0), width)
+        return smooth
 
     wanted, evidence = gathered(wanted), gathered(evidence)
-    coarse = np.clip(wanted / (evidence + 0.5 * evidence.mean() + 1e-6), -1, 1)
-    return cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_CUBIC)
+    coarse = np.clip(
+        wanted / (evidence + POLISH.across_damping * evidence.mean() + 1e-6), -POLISH.max_step_px, POLISH.max_step_px
+    )
+    step_across: Plane = cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_CUBIC)
+    return step_across

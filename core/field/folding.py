@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..raster.arrays import dilated
 from ..raster.picture_map import PictureMap
 from ..system.threads import each
-from .visibility import STRIP
+from .options import FOLDING
 
-# What is occluded is known to 3 px.
-RIM = np.ones((7, 7), np.uint8)
 # In place of -1, 0 or 1: see `turning`.
 NO_TURN = 2
 
@@ -26,7 +24,7 @@ def folds(turns: NDArray[np.int8], hidden: NDArray[np.bool_] | None = None) -> f
     """
     counts = turns != NO_TURN
     if hidden is not None:
-        counts &= cv2.dilate(hidden.astype(np.uint8), RIM) == 0
+        counts &= ~dilated(hidden, FOLDING.hidden_margin_px)
     back, flat, on = (int(np.count_nonzero(counts & (turns == way))) for way in (-1, 0, 1))
     total = back + flat + on
     # the median's own way is the right one: what most pixels do, or nearly
@@ -39,7 +37,7 @@ def turning(picture_map: PictureMap) -> NDArray[np.int8]:
     show its picture, or nothing is known to the right or below."""
     height, width = picture_map.shape
     out = np.full((height, width), NO_TURN, np.int8)
-    rows = max(1, STRIP // width)
+    rows = max(1, FOLDING.strip_pixels // width)
 
     def put(top: int) -> None:
         bottom = min(top + rows, height - 1)
@@ -58,23 +56,25 @@ def turned_over(turns: NDArray[np.int8]) -> NDArray[np.bool_]:
 
     That is how a map jumps back from the rim of a near thing that it knows too little of to know what the rim hides.
     """
-    out: NDArray[np.bool_] = turns == -1
+    mirrored: NDArray[np.bool_] = turns == -1
     # where one picture is a mirror image, not being mirrored is what stands out
-    return out if 2 * int(out.sum()) <= int((turns != NO_TURN).sum()) else turns == 1
+    if 2 * int(mirrored.sum()) <= int((turns != NO_TURN).sum()):
+        return mirrored
+    unmirrored: NDArray[np.bool_] = turns == 1
+    return unmirrored
 
 
 def jacobian(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
     """Area (H, W) that a map's (x, y) takes up for each of its pixels, by central differences; its sign changes where
     the map turns over. NaN beside what is not finite."""
-    (x_down, x_right), (y_down, y_right) = np.gradient(x), np.gradient(y)
-    area: NDArray[Any] = x_right * y_down - x_down * y_right
+    area: NDArray[Any] = np.gradient(x, axis=1) * np.gradient(y, axis=0)
+    area -= np.gradient(x, axis=0) * np.gradient(y, axis=1)
     return area
 
 
 def cell_areas(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
     """Signed area (H − 1, W − 1) that a map (x, y) (H, W) spans between each pixel and its right and lower neighbours;
     its sign changes where the map turns over. NaN beside what is not finite."""
-    first = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1])
-    second = (x[1:, :-1] - x[:-1, :-1]) * (y[:-1, 1:] - y[:-1, :-1])
-    area: NDArray[Any] = first - second
+    area: NDArray[Any] = (x[:-1, 1:] - x[:-1, :-1]) * (y[1:, :-1] - y[:-1, :-1])
+    area -= (x[1:, :-1] - x[:-1, :-1]) * (y[:-1, 1:] - y[:-1, :-1])
     return area

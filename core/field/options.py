@@ -1,4 +1,5 @@
-"""What was chosen in fitting a field, stage by stage: each value with its unit, and why it is what it is.
+"""What was chosen in fitting a field and reading its maps, stage by stage: each value with its unit, and why it is what
+it is.
 
 May import nothing of the project but raster.
 """
@@ -135,6 +136,49 @@ class FadeOptions:
     """px of that width at least, in units of the matches' scale."""
 
 
+@dataclass(frozen=True)
+class VisibilityOptions:
+    """What a picture cannot see (`visibility`)."""
+
+    coarsest_level: int = 4
+    """log2 of the largest side, in px, of the z-buffer's cells: they are as wide as the canvas samples the picture."""
+
+    sampling_margin: float = 1.1
+    """Factor by which that sampling may exceed a cell before a coarser one is taken."""
+
+    surface_cells: float = 1.45
+    """Cells that the map may stray between two points that share one, if these lie on one surface: its diagonal."""
+
+    between: tuple[float, ...] = (0.25, 0.5, 0.75)
+    """Places between the two, as shares of the way, where that is looked at."""
+
+    block_level: int = 4
+    """log2 of the side, in px, of the blocks that folds are known to: with its neighbours, wider than any cell."""
+
+    strip_pixels: int = 2_000_000
+    """Pixels that a thread looks at at once. No result depends on it."""
+
+    agreed_confidence: float = 0.5
+    """Confidence (0..1) of dense refinement above which both pictures see a point."""
+
+    alone_confidence: float = 0.3
+    """The same below which only one of them does, if it lies beside what the depth order says is hidden."""
+
+    max_growth: float = 1 / 200
+    """Share of the picture's longer side by which what is hidden may reach beyond what the depth order says."""
+
+
+@dataclass(frozen=True)
+class FoldingOptions:
+    """Where a map turns over (`folding`)."""
+
+    hidden_margin_px: int = 3
+    """px around what is hidden in which folds do not count: occlusion is known to this much."""
+
+    strip_pixels: int = 2_000_000
+    """Pixels that a thread looks at at once. No result depends on it."""
+
+
 def decades(low: float, high: float) -> Array:
     """Powers of ten (n,) from 10**low to 10**high, two to each decade."""
     return np.asarray(10.0 ** np.arange(low, high + 0.01, 0.5))
@@ -145,3 +189,5 @@ SLACK = SlackOptions()
 SPLINE = SplineOptions()
 PLANE = PlaneOptions()
 FADE = FadeOptions()
+VISIBILITY = VisibilityOptions()
+FOLDING = FoldingOptions()

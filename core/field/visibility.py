@@ -13,22 +13,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import bounds, with_margin, without_specks
+from ..raster.arrays import bounds, dilated, with_margin, without_specks
 from ..raster.lazy import AnyImage
 from ..raster.picture_map import PictureMap
 from ..system.threads import in_order
-
-# Cells of the z-buffer are 2^level px wide: as wide as the canvas samples the target there, within this margin.
-COARSEST, MARGIN = 4, 1.1
-# What lies between two points of one surface that share a cell is seen no further off than its diagonal (in cells).
-LEAVES_CELL = 1.45
-BETWEEN = (0.25, 0.5, 0.75)
-# Where the map folds is known to blocks of the target, 2^BLOCK px wide and with their neighbours wider than any cell.
-BLOCK = 4
-STRIP = 2_000_000
-# Confidence of what both pictures show, and of what one shows alone; how far what is hidden may reach beyond what the
-# depth order tells of it, as a share of the target's longer side.
-AGREED, ALONE, BESIDE = 0.5, 0.3, 1 / 200
+from .options import VISIBILITY
 
 
 def occluded(picture_map: PictureMap, nearness: AnyImage) -> NDArray[np.bool_]:
@@ -51,11 +40,13 @@ def occluded(picture_map: PictureMap, nearness: AnyImage) -> NDArray[np.bool_]:
         claimed = owner[cells]
         # where nobody owns the cell, -1 stands for the last point, and its depth says nothing
         rivals = np.flatnonzero((near[claimed] > near) & (claimed >= 0) & ~found)
-        found[rivals] = _apart(picture_map, points[rivals], points[claimed[rivals]], LEAVES_CELL * 2.0**level)
+        stray = VISIBILITY.surface_cells * 2.0**level
+        found[rivals] = _apart(picture_map, points[rivals], points[claimed[rivals]], stray)
     hidden.ravel()[points[found]] = True
     # pixels between the samples of what hides them
-    closed: NDArray[np.uint8] = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    return (closed > 0) & picture_map.inside()
+    closed = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
+    found_hidden: NDArray[np.bool_] = closed & picture_map.inside()
+    return found_hidden
 
 
 def by_agreement(
@@ -72,18 +63,18 @@ def by_agreement(
     extent = bounds(hidden)
     if confidence is None or extent is None:
         return hidden
-    reach = max(1, round(BESIDE * max(picture_map.size)))
+    reach = max(1, round(VISIBILITY.max_growth * max(picture_map.size)))
     box = with_margin(extent, reach, hidden.shape)
     rows, columns = box
     part = picture_map.within((columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start))
     sure = np.asarray(confidence[box])
-    kept = hidden[box] & (sure <= AGREED)
-    alone = (shown[box] & part.inside() & (sure < ALONE)) | kept
-    grown = without_specks(kept).astype(np.uint8)
+    kept = hidden[box] & (sure <= VISIBILITY.agreed_confidence)
+    alone = (shown[box] & part.inside() & (sure < VISIBILITY.alone_confidence)) | kept
+    reached = without_specks(kept)
     for _ in range(reach):
-        grown = cv2.dilate(grown, np.ones((3, 3), np.uint8)) & alone
+        reached = dilated(reached, 1) & alone
     out = hidden.copy()
-    out[box] = kept | (grown > 0)
+    out[box] = kept | reached
     return out
 
 
@@ -116,14 +107,14 @@ def _contested(picture_map: PictureMap, nearness: AnyImage) -> Contested:
     """
     blocks = _folded_blocks(picture_map)
     height, width = picture_map.x.shape
-    rows = max(1, STRIP // width)
+    rows = max(1, VISIBILITY.strip_pixels // width)
 
     def found_from(top: int) -> Contested:
         strip = slice(top, min(top + rows, height))
         part = PictureMap(picture_map.x[strip], picture_map.y[strip], picture_map.size)
         inside = np.flatnonzero(part.inside())
         x, y = (values.ravel()[inside] for values in (part.x, part.y))
-        row, column = ((v + np.float32(0.5)).astype(np.int32) >> BLOCK for v in (y, x))
+        row, column = ((v + np.float32(0.5)).astype(np.int32) >> VISIBILITY.block_level for v in (y, x))
         row *= blocks.shape[1]
         row += column
         there = np.flatnonzero(blocks.ravel()[row])
@@ -152,10 +143,10 @@ def _folded_blocks(picture_map: PictureMap) -> NDArray[np.bool_]:
 
     A fold is a triangle between canvas pixels that the map turns over (or flattens); it counts as its bounding box.
     """
-    width, height = picture_map.size
-    counts = np.zeros(((height >> BLOCK) + 2, (width >> BLOCK) + 2), np.int32)
+    (width, height), level = picture_map.size, VISIBILITY.block_level
+    counts = np.zeros(((height >> level) + 2, (width >> level) + 2), np.int32)
     mirrored = _mirrored(picture_map)
-    rows = max(1, STRIP // picture_map.x.shape[1])
+    rows = max(1, VISIBILITY.strip_pixels // picture_map.x.shape[1])
 
     def corners_of(top: int) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]]:
         """First and last blocks, across and down, that the folds of some rows fall on."""
@@ -170,7 +161,7 @@ def _folded_blocks(picture_map: PictureMap) -> NDArray[np.bool_]:
         low, high = ([np.nan_to_num(how(v, axis=0), nan=-9) for v in corners] for how in (np.nanmin, np.nanmax))
         there = (high[0] >= 0) & (high[1] >= 0) & (low[0] <= width - 1) & (low[1] <= height - 1)
         across, down = (
-            [(np.clip(ends[axis][there], 0, size - 1) + 0.5).astype(np.intp) >> BLOCK for ends in (low, high)]
+            [(np.clip(ends[axis][there], 0, size - 1) + 0.5).astype(np.intp) >> level for ends in (low, high)]
             for axis, size in enumerate(picture_map.size)
         )
         return across, down
@@ -179,8 +170,7 @@ def _folded_blocks(picture_map: PictureMap) -> NDArray[np.bool_]:
         for at, sign in (((y0, x0), 1), ((y0, x1 + 1), -1), ((y1 + 1, x0), -1), ((y1 + 1, x1 + 1), 1)):
             np.add.at(counts, at, sign)
     covered = counts.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
-    wider: NDArray[np.uint8] = cv2.dilate(covered.astype(np.uint8), np.ones((3, 3), np.uint8))
-    return wider > 0
+    return dilated(covered, 1)
 
 
 def _mirrored(picture_map: PictureMap) -> bool:
@@ -224,9 +214,10 @@ def _levels(picture_map: PictureMap, top: int, rows: int, points: NDArray[np.int
         shorter = np.minimum(step[_along(axis, slice(1, None))], step[_along(axis, slice(None, -1))])
         for part, length in ((first, step[first]), (last, step[last]), (middle, shorter)):
             np.maximum(longest[part], length, out=longest[part])
-    longer_than = np.float32(MARGIN) ** 2 * 4.0 ** np.arange(COARSEST)
-    levels: NDArray[np.intp] = np.searchsorted(longer_than, longest.ravel()[points - low * x.shape[1]])
-    return levels.astype(np.uint8)
+    longer_than = np.float32(VISIBILITY.sampling_margin) ** 2 * 4.0 ** np.arange(VISIBILITY.coarsest_level)
+    at_points = longest.ravel()[points - low * x.shape[1]]
+    levels: NDArray[np.uint8] = np.searchsorted(longer_than, at_points).astype(np.uint8)
+    return levels
 
 
 def _along(axis: int, part: slice) -> tuple[slice, ...]:
@@ -256,7 +247,7 @@ def _apart(
     begin, end = (np.stack(np.divmod(points, width), axis=-1).astype(np.float32) for points in (first, second))
     home = np.stack([picture_map.x.ravel()[first], picture_map.y.ravel()[first]], axis=-1)
     out = np.zeros(first.size, bool)
-    for share in BETWEEN:
+    for share in VISIBILITY.between:
         at = begin + np.float32(share) * (end - begin)
         away = np.flatnonzero(~(_distance(home, picture_map, np.rint(at)) <= tolerance) & ~out)
         # rounded places lie beside the line between the two: those that matter are looked at again, exactly

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ..cameras.camera import Camera
 from ..cameras.lens import undistort
 from ..cameras.projective import distance_to_line
-from ..panorama.canvas import MAX_REACH
 from ..panorama.layers import Layer
+from ..panorama.options import CANVAS
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture
 from ..raster.arrays import Array, Part, beside, bounds, strips
@@ -297,7 +297,7 @@ def coverage_samples(
         points = np.argwhere(shows)[:, ::-1] * float(step) + step // 2 - np.array(canvas.offset)
     else:
         points = canvas.on_reference(canvas.xs[nodes[1]], canvas.ys[nodes[0]], reference)[0][shows]
-        far = MAX_REACH * max(*reference.size, *camera.size)
+        far = CANVAS.max_reach * max(*reference.size, *camera.size)
         with np.errstate(invalid="ignore"):
             flat = ((points >= -far) & (points <= np.array(reference.size) + far)).all(axis=1)
         points, raw = points[flat], raw[flat]

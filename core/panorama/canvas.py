@@ -16,16 +16,10 @@ from ..cameras.lens import distort, undistort
 from ..cameras.projective import ahead_of_camera, homogeneous, inverse_intrinsics
 from ..raster.arrays import Array, Box
 from ..raster.grid import Grid
-from ..raster.options import GRID
 from ..raster.picture_map import falls_inside
 from ..system.errors import OutputTooLarge
+from .options import CANVAS
 from .projection import Projection, extent
-
-# Limits of what is worth showing: a picture stretched more than 4× in length, or reaching further than three pictures
-# away.
-MAX_STRETCH = 4.0
-MAX_REACH = 3.0
-MAX_PIXELS = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -104,11 +98,11 @@ def bounding_canvas(
     left, top, right, bottom = reach
     limits = np.array([-np.inf, -np.inf, np.inf, np.inf]) if projection is None else projection.limits
     # a sphere has no far side that grows without end
-    max_stretch = np.inf if projection is not None and projection.sphere else MAX_STRETCH
+    max_stretch = np.inf if projection is not None and projection.sphere else CANVAS.max_stretch
     cropped = False
     for _ in range(2):  # the second pass looks closer at what the first found
         width, height = max(1, int(right - left)), max(1, int(bottom - top))
-        grid = Grid.over(int(left), int(top), width, height, nodes=GRID.nodes // 10)
+        grid = Grid.over(int(left), int(top), width, height, nodes=CANVAS.search_nodes)
         useful, any_stretched = np.zeros((grid.rows, grid.columns), bool), False
         for places, size in zip(pictures_at(grid), sizes, strict=True):
             seen = falls_inside(places[..., 0], places[..., 1], size)
@@ -127,9 +121,9 @@ def bounding_canvas(
         cropped = cropped or any_stretched
     canvas = Canvas(right - left, bottom - top, (-left, -top), cropped, projection)
     _, _, width, height = canvas.whole
-    if width * height > MAX_PIXELS:
+    if width * height > CANVAS.max_pixels:
         raise OutputTooLarge(
-            f"the panorama would have {width}×{height} pixels, {MAX_PIXELS // 1_000_000} million at most: "
+            f"the panorama would have {width}×{height} pixels, {CANVAS.max_pixels // 1_000_000} million at most: "
             "use smaller pictures, or --scale"
         )
     return canvas
@@ -146,7 +140,7 @@ def expected_reach(
     """
     points = np.concatenate(outlines)
     width, height = size
-    far = MAX_REACH * max(max(one) for one in (size, *sizes))
+    far = CANVAS.max_reach * max(max(one) for one in (size, *sizes))
     finite = points[np.isfinite(points).all(axis=1)]
     cut = len(finite) < len(points)
     lowest = np.array([0.0, 0.0])
@@ -154,7 +148,7 @@ def expected_reach(
     if cut:  # the outline runs to infinity somewhere: look everywhere within reach
         lowest, highest = lowest - far, highest + far
     elif len(finite):
-        margin = 0.1 * max(width, height)
+        margin = CANVAS.margin * max(width, height)
         lowest, highest = (
             np.minimum(lowest, finite.min(axis=0) - margin),
             np.maximum(highest, finite.max(axis=0) + margin),
@@ -188,7 +182,7 @@ def round_reach(
         for outline, matrix, picture in zip((own, *outlines), (np.eye(3), *planes), cameras, strict=True)
     ]
     limits = projection.limits
-    margin = 0.1 * max(cameras[0].size)
+    margin = CANVAS.margin * max(cameras[0].size)
     low, high = np.min(extents, axis=0)[:2], np.max(extents, axis=0)[2:]
     cut = projection.sphere is None and bool((low < limits[:2]).any() or (high > limits[2:]).any())
     reach = np.concatenate([np.maximum(low - margin, limits[:2]), np.minimum(high + margin, limits[2:])])
@@ -200,9 +194,10 @@ def round_reach(
 def border(size: tuple[int, int]) -> Array:
     """Points (N, 2) all around a picture of (W, H) px, in order."""
     width, height = size
-    u = np.linspace(0, 1, 32, endpoint=False)
+    u = np.linspace(0, 1, CANVAS.outline_points, endpoint=False)
     around = [np.column_stack(p) for p in ((u, 0 * u), (0 * u + 1, u), (1 - u, 0 * u + 1), (0 * u, 1 - u))]
-    return np.concatenate(around) * np.array([width - 1.0, height - 1.0])
+    points: Array = np.concatenate(around) * np.array([width - 1.0, height - 1.0])
+    return points
 
 
 def _raw(point: Array, camera: Camera) -> Array:
@@ -222,4 +217,5 @@ def _area_ratio(places: Array, step: int) -> Array:
     """Picture pixels per canvas pixel, from differences between nodes."""
     dx, dy = np.gradient(places, step, axis=1), np.gradient(places, step, axis=0)
     with np.errstate(invalid="ignore"):
-        return np.nan_to_num(np.abs(dx[..., 0] * dy[..., 1] - dx[..., 1] * dy[..., 0]), nan=np.inf)
+        ratio: Array = np.nan_to_num(np.abs(dx[..., 0] * dy[..., 1] - dx[..., 1] * dy[..., 0]), nan=np.inf)
+    return ratio

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,11 @@ from ..raster.arrays import Box, Part, bounds, cut, shown_only
 from ..raster.lazy import AnyImage, Held, LazyImage, Placed, Weighed, extent, part_of, whole
 from ..raster.picture_map import CanvasMap, PictureMap
 from ..raster.sampling import fetch
+from .options import LAYER
 from .reference_map import ReferenceMap
 
 if TYPE_CHECKING:
     from ..pictures.picture import Picture
-
-# Where less than this of a pixel is shown, its colour is rounding.
-LEAST_ALPHA = 1e-2
 
 
 @dataclass(frozen=True)
@@ -100,12 +98,12 @@ class Fetched(LazyImage):
     @staticmethod
     def of(
         picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32], inside: NDArray[np.bool_]
-    ) -> tuple[Fetched, NDArray]:
+    ) -> tuple[Fetched, NDArray[np.float32] | NDArray[np.bool_]]:
         """A picture through a map, and its alpha (H, W); inside (H, W): where the map falls inside the picture."""
-        alpha: NDArray = inside
+        alpha: NDArray[Any] = inside
         if picture.alpha is not None:
             fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
-            alpha = inside * np.where(fetched > LEAST_ALPHA, np.minimum(fetched, 1.0), np.float32(0))
+            alpha = inside * np.where(fetched > LAYER.min_alpha, np.minimum(fetched, 1.0), np.float32(0))
         shows = inside if picture.alpha is None else alpha > 0
         return Fetched(picture, map_x, map_y, shows, extent(picture.light)), alpha
 
@@ -122,6 +120,6 @@ class Fetched(LazyImage):
         pixels = fetch(self.picture.light if alpha is None else Weighed(self.picture.light, alpha), map_x, map_y)
         if alpha is not None:
             # both overshoot alike: divided before alpha is clipped
-            pixels /= np.maximum(fetch(alpha[..., None], map_x, map_y)[..., 0], LEAST_ALPHA)[..., None]
+            pixels /= np.maximum(fetch(alpha[..., None], map_x, map_y)[..., 0], LAYER.min_alpha)[..., None]
         np.clip(pixels, *self.range, out=pixels)
         return pixels if shows.all() else shown_only(pixels, shows)

@@ -13,18 +13,8 @@ import numpy as np
 from ..choices import LEVELS, Level
 from ..raster.arrays import Array
 from ..system.errors import BadRequest
+from .options import LEVELLING
 from .upright_edges import agreement
-
-# How far from level people hold cameras (degrees): they see a tilted horizon, and look up and down on purpose.
-ROLL_SIGMA, PITCH_SIGMA = 1.5, 20.0
-ROUNDS = 50
-# How far from its middle line (degrees of pitch and of roll) down is looked for, and how finely: steps, and how far off
-# upright edges may be. An edge as long as the picture weighs as much as EDGE cameras.
-REACH, STEPS, EDGE = (45.0, 25.0), ((1.0, 1.0), (0.2, 0.5), (0.04, 0.35)), 2.0
-# A camera that was turned so far was turned on its side.
-ON_ITS_SIDE = 45.0
-# Edges of any direction speak for some more than for others: by about the root of the sum of their squares.
-CHANCE = 1.0
 
 
 def parse_level(text: str) -> Level:
@@ -64,8 +54,8 @@ def gravity(rotations: Sequence[Array]) -> Array:
     """
     mean = sum(a[1] for a in rotations)
     down = mean / np.linalg.norm(mean) if mean[1] > 0.5 else np.array([0.0, 1.0, 0.0])
-    roll_sigma, pitch_sigma = np.radians([ROLL_SIGMA, PITCH_SIGMA])
-    for _ in range(ROUNDS):
+    roll_sigma, pitch_sigma = np.radians([LEVELLING.roll_sigma_deg, LEVELLING.pitch_sigma_deg])
+    for _ in range(LEVELLING.iterations):
         cost = sum(
             np.outer(a[0], a[0]) / (roll_sigma**2 + (a[0] @ down) ** 2) + np.outer(a[2], a[2]) / pitch_sigma**2
             for a in rotations
@@ -87,11 +77,11 @@ def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array)
     if not len(normals):
         return held
     # from the camera's own axes, but where it was turned on its side
-    base = np.eye(3) if held[1] > np.cos(np.radians(ON_ITS_SIDE)) else upright(held)
-    roll_sigma, pitch_sigma = np.radians([ROLL_SIGMA, PITCH_SIGMA])
-    middle, (pitch_reach, roll_reach) = (0.0, 0.0), REACH
+    base = np.eye(3) if held[1] > np.cos(np.radians(LEVELLING.sideways_deg)) else upright(held)
+    roll_sigma, pitch_sigma = np.radians([LEVELLING.roll_sigma_deg, LEVELLING.pitch_sigma_deg])
+    middle, pitch_reach, roll_reach = (0.0, 0.0), LEVELLING.pitch_reach_deg, LEVELLING.roll_reach_deg
     best = held
-    for step, off in STEPS:
+    for number, (step, off) in enumerate(LEVELLING.search_steps_deg):
         pitch, roll = (
             values.ravel() for values in np.radians(np.meshgrid(
                 middle[0] + np.arange(-pitch_reach, pitch_reach + step / 2, step),
@@ -104,11 +94,12 @@ def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array)
             for a in rotations
         )
         speaks = agreement(down, normals, lengths, float(np.radians(off)))
-        if step == STEPS[0][0] and speaks.max() - np.median(speaks) < CHANCE * np.linalg.norm(lengths):
+        chance = LEVELLING.chance_factor * np.linalg.norm(lengths)
+        if number == 0 and speaks.max() - np.median(speaks) < chance:
             return held
-        found = int(np.argmin(unlikely - 2 * EDGE * speaks))
+        found = int(np.argmin(unlikely - 2 * LEVELLING.edge_weight * speaks))
         best, middle = down[found], (float(np.degrees(pitch[found])), float(np.degrees(roll[found])))
-        pitch_reach = roll_reach = 1.5 * step
+        pitch_reach = roll_reach = LEVELLING.narrowing * step
     return best
 
 
@@ -126,7 +117,8 @@ def turned(yaw: float, pitch: float, roll: float) -> Array:
     about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
     about_x = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
     about_z = np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]])
-    return (about_y @ about_x @ about_z).T
+    rotation: Array = (about_y @ about_x @ about_z).T
+    return rotation
 
 
 def angles_of(rotation: Array) -> tuple[float, float, float]:

@@ -19,9 +19,7 @@ import numpy as np
 
 from ..cameras.projective import homogeneous, inverse_intrinsics
 from ..raster.arrays import Array
-
-# A cylinder grows without end towards zenith and nadir: tan φ where it is cut off (72°).
-STEEPEST = 3.0
+from .options import PROJECTION
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +49,7 @@ class Projection:
         if self.sphere is not None:
             left, top, width, height = self.sphere
             return np.array([left, top, left + width, top + height], np.float64)
-        across, up = np.floor(np.pi * self.focal), np.floor(STEEPEST * self.focal)
+        across, up = np.floor(np.pi * self.focal), np.floor(PROJECTION.max_cylinder_slope * self.focal)
         return np.array([-across, -up, across + 1, up + 1])
 
     def headings(self, u: Array) -> Array:
@@ -67,7 +65,8 @@ class Projection:
         """Unit rays (…, 3) in the reference camera's frame of points (…, 2) of the plane."""
         theta, phi = self.headings(points[..., 0]), self.elevations(points[..., 1])
         own = np.stack([np.cos(phi) * np.sin(theta), np.sin(phi), np.cos(phi) * np.cos(theta)], axis=-1)
-        return own @ self.rotation.T
+        rays: Array = own @ self.rotation.T
+        return rays
 
     def points(self, rays: Array) -> Array:
         """Points (…, 2) of the plane that show rays (…, 3) of any length, −π < θ ≤ π: the inverse of `rays`."""
@@ -75,7 +74,8 @@ class Projection:
         level = np.hypot(x, z)
         with np.errstate(divide="ignore"):
             rise = y / level if self.kind == "cylindrical" else np.arctan2(y, level)
-        return np.stack([np.arctan2(x, z), rise], axis=-1) * self.focal + np.array(self.centre)
+        points: Array = np.stack([np.arctan2(x, z), rise], axis=-1) * self.focal + np.array(self.centre)
+        return points
 
     def of_reference(self, points: Array) -> Array:
         """Points (…, 2) of the plane that show ideal pixels (…, 2) of the reference."""

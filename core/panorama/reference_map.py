@@ -8,12 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
-from ..raster.arrays import Box, box_of
+from ..raster.arrays import Box, box_of, strips
 from ..raster.picture_map import PictureMap, falls_inside
 from .canvas import Canvas
-
-# Pixels that are worked out at a time.
-AT_ONCE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -41,9 +38,7 @@ class ReferenceMap:
             x, y = np.broadcast_to(canvas.xs[None, :], shape), np.broadcast_to(canvas.ys[:, None], shape)
             return PictureMap(x.astype(np.float32), y.astype(np.float32), self.size)
         x, y = (np.empty(shape, np.float32) for _ in range(2))
-        rows = max(1, AT_ONCE // canvas.width)
-        for start in range(0, canvas.height, rows):
-            strip = slice(start, start + rows)
+        for strip in strips(shape):
             places, _ = canvas.on_reference(canvas.xs, canvas.ys[strip], self.camera)
             x[strip], y[strip] = places[..., 0], places[..., 1]
         return PictureMap(x, y, self.size)

@@ -11,11 +11,7 @@ from ..cameras.projective import homogeneous
 from ..pictures.picture import Picture
 from ..raster.arrays import Array
 from ..raster.resizing import resized_points
-
-# They are looked for at so many px across, from this share of that on; the longest count.
-ACROSS, SHORTEST, MOST = 1000, 0.025, 1000
-# Share of the edges that are upright, beside the density (per rad) of those that are not.
-UPRIGHT = 0.3
+from .options import EDGES
 
 
 def edges(picture: Picture, camera: Camera, K: Array) -> tuple[Array, Array]:
@@ -25,20 +21,21 @@ def edges(picture: Picture, camera: Camera, K: Array) -> tuple[Array, Array]:
     Line segments by von Gioi et al. (IPOL 2012), away from what is transparent. K (3, 3) px as the geometry took it.
     """
     height, width = picture.view.shape[:2]
-    scale = min(1.0, ACROSS / max(width, height))
+    scale = min(1.0, EDGES.side_px / max(width, height))
     size = (max(1, round(scale * width)), max(1, round(scale * height)))
     small = cv2.resize(picture.view, size, interpolation=cv2.INTER_AREA)
     gray = small if small.ndim == 2 or small.shape[2] == 1 else cv2.cvtColor(small, cv2.COLOR_RGB2GRAY)
     found = cv2.createLineSegmentDetector().detect(np.ascontiguousarray(gray.reshape(size[::-1])))[0]
     ends = np.zeros((0, 2, 2)) if found is None else found.reshape(-1, 2, 2).astype(np.float64)
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / max(size)
-    kept = lengths >= SHORTEST
+    kept = lengths >= EDGES.min_length
     if picture.alpha is not None:
         whole = (picture.alpha > 0).astype(np.uint8)
-        whole = cv2.erode(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.ones((7, 7), np.uint8))
+        side = 2 * EDGES.alpha_margin_px + 1
+        whole = cv2.erode(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.ones((side, side), np.uint8))
         columns, rows = (np.clip(np.rint(ends.mean(axis=1)[:, k]).astype(int), 0, size[k] - 1) for k in (0, 1))
         kept &= whole[rows, columns] > 0
-    longest = np.flatnonzero(kept)[np.argsort(-lengths[kept], kind="stable")[:MOST]]
+    longest = np.flatnonzero(kept)[np.argsort(-lengths[kept], kind="stable")[:EDGES.max_edges]]
     ends, lengths = ends[longest], lengths[longest]
     full = resized_points(ends.reshape(-1, 2), size, (width, height))
     rays = homogeneous(undistort(full, camera)) @ np.linalg.inv(K).T
@@ -51,4 +48,5 @@ def agreement(down: Array, normals: Array, lengths: Array, sigma: float) -> Arra
     are upright to within sigma (rad) and the rest anything, than if all are anything."""
     off = np.square(down @ normals.T)
     off *= -0.5 / sigma**2
-    return np.log1p(UPRIGHT * np.exp(off, out=off) / sigma) @ lengths
+    evidence: Array = np.log1p(EDGES.upright_share * np.exp(off, out=off) / sigma) @ lengths
+    return evidence

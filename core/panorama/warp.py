@@ -28,14 +28,12 @@ from ..system.errors import BadRequest, NoOverlap
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
 from .depth import Confidence, Depth, Nearness
+from .options import WARP
 from .projection import Projection
 from .reference_map import ReferenceMap
 
 if TYPE_CHECKING:
     from ..field.refined_depth import RefinedDepth
-
-# Fields fade out within so many pictures beside the reference, for round panoramas at least.
-MAX_FADE = 3.0
 
 
 @dataclass(frozen=True)
@@ -155,9 +153,9 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     if canvas.projection is None:
         return field.on_grid(grid, undistort(grid.points, camera) if camera.distortion.any() else None)
     width, height = camera.size
-    margin = int(np.ceil(min(field.fit.fade_px, MAX_FADE * max(camera.size))))
+    margin = int(np.ceil(min(field.fit.fade_px, WARP.max_fade * max(camera.size))))
     across, down = width + 2 * margin, height + 2 * margin
-    share = min(4.0, max(1.0, across * down / (2 * width * height)))
+    share = min(WARP.max_node_factor, max(1.0, across * down / (2 * width * height)))
     flat = Grid.over(-margin, -margin, across, down, int(share * GRID.nodes))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)

@@ -126,6 +126,13 @@ def cut(array: NDArray[Any], box: Box, beyond: float = 0.0) -> NDArray[Any]:
     return out
 
 
+def dilated(mask: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:
+    """A mask (H, W) with so many px more on every side, in a square window."""
+    side = 2 * margin + 1
+    larger: NDArray[np.bool_] = cv2.dilate(mask.astype(np.uint8), np.ones((side, side), np.uint8)) > 0
+    return larger
+
+
 def cut_in_place(array: NDArray[np.float32], box: Box) -> NDArray[np.float32]:
     """The part of an array (H, W) in a box (left, top, width, height) of it, moved to the front of its memory."""
     left, top, width, height = box

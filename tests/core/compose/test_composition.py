@@ -11,7 +11,7 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.compose.composition import Composition, Decided, composed, pooled_decision
-from edf_stitch.core.compose.overlap import SAME_TONE
+from edf_stitch.core.compose.options import OVERLAP
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
@@ -60,7 +60,7 @@ def test_what_the_target_cannot_see_never_comes_from_it(options: dict) -> None:
     assert ours.sum() > 300
     assert np.abs(second.pixels - first.pixels)[ours].mean() > 0.05
     away = np.abs(log_encode(out.pixels) - log_encode(first.pixels))[ours]
-    assert away.max() <= 2 * SAME_TONE and np.percentile(away, 95) < 0.03, "specks that look alike apart"
+    assert away.max() <= 2 * OVERLAP.same_tone and np.percentile(away, 95) < 0.03, "specks that look alike apart"
     holes = found.hidden & (first.alpha == 0)
     assert holes.any() and not out.alpha[holes].any(), "nobody sees it: transparent, not filled"
     assert not out.pixels[holes].any(), "a file would keep its colour under the alpha"

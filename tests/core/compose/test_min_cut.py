@@ -6,7 +6,8 @@ import itertools
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.min_cut import FIRST, FREE, NOWHERE, SECOND, UNITS, min_cut
+from edf_stitch.core.compose.min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
+from edf_stitch.core.compose.options import MIN_CUT
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,7 +17,7 @@ def price(labels: np.ndarray, cost: np.ndarray, known: np.ndarray, each: np.ndar
     for a, b in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         border = (labels[a] != labels[b]) & (known[a] != NOWHERE) & (known[b] != NOWHERE)
         border &= (known[a] == FREE) | (known[b] == FREE)
-        total += float(((cost[a] + cost[b]) / 2 + 1 / UNITS)[border].sum())
+        total += float(((cost[a] + cost[b]) / 2 + 1 / MIN_CUT.units)[border].sum())
     return total
 
 
@@ -36,7 +37,7 @@ def test_no_labelling_is_cheaper(seed: int, dearest: float) -> None:
         labels = known == SECOND
         labels[tuple(free.T)] = choice
         best = min(best, price(labels, cost, known, each))
-    assert price(found, cost, known, each) == pytest.approx(best, abs=30 / UNITS)
+    assert price(found, cost, known, each) == pytest.approx(best, abs=30 / MIN_CUT.units)
 
 
 def test_it_follows_a_valley_of_low_cost() -> None:

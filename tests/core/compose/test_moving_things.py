@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.compose import moving_things
-from edf_stitch.core.compose.moving_things import times
+from edf_stitch.core.compose.moving_things import moving_labels
 from edf_stitch.core.compose.overlap import overlap_of
 from edf_stitch.core.compose.seam import added_price, find_seam, known_labels, seam_cost
 from edf_stitch.core.panorama.layers import Layer
@@ -42,13 +44,13 @@ def found(
     overlap = overlap_of(first, second, hidden)
     assert overlap is not None
     out = np.zeros((H, W), np.int8)
-    out[overlap.box] = times(overlap, picture_map or flat(), first, second, hidden)
+    out[overlap.box] = moving_labels(overlap, picture_map or flat(), first, second, hidden)
     return out
 
 
 @pytest.mark.parametrize("across", [1000, 120])
 def test_who_moved_belongs_to_the_picture_that_is_alone_nearer_by(across: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(moving_things, "ACROSS", across)
+    monkeypatch.setattr(moving_things, "MOVING_THINGS", replace(moving_things.MOVING_THINGS, side_cells=across))
     reference, target = ground(), ground()
     reference[WALKER], target[FAR] = 0.02, 0.9
     when = found(reference, target)
@@ -65,7 +67,7 @@ def test_who_walks_out_of_the_reference_is_seen_once() -> None:
     overlap = overlap_of(first, second, NOTHING)
     assert overlap is not None
     known, cost = known_labels(first, second, NOTHING), seam_cost(overlap, flat(), None)
-    when = times(overlap, flat(), first, second, NOTHING)
+    when = moving_labels(overlap, flat(), first, second, NOTHING)
     alone, together = (
         find_seam(known, cost, added_price(overlap, NOTHING, given), overlap.box) for given in (None, when)
     )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.overlap import EDGE, SAME_TONE, overlap_of
+from edf_stitch.core.compose.options import OVERLAP
+from edf_stitch.core.compose.overlap import overlap_of
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.log_encoding import log_decode, log_encode
 
@@ -53,7 +54,7 @@ def test_beside_what_the_target_cannot_see_nothing_is_the_same() -> None:
     hidden = NOTHING.copy()
     hidden[20, 35] = hidden[2, 30] = hidden[36, 30] = True
     overlap = overlap_of(*pair(), hidden)
-    assert overlap is not None and EDGE == 3
+    assert overlap is not None and OVERLAP.hidden_margin_px == 3
     other = np.zeros((H, W), bool)
     other[17:24, 32:39] = True
     assert np.array_equal(overlap.same, ~other[ROWS, COLUMNS])
@@ -64,7 +65,7 @@ def test_what_differs_from_the_general_difference_is_content(light: float) -> No
     """In any channel, by more than a few hundredths of a tone; a general difference is another exposure."""
     for channel in range(3):
         more = np.full((H, W, 3), light)
-        more[10:20, 30:36, channel] -= 2 * SAME_TONE
+        more[10:20, 30:36, channel] -= 2 * OVERLAP.same_tone
         overlap = overlap_of(*pair(more), NOTHING)
         assert overlap is not None
         other = np.zeros((H, W), bool)
@@ -74,7 +75,7 @@ def test_what_differs_from_the_general_difference_is_content(light: float) -> No
         other[9:21, 29:37] = True
         assert overlap.same[~other[ROWS, COLUMNS]].all()
     near = np.full((H, W, 3), light)
-    near[10:20, 30:36] += 0.8 * SAME_TONE
+    near[10:20, 30:36] += 0.8 * OVERLAP.same_tone
     calm = overlap_of(*pair(near), NOTHING)
     assert calm is not None and calm.same.all()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from edf_stitch.core.compose import seam
@@ -53,7 +55,7 @@ def borders(labels: np.ndarray) -> np.ndarray:
 def coarse(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """The same must hold whether the cut is made at once or from a coarse one."""
     if request.param == "in bands":
-        monkeypatch.setattr(seam, "COARSE", 500)
+        monkeypatch.setattr(seam, "SEAM", replace(seam.SEAM, coarse_cells=500))
     return str(request.param)
 
 
@@ -166,8 +168,7 @@ def test_a_reference_inside_the_target_does_not_vanish() -> None:
 
 def test_pieces_at_many_places_stay_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     """More border than any band may hold: then the coarse labels stay, and what is settled is still right."""
-    monkeypatch.setattr(seam, "BANDED", 50)
-    monkeypatch.setattr(seam, "COARSE", 50)
+    monkeypatch.setattr(seam, "SEAM", replace(seam.SEAM, coarse_cells=50, band_pixels=50))
     painted = np.where(np.random.default_rng(0).random((H, W)) < 0.02, 1, 0).astype(np.int8)
     labels = cut(layer(LEFT, gray()), layer(RIGHT, gray()), painted=painted)
     assert labels[:, 220:].all() and not labels[:, :80].any()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -178,7 +180,7 @@ def test_strip_by_strip_it_comes_to_the_same(monkeypatch: pytest.MonkeyPatch) ->
     views = pair.views()[0], View.of(pair.target, alpha, 1.0)
     found = []
     for rows in (1000, 31):
-        monkeypatch.setattr(polish_module, "STRIP", rows)
+        monkeypatch.setattr(polish_module, "POLISH", replace(polish_module.POLISH, strip_rows=rows))
         found.append(polished(pair, lines, start, slack=True, views=views))
     for name in ("along", "across", "likeness", "evidence"):
         np.testing.assert_allclose(*(getattr(one, name) for one in found), atol=2e-3, err_msg=name)

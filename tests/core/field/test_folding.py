@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from edf_stitch.core.field import folding
@@ -41,7 +43,7 @@ def test_beside_what_is_not_finite_nothing_is_known() -> None:
 @pytest.mark.parametrize("strip", [1, 100, 2_000_000])
 def test_each_pixel_that_shows_the_target_is_turned_one_way(strip: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """As it is in the first ten columns, pressed flat in the next ten, mirrored in the rest; at any size of strips."""
-    monkeypatch.setattr(folding, "STRIP", strip)
+    monkeypatch.setattr(folding, "FOLDING", replace(folding.FOLDING, strip_pixels=strip))
     x, y = affine(1, 0, 0, 1, (5.0, 3.0))
     column = np.arange(WIDTH)
     x[:] = np.where(column < 10, column, np.where(column < 20, 9, 28 - column)) + 5

@@ -13,7 +13,8 @@ from edf_stitch.core.cameras.projective import homogeneous, infinite_homography
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.field import folding, visibility
 from edf_stitch.core.field.folding import turned_over, turning
-from edf_stitch.core.field.visibility import BESIDE, _folded_blocks, by_agreement, occluded
+from edf_stitch.core.field.options import VISIBILITY
+from edf_stitch.core.field.visibility import _folded_blocks, by_agreement, occluded
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
@@ -171,7 +172,8 @@ def test_where_the_map_folds_is_all_that_has_to_be_looked_at(
     warp, _ = scene.truth()
     if mirrored:
         warp = with_map(warp, scene.target_size[0] - 1 - warp.maps[1].x)
-    monkeypatch.setattr(visibility, "STRIP", 5000)  # in several pieces
+    in_pieces = replace(visibility.VISIBILITY, strip_pixels=5000)
+    monkeypatch.setattr(visibility, "VISIBILITY", in_pieces)
     seen = visibility._folded_blocks(warp.maps[1])
     assert seen.any()
     found = scene.occluded(warp)
@@ -211,7 +213,7 @@ def test_only_what_falls_into_the_target_counts() -> None:
 def test_what_turns_over_is_found_and_nothing_else(
     monkeypatch: pytest.MonkeyPatch, strip: int, mirrored: bool
 ) -> None:
-    monkeypatch.setattr(folding, "STRIP", strip)
+    monkeypatch.setattr(folding, "FOLDING", replace(folding.FOLDING, strip_pixels=strip))
     y, x = np.mgrid[0:60, 0:350].astype(np.float32)
     x[20:31, 100:120] = 219 - x[20:31, 100:120]
     found = turned_over(turning(PictureMap(349 - x if mirrored else x, y, (350, 60))))
@@ -261,7 +263,7 @@ def test_doubt_alone_hides_nothing() -> None:
     warp, told, hidden, _ = agreement()
     unsure, everywhere = np.zeros(SHAPE, np.float32), np.ones(SHAPE, bool)
     out = by_agreement(told, warp.maps[1], unsure, everywhere)
-    reach = round(BESIDE * max(TARGET))
+    reach = round(VISIBILITY.max_growth * max(TARGET))
     near = cv2.dilate(told.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0
     assert (out & ~told).any() and not (out & ~near).any() and not (out & ~warp.maps[1].inside()).any()
     assert np.array_equal(by_agreement(told, warp.maps[1], unsure, ~everywhere), told), "beyond the reference: nothing"
@@ -309,7 +311,7 @@ def folded_by_hand(picture_map: PictureMap, mirrored: bool) -> np.ndarray:
 def test_folds_fall_on_the_blocks_that_their_cells_touch(
     monkeypatch: pytest.MonkeyPatch, seed: int, mirrored: bool, strip: int
 ) -> None:
-    monkeypatch.setattr(visibility, "STRIP", strip)
+    monkeypatch.setattr(visibility, "VISIBILITY", replace(visibility.VISIBILITY, strip_pixels=strip))
     random = np.random.default_rng(seed)
     y, x = np.mgrid[0:30, 0:40] * 9.0 - 12 + random.normal(0, 1.7, (2, 30, 40))
     x[3, 5] = y[3, 5] = np.nan

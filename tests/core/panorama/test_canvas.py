@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.panorama.canvas import MAX_REACH, _area_ratio, border, bounding_canvas, expected_reach
+from edf_stitch.core.panorama.canvas import _area_ratio, border, bounding_canvas, expected_reach
+from edf_stitch.core.panorama.options import CANVAS
 from edf_stitch.core.raster.grid import Grid
 from edf_stitch.core.system.errors import OutputTooLarge
 
@@ -123,13 +124,13 @@ def test_an_outline_that_runs_to_infinity_is_looked_for_within_reach_only() -> N
     points = corners(50, 0, 100, 100)
     points[1] = np.nan
     reach, cut = expected_reach([points], (200, 150), [(100, 100)])
-    far = MAX_REACH * 200
+    far = CANVAS.max_reach * 200
     assert cut and np.array_equal(reach, (-far, -far, 200 + far, 150 + far))
 
 
 def test_an_outline_too_far_away_is_cut() -> None:
     reach, cut = expected_reach([corners(50, 0, 1e5, 100)], (200, 150), [(100, 100)])
-    assert cut and reach[2] == 200 + MAX_REACH * 200 and reach[0] <= 0
+    assert cut and reach[2] == 200 + CANVAS.max_reach * 200 and reach[0] <= 0
     reach, cut = expected_reach([corners(50, 20, 100, 100)], (200, 150), [(100, 100)])
     assert not cut and (reach[:2] <= (0, 0)).all() and (reach[2:] >= (200, 150)).all()
 

@@ -1,0 +1,174 @@
+"""What was chosen in composing a panorama, stage by stage: each value with its unit, and why it is what it is.
+
+Tones are log-encoded light (see `raster.log_encoding`), about 1 from black to white. Values without a source were
+chosen on photographs and rendered scenes: around them the result hardly changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ExposureOptions:
+    """Matching exposure and white balance (`exposure`)."""
+
+    block_px: int = 8
+    """px of the side of the blocks whose means are compared: they forgive an alignment that is a pixel or two off."""
+
+    clipped_light: float = 0.956
+    """Light (white is 1) from which pictures of 8 and 16 bits count as clipped: level 250 of 255, since JPEG rings
+    around white."""
+
+    min_brightness: float = 0.05
+    """Share of the median block's light below which a block is left out: noise and flare tell more than exposure there.
+    """
+
+    min_block_share: float = 0.5
+    """Share of a block that must be seen in both pictures."""
+
+    min_blocks: int = 20
+    """Blocks below which exposure counts as unknown: a median of fewer is chance."""
+
+    max_gain: float = 16.0
+    """Factor (four stops) beyond which it is no exposure but a different light, and nothing is changed."""
+
+
+@dataclass(frozen=True)
+class OverlapOptions:
+    """Where two layers show the same (`overlap`)."""
+
+    opaque_alpha: float = 1 - 1 / 255
+    """Alpha from which a pixel counts as opaque: all but the last level of 8 bits."""
+
+    same_tone: float = 0.06
+    """Tones by which what is the same may differ from the general difference of the pictures: noise and sharpness."""
+
+    same_sigmas: float = 4.0
+    """The same in robust standard deviations of the difference; the larger of the two holds."""
+
+    hidden_margin_px: int = 3
+    """px around what the added picture cannot see in which nothing counts as the same: occlusion is known to this much.
+    """
+
+    sample_pixels: int = 100_000
+    """Pixels that the general difference is measured on: more take time and change nothing."""
+
+
+@dataclass(frozen=True)
+class MovingThingsOptions:
+    """Finding what moved between the pictures (`moving_things`)."""
+
+    side_cells: int = 1000
+    """Cells along the overlap's longer side in which things are looked for, at most."""
+
+    min_width_cells: int = 4
+    """Cells below which something is too narrow to be a thing: misaligned edges are narrower."""
+
+    min_difference: float = 0.15
+    """Tones by which a thing differs at least."""
+
+    max_same_difference: float = 0.08
+    """Tones below which the pictures agree."""
+
+    surroundings_cells: int = 5
+    """Cells around a thing in which the pictures have to agree, and across which its parts are joined."""
+
+    min_agreeing: float = 0.7
+    """Share of these surroundings that must agree: people walk past one another, too."""
+
+    min_widths_of_parallax: float = 2.0
+    """A thing is so many times as wide as the parallax around it: what it hides is at most once as wide."""
+
+    max_area: float = 0.25
+    """Share of the overlap beyond which it is no thing but two different scenes."""
+
+
+@dataclass(frozen=True)
+class MinCutOptions:
+    """The minimal cut (`min_cut`)."""
+
+    units: int = 10_000
+    """Steps from the cheapest to the dearest edge: SciPy's maximum flow takes whole numbers of 32 bits."""
+
+
+@dataclass(frozen=True)
+class SeamOptions:
+    """Where the seam runs (`seam`). Prices are in units of a border between opposite tones, a pixel long."""
+
+    coarse_cells: int = 12_000
+    """Free cells of the coarsest cut at most: a cut takes time with their number to the power of 1.5."""
+
+    band_pixels: int = 80_000
+    """Free pixels of the band in which a finer cut is looked for, at most; a longer seam stays as the coarser found it.
+    """
+
+    band_half_width_px: int = 3
+    """px of a level to either side of the coarser seam that the band takes in: a cell of the coarser level, and half.
+    """
+
+    surrounded_share: float = 0.1
+    """Share of the panorama so far that the added picture must leave alone, or it is taken for surrounded: the cheapest
+    seam would leave nothing of it."""
+
+    kept_depth: float = 0.2
+    """If surrounded, pixels deeper than this share of the largest distance to its border are kept."""
+
+    length_price: float = 0.004
+    """Price of a pixel of seam for its length alone: low, since a longer way where nobody sees it is worth it."""
+
+    added_price: float = 0.1
+    """Price of showing the added picture from corner to corner of the overlap, for each pixel of its diagonal: the
+    reference is exact, the others are resampled by uncertain maps. Dearer, and the seam keeps to the border."""
+
+    ghost_price: float = 0.5
+    """Price of a pixel of what the added picture cannot see: what is thinner than about eight px costs more to go
+    around than to show."""
+
+
+@dataclass(frozen=True)
+class BandOptions:
+    """Blending in bands (`multiband`; Burt and Adelson, ACM TOG 1983), and feathering as widely."""
+
+    coarsest_width: float = 1 / 50
+    """Share of the canvas's diagonal of the coarsest band's width: light is evened out over that."""
+
+    min_bands: int = 3
+    """Bands at least: 8 px."""
+
+    max_bands: int = 7
+    """Bands at most: 128 px. Wider, a difference of light that is local spreads to where there was none."""
+
+    margin_widths: int = 4
+    """Widths of the coarsest band around the seam that are blended: beyond, a pyramid's weights have ended."""
+
+    negligible_tone: float = 1e-5
+    """Tones below which a change is dropped, so that what is far from the seam keeps its bits."""
+
+    max_relative_change: float = 0.5
+    """Share of its own tone by which blending may change a pixel: brighter neighbours' difference is too much for the
+    dark."""
+
+    max_dark_change: float = 0.02
+    """Tones by which it may do so in any case."""
+
+
+@dataclass(frozen=True)
+class InpaintOptions:
+    """Filling holes (`inpaint`)."""
+
+    reach_px: int = 12
+    """px around a hole that it is filled from: enough to lie beyond the rims of what hid it."""
+
+    near_weight: float = 1e-3
+    """Weight of what lies nearer than halfway to the thing that hid the hole, beside what lies behind: it decides only
+    where nothing lies behind."""
+
+
+EXPOSURE = ExposureOptions()
+OVERLAP = OverlapOptions()
+MOVING_THINGS = MovingThingsOptions()
+MIN_CUT = MinCutOptions()
+SEAM = SeamOptions()
+BANDS = BandOptions()
+INPAINT = InpaintOptions()

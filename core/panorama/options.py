@@ -1,0 +1,127 @@
+"""What was chosen in laying out a panorama, stage by stage: each value with its unit, and why it is what it is.
+
+Values without a source were chosen on photographs and rendered scenes: around them the result hardly changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class CanvasOptions:
+    """How large a canvas gets (`canvas`)."""
+
+    max_stretch: float = 4.0
+    """Canvas px per px of a picture, in length: beyond, a perspective panorama shows blur and is cut off."""
+
+    max_reach: float = 3.0
+    """Longer sides of the largest picture by which a flat canvas goes beyond the reference at most: near the horizon of
+    the reference's plane it would have no end."""
+
+    max_pixels: int = 1_000_000_000
+    """Pixels of a panorama: at float32 and three channels, more than 12 GB for its light alone."""
+
+    margin: float = 0.1
+    """Share of the reference's longer side that is searched around where the pictures are expected: this is by the
+    field's plane alone."""
+
+    outline_points: int = 32
+    """Points along each side of a picture that stand for its border, which lenses and round panoramas bend."""
+
+    search_nodes: int = 2000
+    """Nodes of the grid on which the pictures' bounds are looked for: a tenth of a map's, for nothing is shown yet."""
+
+
+@dataclass(frozen=True)
+class WarpOptions:
+    """Maps of all pictures (`warp`)."""
+
+    max_fade: float = 3.0
+    """Longer sides of the reference beside it within which fields end in their plane, in round panoramas: the grid that
+    is laid over the reference's plane has to end somewhere."""
+
+    max_node_factor: float = 4.0
+    """Nodes of that grid at most, in units of those of any other grid: time and memory grow with it."""
+
+
+@dataclass(frozen=True)
+class LayerOptions:
+    """Fetching pictures through their maps (`layers`)."""
+
+    min_alpha: float = 1e-2
+    """Alpha (0..1) below which a pixel counts as transparent: its colour, divided by so little, would be rounding."""
+
+
+@dataclass(frozen=True)
+class ProjectionOptions:
+    """Round panoramas (`projection`)."""
+
+    max_cylinder_slope: float = 3.0
+    """tan φ at which a cylinder is cut off (72°): it grows without end towards zenith and nadir."""
+
+
+@dataclass(frozen=True)
+class LevellingOptions:
+    """Finding which way is down (`levelling`)."""
+
+    roll_sigma_deg: float = 1.5
+    """Degrees of roll, σ: people see a tilted horizon and avoid it."""
+
+    pitch_sigma_deg: float = 20.0
+    """Degrees of pitch, σ: people look up and down on purpose."""
+
+    iterations: int = 50
+    """Reweighted eigenvectors for what the cameras' poses alone say: far more than it takes to settle."""
+
+    pitch_reach_deg: float = 45.0
+    """Degrees of pitch to either side of a camera's own axes within which down is looked for by edges: most of what is
+    photographed, with 2 σ to spare."""
+
+    roll_reach_deg: float = 25.0
+    """The same of roll: a camera that was held askew, but not on its side."""
+
+    search_steps_deg: tuple[tuple[float, float], ...] = ((1.0, 1.0), (0.2, 0.5), (0.04, 0.35))
+    """Rounds of that search: degrees between directions, and degrees, σ, that upright edges may be off. Each round
+    looks around the best of the last; edges are found to about a third of a degree."""
+
+    narrowing: float = 1.5
+    """Steps of the last round to either side of its best direction that the next round searches."""
+
+    edge_weight: float = 2.0
+    """What an edge as long as the picture counts, in cameras."""
+
+    sideways_deg: float = 45.0
+    """Degrees of roll from which a camera counts as turned on its side."""
+
+    chance_factor: float = 1.0
+    """Edges of any direction favour some direction by about the root of the sum of their squared lengths. Only beyond
+    so many times that do edges have a say."""
+
+
+@dataclass(frozen=True)
+class EdgeOptions:
+    """Straight edges that show what is upright (`upright_edges`)."""
+
+    side_px: int = 1000
+    """px of the picture's longer side at which edges are detected: long ones are what tells, and they survive."""
+
+    min_length: float = 0.025
+    """Share of the longer side below which an edge is left out: its direction is uncertain by more than a degree."""
+
+    max_edges: int = 1000
+    """Edges that are used at most, the longest: the search takes time with each."""
+
+    alpha_margin_px: int = 3
+    """px, at that size, around what is transparent in which edges are left out: they are the mask's."""
+
+    upright_share: float = 0.3
+    """Share of the edges that are upright, in a usual picture, beside the density (per rad) of those that are not."""
+
+
+CANVAS = CanvasOptions()
+WARP = WarpOptions()
+LAYER = LayerOptions()
+PROJECTION = ProjectionOptions()
+LEVELLING = LevellingOptions()
+EDGES = EdgeOptions()
