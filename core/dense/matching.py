@@ -25,7 +25,7 @@ from .options import LINES, MATCHING
 
 
 @dataclass(frozen=True)
-class View:
+class ComparedPicture:
     """A picture to be matched, perhaps shrunk.
 
     levels (h, w, C) uint8; shown (h, w) float32: 1 where it shows something, else 0, None if it does everywhere; full
@@ -37,16 +37,16 @@ class View:
     full: NDArray[np.uint8]
 
     @staticmethod
-    def of(view: NDArray[np.uint8], alpha: Plane | None, step: float) -> View:
+    def of(view: NDArray[np.uint8], alpha: Plane | None, step: float) -> ComparedPicture:
         """An 8-bit picture (H, W, C), shrunk by `step` ≥ 1; alpha (H, W) 0 where it shows nothing."""
         shown = None if alpha is None else (alpha > 0).astype(np.float32)
         if step <= 1:
-            return View(view, shown, view)
+            return ComparedPicture(view, shown, view)
         small = max(1, round(view.shape[1] / step)), max(1, round(view.shape[0] / step))
         levels = cv2.resize(view, small, interpolation=cv2.INTER_AREA).reshape(*small[::-1], -1)
         if shown is not None:
             shown = (cv2.resize(shown, small, interpolation=cv2.INTER_AREA) > 0.999).astype(np.float32)
-        return View(levels, shown, view)
+        return ComparedPicture(levels, shown, view)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -114,7 +114,8 @@ def search_base(sparse: SparseMap, matches: Matches, plane: Array, most: float) 
 
 
 def search(
-    lines: EpipolarLines, sparse: SparseMap, reference: View, target: View, step: float, reach: float
+    lines: EpipolarLines, sparse: SparseMap, reference: ComparedPicture, target: ComparedPicture, step: float,
+    reach: float,
 ) -> tuple[Plane, Plane]:
     """Moves (h, w) px along the lines to where the nodes are found in the target, and confidences (h, w): 0 where
     nothing was found, 1 where it was found at full size, little where only at half the size.

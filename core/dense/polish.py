@@ -17,7 +17,7 @@ from ..raster.arrays import Plane, beside
 from ..system.threads import each
 from .edge_aware_smoothing import Smoother
 from .epipolar_lines import EpipolarLines
-from .matching import View
+from .matching import ComparedPicture
 from .options import POLISH
 
 
@@ -33,7 +33,7 @@ class Polished:
 
 
 def polish(
-    lines: EpipolarLines, reference: View, target: View, along: Plane, known: Plane,
+    lines: EpipolarLines, reference: ComparedPicture, target: ComparedPicture, along: Plane, known: Plane,
     weights: tuple[NDArray[np.float32], NDArray[np.float32]], slack: bool,
 ) -> Polished:  # fmt: skip
     """Starts at moves `along` (h, w) px.
@@ -77,7 +77,10 @@ def polish(
     return Polished(along, across, likeness(lines, reference, target, along, across), share)
 
 
-def likeness(lines: EpipolarLines, reference: View, target: View, along: Plane, across: Plane | None = None) -> Plane:
+def likeness(
+    lines: EpipolarLines, reference: ComparedPicture, target: ComparedPicture, along: Plane,
+    across: Plane | None = None,
+) -> Plane:
     """Correlation (h, w) of the two pictures around each node after moves along and across its line, 0 where the target
     shows nothing."""
     first, shown = reference.at_nodes(reference.gray, lines)
@@ -117,7 +120,7 @@ class _Compared:
 
 
 def _compared(
-    lines: EpipolarLines, first: Plane, shown: NDArray[np.bool_], target: View, second: NDArray[np.float32],
+    lines: EpipolarLines, first: Plane, shown: NDArray[np.bool_], target: ComparedPicture, second: NDArray[np.float32],
     along: Plane, across: Plane,
 ) -> _Compared:  # fmt: skip
     """The reference at the nodes (h, w) beside the target and its slopes (h', w', 3) where the moves lead."""

@@ -27,7 +27,7 @@ from ..raster.sampling import fetch
 from ..system.threads import in_order
 from .edge_aware_smoothing import Smoother, cut_edges, edge_weights, strengthen
 from .epipolar_lines import EpipolarLines, SparseMap
-from .matching import View, search, search_base
+from .matching import ComparedPicture, search, search_base
 from .moved_depth import build_refinement
 from .options import BEYOND, REFINE
 from .polish import likeness, polish
@@ -143,9 +143,9 @@ def _overlap(sparse: SparseMap, target_size: tuple[int, int]) -> Box | None:
     return (int(low[0]), int(low[1]), across, down) if min(across, down) >= REFINE.min_overlap_px else None
 
 
-def _views(pictures: tuple[Picture, Picture], step: float) -> tuple[View, View]:
+def _views(pictures: tuple[Picture, Picture], step: float) -> tuple[ComparedPicture, ComparedPicture]:
     """Reference and target, shrunk by `step`."""
-    reference, target = in_order(lambda picture: View.of(picture.view, picture.alpha, step), pictures)
+    reference, target = in_order(lambda picture: ComparedPicture.of(picture.view, picture.alpha, step), pictures)
     return reference, target
 
 
@@ -160,7 +160,7 @@ def _guide(view: NDArray[np.uint8], lines: EpipolarLines) -> NDArray[np.float32]
     return result
 
 
-def _plain(lines: EpipolarLines, sparse: SparseMap, reference: View) -> Plane:
+def _plain(lines: EpipolarLines, sparse: SparseMap, reference: ComparedPicture) -> Plane:
     """Lack of texture (h, w) around the nodes, by the gradient along their epipolar lines: 0 for much, 1 for none."""
     epipole = np.linalg.svd(sparse.two_view.F)[2][2]
     gray = cv2.GaussianBlur(reference.gray, (0, 0), 1.0)

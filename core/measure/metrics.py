@@ -212,7 +212,8 @@ def _similarity(
 def _seam_visibility(
     levels: list[NDArray[Any]], labels: NDArray[np.int16], several: NDArray[np.bool_]
 ) -> float:
-    """See `appearance`; levels (h, w, C) of panorama, reference and target; both (h, w): the overlap."""
+    """See `appearance`; levels (h, w, C) of the panorama and of each layer; several (h, w): where more
+    than one shows something."""
     excess = []
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         across = (labels[here] != labels[there]) & several[here] & several[there]

@@ -18,19 +18,25 @@ from .canvas import Canvas
 
 
 @dataclass(frozen=True, eq=False)
-class Depth(LazyImage):
-    """The inverse depth (H, W) of a canvas, from a field's at the nodes of a grid and its dense refinement."""
+class OnCanvas(LazyImage):
+    """Values (H, W) of the pixels of a canvas; camera: the reference's."""
 
     canvas: Canvas
     camera: Camera
-    grid: Grid
-    nodes: Array
-    refined: RefinedDepth | None
 
     @property
     def shape(self) -> tuple[int, ...]:
         """(H, W)."""
         return self.canvas.height, self.canvas.width
+
+
+@dataclass(frozen=True, eq=False)
+class Depth(OnCanvas):
+    """The inverse depth (H, W) of a canvas, from a field's at the nodes of a grid and its dense refinement."""
+
+    grid: Grid
+    nodes: Array
+    refined: RefinedDepth | None
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         rows, columns = within(part, self.shape)
@@ -66,17 +72,10 @@ class Depth(LazyImage):
 
 
 @dataclass(frozen=True, eq=False)
-class Confidence(LazyImage):
+class Confidence(OnCanvas):
     """How sure (H, W) dense refinement is on a canvas."""
 
-    canvas: Canvas
-    camera: Camera
     refined: RefinedDepth
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(H, W)."""
-        return self.canvas.height, self.canvas.width
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         rows, columns = within(part, self.shape)
@@ -87,18 +86,11 @@ class Confidence(LazyImage):
 
 
 @dataclass(frozen=True, eq=False)
-class Nearness(LazyImage):
+class Nearness(OnCanvas):
     """Baselines per distance (H, W) from a view's camera (see `visibility.nearness_of`); camera: the reference's."""
 
-    canvas: Canvas
-    camera: Camera
     view: View
     depth: AnyImage
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(H, W)."""
-        return self.canvas.height, self.canvas.width
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         rows, columns = within(part, self.shape)

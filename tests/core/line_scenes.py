@@ -10,7 +10,7 @@ from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.projective import fundamental_from_pose, infinite_homography
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
-from edf_stitch.core.dense.matching import View
+from edf_stitch.core.dense.matching import ComparedPicture
 from edf_stitch.core.field.field import FieldValues
 from edf_stitch.core.raster.grid import Grid
 from edf_stitch.synthetic_scenes.scene_camera import SceneCamera
@@ -83,8 +83,8 @@ class Scene:
         """Of the whole reference."""
         return EpipolarLines.over(field, (0, 0, *SIZE), step)
 
-    def views(self, step: float = 1.0) -> tuple[View, View]:
-        return View.of(self.reference, None, step), View.of(self.target, None, step)
+    def views(self, step: float = 1.0) -> tuple[ComparedPicture, ComparedPicture]:
+        return ComparedPicture.of(self.reference, None, step), ComparedPicture.of(self.target, None, step)
 
     def truth(self, lines: EpipolarLines) -> np.ndarray:
         """The moves (h, w) that are right."""

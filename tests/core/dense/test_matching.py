@@ -12,7 +12,7 @@ import pytest
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.dense import matching
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
-from edf_stitch.core.dense.matching import View, in_tones_of, search, search_base
+from edf_stitch.core.dense.matching import ComparedPicture, in_tones_of, search, search_base
 from edf_stitch.core.dense.options import MATCHING
 from edf_stitch.core.field.transfer import target_points
 
@@ -27,7 +27,7 @@ REACH = 40.0
 @pytest.mark.parametrize("step", [1.0, 2.0, 2.6])
 def test_a_view_is_asked_at_px_of_the_full_picture(step: float) -> None:
     x, y = np.meshgrid(np.arange(120.0), np.arange(90.0))
-    view = View.of((40 + x + 0.5 * y).astype(np.uint8)[..., None], None, step)
+    view = ComparedPicture.of((40 + x + 0.5 * y).astype(np.uint8)[..., None], None, step)
     assert view.size == (120, 90) and view.gray.shape == (round(90 / step), round(120 / step))
     at = np.float32(np.linspace(12, 100, 40))[None], np.float32(np.linspace(10, 75, 40))[None]
     found, shown = view.sample(view.gray, *at)
@@ -41,14 +41,14 @@ def test_at_the_nodes_it_shows_what_it_shows_there(covered: bool) -> None:
     alpha = (np.arange(SIZE[1])[:, None] + np.zeros(SIZE[0]) < 90).astype(np.float32) if covered else None
     for box, step in (((12, 20, 100, 80), 1.0), ((12, 20, 100, 80), 2.0)):
         lines = EpipolarLines.over(pair.field(), box, step)
-        for view in (View.of(pair.reference, alpha, 1.0), View.of(pair.reference, alpha, 2.0)):
+        for view in (ComparedPicture.of(pair.reference, alpha, 1.0), ComparedPicture.of(pair.reference, alpha, 2.0)):
             found, shown = view.at_nodes(view.gray, lines)
             expected, seen = view.sample(view.gray, *lines.nodes)
             assert np.array_equal(shown, seen) and np.abs(found - expected).max() < 1e-3 and found.shape == lines.shape
 
 
 def test_colours_become_gray_as_the_eye_weighs_them() -> None:
-    view = View.of(np.full((8, 9, 3), (200, 100, 50), np.uint8), None, 1.0)
+    view = ComparedPicture.of(np.full((8, 9, 3), (200, 100, 50), np.uint8), None, 1.0)
     assert np.abs(view.gray - (0.299 * 200 + 0.587 * 100 + 0.114 * 50)).max() <= 1 and view.shown is None
 
 
@@ -56,7 +56,7 @@ def test_colours_become_gray_as_the_eye_weighs_them() -> None:
 def test_nothing_is_shown_outside_nor_where_there_is_no_picture(step: float) -> None:
     alpha = np.ones((40, 60), np.float32)
     alpha[:, 40:] = 0
-    view = View.of(np.full((40, 60, 3), 99, np.uint8), alpha, step)
+    view = ComparedPicture.of(np.full((40, 60, 3), 99, np.uint8), alpha, step)
     x = np.array([[-3, 10, 38.0 - step, 39.2 + step, 50, 63, 10, 10, np.nan]], np.float32)
     y = np.array([[10, 10, 10, 10, 10, 10, -3, 43, 10]], np.float32)
     found, shown = view.sample(view.gray, x, y)
@@ -87,7 +87,9 @@ def test_tones_follow_the_curve_between_the_pictures() -> None:
 # --- the search -----------------------------------------------------------------------------------------------------
 
 
-def searched(pair: Scene, step: float = 1.0, target: View | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def searched(
+    pair: Scene, step: float = 1.0, target: ComparedPicture | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """How far off the moves are (h, w) px, where something was found, and where something is to be found."""
     field = pair.field()
     lines = pair.lines(field)
@@ -112,7 +114,7 @@ def test_it_finds_what_is_to_be_found(motion: str, step: float) -> None:
 def test_another_exposure_changes_little() -> None:
     pair = scene("sideways")
     off, found, visible = searched(pair)
-    dark = View.of(np.rint(255 * (pair.target / 255.0) ** 1.6 * 0.7).astype(np.uint8), None, 1.0)
+    dark = ComparedPicture.of(np.rint(255 * (pair.target / 255.0) ** 1.6 * 0.7).astype(np.uint8), None, 1.0)
     off_dark, found_dark, _ = searched(pair, target=dark)
     assert found_dark[visible].mean() > 0.85 * found[visible].mean()
     assert np.median(np.abs(off_dark[found_dark & visible])) < np.median(np.abs(off[found & visible])) + 0.1
@@ -128,7 +130,7 @@ def test_colours_tell_what_gray_does_not() -> None:
         red = picture[..., 0].astype(np.float32)
         return np.rint(np.stack([red, (140 - 0.299 * red) / 0.587, np.full_like(red, 40)], axis=-1)).astype(np.uint8)
 
-    views = tuple(View.of(isoluminant(picture), None, 1.0) for picture in (pair.reference, pair.target))
+    views = tuple(ComparedPicture.of(isoluminant(picture), None, 1.0) for picture in (pair.reference, pair.target))
     assert views[0].gray.std() < 1.0
     along, counts = search(lines, field, *views, 1.0, REACH)
     good = (counts == 1) & pair.visible(lines)
@@ -138,7 +140,7 @@ def test_colours_tell_what_gray_does_not() -> None:
 def test_a_gray_picture_is_sought_in_a_coloured_one() -> None:
     pair = scene("sideways")
     gray = cv2.cvtColor(pair.target, cv2.COLOR_RGB2GRAY)[..., None]
-    off, found, visible = searched(pair, target=View.of(gray, None, 1.0))
+    off, found, visible = searched(pair, target=ComparedPicture.of(gray, None, 1.0))
     assert found[visible].mean() > 0.5 and (np.abs(off[found & visible]) < 1).mean() > 0.9
 
 
@@ -148,7 +150,7 @@ def test_what_noise_hides_at_full_size_is_found_at_half_and_counts_less() -> Non
     lines = pair.lines(field)
     rng = np.random.default_rng(3)
     noisy = (np.clip(p + rng.normal(0, 25, p.shape), 0, 255).astype(np.uint8) for p in (pair.reference, pair.target))
-    along, counts = search(lines, field, *(View.of(p, None, 1.0) for p in noisy), 1.0, REACH)
+    along, counts = search(lines, field, *(ComparedPicture.of(p, None, 1.0) for p in noisy), 1.0, REACH)
     guessed = (counts > 0) & (counts < 1) & pair.visible(lines)
     assert guessed.mean() > 0.05 and np.allclose(counts[guessed], MATCHING.coarse_confidence)
     assert (np.abs(along - pair.truth(lines))[guessed] < 3).mean() > 0.6
@@ -162,7 +164,7 @@ def test_what_a_picture_does_not_show_is_not_found() -> None:
     first, second = (np.ones(SIZE[::-1], np.float32) for _ in range(2))
     first[:60, -60:] = 0
     second[:, :100] = 0
-    views = View.of(pair.reference, first, 1.0), View.of(pair.target, second, 1.0)
+    views = ComparedPicture.of(pair.reference, first, 1.0), ComparedPicture.of(pair.target, second, 1.0)
     along, counts = search(lines, field, *views, 1.0, REACH)
     found = counts > 0
     x, _ = lines.target(along)

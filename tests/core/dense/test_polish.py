@@ -10,7 +10,7 @@ import pytest
 from edf_stitch.core.dense import polish as polish_module
 from edf_stitch.core.dense.edge_aware_smoothing import edge_weights
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines
-from edf_stitch.core.dense.matching import View
+from edf_stitch.core.dense.matching import ComparedPicture
 from edf_stitch.core.dense.polish import Polished, polish
 
 from ..line_scenes import MOTIONS, SIZE, Scene, scene
@@ -29,7 +29,8 @@ def vivid(picture: np.ndarray) -> np.ndarray:
 
 
 def polished(
-    pair: Scene, lines: EpipolarLines, along: np.ndarray, slack: bool = False, views: tuple[View, View] | None = None
+    pair: Scene, lines: EpipolarLines, along: np.ndarray, slack: bool = False,
+    views: tuple[ComparedPicture, ComparedPicture] | None = None,
 ) -> Polished:
     guide = cv2.resize(pair.reference, lines.shape[::-1], interpolation=cv2.INTER_AREA)
     weights = edge_weights(cv2.GaussianBlur(guide, (0, 0), 1.0).astype(np.float32), 4.0)
@@ -58,7 +59,7 @@ def test_most_of_what_is_wrong_goes(motion: str) -> None:
     assert inner(pair, lines).mean() > 0.3 and before > 0.3
     found = polished(pair, lines, start)
     assert np.median(off(pair, lines, found.along)) < 0.8 * before
-    views = tuple(View.of(vivid(picture), None, 1.0) for picture in (pair.reference, pair.target))
+    views = tuple(ComparedPicture.of(vivid(picture), None, 1.0) for picture in (pair.reference, pair.target))
     told = polished(pair, lines, start, views=views)
     assert np.median(off(pair, lines, told.along)) < 0.55 * before
     assert not found.across.any(), "a field that keeps to its lines"
@@ -75,7 +76,7 @@ def test_half_as_many_nodes_do_it_too() -> None:
     pair = scene("sideways")
     lines = pair.lines(pair.field(), 2.0)
     start = nearly(lines, pair)
-    views = tuple(View.of(vivid(picture), None, 2.0) for picture in (pair.reference, pair.target))
+    views = tuple(ComparedPicture.of(vivid(picture), None, 2.0) for picture in (pair.reference, pair.target))
     found = polished(pair, lines, start, views=views)
     assert views[0].gray.shape == lines.shape == (SIZE[1] // 2, SIZE[0] // 2)
     assert np.median(off(pair, lines, found.along)) < 0.75 * np.median(off(pair, lines, start))
@@ -86,7 +87,7 @@ def test_light_that_changes_over_the_picture_does_not_lead_it_away() -> None:
     lines = pair.lines(pair.field())
     start = nearly(lines, pair)
     ramp = np.linspace(0.75, 1.0, SIZE[0])[None, :, None]
-    darker = View.of(np.rint(pair.target * ramp * 0.85 + 8).astype(np.uint8), None, 1.0)
+    darker = ComparedPicture.of(np.rint(pair.target * ramp * 0.85 + 8).astype(np.uint8), None, 1.0)
     plain = polished(pair, lines, start)
     lit = polished(pair, lines, start, views=(pair.views()[0], darker))
     assert np.median(off(pair, lines, lit.along)) < np.median(off(pair, lines, plain.along)) + 0.05
@@ -96,8 +97,8 @@ def test_half_the_contrast_does_not_lead_it_away() -> None:
     pair = scene("sideways")
     lines = pair.lines(pair.field())
     start = nearly(lines, pair)
-    flat = View.of((vivid(pair.target) * 0.55 + 60).astype(np.uint8), None, 1.0)
-    found = polished(pair, lines, start, views=(View.of(vivid(pair.reference), None, 1.0), flat))
+    flat = ComparedPicture.of((vivid(pair.target) * 0.55 + 60).astype(np.uint8), None, 1.0)
+    found = polished(pair, lines, start, views=(ComparedPicture.of(vivid(pair.reference), None, 1.0), flat))
     assert np.median(off(pair, lines, found.along)) < 0.55 * np.median(off(pair, lines, start))
 
 
@@ -129,7 +130,7 @@ def test_likeness_says_where_the_pictures_agree() -> None:
     target[:, 100:140] = np.random.default_rng(1).integers(0, 256, (SIZE[1], 40, 3))  # something else stands there
     alpha = np.ones(SIZE[::-1], np.float32)
     alpha[:, :60] = 0
-    found = polished(pair, lines, start, views=(pair.views()[0], View.of(target, alpha, 1.0)))
+    found = polished(pair, lines, start, views=(pair.views()[0], ComparedPicture.of(target, alpha, 1.0)))
     x, _ = lines.target(start)
     assert found.likeness.max() <= 1.01
     assert np.median(found.likeness[here & (x > 150)]) > 0.9
@@ -150,7 +151,8 @@ def test_where_there_is_nothing_to_see_the_search_is_believed() -> None:
     there = (y > 2) & (y < SIZE[1] - 3) & (x > 2) & (x < SIZE[0] - 3) & patch
     low, high = (np.array([f(y[there]), f(x[there])]).astype(int) for f in (np.min, np.max))
     second[max(0, low[0] - 4) : high[0] + 5, max(0, low[1] - 4) : high[1] + 5] = 128
-    found = polished(pair, lines, start, views=(View.of(first, None, 1.0), View.of(second, None, 1.0)))
+    compared = tuple(ComparedPicture.of(one, None, 1.0) for one in (first, second))
+    found = polished(pair, lines, start, views=compared)
     middle = np.s_[65:85, 95:115]
     assert np.abs(found.along - start)[middle].max() < 0.3
     assert found.evidence[middle].max() < np.percentile(found.evidence[~patch & pair.visible(lines)], 20)
@@ -160,7 +162,7 @@ def test_guesses_do_not_pull_at_what_was_found() -> None:
     """A wrong guess beside a right place, in gray that says nothing of its own and holds together."""
     pair = scene("sideways")
     lines = pair.lines(pair.field())
-    blank = View.of(np.full_like(pair.reference, 128), None, 1.0)
+    blank = ComparedPicture.of(np.full_like(pair.reference, 128), None, 1.0)
     start = np.zeros(lines.shape, np.float32)
     start[:, 100:] = 4.0
     known = np.where(start > 0, np.float32(0.01), np.float32(1))
@@ -177,7 +179,7 @@ def test_strip_by_strip_it_comes_to_the_same(monkeypatch: pytest.MonkeyPatch) ->
     start = nearly(lines, pair)
     alpha = np.ones(SIZE[::-1], np.float32)
     alpha[50:70, 80:90] = 0
-    views = pair.views()[0], View.of(pair.target, alpha, 1.0)
+    views = pair.views()[0], ComparedPicture.of(pair.target, alpha, 1.0)
     found = []
     for rows in (1000, 31):
         monkeypatch.setattr(polish_module, "POLISH", replace(polish_module.POLISH, strip_rows=rows))
@@ -195,7 +197,7 @@ def test_contrast_is_evened_out_by_no_more_than_a_factor_of_two() -> None:
     def steepness(faded: float, faded_too: float) -> float:
         """Gray levels per px along the lines that the target is taken to show."""
         first, target = (
-            View.of(np.rint(128 + (picture - 128.0) * share).astype(np.uint8), None, 1.0)
+            ComparedPicture.of(np.rint(128 + (picture - 128.0) * share).astype(np.uint8), None, 1.0)
             for picture, share in ((pair.reference, faded), (pair.target, faded_too))
         )
         slopes = [cv2.Scharr(target.gray, cv2.CV_32F, 1 - k, k, scale=1 / 32) for k in (0, 1)]

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
-from edf_stitch.core.dense.matching import View
+from edf_stitch.core.dense.matching import ComparedPicture
 from edf_stitch.core.dense.refine import _guide, _in_both, _overlap, _plain
 from edf_stitch.core.field.folding import folds, turning
 from edf_stitch.core.options import StitchOptions
@@ -125,7 +125,7 @@ def test_what_does_not_change_along_a_line_is_plain(
     for step, at_most in ((1.0, 0.02), (2.0, 0.05)):
         lines = EpipolarLines.over(sparse, (0, 0, *SIZE), step)
         for ramp, expected in ((along, 1 / (1 + (step * slope) ** 2)), (across, 1.0), (0 * x, 1.0)):
-            plain = _plain(lines, sparse, View.of(rgb(slope * ramp % 250), None, step))
+            plain = _plain(lines, sparse, ComparedPicture.of(rgb(slope * ramp % 250), None, step))
             assert plain.shape == lines.shape
             assert abs(np.median(plain[inner]) - expected) < at_most
 
