@@ -54,6 +54,7 @@ OPERATORS = {
 OPPOSITES = {"min": "max", "minimum": "maximum", "argmin": "argmax", "any": "all", "floor": "ceil", "erode": "dilate"}
 OPPOSITES |= {after: before for before, after in OPPOSITES.items()}
 AXES = {"-1": "-2", "-2": "-1", "0": "1", "1": "0", "2": "1"}
+SHORT = 20
 # What takes its arguments in any order; what reports progress and is no part of the result; strip sizes and the like.
 SYMMETRIC = {"min", "max", "minimum", "maximum", "hypot", "absdiff", "multiply", "add"}
 OBVIOUS = {"isinstance", "zip", "map", "resize", "zeros", "full", "empty", "array", "ones"}  # another order would crash
@@ -96,16 +97,20 @@ class Finder(ast.NodeVisitor):
 
     def __init__(self, file: str, source: bytes) -> None:
         self.file, self.found, self.function = file, [], ""
-        lengths = [len(line) for line in source.splitlines(keepends=True)]
-        self.starts = [sum(lengths[:k]) for k in range(len(lengths))]
+        self.lines = source.splitlines(keepends=True)
+        self.starts = [sum(map(len, self.lines[:k])) for k in range(len(self.lines))]
         self.visit(ast.parse(source))
 
     def add(self, kind: str, node: ast.expr | ast.stmt, text: str) -> None:
         if self.function:
             start = self.starts[node.lineno - 1] + node.col_offset
             stop = self.starts[node.end_lineno - 1] + node.end_col_offset
-            change = f"{ast.unparse(node)} → {text}"
-            new = text if isinstance(node, ast.stmt) else f"({text})"
+            new, old = text if isinstance(node, ast.stmt) else f"({text})", ast.unparse(node)
+            if len(old) < SHORT:  # a number says little without the line it stands in
+                line = self.lines[node.lineno - 1]
+                after = line[: node.col_offset] + text.encode() + line[node.end_col_offset :]
+                old, text = line.decode().strip(), after.decode().strip()
+            change = f"{old} → {text}"
             self.found.append(Mutation(self.file, node.lineno, self.function, kind, change, start, stop, new))
 
     def visit(self, node: ast.AST) -> None:
@@ -152,12 +157,11 @@ class Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_Compare(self, node: ast.Compare) -> None:
-        kind, rest = type(node.ops[0]), node.ops[1:]
+        kind, rest, sides = type(node.ops[0]), node.ops[1:], node.comparators
         if kind in COMPARISONS:
-            self.add("comparison", node, _compare(node, [COMPARISONS[kind](), *rest]))
-        sides = ast.unparse(node.left), ast.unparse(node.comparators[0])
-        if kind in BOUNDARIES and any(WHOLE.search(side) for side in sides):
-            self.add("boundary", node, _compare(node, [BOUNDARIES[kind](), *rest]))
+            self.add("comparison", node, ast.unparse(ast.Compare(node.left, [COMPARISONS[kind](), *rest], sides)))
+        if kind in BOUNDARIES and any(WHOLE.search(ast.unparse(side)) for side in (node.left, sides[0])):
+            self.add("boundary", node, ast.unparse(ast.Compare(node.left, [BOUNDARIES[kind](), *rest], sides)))
         self.generic_visit(node)
 
     def visit_BinOp(self, node: ast.BinOp) -> None:
@@ -216,10 +220,6 @@ class Finder(ast.NodeVisitor):
 
 def _name(function: ast.expr) -> str:
     return getattr(function, "attr", None) or getattr(function, "id", "")
-
-
-def _compare(node: ast.Compare, ops: list[ast.cmpop]) -> str:
-    return ast.unparse(ast.Compare(node.left, ops, node.comparators))
 
 
 def drawn(room: str | None, count: int, seed: int) -> list[Mutation]:

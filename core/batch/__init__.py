@@ -1,4 +1,4 @@
 """Many pairs and clips: the list, what each leaves on disk, the run.
 
-May import every room before it and the pipeline.
+May import the rooms before it but the rivals, and the pipeline.
 """

@@ -105,7 +105,7 @@ def _lines(F: Array, x: NDArray[Any], y: NDArray[Any]) -> tuple[Array, Array, Ar
 
 
 def poses_from_fundamental(F: Array, K: Array, K_prime: Array) -> list[tuple[Array, Array]]:
-    """The four (R, t) of E = K'ᵀ F K (H&Z result 9.19), |t| = 1; `most_in_front` picks among them."""
+    """The four (R, t) of E = K'ᵀ F K (H&Z result 9.19), |t| = 1; `pose_of_fundamental` picks among them."""
     U, _, Vt = np.linalg.svd(K_prime.T @ F @ K)
     U *= np.sign(np.linalg.det(U))
     Vt *= np.sign(np.linalg.det(Vt))

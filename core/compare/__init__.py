@@ -1,4 +1,4 @@
 """Every field on every pair, in one table and page.
 
-May import every room before it and the pipeline.
+May import the rooms before it but the rivals, and the pipeline.
 """

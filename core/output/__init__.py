@@ -1,4 +1,4 @@
 """From a finished stitch to files, and to what a window shows.
 
-May import every room before it and the pipeline.
+May import the rooms before it but the rivals, and the pipeline.
 """

@@ -165,8 +165,8 @@ def shows_parallax(matches: Matches, F: Array, homography: Homography, target_si
     """Whether matches leave the homography along the lines of F, more than noise and coincidence would make them.
 
     Noise, outliers and a homography that fits badly scatter matches along their lines and across them alike; parallax
-    only along. And an F has two degrees of freedom more than its homography: among random outliers some would always
-    be found on the lines of some F, so their number must be beyond that, a contrario (cf. `refuse_chance`).
+    only along. And given a homography an F keeps two free parameters, its epipole: among random outliers some would
+    always be found on the lines of some F, so their number must be beyond that, a contrario (cf. `refuse_chance`).
     """
     line = homogeneous(matches.x) @ F.T
     normal = line[:, :2] / np.maximum(np.hypot(line[:, 0], line[:, 1]), 1e-300)[:, None]

@@ -108,7 +108,7 @@ def test_a_file_of_matches_is_as_good_as_an_array(
 ) -> None:
     (tmp_path / "m.csv").write_bytes(matches_csv(small_result.used_matches))
     by_file, by_array = (
-        stitch(((small_pair.reference, small_pair.target), replace(quick, matches=source)))
+        stitch((small_pair.reference, small_pair.target), replace(quick, matches=source))
         for source in (tmp_path / "m.csv", rows_of(small_result))
     )
     assert np.array_equal(by_file.warp.maps[1].x, by_array.warp.maps[1].x)
@@ -125,7 +125,7 @@ def test_used_matches_are_those_the_field_stands_on(small_result: StitchResult) 
 
 
 def test_used_matches_are_px_of_the_full_pictures(small_pair: Pair, quick: StitchOptions) -> None:
-    half = stitch(((small_pair.reference, small_pair.target), replace(quick, scale=0.5)))
+    half = stitch((small_pair.reference, small_pair.target), replace(quick, scale=0.5))
     used = half.used_matches
     kept = half.edges[0].matches.subset(np.flatnonzero(half.edges[0].two_view.inliers)[half.field.fit.inliers_used])
     assert np.allclose((used.x + 0.5) / 2 - 0.5, kept.x) and np.allclose((used.y + 0.5) / 2 - 0.5, kept.y)
@@ -138,7 +138,7 @@ def test_a_match_outside_its_picture_is_refused(
     rows = rows_of(small_result)
     rows[3, 2] = WIDTH
     with pytest.raises(BadRequest, match="row 3 .* outside the target, which has 240×180"):
-        stitch(((small_pair.reference, small_pair.target), replace(quick, matches=rows, scale=0.5)))
+        stitch((small_pair.reference, small_pair.target), replace(quick, matches=rows, scale=0.5))
 
 
 # --- masks ----------------------------------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ def test_a_thing_that_moved_disturbs_unless_it_is_masked(
 ) -> None:
     pair, first, second = passer_by
     masked = replace(smooth, ignore=(first, second))
-    open_eyed, blind = (stitch(((pair.reference, pair.target), options)) for options in (smooth, masked))
+    open_eyed, blind = (stitch((pair.reference, pair.target), options) for options in (smooth, masked))
     spoilt, clean, best = (errors_beside(pair, one, first) for one in (open_eyed, blind, small_result))
     assert np.median(best) < 0.2 and np.median(spoilt) > 2, "it is large enough to lead astray"
     assert np.median(clean) < 0.3 and np.percentile(clean, 75) < 0.75
@@ -200,7 +200,7 @@ def test_what_is_masked_is_not_seen_in_the_panorama(
     pair, first, second = passer_by
     assert not of_the_thing(small_result.pixels).any()
     options = replace(quick, blend=blend, exposure=False, ignore=(first, second))
-    result = stitch(((pair.reference, pair.target), options))
+    result = stitch((pair.reference, pair.target), options)
     assert of_the_thing(result.pictures[0].pixels).sum() > 3000, "the pictures hold it, alpha hides it"
     # where next to nothing is shown, bicubic's negative lobes alone decide about its colour
     assert not of_the_thing(result.pixels)[result.alpha > 0.05].any()
@@ -217,7 +217,7 @@ def test_what_is_masked_is_not_seen_in_the_panorama(
 def test_a_mask_of_one_picture_leaves_the_other_alone(small_pair: Pair, quick: StitchOptions) -> None:
     mask = np.zeros((HEIGHT, WIDTH), np.uint8)
     mask[:30] = 255
-    result = stitch(((small_pair.reference, small_pair.target), replace(quick, ignore=(None, mask))))
+    result = stitch((small_pair.reference, small_pair.target), replace(quick, ignore=(None, mask)))
     found = result.edges[0].matches
     assert result.pictures[0].alpha is None and found.y[:, 1].min() > 30 and found.x[:, 1].min() < 30
 
@@ -258,7 +258,7 @@ def assert_cropped(full: StitchResult, part: StitchResult, box: tuple[int, int, 
 def test_a_crop_is_a_part_of_the_whole(
     small_pair: Pair, small_result: StitchResult, quick: StitchOptions, kind: Crop
 ) -> None:
-    part = stitch(((small_pair.reference, small_pair.target), replace(quick, crop=kind)))
+    part = stitch((small_pair.reference, small_pair.target), replace(quick, crop=kind))
     assert_cropped(small_result, part, box_of(kind, small_result))
     if kind == "reference":
         assert part.alpha.shape == (HEIGHT, WIDTH) and part.warp.canvas.offset == (0, 0)
@@ -272,13 +272,13 @@ def test_a_crop_beyond_the_panorama_is_refused_with_its_size(
 ) -> None:
     height, width = small_result.alpha.shape
     with pytest.raises(BadRequest, match=f"{width}×{height}"):
-        stitch(((small_pair.reference, small_pair.target), replace(quick, crop=(0, 0, width + 1, 10))))
+        stitch((small_pair.reference, small_pair.target), replace(quick, crop=(0, 0, width + 1, 10)))
 
 
 def test_the_warp_file_of_a_crop_keeps_its_promise(small_pair: Pair, quick: StitchOptions) -> None:
     """x' ~ H_inf p + inverse_depth e' with p = pixel − offset, for what is left of the canvas."""
     options = replace(quick, field="strict", crop=(90, 40, 240, 120))
-    part = stitch(((small_pair.reference, small_pair.target), options))
+    part = stitch((small_pair.reference, small_pair.target), options)
     with np.load(io.BytesIO(warp_bytes(part))) as file:
         warp = dict(file)
     assert warp["map_x_01"].shape == part.alpha.shape == (120, 240) and (warp["offset"] < 0).any()
@@ -313,8 +313,8 @@ def test_half_the_scale_is_the_same_panorama_at_half_the_size(pair: Pair, field:
     K = pair.reference_camera.K
     camera = CameraRequest(focal_px=(K[0, 0],), principal=(K[0, 2], K[1, 2]))
     options = StitchOptions(field, camera=camera, measure=False)
-    full = stitch(((pair.reference, pair.target), options))
-    half = stitch(((pair.reference, pair.target), replace(options, scale=0.5)))
+    full = stitch((pair.reference, pair.target), options)
+    half = stitch((pair.reference, pair.target), replace(options, scale=0.5))
     for ours, theirs in zip((*half.alpha.shape, *half.warp.canvas.offset),
                             (*full.alpha.shape, *full.warp.canvas.offset), strict=True):  # fmt: skip
         assert abs(ours - theirs / 2) <= 2
@@ -333,15 +333,15 @@ def test_half_the_scale_is_the_same_panorama_at_half_the_size(pair: Pair, field:
 def test_given_matches_and_a_crop_go_with_a_scale(small_pair: Pair, smooth: StitchOptions) -> None:
     """Matches are px of the full pictures, a crop px of the panorama that comes out."""
     strict = replace(smooth, field="strict")
-    full = stitch(((small_pair.reference, small_pair.target), strict))
+    full = stitch((small_pair.reference, small_pair.target), strict)
     both = replace(strict, matches=rows_of(full), scale=0.5)
-    half = stitch(((small_pair.reference, small_pair.target), both))
+    half = stitch((small_pair.reference, small_pair.target), both)
     off = from_full(full, half)
     assert np.nanmedian(off) < 0.03 and np.nanpercentile(off, 95) < 0.3
     assert all(abs(a - b / 2) <= 1.5 for a, b in zip(half.alpha.shape, full.alpha.shape, strict=True))
     assert np.allclose(rows_of(half), rows_of(full), atol=1e-9)
     for kind in ("reference", "inscribed", (20, 10, 100, 60)):
-        part = stitch(((small_pair.reference, small_pair.target), replace(both, crop=kind)))
+        part = stitch((small_pair.reference, small_pair.target), replace(both, crop=kind))
         assert_cropped(half, part, box_of(kind, half))
 
 
@@ -355,8 +355,8 @@ def test_deep_and_transparent_pictures_at_half_the_scale(
     deep[0][:41, :61] = (65535, 0, 65535)
     reference = np.dstack([deep[0], alpha])
     options = replace(quick, scale=0.5, matches=rows_of(small_result))
-    plain = stitch(((small_pair.reference, small_pair.target), options))
-    result = stitch(((reference, deep[1]), options))
+    plain = stitch((small_pair.reference, small_pair.target), options)
+    result = stitch((reference, deep[1]), options)
     assert result.bits == 16 and plain.bits == 8 and result.pictures[0].alpha is not None
     seen = rows_of(small_result)[:, :2]
     hidden = (np.rint((seen + 0.5) / 2 - 0.5) < (30, 20)).all(axis=1)
@@ -377,7 +377,7 @@ def test_a_mask_of_the_full_size_goes_with_a_scale(pair: Pair) -> None:
     mask[:, 300:360] = True
     camera = CameraRequest(focal_px=(pair.reference_camera.K[0, 0],))
     options = StitchOptions(camera=camera, scale=0.5, ignore=(mask,), measure=False)
-    result = stitch(((pair.reference, pair.target), options))
+    result = stitch((pair.reference, pair.target), options)
     x, y = result.warp.canvas.offset
     alpha = result.layers[0].alpha[y : y + 150, x : x + 200]
     assert not alpha[:, 150:180].any() and (alpha[:, :150] == 1).all() and (alpha[:, 180:] == 1).all()

@@ -107,7 +107,7 @@ def test_what_goes_on_is_neither_saved_nor_undone(blender, tmp_path):
 
 def test_every_option_of_the_engine_is_offered(blender):
     """Those that come as files or images are added to a job by hand; two are nobody's wish."""
-    by_hand = {"matches", "ignore_reference", "ignore_target", "mask"}
+    by_hand = {"matches", "ignore", "mask"}
     options = {field.name for field in dataclasses.fields(StitchOptions)}
     assert options - {"measure", "cache"} == set(properties.options_of(blender.settings)) | by_hand
 

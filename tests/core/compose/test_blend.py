@@ -149,3 +149,14 @@ def test_overlaps_of_every_width_give_numbers(mode: str, columns: slice) -> None
     assert np.isfinite(out.pixels).all() and np.isfinite(out.alpha).all()
     shown = out.alpha > 0
     assert (out.pixels[shown] > 0.009).all() and (out.pixels[shown] < 1001).all()
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.3])
+def test_by_distances_each_pixel_comes_from_the_picture_whose_border_is_further_away(alpha: float) -> None:
+    """Shared are columns 50 to 89: what lies left of their middle is the first one's, be it ever so transparent."""
+    middle, inner = H // 2, np.s_[25:35]
+    first, second = layer(LEFT, 0.5, alpha), layer(RIGHT, 0.5, alpha)
+    found = distance_labels(first, second)
+    assert not found[inner, :70].any() and found[inner, 70:].all()
+    assert not distance_labels(second, first)[middle, 71:].any() and distance_labels(second, first)[middle, :69].all()
+    assert not distance_labels(first, first).any(), "of equals the one before"

@@ -238,3 +238,16 @@ def test_an_average_of_three_counts_each_alike() -> None:
     assert made.labels is None and (count == 3).sum() > 10_000
     mean = (lights.astype(float) * shown[..., None]).sum(axis=0)[count > 0] / count[count > 0, None]
     assert np.allclose(made.panorama.pixels[count > 0], mean, atol=1e-6)
+
+
+@pytest.mark.parametrize("options", [{}, {"blend": "feather"}, {"seam": "none"}])
+def test_pictures_that_do_not_meet_are_shown_side_by_side(options: dict) -> None:
+    first, second, warp = pictures()
+    first.alpha[:, 180:] = second.alpha[:, :200] = 0
+    out, _, found = compose(first, second, warp, exposure=False, **options)
+    shown = second.alpha > 0
+    shown &= ~found.hidden
+    assert np.array_equal(found.chosen, shown) and shown.sum() > 5000
+    assert np.array_equal(out.alpha > 0, shown | (first.alpha > 0))
+    assert np.array_equal(out.pixels[shown], second.pixels[shown])
+    assert np.array_equal(out.pixels[first.alpha > 0], first.pixels[first.alpha > 0])

@@ -11,7 +11,7 @@ from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.options import INTRINSICS
 from edf_stitch.core.cameras.projective import homogeneous, infinite_homography, project
 from edf_stitch.core.pose import options
-from edf_stitch.core.pose.focal import KnownFocal, focal_warnings, known_focal
+from edf_stitch.core.pose.focal import KnownFocal, focal_warnings, held_focal, known_focal
 from edf_stitch.core.pose.refinement import Pose, focal_deviations, refine_pose
 
 from ..point_scenes import FOCAL, SIZE, turned_by, unit
@@ -186,3 +186,14 @@ def test_the_spread_is_that_of_the_focal_length_that_moves_infinity_more(seed: i
         away[side] = moved_infinity(there, found)
     assert max(away, key=away.__getitem__) == worse and max(away.values()) > 1.03 * min(away.values())
     assert about.h_inf_spread == pytest.approx(away[worse], rel=5e-3)
+
+
+def test_a_focal_length_that_was_held_is_as_sure_as_the_less_sure_of_the_two() -> None:
+    matches, true = scene(SYMMETRIC, noise=0.1)
+    sure, unsure, given = camera(FOCAL, 0.02, "EXIF"), camera(FOCAL, 0.1, "EXIF"), camera()
+    pairs = (sure, unsure), (unsure, sure), (sure, sure)
+    one, other, both = (held_focal(matches, true, *pair, 0.1) for pair in pairs)
+    assert one.deviation == other.deviation == 0.1 and both.deviation == 0.02 and one.source == "EXIF"
+    assert one.h_inf_spread == pytest.approx(other.h_inf_spread) and one.h_inf_spread > 3 * both.h_inf_spread > 15
+    assert held_focal(matches, true, given, given, 0.1) == KnownFocal("test", 0.0, 0.0)
+    assert held_focal(matches, true, given, unsure, 0.1).deviation == 0.1

@@ -19,6 +19,7 @@ from edf_stitch.core.cameras.projective import (
     sampson_residuals,
 )
 from edf_stitch.core.pose.fundamental import (
+    explained_by,
     fit_homography,
     fundamental_candidates,
     refuse_chance,
@@ -267,6 +268,16 @@ def test_what_a_line_is_follows_the_picture_and_the_noise() -> None:
             refuse_without_spread(Matches(matches.x, matches.y, scale), F_TRUE, size, SIZE)
 
 
+def test_a_strip_is_measured_by_the_shorter_side_of_its_own_picture() -> None:
+    long, square = (4000, 900), (4000, 4000)
+    for turned in (False, True):
+        matches = on_a_line(24.0, turned=turned)
+        own, other = (SIZE, long) if turned else (long, SIZE)
+        refuse_without_spread(matches, F_TRUE, own, other)
+        with pytest.raises(DegenerateGeometry):
+            refuse_without_spread(matches, F_TRUE, *((SIZE, square) if turned else (square, SIZE)))
+
+
 # --- parallax ------------------------------------------------------------------------------------------------------
 
 
@@ -334,3 +345,12 @@ def test_neither_order_nor_direction_decides(kind: str, off_plane: float) -> Non
     assert parallax(enlarged, (3 * SIZE[0], 3 * SIZE[1])) == seen
     F, homography = fundamental_candidates(matches, 0)[0], fit_homography(matches, 0)
     assert shows_parallax(matches, -4 * F, homography, SIZE) == seen
+
+
+def test_whatever_poselib_fails_at_opencv_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In place of its F one that sends every point to a line far away."""
+    far = np.array([[0, 0, 0], [0, 0, 0], [0, 1e-5, 1.0]])
+    monkeypatch.setattr("edf_stitch.core.pose.fundamental.robust_fundamental", lambda *_: far)
+    truth = scene("general", 0, 300, 0.5, 0.3)
+    on, sigma = explained_by(fundamental_candidates(truth.matches, 0)[0], truth.matches)
+    assert on.sum() > 180 and sigma < 1
