@@ -105,7 +105,7 @@ class StitchResult:
 
     @property
     def pixels(self) -> NDArray[np.float32]:
-        """The panorama's light (H, W, C) float32, scene-linear."""
+        """The panorama's colours (H, W, C) float32, scene-linear."""
         return self.panorama.pixels
 
     @property
@@ -143,15 +143,15 @@ class StitchResult:
 
     @property
     def confidence(self) -> NDArray[np.float32]:
-        """(H, W) float32, 0..1: how sure dense refinement is of a pixel of the warp's canvas; 0 where it said
-        nothing."""
+        """Confidence (H, W) float32 of dense refinement on the warp's canvas, 0 to 1; 0 where nothing was refined."""
         confidence = self.warp.confidence
         shape = self.warp.canvas.height, self.warp.canvas.width
         return np.zeros(shape, np.float32) if confidence is None else confidence
 
     @property
     def inpainted(self) -> NDArray[np.bool_]:
-        """(H, W) bool: what no picture saw and was filled because that was asked for."""
+        """Pixels (H, W) bool of the layers' canvas that no picture saw and that were filled, because options ask for
+        it."""
         filled = np.zeros(self.layers[0].alpha.shape, bool)
         asked = self.report["options"]
         if asked["holes"] != "inpaint" or asked["blend"] == "linear":
@@ -280,22 +280,24 @@ def compose(
     painted = None if frame.painted is None else _on_canvas(frame.painted, whole.canvas)
     floats = [picture.bits == 32 for picture in pictures]
     made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
-    found, panorama, labels = made.decided, made.panorama, made.labels
-    seen = appearance(panorama, made.exposed, labels, any(floats)) if options.measure else {}
+    panorama, labels = made.panorama, made.labels
+    looks = appearance(panorama, made.exposed, labels, any(floats)) if options.measure else {}
     box = crop_box(options.crop, whole.canvas.whole, panorama.alpha > 0, whole.maps[0].box())
-    panorama, shown = panorama.within(box), whole.canvas.within(box)
+    panorama, canvas = panorama.within(box), whole.canvas.within(box)
+    # of a whole sphere, layers and maps exist only where the pictures lie
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))
 
     progress("write", 0.0)
-    report, more = make_report(options, pictures, alignment, shown, found, seen)
+    report, more = make_report(options, pictures, alignment, canvas, made.decided, looks)
     warnings = (*(line for picture in pictures for line in _named(picture)), *alignment.warnings, *more)
     report["warnings"] = list(warnings)
     progress("write", 0.5)
     return StitchResult(
-        panorama, shown, pictures, tuple(layer.within(box) for layer in layers), whole.within(box),
-        tuple(cut(one.hidden, box) for one in found), None if labels is None else cut(labels, box, -1), found,
-        alignment.edges, alignment.views, alignment.field, alignment.cameras, warnings, report, progress.seconds,
-        frame.full_sizes,
+        panorama=panorama, canvas=canvas, pictures=pictures, layers=tuple(layer.within(box) for layer in layers),
+        warp=whole.within(box), occluded=tuple(cut(one.hidden, box) for one in made.decided),
+        labels=None if labels is None else cut(labels, box, -1), decided=made.decided, edges=alignment.edges,
+        views=alignment.views, field=alignment.field, cameras=alignment.cameras, warnings=warnings, report=report,
+        seconds=progress.seconds, full_sizes=frame.full_sizes,
     )  # fmt: skip
 
 
