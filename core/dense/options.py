@@ -260,11 +260,11 @@ class PolishOptions:
     max_gain: float = 2.0
     """Factor of contrast, either way, that the pictures may differ by around a node."""
 
-    min_usual: float = 2.0
-    """Gray levels of difference that count half, at least: noise of a usual picture."""
+    min_half_residual: float = 2.0
+    """Gray levels at which a residual counts half, at least: noise of a usual picture."""
 
-    usual_factor: float = 1.5
-    """The same in medians of the difference: about its standard deviation."""
+    half_residual_factor: float = 1.5
+    """The same in medians of the residuals' magnitudes: about their standard deviation."""
 
     across_width: float = 0.03
     """Share of the picture's side, σ, over which moves across the lines vary: a lens bends slowly."""

@@ -1,8 +1,8 @@
-"""The last fraction of a pixel: along every line to where both pictures look alike, by Gauss-Newton.
+"""The last fraction of a pixel: photometric alignment along every epipolar line, by Gauss-Newton.
 
-Lucas and Kanade (IJCAI 1981) with one unknown a pixel, a local gain and bias (both pictures lose their local mean, one
-is scaled to the other), robust weights, and edge-aware smoothing between the steps. Where the field may leave its
-lines, a second, very smooth unknown across them is found on the way.
+This is Lucas and Kanade's method (IJCAI 1981) with one unknown per pixel, a local gain and bias between the pictures,
+robust weights, and edge-aware smoothing between the steps. Where the field may leave its lines, a second, very smooth
+unknown across them is estimated with it.
 """
 
 from __future__ import annotations
@@ -23,8 +23,17 @@ from .options import POLISH
 
 @dataclass(frozen=True)
 class Polished:
-    """Moves (h, w) px along the lines and across them; likeness (h, w): correlation of the two pictures around each
-    node, 0 where the target shows nothing; evidence (h, w) 0..1: how much texture says so."""
+    """What polishing found at each node (h, w).
+
+    Attributes
+    ----------
+    along, across : (h, w) float32 arrays
+        Moves along the epipolar lines and across them, px.
+    likeness : (h, w) float32 array
+        Correlation of the two pictures around each node, 0 where the target shows nothing.
+    evidence : (h, w) float32 array
+        0..1, how much texture there is to go by.
+    """
 
     along: Plane
     across: Plane
@@ -36,64 +45,92 @@ def polish(
     lines: EpipolarLines, reference: ComparedPicture, target: ComparedPicture, along: Plane, known: Plane,
     weights: tuple[NDArray[np.float32], NDArray[np.float32]], slack: bool,
 ) -> Polished:  # fmt: skip
-    """Starts at moves `along` (h, w) px.
+    """Refine moves along epipolar lines until both pictures look alike.
 
-    known (h, w) 0..1: how well, so that guesses do not pull at what was found; weights: see `edge_weights`; slack:
-    whether the lines may be left.
+    Parameters
+    ----------
+    lines : EpipolarLines
+    reference, target : ComparedPicture
+        Gray levels of the two pictures.
+    along : (h, w) float32 array
+        Moves to start from, px.
+    known : (h, w) float32 array
+        0..1, how well they are known: guesses count less among their neighbours.
+    weights : pair of float32 arrays
+        Connections of neighbours (see `edge_weights`).
+    slack : bool
+        Whether the lines may be left.
+
+    Returns
+    -------
+    Polished
     """
     across = np.zeros_like(along)
     start = along
     smoother = Smoother.of(weights, POLISH.smoothness)
     steps_px = target.gray.shape[1] / target.size[0], target.gray.shape[0] / target.size[1]
-    share, wanted = np.empty_like(along), np.empty_like(along)
+    evidence, moved = np.empty_like(along), np.empty_like(along)
     for blur, count in POLISH.schedule:
         first, shown = reference.at_nodes(cv2.GaussianBlur(reference.gray, (0, 0), blur), lines)
         smooth = cv2.GaussianBlur(target.gray, (0, 0), blur)
         slopes = [cv2.Scharr(smooth, cv2.CV_32F, 1 - k, k, scale=steps_px[k] / 32) for k in (0, 1)]
         second = cv2.merge([smooth, *slopes])
         for _ in range(count):
-            seen = _compared(lines, first, shown, target, second, along, across)
+            compared = _compared(lines, first, shown, target, second, along, across)
 
-            def move(rows: slice, seen: _Compared = seen, along: Plane = along) -> None:
-                """What these rows want and how much that counts, into `wanted` and `share`."""
+            def move(rows: slice, compared: _Compared = compared, along: Plane = along) -> None:
+                """A Gauss-Newton step of some rows into `moved`, and how much each node counts into `evidence`."""
                 near, own = beside(rows, POLISH.window_px // 2, len(along))
-                told = seen.trust(near)
-                told *= seen.slope[near]
-                pull = _mean(told * seen.left[near], POLISH.window_px)[own]
-                told *= seen.slope[near]
-                evidence = _mean(told, POLISH.window_px)[own]
-                pull += np.float32(POLISH.start_evidence) * (start[rows] - along[rows])
-                pull /= evidence + np.float32(POLISH.start_evidence + POLISH.damping)
-                np.add(along[rows], np.clip(pull, -POLISH.max_step_px, POLISH.max_step_px, out=pull), out=wanted[rows])
-                np.add(evidence, np.float32(POLISH.min_evidence), out=share[rows])
-                share[rows] /= evidence + np.float32(POLISH.half_evidence)
-                share[rows] *= known[rows]
+                weight = compared.trust(near)
+                weight *= compared.slope[near]
+                step = _mean(weight * compared.residual[near], POLISH.window_px)[own]
+                weight *= compared.slope[near]
+                curvature = _mean(weight, POLISH.window_px)[own]
+                step += np.float32(POLISH.start_evidence) * (start[rows] - along[rows])
+                step /= curvature + np.float32(POLISH.start_evidence + POLISH.damping)
+                np.add(along[rows], np.clip(step, -POLISH.max_step_px, POLISH.max_step_px, out=step), out=moved[rows])
+                np.add(curvature, np.float32(POLISH.min_evidence), out=evidence[rows])
+                evidence[rows] /= curvature + np.float32(POLISH.half_evidence)
+                evidence[rows] *= known[rows]
 
             each(move, _strips(len(along)))
-            along = smoother.smoothed(wanted, share, floor=POLISH.min_confidence)
+            along = smoother.smoothed(moved, evidence, floor=POLISH.min_confidence)
             if slack:
-                trust = seen.trust(slice(None)) * seen.aside
-                across = across + _smooth_step(trust * seen.left, trust * seen.aside, lines.step)
-    return Polished(along, across, likeness(lines, reference, target, along, across), share)
+                weight = compared.trust(slice(None)) * compared.slope_across
+                across = across + _smooth_step(weight * compared.residual, weight * compared.slope_across)
+    return Polished(along, across, likeness(lines, reference, target, along, across), evidence)
 
 
 def likeness(
     lines: EpipolarLines, reference: ComparedPicture, target: ComparedPicture, along: Plane,
     across: Plane | None = None,
 ) -> Plane:
-    """Correlation (h, w) of the two pictures around each node after moves along and across its line, 0 where the target
-    shows nothing."""
+    """Correlation of the two pictures around each node.
+
+    Parameters
+    ----------
+    lines : EpipolarLines
+    reference, target : ComparedPicture
+        Gray levels of the two pictures.
+    along, across : (h, w) float32 arrays
+        Moves along the epipolar lines and across them, px; none across if not given.
+
+    Returns
+    -------
+    (h, w) float32 array
+        −1..1, 0 where the target shows nothing.
+    """
     first, shown = reference.at_nodes(reference.gray, lines)
     out = np.empty_like(along)
 
     def compare(rows: slice) -> None:
         near, here = beside(rows, POLISH.surroundings_px, len(along))
-        fetched, there = target.sample(target.gray, *lines.target(along, across, near))
-        there &= shown[near]
-        a, b, share = _without_means(first[near], fetched, there)
+        fetched, valid = target.sample(target.gray, *lines.target(along, across, near))
+        valid &= shown[near]
+        a, b, share = _without_means(first[near], fetched, valid)
         both, own, other = (_mean_there(u * v, share) for u, v in ((a, b), (a, a), (b, b)))
         both /= np.sqrt((own + 1) * (other + 1))
-        both *= there
+        both *= valid
         out[rows] = both[here]
 
     each(compare, _strips(len(along)))
@@ -102,21 +139,24 @@ def likeness(
 
 @dataclass(frozen=True)
 class _Compared:
-    """left (h, w): gray levels by which the target is wrong, 0 where not both are seen; slope, aside: levels per px
-    along the lines and across them; there: where both are seen; usual: levels that count half."""
+    """The reference beside the target where moves lead, at each node (h, w).
 
-    left: Plane
+    residual: gray levels, 0 where not valid; slope, slope_across: gray levels per px along the lines and across them;
+    valid: where both pictures show something; half_residual: gray levels at which a residual counts half.
+    """
+
+    residual: Plane
     slope: Plane
-    aside: Plane
-    there: NDArray[np.bool_]
-    usual: np.float32
+    slope_across: Plane
+    valid: NDArray[np.bool_]
+    half_residual: np.float32
 
     def trust(self, rows: slice) -> Plane:
-        """0..1 (…, w) of some rows."""
-        out = self.left[rows] * (1 / self.usual)
+        """Robust weights (…, w), 0..1, of some rows: those of a Cauchy loss."""
+        out = self.residual[rows] * (1 / self.half_residual)
         out *= out
         out += 1
-        return np.divide(self.there[rows], out, out=out)
+        return np.divide(self.valid[rows], out, out=out)
 
 
 def _compared(
@@ -124,63 +164,65 @@ def _compared(
     along: Plane, across: Plane,
 ) -> _Compared:  # fmt: skip
     """The reference at the nodes (h, w) beside the target and its slopes (h', w', 3) where the moves lead."""
-    left, slope, aside, there = *(np.empty_like(along) for _ in range(3)), np.empty(along.shape, bool)
+    residual, slope, slope_across, valid = *(np.empty_like(along) for _ in range(3)), np.empty(along.shape, bool)
 
     def compare(rows: slice) -> None:
         near, own = beside(rows, POLISH.surroundings_px, len(along))
-        fetched, both_seen = target.sample(second, *lines.target(along, across, near))
-        both_seen &= shown[near]
+        fetched, both_shown = target.sample(second, *lines.target(along, across, near))
+        both_shown &= shown[near]
         gray, gx, gy = cv2.split(fetched)
-        a, b, share = _without_means(first[near], gray, both_seen)
+        a, b, share = _without_means(first[near], gray, both_shown)
         gain = _mean_there(a * b, share)[own]
         gain += POLISH.gain_noise
         gain /= _mean_there(b * b, share)[own] + POLISH.gain_noise
         np.clip(gain, np.float32(1 / POLISH.max_gain), np.float32(POLISH.max_gain), out=gain)
-        there[rows] = both_seen[own]
-        np.multiply(gain, b[own], out=left[rows])
-        np.subtract(a[own], left[rows], out=left[rows])
-        left[rows] *= there[rows]
+        valid[rows] = both_shown[own]
+        np.multiply(gain, b[own], out=residual[rows])
+        np.subtract(a[own], residual[rows], out=residual[rows])
+        residual[rows] *= valid[rows]
         gx, gy = gx[own] * gain, gy[own] * gain
         x, y = (lines.direction[rows, :, k] for k in (0, 1))
         np.add(gx * x, gy * y, out=slope[rows])
-        np.subtract(gy * x, gx * y, out=aside[rows])
+        np.subtract(gy * x, gx * y, out=slope_across[rows])
 
     each(compare, _strips(len(along)))
-    some = np.abs(left[::4, ::4][there[::4, ::4]])
+    some = np.abs(residual[::4, ::4][valid[::4, ::4]])  # a sixteenth tells the median as well
     typical = float(np.median(some)) if some.size else 0.0
-    return _Compared(left, slope, aside, there, np.float32(max(POLISH.min_usual, POLISH.usual_factor * typical)))
+    half_residual = np.float32(max(POLISH.min_half_residual, POLISH.half_residual_factor * typical))
+    return _Compared(residual, slope, slope_across, valid, half_residual)
 
 
 def _strips(rows: int) -> list[slice]:
-    """Rows that are worked on at once, so that what is made of them stays near the processor."""
+    """Rows that a thread works on at once."""
     return [slice(top, min(top + POLISH.strip_rows, rows)) for top in range(0, rows, POLISH.strip_rows)]
 
 
 def _mean(values: Plane, side: int) -> Plane:
+    """Means over a square window."""
     mean: Plane = cv2.blur(values, (side, side), borderType=cv2.BORDER_REFLECT_101)
     return mean
 
 
 def _mean_there(values: Plane, share: Plane | None) -> Plane:
-    """The mean of the surroundings of which a share (None: all) is seen, of values that are 0 elsewhere."""
+    """Means over the surroundings, of which a share is valid (None: all), of values that are 0 where they are not."""
     mean = _mean(values, POLISH.surroundings_px)
     return mean if share is None else np.divide(mean, share, out=mean)
 
 
-def _without_means(a: Plane, b: Plane, there: NDArray[np.bool_]) -> tuple[Plane, Plane, Plane | None]:
-    """Both without their local mean, 0 where they are not there, and the share of the surroundings that is: None where
-    all is."""
-    if there.all():
+def _without_means(a: Plane, b: Plane, valid: NDArray[np.bool_]) -> tuple[Plane, Plane, Plane | None]:
+    """Both minus their local means, 0 where not valid, and the valid share of the surroundings, None if all is valid.
+    """
+    if valid.all():
         return a - _mean(a, POLISH.surroundings_px), b - _mean(b, POLISH.surroundings_px), None
-    weight = there.astype(np.float32)
+    weight = valid.astype(np.float32)
     share = np.maximum(_mean(weight, POLISH.surroundings_px), np.float32(1e-3))
     a, b = ((values - _mean_there(values * weight, share)) * weight for values in (a, b))
     return a, b, share
 
 
-def _smooth_step(wanted: Plane, evidence: Plane, step: float) -> Plane:
-    """A step across the lines: evidence gathered over a wide window; where there is little, little is done."""
-    rows, columns = wanted.shape
+def _smooth_step(gradient: Plane, curvature: Plane) -> Plane:
+    """A Gauss-Newton step (h, w) px across the lines, over a wide window; damped where there is little to go by."""
+    rows, columns = gradient.shape
     small = max(1, columns // POLISH.across_step), max(1, rows // POLISH.across_step)
     width = max(1.0, POLISH.across_width * np.sqrt(rows * columns) / POLISH.across_step)
 
@@ -188,9 +230,9 @@ def _smooth_step(wanted: Plane, evidence: Plane, step: float) -> Plane:
         smooth: Plane = cv2.GaussianBlur(cv2.resize(values, small, interpolation=cv2.INTER_AREA), (0, 0), width)
         return smooth
 
-    wanted, evidence = gathered(wanted), gathered(evidence)
-    coarse = np.clip(
-        wanted / (evidence + POLISH.across_damping * evidence.mean() + 1e-6), -POLISH.max_step_px, POLISH.max_step_px
-    )
+    gradient, curvature = gathered(gradient), gathered(curvature)
+    curvature += POLISH.across_damping * curvature.mean()
+    curvature += 1e-6
+    coarse = np.clip(gradient / curvature, -POLISH.max_step_px, POLISH.max_step_px)
     step_across: Plane = cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_CUBIC)
     return step_across

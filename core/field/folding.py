@@ -1,4 +1,4 @@
-"""Where a map turns over."""
+"""Where a map turns over (docs/method.md, 7)."""
 
 from __future__ import annotations
 
@@ -17,24 +17,35 @@ NO_TURN = 2
 
 
 def folds(turns: NDArray[np.int8], hidden: NDArray[np.bool_] | None = None) -> float:
-    """Share of the pixels that show the target where the map turns over (its Jacobian changes sign).
+    """How much of a map is folded.
 
-    turns (H, W): see `turning`; hidden (H, W): what the target cannot see does not count, nor its rim: there one thing
-    ends before another.
+    Parameters
+    ----------
+    turns : (H, W) int8 array
+        See `turning`.
+    hidden : (H, W) bool array, optional
+        What the picture cannot see. Neither that nor its rim counts: one thing ends in front of another there.
+
+    Returns
+    -------
+    float
+        Share of the pixels that show the picture where the sign of the map's Jacobian is not the usual one.
     """
     counts = turns != NO_TURN
     if hidden is not None:
         counts &= ~dilated(hidden, FOLDING.hidden_margin_px)
     back, flat, on = (int(np.count_nonzero(counts & (turns == way))) for way in (-1, 0, 1))
     total = back + flat + on
-    # the median's own way is the right one: what most pixels do, or nearly
+    # the median of the signs is the usual one
     usual = back if 2 * back >= total else on if 2 * on >= total else flat
     return (total - usual) / total if total else 0.0
 
 
 def turning(picture_map: PictureMap) -> NDArray[np.int8]:
-    """Which way (H, W) the map turns its pixels: 1 as they are, -1 mirrored, 0 flattened; NO_TURN where it does not
-    show its picture, or nothing is known to the right or below."""
+    """The sign (H, W) of a map's Jacobian: 1 upright, −1 mirrored, 0 flattened.
+
+    NO_TURN where the map does not show its picture, or nothing is known to the right or below.
+    """
     height, width = picture_map.shape
     out = np.full((height, width), NO_TURN, np.int8)
     rows = max(1, FOLDING.strip_pixels // width)
@@ -52,12 +63,12 @@ def turning(picture_map: PictureMap) -> NDArray[np.int8]:
 
 
 def turned_over(turns: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Where (H, W) a map turns over (see `turning`): it would show the target mirrored, which no surface in view does.
+    """Where (H, W) a map would show its picture mirrored, which no visible surface does; turns (H, W): see `turning`.
 
-    That is how a map jumps back from the rim of a near thing that it knows too little of to know what the rim hides.
+    A map does so where it jumps back from the rim of a near thing and too little is known of what the rim hides.
     """
     mirrored: NDArray[np.bool_] = turns == -1
-    # where one picture is a mirror image, not being mirrored is what stands out
+    # of a mirrored picture, what is not mirrored stands out
     if 2 * int(mirrored.sum()) <= int((turns != NO_TURN).sum()):
         return mirrored
     unmirrored: NDArray[np.bool_] = turns == 1

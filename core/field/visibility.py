@@ -1,7 +1,8 @@
-"""What a picture cannot see: of several canvas points that claim one of its pixels, the nearest owns it.
+"""What a picture cannot see: of several canvas points that fall on one of its pixels it shows only the nearest.
 
 A point p at inverse depth d lies x'₃ / d baselines in front of the picture's camera, x'₃ of H_inf p + d e' before the
-division. So the depth order is in map and depth already; a z-buffer over the picture's pixels reads it out.
+division. So map and depth already hold the depth order; a z-buffer over the picture's pixels reads it out.
+Method: docs/method.md, 7.
 """
 
 from __future__ import annotations
@@ -21,12 +22,21 @@ from .options import VISIBILITY
 
 
 def occluded(picture_map: PictureMap, nearness: AnyImage) -> NDArray[np.bool_]:
-    """Where (H, W) a map falls on a pixel of its picture that a nearer canvas point owns: what is seen there is not
-    this.
+    """Where a map falls on a pixel of its picture that shows a nearer canvas point instead.
 
-    nearness (H, W): baselines per distance from the picture's camera (see `nearness_of`); what is infinitely far has 0,
-    and where there is no depth (NaN, no baseline), nothing hides anything. A surface does not hide itself, however
-    obliquely it is seen and however much the map magnifies. Linear in the pixels.
+    A surface does not hide itself, however obliquely it is seen and however much the map magnifies. Time is linear in
+    the pixels.
+
+    Parameters
+    ----------
+    picture_map : PictureMap
+    nearness : (H, W) image
+        Baselines per distance from the picture's camera (see `nearness_of`): 0 infinitely far away, NaN without depth,
+        where nothing hides anything.
+
+    Returns
+    -------
+    (H, W) bool array
     """
     hidden = np.zeros(picture_map.x.shape, bool)
     contested = _contested(picture_map, nearness)
@@ -38,12 +48,12 @@ def occluded(picture_map: PictureMap, nearness: AnyImage) -> NDArray[np.bool_]:
         cells, count = contested.cells(level, picture_map.size)
         owner = _owners(cells, np.flatnonzero(contested.levels == level), near, count)
         claimed = owner[cells]
-        # where nobody owns the cell, -1 stands for the last point, and its depth says nothing
+        # a cell without an owner has -1, which indexes the last point: it is left out
         rivals = np.flatnonzero((near[claimed] > near) & (claimed >= 0) & ~found)
         stray = VISIBILITY.surface_cells * 2.0**level
         found[rivals] = _apart(picture_map, points[rivals], points[claimed[rivals]], stray)
     hidden.ravel()[points[found]] = True
-    # pixels between the samples of what hides them
+    # gaps between samples of a magnified surface that hides
     closed = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
     found_hidden: NDArray[np.bool_] = closed & picture_map.inside()
     return found_hidden
@@ -52,13 +62,25 @@ def occluded(picture_map: PictureMap, nearness: AnyImage) -> NDArray[np.bool_]:
 def by_agreement(
     hidden: NDArray[np.bool_], picture_map: PictureMap, confidence: AnyImage | None, shown: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """What is hidden by the depth order (see `occluded`), put right by what dense refinement found in both pictures.
+    """Correct what the depth order says by whether the pictures agree.
 
-    What both agree on both see; and beside what is hidden, what they agree on nowhere is hidden too: the rims that a
-    map draws are a few px off, and a band of background that the target does not see has no depth of its own. A speck
-    is noise, and nothing lies beside it.
-    confidence (H, W): dense refinement's; without it `hidden` stays what it was; shown (H, W): where the reference
-    shows anything.
+    What both agree on, both see. Beside what is hidden, what they do not agree on is hidden too: the rims in a map are
+    a few px off, and a band of background that the picture cannot see has no depth of its own. Specks do not grow,
+    since they are noise.
+
+    Parameters
+    ----------
+    hidden : (H, W) bool array
+        By the depth order (see `occluded`).
+    picture_map : PictureMap
+    confidence : (H, W) image or None
+        Of dense refinement; without it `hidden` is returned.
+    shown : (H, W) bool array
+        Where the panorama before shows anything.
+
+    Returns
+    -------
+    (H, W) bool array
     """
     extent = bounds(hidden)
     if confidence is None or extent is None:
@@ -67,21 +89,23 @@ def by_agreement(
     box = with_margin(extent, reach, hidden.shape)
     rows, columns = box
     part = picture_map.within((columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start))
-    sure = np.asarray(confidence[box])
-    kept = hidden[box] & (sure <= VISIBILITY.agreed_confidence)
-    alone = (shown[box] & part.inside() & (sure < VISIBILITY.alone_confidence)) | kept
-    reached = without_specks(kept)
+    confidence_here = np.asarray(confidence[box])
+    confirmed = hidden[box] & (confidence_here <= VISIBILITY.agreed_confidence)
+    alone = (shown[box] & part.inside() & (confidence_here < VISIBILITY.alone_confidence)) | confirmed
+    reached = without_specks(confirmed)
     for _ in range(reach):
         reached = dilated(reached, 1) & alone
     out = hidden.copy()
-    out[box] = kept | reached
+    out[box] = confirmed | reached
     return out
 
 
 @dataclass(frozen=True)
 class Contested:
-    """Canvas points (N,), as flat indices, that others may hide, with all those others: where the map sends them
-    (target px), their inverse depth there, and what cells they have (see `_levels`)."""
+    """Canvas points (N,), as flat indices, that may hide one another.
+
+    x, y: where the map sends them, px of the picture; near: their nearness; levels: their cells (see `_levels`).
+    """
 
     points: NDArray[np.intp]
     x: NDArray[np.float32]

@@ -1,7 +1,7 @@
-"""The plane the panorama lives in: its size and where the reference lies in it; grids of nodes over it.
+"""The canvas: the part of a plane that the panorama covers, and where the pictures lie in it.
 
-Canvas pixels are pixels of that plane moved by whole numbers. The plane is the reference's own, so that the reference
-is pasted exactly, or that of a round panorama (see `projection`).
+The plane is the reference's own, so that the reference is pasted exactly, or that of a round panorama (see
+`projection`). Canvas pixels are pixels of the plane shifted by whole numbers.
 """
 
 from __future__ import annotations
@@ -24,8 +24,19 @@ from .projection import Projection, extent
 
 @dataclass(frozen=True)
 class Canvas:
-    """width, height px; offset: canvas pixel (x, y) of the plane's pixel (0, 0), in a flat panorama the reference's;
-    cropped: part of the pictures runs off the canvas; projection: of a round panorama, None for a flat one."""
+    """A canvas.
+
+    Attributes
+    ----------
+    width, height : int
+        px.
+    offset : (int, int)
+        Canvas pixel (x, y) of the plane's pixel (0, 0), which is the reference's first in a flat panorama.
+    cropped : bool
+        Part of the pictures lies beyond the canvas.
+    projection : Projection or None
+        Of a round panorama; None for a flat one.
+    """
 
     width: int
     height: int
@@ -45,29 +56,40 @@ class Canvas:
 
     @property
     def whole(self) -> Box:
-        """The whole panorama in px of the canvas: itself, but of a sphere all of it."""
+        """The whole panorama in canvas px: the canvas itself, but in a spherical panorama the whole sphere."""
         sphere = None if self.projection is None else self.projection.sphere
         if sphere is None:
             return 0, 0, self.width, self.height
         return sphere[0] + self.offset[0], sphere[1] + self.offset[1], sphere[2], sphere[3]
 
     def within(self, box: Box) -> Canvas:
-        """The canvas of a box (left, top, width, height) of it."""
+        """The part of the canvas in a box (left, top, width, height) of it."""
         left, top, width, height = box
         return replace(self, width=width, height=height, offset=(self.offset[0] - left, self.offset[1] - top))
 
     def of_reference(self, points: Array, camera: Camera | None = None) -> Array:
-        """Canvas px (…, 2) of raw pixels (…, 2) of the reference; camera: its, if its lens matters."""
+        """Canvas px (…, 2) of raw pixels (…, 2) of the reference; camera: the reference's, if its lens matters."""
         if self.projection is not None:
             points = self.projection.of_reference(points if camera is None else undistort(points, camera))
         return points + np.array(self.offset, np.float64)
 
     def project_rows(self, rows: Array, xs: Array, ys: Array, camera: Camera | None = None) -> list[Array]:
-        """rows (k, 3) times canvas points p, each (len(ys), len(xs)), for columns xs and lines ys in px of the plane.
-        camera: the reference's, if its lens matters.
+        """Multiply the rows of a matrix by all canvas points p of some columns and lines.
 
         p is the homogeneous ideal pixel of the reference, with p_3 = 1 in a flat panorama and |K⁻¹ p| = 1 in a round
-        one (see `projection`): what lies ahead of the reference camera has p_3 > 0.
+        one (docs/method.md, 6). Points ahead of the reference camera have p_3 > 0.
+
+        Parameters
+        ----------
+        rows : (k, 3) array
+        xs, ys : (w,) and (h,) arrays
+            Columns and lines, px of the plane.
+        camera : Camera, optional
+            The reference's, if its lens matters.
+
+        Returns
+        -------
+        list of k (h, w) arrays
         """
         if self.projection is not None:
             return self.projection.project_rows(rows, xs, ys)
@@ -89,31 +111,50 @@ def bounding_canvas(
     pictures_at: Callable[[Grid], Sequence[Array]], reference: Box, sizes: Sequence[tuple[int, int]], reach: Array,
     projection: Projection | None = None,
 ) -> Canvas:  # fmt: skip
-    """A canvas, small to within a cell, that holds the reference and every well-behaved part of the further pictures.
+    """The smallest canvas, to within a cell, of the reference and every part of the others that is not overstretched.
 
-    pictures_at(grid) gives for each of these its pixels (rows, columns, 2), NaN behind its camera; reference: where the
-    reference lies, sizes: (W, H) of the further pictures, reach (4,): left, top, right, bottom that they are expected
-    to reach (see `expected_reach`), all in px of the plane. Raises OutputTooLarge.
+    Parameters
+    ----------
+    pictures_at : callable
+        Gives, for a grid over the plane, where each further picture is seen: (rows, columns, 2) px, NaN behind its
+        camera.
+    reference : Box
+        Where the reference lies, px of the plane.
+    sizes : sequence of (int, int)
+        (W, H) px of the further pictures.
+    reach : (4,) array
+        left, top, right, bottom, px of the plane, that is searched (see `expected_reach`).
+    projection : Projection, optional
+        Of a round panorama.
+
+    Returns
+    -------
+    Canvas
+
+    Raises
+    ------
+    OutputTooLarge
+        It would have more than `CanvasOptions.max_pixels`.
     """
     left, top, right, bottom = reach
     limits = np.array([-np.inf, -np.inf, np.inf, np.inf]) if projection is None else projection.limits
-    # a sphere has no far side that grows without end
+    # nothing stretches without end on a sphere
     max_stretch = np.inf if projection is not None and projection.sphere else CANVAS.max_stretch
     cropped = False
-    for _ in range(2):  # the second pass looks closer at what the first found
+    for _ in range(2):  # the second pass has a finer grid over what the first found
         width, height = max(1, int(right - left)), max(1, int(bottom - top))
         grid = Grid.over(int(left), int(top), width, height, nodes=CANVAS.search_nodes)
         useful, any_stretched = np.zeros((grid.rows, grid.columns), bool), False
         for places, size in zip(pictures_at(grid), sizes, strict=True):
-            seen = falls_inside(places[..., 0], places[..., 1], size)
-            stretched = seen & (_area_ratio(places, grid.step) < 1 / max_stretch**2)
-            useful |= seen & ~stretched
+            shown = falls_inside(places[..., 0], places[..., 1], size)
+            stretched = shown & (_area_ratio(places, grid.step) < 1 / max_stretch**2)
+            useful |= shown & ~stretched
             any_stretched |= bool(stretched.any())
         new = np.array([reference[0], reference[1], reference[0] + reference[2], reference[1] + reference[3]])
         if useful.any():
             rows, columns = np.flatnonzero(useful.any(axis=1)), np.flatnonzero(useful.any(axis=0))
             xs, ys, margin = grid.xs, grid.ys, grid.step
-            # a node sees its own cell; the picture's edge lies between it and its neighbour
+            # the picture ends somewhere between its last node and the next
             new = np.array(
                 [xs[columns[0]] - margin, ys[rows[0]] - margin, xs[columns[-1]] + margin, ys[rows[-1]] + margin]
             )
@@ -132,11 +173,23 @@ def bounding_canvas(
 def expected_reach(
     outlines: Sequence[Array], size: tuple[int, int], sizes: Sequence[tuple[int, int]]
 ) -> tuple[Array, bool]:
-    """A rectangle (left, top, right, bottom) that holds the reference and the further pictures' outlines, bounded; and
-    whether it was cut.
+    """Where to look for the pictures in a flat panorama.
 
-    outlines, each (N, 2): in the reference's plane, NaN where they lie behind the reference camera; size, sizes: (W, H)
-    of the reference and of the others.
+    Parameters
+    ----------
+    outlines : sequence of (N, 2) arrays
+        Of the further pictures, px of the reference's plane, NaN behind the reference camera.
+    size : (int, int)
+        (W, H) px of the reference.
+    sizes : sequence of (int, int)
+        The same of the further pictures.
+
+    Returns
+    -------
+    (4,) array
+        left, top, right, bottom of a bounded rectangle that holds the reference and the outlines.
+    bool
+        Whether the outlines reach beyond its bounds.
     """
     points = np.concatenate(outlines)
     width, height = size
@@ -145,7 +198,7 @@ def expected_reach(
     cut = len(finite) < len(points)
     lowest = np.array([0.0, 0.0])
     highest = np.array([width, height], np.float64)
-    if cut:  # the outline runs to infinity somewhere: look everywhere within reach
+    if cut:  # an outline runs to infinity: look everywhere within reach
         lowest, highest = lowest - far, highest + far
     elif len(finite):
         margin = CANVAS.margin * max(width, height)
@@ -161,11 +214,26 @@ def expected_reach(
 def round_reach(
     projection: Projection, planes: Sequence[Array], outlines: Sequence[Array], cameras: Sequence[Camera]
 ) -> tuple[Box, Array, bool]:
-    """Where a round panorama's plane holds the reference, and all pictures (left, top, right, bottom), with a margin;
-    and whether it cuts them.
+    """Where to look for the pictures in a round panorama.
 
-    planes (3, 3): from the reference to each further picture by a plane; outlines (N, 3): of these, as canvas points p
-    by it; cameras: of all pictures, the reference's first.
+    Parameters
+    ----------
+    projection : Projection
+    planes : sequence of (3, 3) arrays
+        Homographies from the reference to each further picture, of the plane in which the field continues.
+    outlines : sequence of (N, 3) arrays
+        Of these pictures, as canvas points p on that plane.
+    cameras : sequence of Camera
+        Of all pictures, the reference's first.
+
+    Returns
+    -------
+    Box
+        Where the reference lies, px of the plane.
+    (4,) array
+        left, top, right, bottom of a rectangle that holds all pictures, with a margin.
+    bool
+        Whether they reach beyond the projection's limits.
     """
     to_ray = inverse_intrinsics(projection.K)
 
@@ -192,7 +260,7 @@ def round_reach(
 
 
 def border(size: tuple[int, int]) -> Array:
-    """Points (N, 2) all around a picture of (W, H) px, in order."""
+    """Points (N, 2) along the border of a picture of (W, H) px, in order."""
     width, height = size
     u = np.linspace(0, 1, CANVAS.outline_points, endpoint=False)
     around = [np.column_stack(p) for p in ((u, 0 * u), (0 * u + 1, u), (1 - u, 0 * u + 1), (0 * u, 1 - u))]
@@ -206,7 +274,7 @@ def _raw(point: Array, camera: Camera) -> Array:
 
 
 def _union(box: Array, reference: Box, limits: Array) -> tuple[int, int, int, int]:
-    """left, top, right, bottom of what holds both a box given so and the reference, as far as the plane goes."""
+    """left, top, right, bottom, within limits, of what holds the reference and a box (left, top, right, bottom)."""
     left, top, width, height = reference
     low = np.maximum(np.minimum([left, top], np.floor(box[:2])), limits[:2])
     high = np.minimum(np.maximum([left + width, top + height], np.ceil(box[2:]) + 1), limits[2:])

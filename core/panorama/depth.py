@@ -1,4 +1,4 @@
-"""Inverse depth on a canvas, how sure it is, and how near that is to a picture: worked out where they are asked for."""
+"""Inverse depth on a canvas, its confidence, and nearness to a picture's camera, as images that are read lazily."""
 
 from __future__ import annotations
 
@@ -41,30 +41,31 @@ class Depth(OnCanvas):
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         rows, columns = within(part, self.shape)
         out = np.empty((rows.stop - rows.start, columns.stop - columns.start), np.float32)
-        # whole strips, as the map was made of: BLAS has other last bits for other shapes
+        # the same strips as in `build_map`: BLAS rounds differently for other shapes
         for strip in strips(self.shape):
             low, high = max(rows.start, strip.start), min(rows.stop, strip.stop)
             if low < high:
-                d = self._alone(strip)
+                d = self._depth(strip)
                 out[low - rows.start : high - rows.start] = d[low - strip.start : high - strip.start, columns]
         return out
 
     def strip(self, rows: slice) -> tuple[Array, NDArray[np.float32] | None]:
-        """Whole rows of it, and px that dense refinement adds in its picture."""
+        """Whole rows of inverse depth, and px (h, W, 2) that dense refinement adds in its picture, None without it."""
         canvas, d = self.canvas, self._of_field(rows)
         if self.refined is None:
             return d, None
         more, sideways, _ = _refined_at(self.refined, canvas, canvas.xs, canvas.ys[rows], self.camera)
         return d + more, sideways
 
-    def _alone(self, rows: slice) -> Array:
-        """Whole rows of it."""
+    def _depth(self, rows: slice) -> Array:
+        """Whole rows of inverse depth, without what dense refinement adds in its picture."""
         canvas, refined = self.canvas, self.refined
         if refined is None or canvas.projection is not None:
             return self.strip(rows)[0]
         return self._of_field(rows) + refined.part_over(refined.inverse_depth, canvas.xs, canvas.ys[rows])
 
     def _of_field(self, rows: slice) -> Array:
+        """Whole rows of the field's inverse depth."""
         left, top = -self.canvas.offset[0], rows.start - self.canvas.offset[1]
         # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
         values = self.grid.to_pixels(self.nodes, left, top, self.canvas.width, rows.stop - rows.start)
@@ -73,7 +74,7 @@ class Depth(OnCanvas):
 
 @dataclass(frozen=True, eq=False)
 class Confidence(OnCanvas):
-    """How sure (H, W) dense refinement is on a canvas."""
+    """Confidence (H, W) of dense refinement on a canvas, 0..1."""
 
     refined: RefinedDepth
 

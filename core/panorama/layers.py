@@ -21,9 +21,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Layer:
-    """One picture on the canvas: light (H, W, C) float32 scene-linear, as an array or worked out where it is asked for
-    (see `lazy`); straight alpha (H, W), float32 in [0, 1] or, where nothing is half seen through, bool; 0 where it
-    shows nothing."""
+    """One picture on the canvas.
+
+    Attributes
+    ----------
+    light : (H, W, C) image
+        Scene-linear, float32: an array, or worked out where it is read (see `raster.lazy`).
+    alpha : (H, W) array
+        Straight alpha in [0, 1], float32, or bool where nothing is translucent; 0 where the picture shows nothing.
+    """
 
     light: AnyImage
     alpha: NDArray[np.float32] | NDArray[np.bool_]
@@ -41,14 +47,23 @@ class Layer:
         return Layer(Placed(self.light, (-top, -left), (height, width)), cut(self.alpha, box))
 
     def keep(self, part: Part) -> Layer:
-        """The same, with the light of a part, which is asked for more than once, kept as an array."""
+        """The same layer with the light of a part kept as an array, for parts that are read more than once."""
         return Layer(Held(self.light, (part[0].start, part[1].start), part_of(self.light, part)), self.alpha)
 
 
 def layer_of(picture: Picture, picture_map: CanvasMap) -> Layer:
-    """A picture on the canvas: fetched through its map, but pasted pixel for pixel where the canvas is its own plane.
+    """Put a picture on the canvas.
 
-    Alpha by what it was in the picture, 0 outside it.
+    Parameters
+    ----------
+    picture : Picture
+    picture_map : CanvasMap
+        Where it is seen on the canvas.
+
+    Returns
+    -------
+    Layer
+        Pasted pixel for pixel where the canvas is the picture's own plane, else resampled; alpha 0 outside it.
     """
     if isinstance(picture_map, ReferenceMap) and picture_map.pasted:
         return _pasted_layer(picture, picture_map)
@@ -56,7 +71,7 @@ def layer_of(picture: Picture, picture_map: CanvasMap) -> Layer:
 
 
 def _pasted_layer(picture: Picture, picture_map: ReferenceMap) -> Layer:
-    """The reference on a flat canvas, of which it is a part."""
+    """The reference on a flat canvas, which holds all of it."""
     height, width, _ = picture.light.shape
     canvas = picture_map.canvas
     x, y = canvas.offset
@@ -66,7 +81,7 @@ def _pasted_layer(picture: Picture, picture_map: ReferenceMap) -> Layer:
 
 
 def _fetched_layer(picture: Picture, picture_map: PictureMap) -> Layer:
-    """A picture through a map of its raw pixels (H, W)."""
+    """A picture resampled through a map (H, W) of its raw pixels."""
     map_x, map_y, inside = picture_map.x, picture_map.y, picture_map.inside()
     channels = picture.light.shape[2]
     box = bounds(inside)
@@ -85,8 +100,8 @@ def _fetched_layer(picture: Picture, picture_map: PictureMap) -> Layer:
 class Fetched(LazyImage):
     """A picture (h, w, C) through a map of its raw pixels (H, W), bicubic in scene-linear float.
 
-    Colours are weighted by alpha while interpolating, so that transparent pixels never bleed. Bicubic overshoot is held
-    to the range of the picture itself: a black edge never turns negative. shows (H, W): where it shows anything.
+    Colours are weighted by alpha while interpolating, so that transparent pixels never bleed. Overshoot is clipped to
+    the picture's own range, so that a black edge never turns negative. shows (H, W): where it shows anything.
     """
 
     picture: Picture
@@ -119,7 +134,7 @@ class Fetched(LazyImage):
         map_x, map_y = self.map_x[part], self.map_y[part]
         pixels = fetch(self.picture.light if alpha is None else Weighed(self.picture.light, alpha), map_x, map_y)
         if alpha is not None:
-            # both overshoot alike: divided before alpha is clipped
+            # divided before alpha is clipped, since both overshoot alike
             pixels /= np.maximum(fetch(alpha[..., None], map_x, map_y)[..., 0], LAYER.min_alpha)[..., None]
         np.clip(pixels, *self.range, out=pixels)
         return pixels if shows.all() else shown_only(pixels, shows)

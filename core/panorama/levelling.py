@@ -1,7 +1,7 @@
-"""How a round panorama is turned: its horizon by upright edges and by how the pictures were held, or by hand.
+"""How a round panorama is levelled: by upright edges and by how the cameras were held, or by given angles.
 
-Angles are those of Hugin and PTGui: where the reference camera looks in the panorama. Yaw to the right of its middle,
-pitch above its horizon, roll clockwise, in degrees.
+Angles are those of Hugin and PTGui, in degrees: where the reference camera looks in the panorama. Yaw is to the right
+of its middle, pitch above its horizon, roll clockwise.
 """
 
 from __future__ import annotations
@@ -31,10 +31,21 @@ def parse_level(text: str) -> Level:
 
 
 def rotation_for(level: Level, rotations: Sequence[Array], edges: tuple[Array, Array] | None = None) -> Array:
-    """The rotation (3, 3) from the panorama's axes to the reference camera's.
+    """The rotation that levels a panorama.
 
-    level: `auto`, `none` (the reference looks straight ahead) or yaw, pitch, roll; rotations (3, 3): see
-    `gravity`; edges: see `gravity_by_edges`.
+    Parameters
+    ----------
+    level : Level
+        "auto", "none" (the reference looks straight ahead), or (yaw, pitch, roll) in degrees.
+    rotations : sequence of (3, 3) arrays
+        From the reference camera to each camera that is known, itself (I) among them; for "auto".
+    edges : ((N, 3) array, (N,) array), optional
+        Normals and lengths of straight edges (see `gravity_by_edges`); for "auto".
+
+    Returns
+    -------
+    (3, 3) array
+        From the panorama's axes to the reference camera's.
     """
     if level == "auto":
         return upright(gravity(rotations) if edges is None else gravity_by_edges(rotations, *edges))
@@ -42,15 +53,27 @@ def rotation_for(level: Level, rotations: Sequence[Array], edges: tuple[Array, A
 
 
 def gravity(rotations: Sequence[Array]) -> Array:
-    """The direction down (3,) in the reference camera's frame, from how the cameras were held.
+    """Estimate which way is down from how the cameras were held.
 
-    rotations (3, 3): from the reference camera to each that is known, itself (I) among them; their rows are the x, y
-    and z axes of a camera in the reference's frame.
+    Brown and Lowe [1]_ take the direction perpendicular to all cameras' x axes, which nobody tilts on purpose. Cameras
+    that look almost the same way do not determine it, so here each camera is also expected to look level, far more
+    loosely: u minimises Σ ln(1 + (x_i·u)² / σ_roll²) + (z_i·u)² / σ_pitch². The logarithm ignores a camera that was
+    turned on its side.
 
-    Brown and Lowe (IJCV 2007, section 4) take the direction that is square to all cameras' x axes, which nobody tilts
-    on purpose. With cameras that look almost the same way that is anything, so here each camera counts as level too,
-    far more loosely: u minimises Σ ln(1 + (x_i·u)² / σ_roll²) + (z_i·u)² / σ_pitch². The logarithm lets go of a camera
-    that was turned on its side.
+    Parameters
+    ----------
+    rotations : sequence of (3, 3) arrays
+        From the reference camera to each that is known, itself (I) among them. Their rows are the x, y and z axes of
+        that camera in the reference's frame.
+
+    Returns
+    -------
+    (3,) array
+        The unit vector down in the reference camera's frame.
+
+    References
+    ----------
+    .. [1] Brown and Lowe, Automatic Panoramic Image Stitching using Invariant Features, IJCV 2007, section 4.
     """
     mean = sum(a[1] for a in rotations)
     down = mean / np.linalg.norm(mean) if mean[1] > 0.5 else np.array([0.0, 1.0, 0.0])
@@ -66,22 +89,32 @@ def gravity(rotations: Sequence[Array]) -> Array:
 
 
 def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array) -> Array:
-    """The direction down (3,) in the reference camera's frame: of those near `gravity` the likeliest by how the
-    cameras were held and by the upright edges that they saw.
+    """Estimate which way is down from how the cameras were held and from the upright edges that they saw.
 
-    normals (N, 3), in the reference's frame, and lengths (N,): see `upright_edges.edges`. All uprights meet in one
-    point of the picture, which is where down is: that tells pitch, too, where there are some to the left and to the
-    right.
+    All upright edges meet in one point of the picture, the one straight down. Where some lie on the left and some on
+    the right, that tells pitch as well as roll. The likeliest direction is searched for on a grid, from coarse to fine.
+
+    Parameters
+    ----------
+    rotations : sequence of (3, 3) arrays
+        See `gravity`.
+    normals, lengths : (N, 3) and (N,) arrays
+        Of straight edges, in the reference's frame (see `upright_edges.edges`).
+
+    Returns
+    -------
+    (3,) array
+        The unit vector down in the reference camera's frame; that of `gravity` where edges agree on none.
     """
-    held = gravity(rotations)
+    by_pose = gravity(rotations)
     if not len(normals):
-        return held
-    # from the camera's own axes, but where it was turned on its side
-    base = np.eye(3) if held[1] > np.cos(np.radians(LEVELLING.sideways_deg)) else upright(held)
+        return by_pose
+    # directions around the camera's own axes, unless it was turned on its side
+    base = np.eye(3) if by_pose[1] > np.cos(np.radians(LEVELLING.sideways_deg)) else upright(by_pose)
     roll_sigma, pitch_sigma = np.radians([LEVELLING.roll_sigma_deg, LEVELLING.pitch_sigma_deg])
     middle, pitch_reach, roll_reach = (0.0, 0.0), LEVELLING.pitch_reach_deg, LEVELLING.roll_reach_deg
-    best = held
-    for number, (step, off) in enumerate(LEVELLING.search_steps_deg):
+    best = by_pose
+    for number, (step, edge_sigma) in enumerate(LEVELLING.search_steps_deg):
         pitch, roll = (
             values.ravel() for values in np.radians(np.meshgrid(
                 middle[0] + np.arange(-pitch_reach, pitch_reach + step / 2, step),
@@ -89,23 +122,25 @@ def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array)
             ))
         )  # fmt: skip
         down = np.column_stack([np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch), np.sin(pitch)]) @ base.T
-        unlikely = sum(
+        pose_cost = sum(
             np.log1p(np.square(down @ a[0]) / roll_sigma**2) + np.square(down @ a[2]) / pitch_sigma**2
             for a in rotations
         )
-        speaks = agreement(down, normals, lengths, float(np.radians(off)))
+        evidence = agreement(down, normals, lengths, float(np.radians(edge_sigma)))
         chance = LEVELLING.chance_factor * np.linalg.norm(lengths)
-        if number == 0 and speaks.max() - np.median(speaks) < chance:
-            return held
-        found = int(np.argmin(unlikely - 2 * LEVELLING.edge_weight * speaks))
+        if number == 0 and evidence.max() - np.median(evidence) < chance:
+            return by_pose
+        found = int(np.argmin(pose_cost - 2 * LEVELLING.edge_weight * evidence))
         best, middle = down[found], (float(np.degrees(pitch[found])), float(np.degrees(roll[found])))
         pitch_reach = roll_reach = LEVELLING.narrowing * step
     return best
 
 
 def upright(down: Array) -> Array:
-    """The rotation (3, 3) from a panorama whose y axis is `down` (3,), in the reference's frame, and in whose middle
-    the reference's direction lies."""
+    """The rotation (3, 3) to the reference's frame from a panorama whose y axis is `down` (3,), given in that frame.
+
+    The panorama's middle lies where the reference looks.
+    """
     ahead = np.array([0.0, 0.0, 1.0]) - down[2] * down
     ahead /= np.linalg.norm(ahead)
     return np.column_stack([np.cross(down, ahead), down, ahead])
@@ -122,7 +157,7 @@ def turned(yaw: float, pitch: float, roll: float) -> Array:
 
 
 def angles_of(rotation: Array) -> tuple[float, float, float]:
-    """yaw, pitch, roll in degrees of a rotation (3, 3): the inverse of `turned`; straight up or down, roll is 0."""
+    """yaw, pitch, roll in degrees of a rotation (3, 3), the inverse of `turned`; roll is 0 straight up or down."""
     to_panorama = rotation.T
     pitch = np.arcsin(np.clip(-to_panorama[1, 2], -1, 1))
     if abs(to_panorama[1, 2]) > 1 - 1e-12:

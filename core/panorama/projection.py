@@ -1,13 +1,12 @@
-"""Round panoramas, cylindrical and equirectangular: which ray each of their points shows.
+"""Round panoramas, cylindrical and equirectangular: which ray each of their points shows (docs/method.md, 6).
 
-A panorama has axes of its own: x to the right, y down, z ahead; levelled, y is gravity. Its plane is measured in px, u
-to the right and v down from the direction ahead, where both kinds have f px per radian, as the reference picture:
+A panorama has axes of its own: x to the right, y down, z ahead; levelled, y points along gravity. Its plane is in px, u
+to the right and v down from the direction ahead. There both kinds have f px per radian, as the reference has:
 
     r = (cos φ sin θ, sin φ, cos φ cos θ),  θ = u / f,  tan φ = v / f (cylinder)  or  φ = v / f (equirectangular)
 
-Everything that is said of a canvas point p in the reference's plane (x' ~ H_inf p + d e', d = m·p on a plane) holds for
-the rays of a round panorama with p = K r, |r| = 1 in the reference camera's frame, and d = |baseline| / range along r.
-A flat panorama needs nothing of this: its p are the reference's pixels.
+All equations for a canvas point p of the reference's plane (x' ~ H_inf p + d e', d = m·p on a plane) hold for the rays
+of a round panorama with p = K r, |r| = 1 in the reference camera's frame, and d = |baseline| / range along r.
 """
 
 from __future__ import annotations
@@ -24,11 +23,19 @@ from .options import PROJECTION
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """How a round panorama's plane unrolls.
+    """How a round panorama is unrolled into a plane.
 
-    kind: cylindrical or equirectangular; focal: px per radian; centre: (u, v) of the direction ahead, in px of the
-    plane (pixel centres are integers); rotation (3, 3): from the panorama's axes to the reference camera's; K (3, 3) of
-    the reference.
+    Attributes
+    ----------
+    kind : {"cylindrical", "equirectangular"}
+    focal : float
+        px per radian.
+    centre : (float, float)
+        (u, v) of the direction ahead, px of the plane; pixel centres are integers.
+    rotation : (3, 3) array
+        From the panorama's axes to the reference camera's.
+    K : (3, 3) array
+        Of the reference, px.
     """
 
     kind: str
@@ -39,7 +46,7 @@ class Projection:
 
     @property
     def sphere(self) -> tuple[int, int, int, int] | None:
-        """left, top, width, height (px of the plane) of the whole sphere; a cylinder has no such thing."""
+        """left, top, width, height (px of the plane) of the whole sphere; None for a cylinder."""
         half = round(np.pi * self.focal)
         return (-half, -half // 2, 2 * half, half) if self.kind == "equirectangular" else None
 
@@ -57,7 +64,7 @@ class Projection:
         return (u - self.centre[0]) / self.focal
 
     def elevations(self, v: Array) -> Array:
-        """φ in radians, positive downwards, of rows v, px of the plane; goes on over the poles."""
+        """φ in radians, positive downwards, of lines v, px of the plane; not limited to ±90°."""
         rise = (v - self.centre[1]) / self.focal
         return np.arctan(rise) if self.kind == "cylindrical" else rise
 
@@ -91,10 +98,20 @@ class Projection:
 
 
 def round_projection(kind: str, K: Array, rotation: Array) -> Projection:
-    """The projection with as many px per radian as the middle of the reference, to within what makes a sphere of whole
-    pixels.
+    """The projection that has as many px per radian as the middle of the reference.
 
-    kind: cylindrical or equirectangular; K (3, 3) of the reference; rotation: see Projection.
+    Parameters
+    ----------
+    kind : {"cylindrical", "equirectangular"}
+    K : (3, 3) array
+        Of the reference, px.
+    rotation : (3, 3) array
+        From the panorama's axes to the reference camera's.
+
+    Returns
+    -------
+    Projection
+        An equirectangular one is scaled a little, so that the sphere has a whole number of pixels.
     """
     focal = float(np.sqrt(K[0, 0] * K[1, 1]))
     if kind == "cylindrical":
@@ -105,10 +122,22 @@ def round_projection(kind: str, K: Array, rotation: Array) -> Projection:
 
 
 def extent(projection: Projection, outline: Array, shows: Callable[[Array], bool]) -> Array:
-    """left, top, right, bottom (px of the plane) of what a closed outline of rays (N, 3) encloses.
+    """The rectangle that what a closed outline encloses takes up.
 
-    shows(ray): whether a ray lies inside. An outline that crosses the line behind, or goes round a pole, takes the
-    whole width; round a pole it crosses that line, seen from which no step of it turns by half a circle.
+    An outline that crosses ±180°, or goes around a pole and therefore crosses it too, takes the whole width.
+
+    Parameters
+    ----------
+    projection : Projection
+    outline : (N, 3) array
+        Rays in order, in the reference camera's frame; neighbours less than half a circle apart.
+    shows : callable
+        Whether a ray (3,) lies inside.
+
+    Returns
+    -------
+    (4,) array
+        left, top, right, bottom, px of the plane.
     """
     points = projection.points(np.vstack([outline, outline[:1]]))
     left, top, right, bottom = projection.limits

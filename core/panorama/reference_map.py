@@ -1,4 +1,4 @@
-"""Where the pixels of a canvas are seen in the reference: known without a field, for it is seen from its own place."""
+"""Where the reference is seen on a canvas. That needs no field: the panorama has the reference's viewpoint."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .canvas import Canvas
 
 @dataclass(frozen=True)
 class ReferenceMap:
-    """The reference's map of a canvas, worked out where it is asked for; camera: the reference's."""
+    """The reference's map of a canvas, worked out where it is read; camera: the reference's."""
 
     canvas: Canvas
     camera: Camera
@@ -27,7 +27,7 @@ class ReferenceMap:
 
     @property
     def pasted(self) -> bool:
-        """Whether the canvas is the reference's own plane, so that it lies there pixel for pixel."""
+        """Whether the canvas is the reference's own plane, in which it lies pixel for pixel."""
         return self.canvas.projection is None
 
     def arrays(self) -> PictureMap:

@@ -1,4 +1,4 @@
-"""Straight edges that a picture shows: those of walls, doors and trunks tell where down is, however it was taken."""
+"""Straight edges in a picture. Those of walls, doors and trunks are upright, and so tell which way is down."""
 
 from __future__ import annotations
 
@@ -15,10 +15,26 @@ from .options import EDGES
 
 
 def edges(picture: Picture, camera: Camera, K: Array) -> tuple[Array, Array]:
-    """The planes through the camera and each straight edge: normals (N, 3), of length 1, in the camera's frame; and
-    the edges' lengths (N,) as shares of the picture's longer side.
+    """Detect straight edges away from what is transparent.
 
-    Line segments by von Gioi et al. (IPOL 2012), away from what is transparent. K (3, 3) px as the geometry took it.
+    Parameters
+    ----------
+    picture : Picture
+    camera : Camera
+        Its lens counts.
+    K : (3, 3) array
+        px, as the pose was estimated.
+
+    Returns
+    -------
+    normals : (N, 3) array
+        Unit normals of the planes through the camera and each edge, in the camera's frame; the longest edges first.
+    lengths : (N,) array
+        Shares of the picture's longer side.
+
+    References
+    ----------
+    von Gioi et al., LSD: a Line Segment Detector, IPOL 2012.
     """
     height, width = picture.view.shape[:2]
     scale = min(1.0, EDGES.side_px / max(width, height))
@@ -28,14 +44,14 @@ def edges(picture: Picture, camera: Camera, K: Array) -> tuple[Array, Array]:
     found = cv2.createLineSegmentDetector().detect(np.ascontiguousarray(gray.reshape(size[::-1])))[0]
     ends = np.zeros((0, 2, 2)) if found is None else found.reshape(-1, 2, 2).astype(np.float64)
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / max(size)
-    kept = lengths >= EDGES.min_length
+    used = lengths >= EDGES.min_length
     if picture.alpha is not None:
-        whole = (picture.alpha > 0).astype(np.uint8)
+        opaque = (picture.alpha > 0).astype(np.uint8)
         side = 2 * EDGES.alpha_margin_px + 1
-        whole = cv2.erode(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.ones((side, side), np.uint8))
+        opaque = cv2.erode(cv2.resize(opaque, size, interpolation=cv2.INTER_AREA), np.ones((side, side), np.uint8))
         columns, rows = (np.clip(np.rint(ends.mean(axis=1)[:, k]).astype(int), 0, size[k] - 1) for k in (0, 1))
-        kept &= whole[rows, columns] > 0
-    longest = np.flatnonzero(kept)[np.argsort(-lengths[kept], kind="stable")[:EDGES.max_edges]]
+        used &= opaque[rows, columns] > 0
+    longest = np.flatnonzero(used)[np.argsort(-lengths[used], kind="stable")[:EDGES.max_edges]]
     ends, lengths = ends[longest], lengths[longest]
     full = resized_points(ends.reshape(-1, 2), size, (width, height))
     rays = homogeneous(undistort(full, camera)) @ np.linalg.inv(K).T
@@ -44,8 +60,10 @@ def edges(picture: Picture, camera: Camera, K: Array) -> tuple[Array, Array]:
 
 
 def agreement(down: Array, normals: Array, lengths: Array, sigma: float) -> Array:
-    """By how much (M,) edges speak for each direction down (M, 3): the logarithm of how much likelier they are if some
-    are upright to within sigma (rad) and the rest anything, than if all are anything."""
+    """Evidence (M,) of edges for each direction down (M, 3): a log-likelihood ratio, weighted by length.
+
+    Some edges are upright to within sigma (rad) and the rest have any direction, against all having any direction.
+    """
     off = np.square(down @ normals.T)
     off *= -0.5 / sigma**2
     evidence: Array = np.log1p(EDGES.upright_share * np.exp(off, out=off) / sigma) @ lengths

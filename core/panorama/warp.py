@@ -1,7 +1,7 @@
-"""The backward maps: for every canvas pixel the pixel of each picture to fetch.
+"""The backward maps: for every canvas pixel the pixel of each picture to fetch (docs/method.md, 6).
 
-Between nodes only d is interpolated (and slack, which is smoother still); H_inf p + d e' is evaluated at every pixel,
-so that a field without slack keeps every pixel on its epipolar line exactly.
+Between the nodes of a grid only d is interpolated, and slack, which is smoother still. H_inf p + d e' is evaluated at
+every pixel, so that a field without slack keeps every pixel exactly on its epipolar line.
 """
 
 from __future__ import annotations
@@ -38,9 +38,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Warp:
-    """maps: for each picture, the reference first, where it is seen; depth (H, W) float32: the inverse depth, NaN where
-    the field knows none; lazy_confidence (H, W) float32, 0..1, of what dense refinement found there, None without it.
-    These two are worked out where they are asked for (see `raster.lazy`)."""
+    """Where each picture is seen on a canvas, and how deep.
+
+    Attributes
+    ----------
+    canvas : Canvas
+    maps : tuple of CanvasMap
+        For each picture, the reference first: its raw pixel at each canvas pixel.
+    depth : (H, W) image
+        Inverse depth, 1 / baseline, float32, NaN where the field knows none; worked out where it is read (see
+        `raster.lazy`).
+    lazy_confidence : (H, W) image or None
+        Confidence of dense refinement, 0..1, float32, likewise; None without it.
+    """
 
     canvas: Canvas
     maps: tuple[CanvasMap, ...]
@@ -58,8 +68,10 @@ class Warp:
         return None if self.lazy_confidence is None else whole(self.lazy_confidence)
 
     def within(self, box: Box, in_place: bool = False) -> Warp:
-        """The part in a box (left, top, width, height) of the canvas; NaN, and no confidence, where that reaches over
-        its edges. in_place: the box lies on the canvas, and the whole, whose memory the part takes, is lost."""
+        """The part in a box (left, top, width, height) of the canvas; beyond the canvas, NaN and confidence 0.
+
+        in_place: the box lies within the canvas and the part takes over the whole's memory; the whole is lost.
+        """
         left, top, width, height = box
         maps = tuple(one.within(box, in_place) for one in self.maps)
         depth = Placed(self.depth, (-top, -left), (height, width), np.nan)
@@ -76,10 +88,30 @@ class Warp:
 def build_warp(
     field: Field, views: Sequence[View], projection: Projection | None = None, refined: RefinedDepth | None = None
 ) -> Warp:
-    """The canvas that holds all pictures, flat or of a round projection, and their maps, refined by what dense
-    refinement found.
+    """Lay out a canvas that holds all pictures, and map them onto it.
 
-    Raises NoOverlap, OutputTooLarge, or BadRequest for a field that knows the reference's plane only.
+    Parameters
+    ----------
+    field : Field
+    views : sequence of View
+        What is known of the pictures, the reference's first.
+    projection : Projection, optional
+        Of a round panorama; by default the panorama is flat.
+    refined : RefinedDepth, optional
+        What dense refinement found.
+
+    Returns
+    -------
+    Warp
+
+    Raises
+    ------
+    NoOverlap
+        No further picture comes to lie near the reference.
+    OutputTooLarge
+        The canvas would have too many pixels.
+    BadRequest
+        The panorama is round, and the field knows the reference's plane only.
     """
     camera, further = views[0].camera, views[1:]
     planes = [_plane_map(field, view) for view in further]
@@ -113,7 +145,26 @@ def _at_nodes(values: FieldValues, view: View, number: int, grid: Grid, plane: C
 def build_map(
     field: Field, views: Sequence[View], canvas: Canvas, refined: RefinedDepth | None = None
 ) -> Warp:
-    """The maps of a given canvas, evaluated in strips."""
+    """Map all pictures onto a given canvas, strip by strip.
+
+    Parameters
+    ----------
+    field : Field
+    views : sequence of View
+        What is known of the pictures, the reference's first.
+    canvas : Canvas
+    refined : RefinedDepth, optional
+        What dense refinement found.
+
+    Returns
+    -------
+    Warp
+
+    Raises
+    ------
+    BadRequest
+        The panorama is round, and the field knows the reference's plane only.
+    """
     left, top = -canvas.offset[0], -canvas.offset[1]
     camera = views[0].camera
     grid = Grid.over(left, top, canvas.width, canvas.height)
@@ -147,8 +198,8 @@ def build_map(
 def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> FieldValues:
     """A field's values at the nodes of a grid over the canvas's plane.
 
-    In a round panorama they come from a grid over the reference's plane, where fields live: what d has there beside the
-    plane it ends in, times p_3; and that plane alone where the reference camera does not look.
+    Fields are defined on the reference's plane. For a round panorama, what d has beside the plane that it ends in is
+    interpolated there and scaled by p_3; where the reference camera does not look, that plane alone is left.
     """
     if canvas.projection is None:
         return field.on_grid(grid, undistort(grid.points, camera) if camera.distortion.any() else None)
@@ -164,21 +215,21 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
             f"the field {field.name!r} knows the reference's plane only: use slack or strict, or a perspective panorama"
         )
     places, ahead = canvas.on_reference(grid.xs, grid.ys, camera)
-    left_over = flat.at(values.inverse_depth - homogeneous(ideal) @ values.far, places)
+    beside_plane = flat.at(values.inverse_depth - homogeneous(ideal) @ values.far, places)
     (base,) = canvas.project_rows(values.far[None], grid.xs, grid.ys, camera)
     shift = values.shift
     if shift is not None:
         shift = np.stack([flat.at(shift[..., k], places) for k in (0, 1)], axis=-1)
-    return FieldValues(base + np.nan_to_num(ahead) * left_over, shift, picture=values.picture)
+    return FieldValues(base + np.nan_to_num(ahead) * beside_plane, shift, picture=values.picture)
 
 
 def _plane_map(field: Field, view: View) -> Array:
-    """The homography (3, 3) from the reference to a picture of the field's own plane."""
+    """The homography (3, 3) from the reference to a picture by the plane in which the field continues."""
     return view.H_inf + np.outer(view.e_prime, field.plane)
 
 
 def _outline(H_plane: Array, view: View) -> Array:
-    """A picture's border (N, 3), in order, as canvas points p by a plane."""
+    """A picture's border (N, 3), in order, as canvas points p that H_plane (3, 3) maps to it."""
     ideal = undistort(border(view.size), view.camera)
     return homogeneous(ideal) @ np.linalg.inv(H_plane).T
 
@@ -191,11 +242,11 @@ def _in_plane(points: Array) -> Array:
 
 
 def _trimmed(warp: Warp) -> Warp:
-    """Without rim lines that no picture reaches."""
-    seen = np.zeros((warp.canvas.height, warp.canvas.width), bool)
+    """The warp without the outer rows and columns that no picture reaches."""
+    shown = np.zeros((warp.canvas.height, warp.canvas.width), bool)
     for one in warp.maps[1:]:
-        seen |= one.inside()
-    if not seen.any():
+        shown |= one.inside()
+    if not shown.any():
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
-    seen |= warp.maps[0].inside()
-    return warp.within(box_of(seen), in_place=True)
+    shown |= warp.maps[0].inside()
+    return warp.within(box_of(shown), in_place=True)
