@@ -199,6 +199,8 @@ def stitch(
         And its kinds: what is wrong with the pictures or the options, and what would help; Cancelled where asked to
         stop.
     """
+    if isinstance(pictures, (str, Path, np.ndarray, Picture)):
+        raise BadRequest("stitch() takes its pictures as a list: stitch([left, right], options)")
     options = options or StitchOptions()
     stopwatch = Stopwatch(Progress(progress, cancelled))
 

@@ -270,7 +270,8 @@ def _stitch(args: argparse.Namespace) -> int:
     options = options_from(args, measure=bool(args.report or args.verbose))
     outputs = OutputRequest(args.output, args.report, args.layers, args.warp)
     with OutputFiles(args.overwrite, [*args.pictures, *options.files_read]) as files:
-        check(outputs, files, [path.name for path in args.pictures])
+        names = [path.name for path in args.pictures]
+        check(outputs, files, names, options.has_seam, options.holes == "inpaint")
         with progress_shown(args.quiet) as show:
             result = stitch(args.pictures, options, progress=show)
             show("write", MESSAGES.written_share)

@@ -33,6 +33,8 @@ LABELS, SEAM = "labels", "seam"
 # What was filled in though neither picture saw it: only where that is asked for.
 INPAINTED = "inpainted"
 CONFIDENCE, CANVAS = "confidence", "canvas.json"
+# Characters of a picture's name in that of its layer: three bytes each, and a file system takes 255.
+LONGEST_NAME = 70
 _NOT_IN_NAMES = re.compile(r"[^\w.() +-]")
 
 
@@ -68,7 +70,9 @@ class OutputRequest:
         return None if self.report is None else self.report.with_name(self.report.stem + ".matches.csv")
 
 
-def check(request: OutputRequest, files: OutputFiles, pictures: Sequence[str]) -> None:
+def check(
+    request: OutputRequest, files: OutputFiles, pictures: Sequence[str], seam: bool = True, inpainted: bool = True
+) -> None:
     """Checks, before the work begins, that everything asked for could be written.
 
     Parameters
@@ -78,11 +82,13 @@ def check(request: OutputRequest, files: OutputFiles, pictures: Sequence[str]) -
         What is written through later.
     pictures : sequence of str
         Names of the pictures' files, after which their layers are called.
+    seam, inpainted : bool
+        Whether the stitch will have a seam, and whether its holes are to be filled.
 
     Raises
     ------
     BadRequest
-        A format that is not written, one file for two outputs, or layers of other pictures in the folder.
+        A format that is not written, one file for two outputs, or files of another stitch in the folder of layers.
     UnwritableOutput
         The system does not let it be written, or it exists and is not to be replaced.
     """
@@ -95,28 +101,30 @@ def check(request: OutputRequest, files: OutputFiles, pictures: Sequence[str]) -
     if request.layers is not None:
         names = layer_files(pictures, (".png", ".exr"))
         files.check_folder(request.layers, names)
-        _refuse_other_layers(request.layers, names)
+        _refuse_other_files(request.layers, layer_files(pictures, (".png", ".exr"), seam, inpainted))
         taken = {(request.layers / name).resolve() for name in names}
         for path in single:
             if path.resolve() in taken:
                 raise BadRequest(f"{path}: named for two outputs, a layer is one; give each its own name")
 
 
-def _refuse_other_layers(folder: Path, names: Sequence[str]) -> None:
-    """Raises BadRequest if the folder holds layers of other pictures: two files of one number would be ambiguous."""
-    others = sorted(path.name for path in folder.glob("[0-9][0-9]_*.*") if path.suffix in (".png", ".exr"))
-    strange = [name for name in others if name not in names]
-    if strange:
+def _refuse_other_files(folder: Path, names: Sequence[str]) -> None:
+    """Raises BadRequest if the folder holds files of another stitch that would stay: they would be taken for this
+    one's."""
+    layers = sorted(path.name for path in folder.glob("[0-9][0-9]_*.*") if path.suffix in (".png", ".exr"))
+    masks = [f"{mask}.png" for mask in (LABELS, SEAM, INPAINTED) if (folder / f"{mask}.png").exists()]
+    others = [name for name in (*layers, *masks) if name not in names]
+    if others:
         raise BadRequest(
-            f"{folder}: holds layers of other pictures ({', '.join(strange[:3])}{', …' if strange[3:] else ''}); name "
-            "another folder, or remove them"
+            f"{folder}: holds files of another stitch that this one does not write ({', '.join(others[:3])}"
+            f"{', …' if others[3:] else ''}); name another folder, or remove them"
         )
 
 
 def layer_stem(number: int, name: str) -> str:
-    """File name of a picture's layer without suffix: its number, and its name in characters that any file system
-    takes."""
-    return f"{number:02d}_{_NOT_IN_NAMES.sub('_', Path(name).stem)}"
+    """File name of a picture's layer without suffix: its number, and its name, shortened, in characters that any file
+    system takes."""
+    return f"{number:02d}_{_NOT_IN_NAMES.sub('_', Path(name).stem)[:LONGEST_NAME]}"
 
 
 def layer_files(
@@ -250,7 +258,8 @@ def warp_bytes(result: StitchResult) -> bytes:
         # inside, e' is 0 without depth; in a file that would say that all cameras stand in one place
         e_prime[1:] = np.nan
     arrays: dict[str, NDArray[Any]] = {
-        "format": np.array(WARP_FORMAT), "canvas": np.array([canvas.width, canvas.height]),
+        "format": np.array(WARP_FORMAT), "sizes": np.array([view.size for view in views]),
+        "canvas": np.array([canvas.width, canvas.height]),
         "offset": np.array(canvas.offset, np.int64), "inverse_depth": warp.inverse_depth,
         "K": np.stack([view.K for view in views]), "R": np.stack([view.R for view in views]),
         "t": np.stack([view.t for view in views]), "dist": np.stack([view.camera.distortion for view in views]),
@@ -286,4 +295,5 @@ def npz_bytes(arrays: dict[str, NDArray[Any]]) -> bytes:
 
 def json_bytes(value: dict[str, Any]) -> bytes:
     """JSON as people read it; NaN and infinity become null."""
-    return (json.dumps(plain(value), indent=1, ensure_ascii=False) + "\n").encode()
+    # the name of a file need not be UTF-8
+    return (json.dumps(plain(value), indent=1, ensure_ascii=False) + "\n").encode(errors="replace")

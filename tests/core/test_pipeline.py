@@ -350,6 +350,15 @@ def test_the_same_field_gives_the_same_map_wherever_memory_lies(small_result: St
         assert np.array_equal(again.inverse_depth, first.inverse_depth, equal_nan=True)
 
 
+def test_pictures_come_as_a_list_of_two(small_pair: Pair) -> None:
+    for alone in ("left.jpg", Path("left.jpg"), small_pair.reference):
+        with pytest.raises(BadRequest, match=r"as a list: stitch\(\[left, right\], options\)"):
+            stitch(alone)  # type: ignore[arg-type]
+    for count, words in ((1, "one picture alone"), (3, "3 pictures given: two at a time for now")):
+        with pytest.raises(BadRequest, match=words):
+            stitch([small_pair.reference] * count)
+
+
 def test_chance_comes_from_the_seed_alone(small_pair: Pair, known: StitchOptions) -> None:
     """Whatever state other people's generators are in, the result is the same; and another seed is as good."""
     quick = replace(known, seed=7, measure=False)

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.output import outputs
-from edf_stitch.core.output.outputs import OutputRequest, check, json_bytes, npz_bytes, warp_bytes, write
+from edf_stitch.core.output.outputs import OutputRequest, check, json_bytes, layer_stem, npz_bytes, warp_bytes, write
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.pictures.masks import read_painted
 from edf_stitch.core.pictures.picture import load_picture
@@ -27,8 +27,9 @@ from edf_stitch.synthetic_scenes.two_planes import Pair
 from ...pairs import with_two_view
 
 NPZ = {
-    "format": ("<i8", ()), "canvas": ("<i8", (2,)), "offset": ("<i8", (2,)), "map_x_01": ("<f4", None),
-    "map_y_01": ("<f4", None), "box_01": ("<i8", (4,)), "inverse_depth": ("<f4", None), "K": ("<f8", (2, 3, 3)),
+    "format": ("<i8", ()), "sizes": ("<i8", (2, 2)), "canvas": ("<i8", (2,)), "offset": ("<i8", (2,)),
+    "map_x_01": ("<f4", None), "map_y_01": ("<f4", None), "box_01": ("<i8", (4,)),
+    "inverse_depth": ("<f4", None), "K": ("<f8", (2, 3, 3)),
     "R": ("<f8", (2, 3, 3)), "t": ("<f8", (2, 3)), "dist": ("<f8", (2, 5)), "H_inf": ("<f8", (2, 3, 3)),
     "e_prime": ("<f8", (2, 3)), "F": ("<f8", (1, 3, 3)), "edges": ("<i8", (1, 2)),
 }  # fmt: skip
@@ -141,6 +142,7 @@ def test_the_warp_file_holds_what_design_says(small_pair: Pair, known: StitchOpt
         expected = (height, width) if shape is None else shape
         assert found[name].dtype.str == kind and found[name].shape == expected, name
     assert found["format"] == 2 and found["canvas"].tolist() == [width, height]
+    assert found["sizes"].tolist() == [[240, 180], [240, 180]]
     assert found["box_01"].tolist() == [0, 0, width, height] and found["edges"].tolist() == [[0, 1]]
     for name, own in (("R", np.eye(3)), ("t", np.zeros(3)), ("H_inf", np.eye(3)), ("e_prime", np.zeros(3))):
         assert np.array_equal(found[name][0], own), "the reference stands at the origin"
@@ -223,8 +225,22 @@ def test_the_layers_folder_says_what_it_holds(small_result: StitchResult, writte
 def test_layers_of_other_pictures_are_not_mixed_with_these(small_result: StitchResult, tmp_path: Path) -> None:
     (tmp_path / "layers").mkdir()
     (tmp_path / "layers" / "01_other.png").write_bytes(b"mine")
-    with pytest.raises(BadRequest, match="holds layers of other pictures .01_other.png"):
+    with pytest.raises(BadRequest, match="files of another stitch .* .01_other.png"):
         check(all_of(tmp_path), OutputFiles(overwrite=True), NAMES)
+
+
+def test_masks_that_this_stitch_does_not_write_are_not_left_beside_its_own(written: Path, tmp_path: Path) -> None:
+    (tmp_path / "layers").mkdir()
+    (tmp_path / "layers" / "labels.png").write_bytes((written / "layers" / "labels.png").read_bytes())
+    with pytest.raises(BadRequest, match=r"does not write \(labels.png\)"):
+        check(all_of(tmp_path), OutputFiles(overwrite=True), NAMES, seam=False)
+    check(all_of(tmp_path), OutputFiles(overwrite=True), NAMES)
+
+
+def test_a_layer_has_a_name_that_every_file_system_takes() -> None:
+    assert layer_stem(3, "a:b*c?.jpg") == "03_a_b_c_"
+    assert len(layer_stem(0, 250 * "漢" + ".png").encode()) < 240
+    assert json_bytes({"name": "a\udcff.png"}) == b'{\n "name": "a?.png"\n}\n'
 
 
 def test_the_seam_is_a_mask_to_paint_on(small_result: StitchResult, written: Path) -> None:
