@@ -106,7 +106,7 @@ def cameras_for(
         ]
         known = [camera for camera in cameras if not camera.assumed]
         if known:  # one lens took all pictures more often than not
-            cameras = [_like(known[0], camera) if camera.assumed else camera for camera in cameras]
+            cameras = [_with_lens_of(known[0], camera) if camera.assumed else camera for camera in cameras]
     if request.principal:
         values = [request.principal[i : i + 2] for i in range(0, len(request.principal), 2)]
         cameras = [
@@ -115,7 +115,7 @@ def cameras_for(
     return cameras, warnings
 
 
-def _like(known: Camera, unknown: Camera) -> Camera:
+def _with_lens_of(known: Camera, unknown: Camera) -> Camera:
     """An unknown camera with the lens of a known one."""
     guess = known.focal * max(unknown.size) / max(known.size)
     # the same knowledge as the other picture's, so that the focal prior does not count it twice

@@ -17,7 +17,7 @@ FIGURES: dict[str, tuple[str, str, int, bool | None]] = {
     "off_line_mean_px": ("off its lines in the overlap", "px", 2, False),
     # each field over the matches that it is fitted to: one that drops more of them has an easier time
     "held_out_rms_px": ("held out, RMS over the matches it keeps", "px", 2, False),
-    "held_out_towards_rms_px": ("the same towards the rest", "px", 2, False),
+    "held_out_towards_rms_px": ("held out, towards what only the target shows", "px", 2, False),
     "alignment_median_px": ("matches, median", "px", 2, False), "alignment_p95_px": ("matches, 95th", "px", 2, False),
     "folds": ("folds", "%", 3, False), "occluded": ("occluded, of the overlap", "%", 1, None),
     "overlap_px": ("overlap", "px", 0, None), "canvas_psnr_db": ("canvas PSNR", "dB", 2, None),
