@@ -22,7 +22,7 @@ from edf_stitch.core.cameras.projective import (
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.compose.multiband import bands_for
-from edf_stitch.core.field import visibility
+from edf_stitch.core.field import folding, visibility
 from edf_stitch.core.panorama.warp import build_map
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
@@ -326,7 +326,8 @@ def test_the_same_pixels_whichever_strip_is_done_first(
 ) -> None:
     """Small pictures are one strip; here they are dozens, with dense refinement and all."""
     monkeypatch.setattr(arrays, "PARTS", replace(arrays.PARTS, strip_pixels=5_000))
-    monkeypatch.setattr(visibility, "STRIP", 5_000)
+    monkeypatch.setattr(visibility, "VISIBILITY", replace(visibility.VISIBILITY, strip_pixels=5_000))
+    monkeypatch.setattr(folding, "FOLDING", replace(folding.FOLDING, strip_pixels=5_000))
     before, results = cv2.getNumThreads(), []
     try:
         for threads in (1, 3):
