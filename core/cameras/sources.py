@@ -196,9 +196,26 @@ def read_camera_file(
 ) -> list[Camera]:
     """Cameras of the pictures from a JSON file or its content.
 
-    Layout: {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "R": 3×3?, "t": [3]?}}} with NAME the
-    picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes, integer pixel centres. Raises
-    BadRequest (content), UnreadableImage (file).
+    Parameters
+    ----------
+    source : str, path or dict
+        {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "R": 3×3?, "t": [3]?}}} with NAME the
+        picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes, integer pixel centres.
+    names : sequence of str
+        The pictures' file names.
+    sizes : sequence of (int, int)
+        Their (W, H) px.
+
+    Returns
+    -------
+    list of Camera
+
+    Raises
+    ------
+    BadRequest
+        For the content.
+    UnreadableImage
+        For the file.
     """
     if not isinstance(source, dict):
         try:

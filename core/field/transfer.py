@@ -41,9 +41,20 @@ def target_points(view: Transfer, points: Array, inverse_depth: Array) -> Array:
 
 
 def transfer(view: Transfer, infinite: list[Array], inverse_depth: Array) -> tuple[Array, Array]:
-    """x and y (…) of π(q + d e') for the three coordinates (…) of q = H_inf p (see `Canvas.project_rows`) and d (…).
+    """Pixels of a picture from canvas points that were brought to infinity: π(q + d e').
 
-    NaN where the point lies behind the picture's camera.
+    Parameters
+    ----------
+    view : Transfer
+    infinite : list of three (…) arrays
+        The coordinates of q = H_inf p (see `Canvas.project_rows`).
+    inverse_depth : (…) array
+        d.
+
+    Returns
+    -------
+    x, y : (…) arrays
+        Ideal px, NaN where the point lies behind the picture's camera.
     """
     e = view.e_prime
     depth = inverse_depth if e.any() else 0.0  # without a baseline no depth, not even NaN, moves a point

@@ -52,16 +52,33 @@ class _Table(NamedTuple):
 def read_matches(
     source: str | Path | NDArray[Any], size: Size, size_prime: Size, worked: tuple[Size, Size] | None = None
 ) -> Matches:
-    """The user's matches, with `weight` (N,) float64 above 0 and `given` True; or those that a stitch found.
+    """Matches from a file or an array: the user's own, or those that a stitch found and reported.
 
-    source: a CSV file in UTF-8, x,y in the reference ↔ x2,y2 in the target in px of the upright pictures, pixel centres
-    integer, optionally a weight (1 where there is none, 0 leaves the match out); separated by commas, semicolons or
-    white space; a header may name the columns in any order, among others, and lines starting with # are left out. Or
-    an array (N, 4) or (N, 5) of the same. size, size_prime: (W, H) px of the reference and the target. worked: sizes
-    of the two that the matches are wanted in, where that is another. Of several matches between the same two points
-    the first is kept, unless they were found (the file has a column `state`, see `matches_csv`): those come back as
-    they were, `given` False, but for those that were used and have a weight of 0 by now.
-    Raises BadRequest (content) with the line, UnreadableImage (file).
+    Parameters
+    ----------
+    source : str, path or (N, 4) or (N, 5) array
+        A CSV file in UTF-8: x, y in the reference and x2, y2 in the target, px of the upright pictures with integer
+        pixel centres, and optionally a weight (default 1; 0 leaves the match out). Separated by commas, semicolons or
+        white space; a header may name the columns in any order, among others; lines that start with # are skipped. Or
+        an array of the same columns.
+    size, size_prime : (int, int)
+        (W, H) px of the reference and of the target.
+    worked : ((int, int), (int, int)), optional
+        Sizes that the matches are wanted in, if the pictures were resized.
+
+    Returns
+    -------
+    Matches
+        With `weight` above 0 and `given` True; of several matches between the same two points the first. From a file
+        with a column `state` (see `matches_csv`): as they were found, `given` False, without those that were used and
+        have a weight of 0 by now.
+
+    Raises
+    ------
+    BadRequest
+        For the content, with the line.
+    UnreadableImage
+        For the file.
     """
     table = _from_array(source) if isinstance(source, np.ndarray) else _from_file(Path(source))
     _check(table, size, size_prime)
@@ -95,9 +112,19 @@ def matches_csv(
 ) -> bytes:
     """The matches as a CSV file that `read_matches` reads back to the same floats.
 
-    states: what became of each match that was found (of STATES); those that were left out have weight 0, which is how
-    a program that knows no states reads it. worked: the same matches in px of the pictures that were worked on, where
-    that was not their full size.
+    Parameters
+    ----------
+    matches : Matches
+        In px of the full pictures.
+    states : sequence of str, optional
+        What became of each match that was found (of STATES). Those that were left out get weight 0, for programs that
+        know no states.
+    worked : Matches, optional
+        The same matches in px of the pictures that were worked on, if these were resized.
+
+    Returns
+    -------
+    bytes
     """
     weight = matches.weights
     if states is not None:

@@ -59,8 +59,16 @@ def srgb_curve() -> Curve:
 def decode(coded: NDArray[Any], curves: tuple[Curve, ...] | None = None) -> NDArray[Any]:
     """Display-encoded levels to light.
 
-    coded: H×W×C uint8 or uint16; curves: one for all channels or one a channel, sRGB when None. Returns H×W×C float32
-    in [0, 1].
+    Parameters
+    ----------
+    coded : (H, W, C) uint8 or uint16 array
+    curves : tuple of Curve, optional
+        One for all channels or one for each; sRGB by default.
+
+    Returns
+    -------
+    (H, W, C) float32 array
+        In [0, 1].
     """
     curves = curves or (srgb_curve(),)
     light = np.empty(coded.shape, np.float32)
@@ -76,8 +84,18 @@ def decode(coded: NDArray[Any], curves: tuple[Curve, ...] | None = None) -> NDAr
 def encode(light: NDArray[Any], bits: int, curves: tuple[Curve, ...] | None = None) -> NDArray[Any]:
     """Light to display-encoded levels, the inverse of `decode`: every level survives the round trip.
 
-    light: H×W×C float32; below 0 and NaN become 0, above 1 the highest level. bits: 8 or 16. curves: one for all
-    channels or one a channel, sRGB when None. Returns H×W×C uint8 or uint16.
+    Parameters
+    ----------
+    light : (H, W, C) float32 array
+        Below 0 and NaN become 0, above 1 the highest level.
+    bits : int
+        8 or 16.
+    curves : tuple of Curve, optional
+        One for all channels or one for each; sRGB by default.
+
+    Returns
+    -------
+    (H, W, C) uint8 or uint16 array
     """
     curves = curves or (srgb_curve(),)
     levels = np.empty(light.shape, np.uint8 if bits == 8 else np.uint16)

@@ -27,10 +27,19 @@ def count() -> int:
 
 
 def in_order(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[Result]:
-    """What `work` makes of each part, in the parts' order.
+    """Results of `work` for each part, in the order of the parts, computed by several threads.
 
-    At most `count()` results are begun or waiting to be taken, so that memory stays bounded. The first error among the
-    parts is raised when it is its turn; then, or where nobody asks for more, no further part is begun.
+    Parameters
+    ----------
+    work : callable
+        Called with one part.
+    parts : iterable
+
+    Yields
+    ------
+    result
+        At most `count()` results are begun or waiting, so that memory stays bounded. The first error among the parts
+        is raised when it is its turn; then, or if no more results are asked for, no further part is begun.
     """
     at_once = count()
     if at_once == 1:
