@@ -36,6 +36,12 @@ def packed(value: Any) -> bytes:
     return stream.getvalue()
 
 
+def members(data: bytes) -> dict[str, bytes]:
+    """What an archive holds, without the time of day at which it was made."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
 def unpacked(data: bytes) -> Any:
     return cache_module._unpacked(io.BytesIO(data), "name")
 
@@ -58,7 +64,7 @@ def test_geometry_and_every_field_come_back_bit_by_bit(result: StitchResult, nam
     field = fit_field(name, "plane", view, used, cameras[0].size, cameras[1].size)
     data = packed((view, field, cameras, used))
     back = unpacked(data)
-    assert packed(back) == data, "as a whole, with the order of every array's axes"
+    assert members(packed(back)) == members(data), "as a whole, with the order of every array's axes"
     assert [type(part) for part in back] == [type(view), type(field), tuple, Matches]
     grid = Grid.over(-40, -30, 500, 400)
     ours, theirs = field.on_grid(grid), back[1].on_grid(grid)
