@@ -224,8 +224,12 @@ def worker_that(monkeypatch, prepare: str) -> None:
 
 def pausing_at(monkeypatch, stage: str) -> None:
     """The worker stops to think at the stage, so that it is there when something happens to it."""
-    pause = f"import time; say = worker._say\ndef pausing(line):\n say(line)\n if line.get('stage') == {stage!r}:"
-    pause += "\n  (Path(sys.argv[1]) / 'paused').touch()\n  time.sleep(600)\nworker._say = pausing"
+    pause = "import time; say, kind, stops = worker._say, worker._Stop, []\n"
+    pause += "worker._Stop = lambda: stops.append(kind()) or stops[0]\n"
+    pause += f"def pausing(line):\n say(line)\n if line.get('stage') == {stage!r}:\n"
+    # asked, and not only interrupted: Python swallows an interruption that falls into the end of an object
+    pause += "  (Path(sys.argv[1]) / 'paused').touch()\n  while not stops[0].asked: time.sleep(0.01)\n"
+    pause += "  raise KeyboardInterrupt\nworker._say = pausing"
     worker_that(monkeypatch, pause)
 
 
