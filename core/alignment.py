@@ -6,7 +6,7 @@ their matches are pooled, so that the panorama does not wobble from frame to fra
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -38,10 +38,8 @@ from .pose.match_files import read_matches
 from .pose.options import ESTIMATION, FEATURES
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, TooFewMatches
+from .system.progress import ReportProgress
 from .system.threads import in_order
-
-# Called with a stage's name and the share of that stage that is done.
-ReportProgress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from .panorama.layers import Layer, layer_of
 from .panorama.warp import Warp
 from .pictures.masks import painted_over
 from .pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
-from .raster.arrays import Box, common, cut
+from .raster.arrays import Box, box_of, common, cut
 from .raster.resizing import resized_points
 from .system.errors import BadRequest, NoOverlap
 from .system.progress import Progress
@@ -114,15 +114,26 @@ class StitchResult:
         return self.panorama.alpha.astype(np.float32)
 
     @property
+    def full_matches(self) -> Matches:
+        """All matches, before any was left out, in px of the full pictures."""
+        edge = self.edges[0]
+        matches = edge.matches
+        sides = zip((matches.x, matches.y), edge.pair(self.cameras), edge.pair(self.full_sizes), strict=True)
+        x, y = (resized_points(points, camera.size, full) for points, camera, full in sides)
+        return replace(matches, x=x, y=y)
+
+    @property
     def used_matches(self) -> Matches:
         """The matches that the field stands on, in px of the full pictures."""
-        edge = self.edges[0]
-        used = edge.matches.subset(np.flatnonzero(edge.two_view.inliers)[self.field.fit.inliers_used])
-        x, y = (
-            resized_points(points, camera.size, full)
-            for points, full, camera in zip((used.x, used.y), self.full_sizes, self.cameras, strict=True)
-        )
-        return Matches(x, y, used.scale, used.weights)
+        return self.full_matches.subset(self.used)
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which of all matches the field stands on (N,), bool."""
+        inliers = self.edges[0].two_view.inliers
+        used = np.zeros(len(inliers), bool)
+        used[np.flatnonzero(inliers)[self.field.fit.inliers_used]] = True
+        return used
 
     @property
     def spread(self) -> Box:
@@ -284,7 +295,7 @@ def compose(
     made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
     panorama, labels = made.panorama, made.labels
     looks = appearance(panorama, made.exposed, labels, any(floats)) if options.measure else {}
-    box = crop_box(options.crop, whole.canvas.whole, panorama.alpha > 0, whole.maps[0].box())
+    box = crop_box(options.crop, whole.canvas.whole, panorama.alpha > 0, box_of(whole.maps[0].inside()))
     panorama, canvas = panorama.within(box), whole.canvas.within(box)
     # of a whole sphere, layers and maps exist only where the pictures lie
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))

@@ -5,7 +5,7 @@ For each: what it cannot see, its exposure, the seam to the panorama so far (`be
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from ..panorama.warp import Warp
 from ..raster.arrays import bounds, with_margin, without_specks
 from ..raster.lazy import AnyImage, Weighed, whole
 from ..raster.picture_map import PictureMap
+from ..system.progress import ReportProgress
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
 from .exposure import Exposure, match_exposure, pooled, unchanged
 from .inpaint import holes_of, inpainted
@@ -30,9 +31,6 @@ from .options import EXPOSURE
 from .overlap import Overlap, overlap_of
 from .seam import added_price, find_seam, known_labels, seam_cost
 from .wraparound import roll_for, rolled, rolled_layer, rolled_map
-
-# Called with a stage's name and how much of it is done.
-ReportProgress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

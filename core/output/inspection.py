@@ -55,8 +55,7 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
         S and K_canvas are NaN there, and the report's `canvas.projection` says what the canvas shows.
     """
     edge, canvas = result.edges[0], result.canvas
-    view, scale = edge.two_view, scales(result)
-    S, S_prime = scale[edge.i], scale[edge.j]
+    view, (S, S_prime) = edge.two_view, edge.pair(scales(result))
     shift = np.eye(3) if canvas.projection is None else np.full((3, 3), np.nan)
     shift[:2, 2] += canvas.offset
     return {
@@ -70,10 +69,11 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
 def match_errors(result: StitchResult, rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distance (N,), in px of the full target, between where the map sees x and its match x'; rows (N, ≥ 4): x, y, x',
     y' in px of the full pictures. NaN where the panorama does not show x."""
-    edge, scale = result.edges[0], scales(result)
-    x, y = homogeneous(rows[:, :2]) @ scale[edge.i].T, homogeneous(rows[:, 2:4]) @ scale[edge.j].T
+    edge = result.edges[0]
+    S, S_prime = edge.pair(scales(result))
+    x, y = homogeneous(rows[:, :2]) @ S.T, homogeneous(rows[:, 2:4]) @ S_prime.T
     error = look_up(result.warp, x[:, :2], result.cameras[edge.i], edge.j) - y[:, :2]
-    distance: Array = np.linalg.norm(error / np.diag(scale[edge.j])[:2], axis=1)
+    distance: Array = np.linalg.norm(error / np.diag(S_prime)[:2], axis=1)
     return distance
 
 
@@ -90,15 +90,11 @@ def match_rows(result: StitchResult) -> dict[str, Any]:
         `rows` (N, 4): x, y, x', y' in px of the full pictures, to a thousandth. `weights` (N,). `states`: USED or
         LEFT_OUT, for each. `errors` (N,): see `match_errors`. `file`: see `match_file`, as text.
     """
-    edge, back = result.edges[0], [np.linalg.inv(S) for S in scales(result)]
-    found = edge.matches
-    x, y = homogeneous(found.x) @ back[edge.i].T, homogeneous(found.y) @ back[edge.j].T
-    rows = np.column_stack([x[:, :2], y[:, :2]])
-    used = np.zeros(len(found), bool)
-    used[np.flatnonzero(edge.two_view.inliers)[result.field.fit.inliers_used]] = True
+    found = result.full_matches
+    rows = np.column_stack([found.x, found.y])
     return {
-        "rows": rows.round(3), "weights": np.ones(len(found)) if found.weights is None else found.weights,
-        "states": _states(used), "errors": match_errors(result, rows).round(3), "file": match_file(result).decode(),
+        "rows": rows.round(3), "weights": found.weights, "states": _states(result.used),
+        "errors": match_errors(result, rows).round(3), "file": match_file(result).decode(),
     }  # fmt: skip
 
 

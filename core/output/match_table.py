@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..cameras.matches import Matches
 from ..pipeline import StitchResult
 from ..pose.match_files import NOT_BY_FIELD, NOT_BY_GEOMETRY, USED, matches_csv
-from ..raster.resizing import resized_points
 
 
 def match_file(result: StitchResult) -> bytes:
@@ -24,20 +22,13 @@ def match_file(result: StitchResult) -> bytes:
         what became of each.
     """
     edge = result.edges[0]
-    matches, full_sizes = edge.matches, edge.pair(result.full_sizes)
     sizes = tuple(camera.size for camera in edge.pair(result.cameras))
-    points = zip((matches.x, matches.y), sizes, full_sizes, strict=True)
-    x, y = (resized_points(one, size, full) for one, size, full in points)
-    worked = None if sizes == full_sizes else matches
-    states = None if matches.given else _states(result)
-    return matches_csv(Matches(x, y, matches.scale, matches.weight), states, worked)
+    worked = None if sizes == edge.pair(result.full_sizes) else edge.matches
+    states = None if edge.matches.given else _states(result)
+    return matches_csv(result.full_matches, states, worked)
 
 
 def _states(result: StitchResult) -> list[str]:
     """What became of each match: used, left out by the geometry, or by the field."""
-    edge = result.edges[0]
-    inliers = np.flatnonzero(edge.two_view.inliers)
-    used = result.field.fit.inliers_used
-    states = np.full(len(edge.matches), NOT_BY_GEOMETRY, object)
-    states[inliers] = np.where(used, USED, NOT_BY_FIELD)
-    return [str(state) for state in states]
+    of_inliers = np.where(result.used, USED, NOT_BY_FIELD)
+    return [str(state) for state in np.where(result.edges[0].two_view.inliers, of_inliers, NOT_BY_GEOMETRY)]

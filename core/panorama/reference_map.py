@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
-from ..raster.arrays import Box, box_of, strips
+from ..raster.arrays import Box, strips
 from ..raster.picture_map import PictureMap, falls_inside
 from .canvas import Canvas
 
@@ -55,9 +55,3 @@ class ReferenceMap:
     def within(self, box: Box, in_place: bool = False) -> ReferenceMap:
         """The map of a box (left, top, width, height) of the canvas; in_place: see `PictureMap.within`."""
         return ReferenceMap(self.canvas.within(box), self.camera)
-
-    def box(self) -> Box:
-        """Where the reference lies on the canvas: left, top, width, height."""
-        if self.pasted:
-            return (*self.canvas.offset, *self.size)
-        return box_of(self.inside())

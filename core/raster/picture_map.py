@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Box, box_of, cut, cut_in_place
+from .arrays import Box, cut, cut_in_place
 
 
 class CanvasMap(Protocol):
@@ -25,10 +25,6 @@ class CanvasMap(Protocol):
 
     def inside(self) -> NDArray[np.bool_]:
         """Where (H, W) the map falls inside the picture."""
-        ...
-
-    def box(self) -> Box:
-        """The smallest box (left, top, width, height) of the canvas that holds all of the picture that is shown."""
         ...
 
     def within(self, box: Box, in_place: bool = False) -> CanvasMap:
@@ -57,10 +53,6 @@ class PictureMap:
     def inside(self) -> NDArray[np.bool_]:
         """Where (H, W) the map falls inside the picture."""
         return falls_inside(self.x, self.y, self.size)
-
-    def box(self) -> Box:
-        """The smallest box (left, top, width, height) of the canvas that holds all of the picture that is shown."""
-        return box_of(self.inside())
 
     def within(self, box: Box, in_place: bool = False) -> PictureMap:
         """The part in a box (left, top, width, height) of the canvas; NaN where that reaches over its edges.

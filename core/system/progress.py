@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from .errors import Cancelled
 
+# Called with a stage's name and how much of it is done.
+ReportProgress = Callable[[str, float], None]
 # Shares of the total time of each stage, in the order of the data; measured on 3 MP pairs, good enough for a bar.
 STAGES: dict[str, float] = {
     "read": 0.05,

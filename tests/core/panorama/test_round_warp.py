@@ -24,6 +24,7 @@ from edf_stitch.core.panorama.projection import Projection, round_projection
 from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp, build_map, build_warp
 from edf_stitch.core.pictures.picture import picture_from_array
+from edf_stitch.core.raster.arrays import box_of
 from edf_stitch.core.raster.lazy import whole
 from edf_stitch.core.system.errors import BadRequest
 
@@ -140,7 +141,7 @@ def test_the_canvas_holds_both_pictures_whole_and_no_more(by_hand: SimpleNamespa
         assert cv2.dilate(found, np.ones((7, 7), np.uint8)).all()
     seen = own | theirs
     assert seen[0].any() and seen[-1].any() and seen[:, 0].any() and seen[:, -1].any() and not warp.canvas.cropped
-    left, top, width, height = warp.maps[0].box()
+    left, top, width, height = box_of(warp.maps[0].inside())
     assert own[top : top + height, left : left + width].sum() == own.sum()
     assert own[top].any() and own[:, left].any() and own[top + height - 1].any() and own[:, left + width - 1].any()
 
