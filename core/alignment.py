@@ -263,7 +263,7 @@ def size_of(picture: Picture) -> tuple[int, int]:
 
 def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> Projection | None:
     """The round projection that is asked for, levelled; None for a flat panorama."""
-    if options.projection == "perspective":
+    if options.projection == "reference":
         return None
     known = [view.R for view in views if np.isfinite(view.R).all()]
     upright = None

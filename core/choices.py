@@ -11,19 +11,24 @@ RIVALS = ("rew", "apap", "homography")
 FIELDS = ("slack", "strict", "paper", *RIVALS)
 # Fields that are defined on every ray, not only in the reference's image plane: a cylinder or sphere needs one.
 ROUND_FIELDS = ("slack", "strict")
-# What a field fades to outside the overlap: a plane of the scene that goes on there, or infinite distance.
-FADES = ("plane", "infinity")
-# The surface that the panorama lies on: the reference's image plane, a cylinder, or a sphere.
-PROJECTIONS = ("perspective", "cylindrical", "equirectangular")
-# How a cylindrical or equirectangular panorama is turned: one of LEVELS, or yaw, pitch, roll in degrees.
+# What d becomes outside the overlap: what lies at its rim goes on as the picture does, or it fades to one plane of the
+# scene, or to infinite distance.
+FADES = ("continue", "plane", "infinity")
+# The surface that the panorama lies on: chosen by its field of view, the reference's own image plane, a centred plane,
+# Pannini's (with `pannini:D` of a given distance), a cylinder, or a sphere.
+PROJECTIONS = ("auto", "reference", "perspective", "pannini", "cylindrical", "equirectangular")
+# How far the viewpoint slides from the reference's place to the target's: chosen, or a share from 0 to 1.
+Slide = str | float
+# How a panorama that is not on the reference's plane is turned: one of LEVELS, or yaw, pitch, roll in degrees.
 LEVELS = ("auto", "none")
 Level = str | tuple[float, float, float]
-# What of the panorama is kept: one of CROPS, or a box (left, top, width, height) in px.
-CROPS = ("full", "inscribed", "reference")
+# What of the panorama is kept: the inscribed rectangle where that holds most of it, else all, or what a name says; or a box (left, top, width, height) in px.
+CROPS = ("auto", "full", "inscribed", "reference")
 Crop = str | tuple[int, int, int, int]
 # Band by band across the seam; by weights that fade towards the pictures' borders or the seam; or a plain average.
 BLENDS = ("multiband", "feather", "linear")
 # Where the pictures look most alike, or midway between their borders.
 SEAMS = ("graphcut", "none")
-# What becomes of pixels that neither camera saw, because something near hid them: left out, or filled smoothly.
-HOLES = ("transparent", "inpaint")
+# What becomes of pixels that no camera saw: small closed holes are filled and larger ones left out, all are left out, or
+# all that something near hid are filled smoothly.
+HOLES = ("auto", "transparent", "inpaint")

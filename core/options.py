@@ -11,7 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cameras.sources import CameraRequest
-from .choices import BLENDS, CROPS, FADES, FIELDS, HOLES, LEVELS, PROJECTIONS, ROUND_FIELDS, SEAMS, Crop, Level
+from .choices import (
+    BLENDS,
+    CROPS,
+    FADES,
+    FIELDS,
+    HOLES,
+    LEVELS,
+    PROJECTIONS,
+    ROUND_FIELDS,
+    SEAMS,
+    Crop,
+    Level,
+    Slide,
+)
 from .system.errors import BadRequest
 
 # Below a fiftieth of its side a photograph has too few pixels for features.
@@ -36,11 +49,19 @@ class StitchOptions:
     ignore : tuple of (Path, ndarray or None), default empty
         For each picture, the reference first, a mask of what is kept out of everything, white = ignored. None, and what
         is not named: nothing.
-    projection : str, default "perspective"
-        The surface that the panorama lies on, one of PROJECTIONS.
+    slide : float or "auto", default 0
+        How far the viewpoint slides from the reference's place to the target's across the overlap: 0 stays, 1 goes all
+        the way, "auto" chooses (docs/method.md).
+    projection : str, default "reference"
+        The surface that the panorama lies on, one of PROJECTIONS, or "pannini:D" with a distance D from 0 to 1.
+        "reference" keeps every pixel of the reference: it implies no slide and the full canvas.
     level : str or (yaw, pitch, roll), default "auto"
         How a cylindrical or equirectangular panorama is turned: one of LEVELS, or the reference camera's angles in
         degrees (see `levelling`).
+    centre : (yaw, pitch), optional
+        Degrees from the middle of the frame that would be chosen: moves the frame, turns nothing.
+    fov : float, optional
+        Horizontal field of view of the frame, degrees; all that is shown by default.
     scale : float, default 1
         Factor by which all pictures are resized first, from LEAST_SCALE to 1.
     crop : str or (left, top, width, height), default "full"
@@ -74,8 +95,11 @@ class StitchOptions:
     camera: CameraRequest = CameraRequest()
     matches: Path | NDArray[Any] | None = None
     ignore: tuple[Path | NDArray[Any] | None, ...] = ()
-    projection: str = "perspective"
+    slide: Slide = 0.0
+    projection: str = "reference"
     level: Level = "auto"
+    centre: tuple[float, float] | None = None
+    fov: float | None = None
     scale: float = 1.0
     crop: Crop = "full"
     dense: bool = True
@@ -129,7 +153,7 @@ class StitchOptions:
             )
 
     def _check_level(self) -> None:
-        flat = self.projection == "perspective"
+        flat = self.projection == "reference"
         if not flat and self.field not in ROUND_FIELDS:
             raise BadRequest(
                 f"the field {self.field!r} knows the reference's plane only: for a {self.projection} panorama choose "
@@ -143,6 +167,6 @@ class StitchOptions:
             raise BadRequest(f"the level {self.level} is not yaw, pitch, roll in degrees")
         elif flat:
             raise BadRequest(
-                "a perspective panorama keeps the reference's plane and is not turned: leave the level out, or choose "
+                "the projection reference keeps the reference's plane and is not turned: leave the level out, or choose "
                 "the projection cylindrical or equirectangular"
             )

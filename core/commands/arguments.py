@@ -92,8 +92,8 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
         help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
     )  # fmt: skip
     how.add_argument(
-        "--projection", default="perspective", type=_choice(PROJECTIONS), metavar="PROJECTION",
-        help="perspective (default: REF keeps every pixel), cylindrical, or equirectangular (the whole sphere)",
+        "--projection", default="reference", type=_choice(PROJECTIONS), metavar="PROJECTION",
+        help="reference (default: the plane of REF, which keeps every pixel), cylindrical, or equirectangular (the whole sphere)",
     )  # fmt: skip
     how.add_argument(
         "--level", default="auto", metavar="LEVEL",

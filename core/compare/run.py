@@ -79,7 +79,7 @@ def check_options(options: StitchOptions, pairs: Sequence[PairFiles]) -> None:
     """Raises BadRequest for options with which figures could not be compared."""
     if options.crop != "full":
         raise BadRequest("a comparison looks at whole panoramas: leave --crop out")
-    if getattr(options, "projection", "perspective") != "perspective":
+    if getattr(options, "projection", "reference") != "reference":
         raise BadRequest("a comparison looks at flat panoramas, where all fields exist: leave --projection out")
     if len(pairs) > 1:
         for name, value in (

@@ -13,7 +13,7 @@ class CanvasOptions:
     """How large a canvas gets (`canvas`)."""
 
     max_stretch: float = 4.0
-    """Canvas px per px of a picture, in length: beyond, a perspective panorama shows blur and is cut off."""
+    """Canvas px per px of a picture, in length: beyond, the reference's plane shows blur and is cut off."""
 
     max_reach: float = 3.0
     """Longer sides of the largest picture by which a flat canvas goes beyond the reference at most: near the horizon of

@@ -212,7 +212,7 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)
     if values.far is None:
         raise BadRequest(
-            f"the field {field.name!r} knows the reference's plane only: use slack or strict, or a perspective panorama"
+            f"the field {field.name!r} knows the reference's plane only: use slack or strict, or --projection reference"
         )
     places, ahead = canvas.on_reference(grid.xs, grid.ys, camera)
     beside_plane = flat.at(values.inverse_depth - homogeneous(ideal) @ values.far, places)

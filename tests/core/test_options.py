@@ -18,7 +18,7 @@ def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore": (),
-        "projection": "perspective", "level": "auto", "scale": 1.0, "crop": "full",
+        "projection": "reference", "level": "auto", "scale": 1.0, "crop": "full",
         "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "holes": "transparent",
         "seed": 0,
         "measure": True, "cache": None,

@@ -54,7 +54,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
 
 
 @pytest.mark.parametrize(("words", "expected"), [
-    (["--field", "strict", "--fade", "plane", "--projection", "perspective", "--seam", "none"],
+    (["--field", "strict", "--fade", "plane", "--projection", "reference", "--seam", "none"],
      {"field": "strict", "seam": "none"}),
     (["--field", "paper", "--fade", "infinity"], {"field": "paper", "fade": "infinity"}),
     (["--matches", "m.csv", "--ignore-ref", "a.png", "--ignore-target", "b.png"],
@@ -67,7 +67,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--holes", "inpaint"], {"holes": "inpaint"}), (["--holes", "transparent"], {}),
     (["--mask", "m.png"], {"mask": Path("m.png")}),
     (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {"blend": "feather"}),
-    (["--projection", "perspective"], {}), (["--projection", "cylindrical"], {"projection": "cylindrical"}),
+    (["--projection", "reference"], {}), (["--projection", "cylindrical"], {"projection": "cylindrical"}),
     (["--projection", "equirectangular", "--level=-5,2.5,0"],
      {"projection": "equirectangular", "level": (-5.0, 2.5, 0.0)}),
     (["--level", "auto"], {}), (["--level", "none"], {"level": "none"}),

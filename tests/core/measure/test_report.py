@@ -117,7 +117,7 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
         assert (entry["name"], entry["bits"], entry["alpha"], entry["icc"]) == ("array", 8, False, False)
         assert entry["camera"]["fixed"] and entry["camera"]["focal_px"] == view.K[0, 0]
     assert report["options"] == {
-        "field": "slack", "fade": "plane", "dense": True, "projection": "perspective", "level": "auto", "scale": 1.0,
+        "field": "slack", "fade": "plane", "dense": True, "projection": "reference", "level": "auto", "scale": 1.0,
         "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": True,
         "holes": "transparent", "seed": 0}
     assert report["composition"]["exposure_blocks"] > 100
