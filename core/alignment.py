@@ -6,7 +6,7 @@ their matches are pooled, so that the panorama does not wobble from frame to fra
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,8 @@ from .field.slack import SlackField
 from .field.strict import StrictField
 from .fields import fit_field
 from .options import StitchOptions
-from .panorama.levelling import rotation_for
-from .panorama.projection import Projection, round_projection
+from .panorama.framing import FrameRequest, frame_for
+from .panorama.projection import Projection
 from .panorama.upright_edges import edges
 from .panorama.warp import Warp, build_warp
 from .pictures.masks import read_mask, read_painted, without
@@ -239,7 +239,11 @@ def fit_and_warp(
     # the field's own geometry: a rival knows no depth, so its views have none
     views = views_of(field.two_view, cameras)
     refined = None if dense is None else dense.refined
-    warp = build_warp(field, views, _projection(options, views, frames[0]), refined)
+
+    def warp_on(projection: Projection | None) -> Warp:
+        return build_warp(field, views, projection, refined)
+
+    warp = warp_on(_projection(options, views, frames[0], warp_on))
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense)
 
@@ -261,11 +265,12 @@ def size_of(picture: Picture) -> tuple[int, int]:
     return width, height
 
 
-def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> Projection | None:
-    """The round projection that is asked for, levelled; None for a flat panorama."""
+def _projection(
+    options: StitchOptions, views: Sequence[View], frame: Frame, warp_on: Callable[[Projection], Warp]
+) -> Projection | None:
+    """The projection that is asked for, framed by what a coarse warp shows; None for the reference's own plane."""
     if options.projection == "reference":
         return None
-    known = [view.R for view in views if np.isfinite(view.R).all()]
     upright = None
     if options.level == "auto":
         found = [
@@ -276,7 +281,8 @@ def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> 
         ]
         normals, lengths = zip(*found, strict=True)
         upright = np.vstack(normals), np.concatenate(lengths)
-    return round_projection(options.projection, views[0].K, rotation_for(options.level, known, upright))
+    kind, distance = options.surface
+    return frame_for(FrameRequest(kind, distance, options.level, options.centre, options.fov), views, upright, warp_on)
 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:
