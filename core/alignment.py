@@ -28,7 +28,7 @@ from .fields import fit_field
 from .options import StitchOptions
 from .panorama.levelling import rotation_for
 from .panorama.projection import Projection, round_projection
-from .panorama.upright_edges import edges
+from .panorama.upright_edges import straight_edges
 from .panorama.warp import Warp, build_warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
@@ -269,13 +269,11 @@ def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> 
     upright = None
     if options.level == "auto":
         found = [
-            (normals if number == 0 else normals @ view.R, lengths)
-            for number, (picture, view) in enumerate(zip(frame.pictures, views, strict=True))
+            straight_edges(picture, view.camera, view.K).in_reference(view.R)
+            for picture, view in zip(frame.pictures, views, strict=True)
             if np.isfinite(view.R).all()
-            for normals, lengths in (edges(picture, view.camera, view.K),)
         ]
-        normals, lengths = zip(*found, strict=True)
-        upright = np.vstack(normals), np.concatenate(lengths)
+        upright = np.vstack([one.normals for one in found]), np.concatenate([one.lengths for one in found])
     return round_projection(options.projection, views[0].K, rotation_for(options.level, known, upright))
 
 
