@@ -28,7 +28,7 @@ from .fields import fit_field
 from .options import StitchOptions
 from .panorama.framing import FrameRequest, frame_for
 from .panorama.projection import Projection
-from .panorama.upright_edges import edges
+from .panorama.upright_edges import straight_edges
 from .panorama.warp import Warp, build_warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
@@ -271,18 +271,17 @@ def _projection(
     """The projection that is asked for, framed by what a coarse warp shows; None for the reference's own plane."""
     if options.projection == "reference":
         return None
-    upright = None
-    if options.level == "auto":
-        found = [
-            (normals if number == 0 else normals @ view.R, lengths)
-            for number, (picture, view) in enumerate(zip(frame.pictures, views, strict=True))
-            if np.isfinite(view.R).all()
-            for normals, lengths in (edges(picture, view.camera, view.K),)
-        ]
-        normals, lengths = zip(*found, strict=True)
-        upright = np.vstack(normals), np.concatenate(lengths)
     kind, distance = options.surface
-    return frame_for(FrameRequest(kind, distance, options.level, options.centre, options.fov), views, upright, warp_on)
+    asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
+    lines = None
+    if asked.needs_edges:
+        found = [
+            straight_edges(picture, view.camera, view.K).in_reference(view.R)
+            for picture, view in zip(frame.pictures, views, strict=True)
+            if np.isfinite(view.R).all()
+        ]
+        lines = np.vstack([one.normals for one in found]), np.concatenate([one.lengths for one in found])
+    return frame_for(asked, views, lines, warp_on)
 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:

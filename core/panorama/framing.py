@@ -49,6 +49,11 @@ class FrameRequest:
     centre: tuple[float, float] | None = None
     fov: float | None = None
 
+    @property
+    def needs_edges(self) -> bool:
+        """Whether straight edges have a say in the frame: which way is down, and whether the scene is frontal."""
+        return self.level == "auto" or (self.kind in ("auto", "pannini") and self.distance is None)
+
 
 @dataclass(frozen=True, eq=False)
 class Shown:
@@ -85,7 +90,7 @@ def frame_for(
     views : sequence of View
         What is known of the pictures, the reference's first.
     edges : ((N, 3) array, (N,) array) or None
-        Normals, in the reference's frame, and lengths of straight edges (see `gravity_by_edges`).
+        Normals, in the reference's frame, and lengths of straight edges (see `gravity_by_edges`); None if not needed.
     warp_on : callable
         Gives the maps of all pictures on a projection.
 

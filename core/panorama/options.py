@@ -45,8 +45,7 @@ class WarpOptions:
     """Nodes of that grid at most, in units of those of any other grid: time and memory grow with it."""
 
     node_share: float = 0.5
-    """Distance between nodes of that grid, at least, in those between the canvas's own: a coarse map needs no fine ones.
-    """
+    """Distance between nodes of that grid at least, in those between the canvas's own: a coarse map needs fewer."""
 
 
 @dataclass(frozen=True)
