@@ -24,7 +24,7 @@ from ..raster.picture_map import PictureMap
 from ..system.progress import ReportProgress
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
 from .exposure import Exposure, match_exposure, pooled, unchanged
-from .inpaint import holes_of, inpainted
+from .inpaint import closed_holes, holes_of, inpainted
 from .min_cut import FREE, SECOND
 from .moving_things import moving_labels
 from .options import EXPOSURE
@@ -83,12 +83,15 @@ class Composition:
         One for each picture, the reference first.
     labels : (H, W) int16 array or None
         Which picture each pixel comes from: 0 the reference, −1 none; None without a seam.
+    filled : (H, W) bool array
+        What no picture shows and was filled.
     """
 
     panorama: Layer
     exposed: tuple[Layer, ...]
     decided: tuple[Decided, ...]
     labels: NDArray[np.int16] | None
+    filled: NDArray[np.bool_]
 
 
 def composed(
@@ -141,10 +144,17 @@ def composed(
         steps.append(_add(out, added, painted, report, decided[number] if decided else None, keep))
         out = steps[-1].panorama
     exposed, found = tuple(step.layer for step in steps), tuple(step.decided for step in steps)
+    filled = _filled(out, steps, options)
+    return Composition(inpainted(out, filled, warp.depth), exposed, found, _labels(layers[0], found), filled)
+
+
+def _filled(panorama: Layer, steps: Sequence[_Step], options: StitchOptions) -> NDArray[np.bool_]:
+    """What (H, W) no picture shows and is to be filled."""
+    if options.holes == "auto":
+        return closed_holes(panorama.alpha > 0, small=True)[0]
     holes = [step.holes for step in steps if step.holes.size]
-    if holes:
-        out = inpainted(out, np.logical_or.reduce(holes) & (out.alpha == 0), warp.depth)
-    return Composition(out, exposed, found, _labels(layers[0], found))
+    nothing = np.broadcast_to(np.False_, panorama.alpha.shape)
+    return np.logical_or.reduce(holes) & (panorama.alpha == 0) if holes else nothing
 
 
 @dataclass(frozen=True)

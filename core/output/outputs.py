@@ -194,7 +194,7 @@ def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
         _add_layer(files, folder, layer_stem(number, picture.name), layer.within(place), result)
     masks = {_occluded(number): _mask_bytes(cut(mask, place)) for number, mask in enumerate(result.occluded) if number}
     masks[CONFIDENCE] = _mask_bytes(cut(result.confidence, place))
-    if result.report["options"]["holes"] == "inpaint":
+    if result.report["options"]["holes"] != "transparent":
         masks[INPAINTED] = _mask_bytes(cut(result.inpainted, place))
     if result.labels is not None:
         labels = cut(result.labels, place, -1)
@@ -278,6 +278,7 @@ def warp_bytes(result: StitchResult) -> bytes:
     if projection is not None:
         arrays |= {
             "offset": np.full(2, np.nan), "projection": np.array(projection.kind), "focal": np.array(projection.focal),
+            "distance": np.array(projection.distance),
             "centre": np.array(projection.centre) + canvas.offset, "rotation": projection.rotation,
         }  # fmt: skip
     return npz_bytes(arrays)

@@ -111,7 +111,7 @@ def build_warp(
     OutputTooLarge
         The canvas would have too many pixels.
     BadRequest
-        The panorama is round, and the field knows the reference's plane only.
+        The panorama has a projection, and the field knows the reference's plane only; or its window shows nothing.
     """
     camera, further = views[0].camera, views[1:]
     planes = [_plane_map(field, view) for view in further]
@@ -247,7 +247,11 @@ def _trimmed(warp: Warp) -> Warp:
     shown = np.zeros((warp.canvas.height, warp.canvas.width), bool)
     for one in warp.maps[1:]:
         shown |= one.inside()
-    if not shown.any():
+    projection = warp.canvas.projection
+    framed = projection is not None and projection.window is not None
+    if not shown.any() and not framed:
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
     shown |= warp.maps[0].inside()
+    if not shown.any():
+        raise BadRequest("the frame lies beside both pictures: give a centre nearer to 0,0, or a larger field of view")
     return warp.within(box_of(shown), in_place=True)
