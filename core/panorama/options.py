@@ -229,6 +229,37 @@ class ChoiceOptions:
     """The same as a share of its parallax, in addition: surfaces that are seen at a slant."""
 
 
+@dataclass(frozen=True)
+class SlideOptions:
+    """How the viewpoint slides (`viewpoint`)."""
+
+    percentiles: tuple[float, float] = (1.5, 98.5)
+    """Per cent of the overlap, along the line between the pictures' centres, between which it slides: its corners do
+    not count."""
+
+    margin: float = 0.04
+    """Share of that range by which the slide ends sooner on either side: what lies there is seen best."""
+
+    straightened: float = 2.0
+    """How many times as far apart in heading as in elevation (or the reverse) the centres are for the slide to go by
+    that alone: then uprights stay upright."""
+
+    least_apart: float = 0.02
+    """Radians between the pictures' centres: of closer ones, neither has a side."""
+
+    least_alone: float = 0.03
+    """Share of each picture that it alone shows: with less the other one surrounds it."""
+
+    nodes: int = 400
+    """Nodes along the longer side of the base at which the overlap is looked at."""
+
+    rounds: int = 6
+    """Steps of false position for s: below a thousandth where the parallax is no more than the width of the slide."""
+
+    least_range: float = 1e-9
+    """Range, in that of the reference, of a point that the viewpoint slides through."""
+
+
 CANVAS = CanvasOptions()
 WARP = WarpOptions()
 LAYER = LayerOptions()
@@ -238,3 +269,4 @@ EDGES = EdgeOptions()
 STRAIGHTNESS = StraightnessOptions()
 OWN_DEPTH = OwnDepthOptions()
 CHOICE = ChoiceOptions()
+SLIDE = SlideOptions()
