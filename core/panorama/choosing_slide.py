@@ -26,7 +26,6 @@ from .upright_edges import StraightEdges
 from .viewpoint import Viewpoint, viewpoint_between
 from .warp import Warp
 
-
 # The upper left corner of each cell of a grid (rows, columns, …), that to its right, and that below it.
 CORNERS = np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, :-1]
 
@@ -159,20 +158,37 @@ def _shown(depth: OwnDepth, edges: StraightEdges, down: Array | None) -> _Shown:
     view = depth.view
     long = edges.lengths >= CHOICE.least_length
     edges = StraightEdges(edges.rays[long], edges.lengths[long])
+    rays = along(edges)
+    places = depth.things(rays)
     upright = np.zeros(len(edges.lengths), bool)
     if down is not None:
-        upright = leans(edges.normals, down) < CHOICE.upright_within
+        upright = (leans(edges.normals, down) < CHOICE.upright_within) & ~_level(rays, places.d, down)
     step = max(view.size) / CHOICE.cells
     columns, rows = (np.arange(0, side, step) for side in view.size)
     ideal = undistort(np.stack(np.meshgrid(columns, rows), axis=-1), view.camera)
-    rays = homogeneous(ideal) @ (inverse_intrinsics(view.K).T @ view.R)
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    rough, smooth = depth.things(rays), depth.smoothed(CHOICE.smoothing).things(rays)
+    grid = homogeneous(ideal) @ (inverse_intrinsics(view.K).T @ view.R)
+    grid /= np.linalg.norm(grid, axis=-1, keepdims=True)
+    rough, smooth = depth.things(grid), depth.smoothed(CHOICE.smoothing).things(grid)
     parallax = CHOICE.px_per_radian * np.stack([rough.d[part] for part in CORNERS])
     nearest, farthest = parallax.max(axis=0), parallax.min(axis=0)
     surface = nearest - farthest < CHOICE.least_jump_px + CHOICE.jump_share * nearest
-    areas = np.where(surface, _areas(rays), np.nan)
-    return _Shown(depth.things(along(edges)), edges.lengths, upright, smooth, areas)
+    areas = np.where(surface, _areas(grid), np.nan)
+    return _Shown(places, edges.lengths, upright, smooth, areas)
+
+
+def _level(rays: Array, d: Array, down: Array) -> NDArray[np.bool_]:
+    """Which edges (N,) lie on a floor or ceiling rather than upright, by unit rays (N, points, 3) from the camera and
+    inverse range (N, points): those that run straight away from it lie in a plane with gravity, too.
+
+    Along a level edge the height below the camera stays the same, along an upright one the distance.
+    """
+    sine = rays @ down
+    height, distance = (np.log(np.maximum(v, 1e-6)) for v in (np.abs(sine), np.sqrt(1 - np.square(sine))))
+    inverse_range = np.log(np.maximum(d, 1e-6))
+    spread = [np.abs(np.diff(inverse_range - part, axis=1).sum(axis=1)) for part in (height, distance)]
+    crosses = sine.min(axis=1) * sine.max(axis=1) < 0
+    level: NDArray[np.bool_] = ~crosses & (spread[0] < spread[1])
+    return level
 
 
 def _geometry(
@@ -191,13 +207,13 @@ def _geometry(
     ratio = np.concatenate(ratios)
     with np.errstate(invalid="ignore"):
         enlarged, folded = ratio > CHOICE.max_enlarged**2, ratio < CHOICE.least_area
-    return _mean(bends, weights), _mean(lean, upright_weights), float(enlarged.mean()), float(folded.mean())
+    return _mean(bends, weights), _mean(lean, upright_weights, CHOICE.least_upright), float(enlarged.mean()), float(folded.mean())
 
 
-def _mean(values: Sequence[Array], weights: Sequence[Array]) -> float:
-    """The weighted mean of all values, 0 where there are none."""
+def _mean(values: Sequence[Array], weights: Sequence[Array], least: float = 1e-9) -> float:
+    """The weighted mean of all values, towards 0 where all weights together are less than `least`."""
     total = float(sum(one.sum() for one in weights))
-    return float(sum(one @ weight for one, weight in zip(values, weights, strict=True))) / total if total else 0.0
+    return float(sum(one @ weight for one, weight in zip(values, weights, strict=True))) / max(total, least)
 
 
 def _areas(rays: Array) -> Array:

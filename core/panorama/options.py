@@ -177,6 +177,10 @@ class ChoiceOptions:
     upright_within: float = 0.012
     """Radians off gravity within which an edge is upright, as its own picture shows it."""
 
+    least_upright: float = 0.5
+    """Length of all upright edges together, in longer sides, below which their lean counts for less: two or three may
+    be something else."""
+
     max_lean_deg: float = 8.0
     """Degrees of lean that an edge counts at most."""
 

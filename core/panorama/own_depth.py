@@ -115,5 +115,7 @@ def _nearest(base: Warp, number: int, d: Array, size: tuple[int, int]) -> NDArra
 
 def _looked_up(image: NDArray[np.float32], places: Array) -> Array:
     """Values (…) of an image (h, w) at pixels (…, 2), beyond its border those of the border."""
+    if not places.size:
+        return np.zeros(places.shape[:-1])
     x, y = (np.ascontiguousarray(places[..., k], np.float32) for k in (0, 1))
     return cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
