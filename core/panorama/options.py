@@ -264,6 +264,44 @@ class SlideOptions:
     """Range, in that of the reference, of a point that the viewpoint slides through."""
 
 
+@dataclass(frozen=True)
+class CarryOptions:
+    """Inverse depth carried to the sliding viewpoint (`carried_depth`, `slid_warp`)."""
+
+    jump_px: float = 2.5
+    """px of parallax between neighbours, with `jump_share` of the nearer one's, from which they lie on two surfaces."""
+
+    jump_share: float = 0.06
+    """See `jump_px`: what is near has steeper slopes."""
+
+    sharpenings: int = 2
+    """Rounds in which pixels between two surfaces are given to the nearer in depth; a jump is 2 to 4 px wide."""
+
+    speck_px: int = 3
+    """px, side of the median that takes single points out of the surface that they fall on."""
+
+    rounds: int = 2
+    """px by which gaps are filled from their far side at each size."""
+
+    halvings: int = 6
+    """Times that the canvas is halved for gaps that are still there: up to 2 · 2⁶ px wide."""
+
+    refinements: int = 2
+    """Times that a pixel's depth is looked up where its point lies: it settles at once on smooth surfaces."""
+
+    same_share: float = 0.06
+    """Share of d, with `same_px` px of parallax, by which a surface may differ from what was carried over."""
+
+    same_px: float = 0.5
+    """See `same_share`."""
+
+    least_shift_px: float = 1e-3
+    """px beside the epipolar line below which a map counts as on it: this is rounding."""
+
+    reach_nodes: int = 200
+    """Nodes along the longer side of the base at which the pictures' bounds are looked for."""
+
+
 CANVAS = CanvasOptions()
 WARP = WarpOptions()
 LAYER = LayerOptions()
@@ -274,3 +312,4 @@ STRAIGHTNESS = StraightnessOptions()
 OWN_DEPTH = OwnDepthOptions()
 CHOICE = ChoiceOptions()
 SLIDE = SlideOptions()
+CARRY = CarryOptions()

@@ -58,7 +58,8 @@ class Viewpoint:
 
     def place(self, rays: NDArray[Any]) -> NDArray[Any]:
         """C (…, 3), in baselines, from where rays (…, 3) are seen."""
-        return self.slide_at(rays)[..., None] * self.c.astype(rays.dtype)
+        places: NDArray[Any] = self.slide_at(rays)[..., None] * self.c.astype(rays.dtype)
+        return places
 
     def way_of(self, x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> NDArray[Any]:
         """How far along (…), radians, rays of any length in the viewpoint's own axes point."""
@@ -137,7 +138,8 @@ class Viewpoint:
         kind = parts[0][0].dtype.type
 
         def off_at(slide: NDArray[Any]) -> NDArray[Any]:
-            return self.slide_of(*(q - slide * step for q, step in parts)) - slide
+            off: NDArray[Any] = self.slide_of(*(q - slide * step for q, step in parts)) - slide
+            return off
 
         low, high = np.zeros_like(parts[0][0]), np.full_like(parts[0][0], self.s1)
         off_low, off_high = off_at(low), off_at(high)
