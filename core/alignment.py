@@ -20,13 +20,15 @@ from .cameras.lens import undistort
 from .cameras.matches import Matches
 from .cameras.sources import cameras_for, role
 from .cameras.view import View, views_of
+from .continuation.continuation import Continuation, continue_beyond
 from .dense.refine import Dense, refine
 from .field.field import Field
+from .field.refined_depth import RefinedDepth
 from .field.slack import SlackField
 from .field.strict import StrictField
 from .fields import fit_field
 from .options import StitchOptions
-from .panorama.levelling import rotation_for
+from .panorama.levelling import confirmed, gravity_by_edges, rotation_for
 from .panorama.projection import Projection, round_projection
 from .panorama.upright_edges import straight_edges
 from .panorama.warp import Warp, build_warp
@@ -62,6 +64,8 @@ class Alignment:
         In plain words.
     dense : Dense or None
         Dense refinement of the field; None where it was not asked for.
+    continuation : Continuation or None
+        What goes on beyond the overlap; None where the field itself does.
     """
 
     cameras: tuple[Camera, ...]
@@ -71,6 +75,7 @@ class Alignment:
     warp: Warp
     warnings: tuple[str, ...]
     dense: Dense | None = None
+    continuation: Continuation | None = None
 
 
 @dataclass(frozen=True)
@@ -239,9 +244,29 @@ def fit_and_warp(
     # the field's own geometry: a rival knows no depth, so its views have none
     views = views_of(field.two_view, cameras)
     refined = None if dense is None else dense.refined
-    warp = build_warp(field, views, _projection(options, views, frames[0]), refined)
+    continuation = _continued(field, views, refined, frames) if options.fade == "continue" else None
+    warp = build_warp(field, views, _projection(options, views, frames[0]), refined, continuation)
     edges = (replace(edge, two_view=field.two_view),)
-    return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense)
+    return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense, continuation)
+
+
+def _continued(
+    field: Field, views: tuple[View, ...], refined: RefinedDepth | None, frames: Sequence[Frame]
+) -> Continuation | None:
+    """What goes on beyond the overlap; None where the field has no depth, and for clips: what moves in a frame must
+    not make the rest swim."""
+    if len(frames) > 1 or not isinstance(field, (StrictField, SlackField)) or not np.isfinite(views[1].R).all():
+        return None
+    found = [
+        straight_edges(picture, view.camera, view.K)
+        for picture, view in zip(frames[0].pictures, views, strict=True)
+    ]
+    turned = [edges.in_reference(view.R) for edges, view in zip(found, views, strict=True)]
+    normals, lengths = np.vstack([one.normals for one in turned]), np.concatenate([one.lengths for one in turned])
+    down = gravity_by_edges([view.R for view in views], normals, lengths)
+    return continue_beyond(
+        field, views, refined, frames[0].pictures[1].view, found[1].rays, down, confirmed(down, normals, lengths)
+    )
 
 
 def _refined(

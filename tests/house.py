@@ -16,7 +16,7 @@ ADDON = ROOT / "edf_addon"
 
 # Which rooms each may import, itself left out. Rooms stand in the order of the data.
 BELOW_POSE = ("system", "raster", "pictures", "cameras")
-BELOW_MEASURE = (*BELOW_POSE, "pose", "field", "dense", "panorama", "compose")
+BELOW_MEASURE = (*BELOW_POSE, "pose", "field", "dense", "continuation", "panorama", "compose")
 TOP = ("choices", "options", "fields", "alignment", "pipeline")
 MAY_IMPORT = {
     "system": (),
@@ -27,6 +27,7 @@ MAY_IMPORT = {
     "field": ("system", "raster", "cameras"),
     "rivals": ("system", "raster", "cameras", "pose", "field"),
     "dense": (*BELOW_POSE, "field"),
+    "continuation": ("system", "raster", "cameras", "field"),
     "panorama": (*BELOW_POSE, "field", "choices"),
     "compose": (*BELOW_POSE, "field", "panorama", "choices", "options"),
     "measure": BELOW_MEASURE,
