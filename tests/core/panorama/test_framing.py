@@ -15,7 +15,6 @@ from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.framing import FrameRequest, frame_for
 from edf_stitch.core.panorama.levelling import angles_of, turned
 from edf_stitch.core.panorama.projection import Projection, focal_of
-from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
 from edf_stitch.core.raster.picture_map import PictureMap
 
@@ -26,7 +25,7 @@ def view_of(angles: Angles, first: Angles, size: tuple[int, int], focal: float) 
     """A camera at yaw, pitch, roll, beside a reference at others."""
     K = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1.0]])
     R = turned(*angles) @ turned(*first).T
-    camera = Camera(size, focal, tuple(K[:2, 2]), "given", 0.0)
+    camera = Camera(K, size, "given", 0.0)
     return View(camera, K, R, np.zeros(3), K @ R @ np.linalg.inv(K), np.zeros(3))
 
 
@@ -36,19 +35,19 @@ def rig(*all_angles: Angles, size: tuple[int, int] = (800, 600), focals: tuple[f
 
 
 def warps(views: list[View]) -> Callable[[Projection], Warp]:
-    """Their maps on a projection, at half of its limits or all of a sphere."""
+    """Their maps on all of a projection."""
 
     def warp_on(projection: Projection) -> Warp:
         left, top, right, bottom = projection.limits.astype(int)
         canvas = Canvas(right - left, bottom - top, (-left, -top), projection=projection)
         rays = projection.rays(np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1))
-        maps = [ReferenceMap(canvas, views[0].camera)]
+        maps = []
         for view in views:
             p = rays @ (view.K @ view.R).T
             with np.errstate(divide="ignore", invalid="ignore"):
                 x, y = (np.where(p[..., 2] > 1e-6, p[..., k] / p[..., 2], np.nan) for k in (0, 1))
             maps.append(PictureMap(x.astype(np.float32), y.astype(np.float32), view.size))
-        return Warp(canvas, tuple(maps[1:]), np.zeros((canvas.height, canvas.width), np.float32))
+        return Warp(canvas, tuple(maps), np.zeros((canvas.height, canvas.width), np.float32))
 
     return warp_on
 
@@ -89,7 +88,7 @@ def test_the_wider_it_is_the_rounder_it_gets(yaw: float, kind: str, distance: fl
 
 
 def test_what_reaches_far_up_is_drawn_on_a_sphere() -> None:
-    assert framed(rig((0, 0, 0), (0, 45, 0))).kind == "equirectangular"
+    assert framed(rig((0, 0, 0), (0, 60, 0))).kind == "equirectangular"
 
 
 @pytest.mark.parametrize(("pitch", "kept"), [(8.0, 0.0), (-11.0, 0.0), (20.0, 8.0), (-20.0, -8.0)])
@@ -99,7 +98,7 @@ def test_a_tilt_is_levelled_fully_up_to_a_point(pitch: float, kept: float) -> No
     down = turned(*(-15, pitch, 0))[:, 1]
     ahead = framed(views, down).rotation[:, 2]
     level = turned(-15, pitch, 0).T  # from the reference's frame to the world's
-    assert abs(np.degrees(np.arcsin(-(level @ ahead)[1])) - kept) < 1.0
+    assert abs(np.degrees(np.arcsin(-(level @ ahead)[1])) - kept) < 1.5
 
 
 def test_edges_that_would_leave_no_room_are_not_believed() -> None:
@@ -122,8 +121,8 @@ def test_nobody_tilts_a_camera_so_far_by_mistake(angles: Angles) -> None:
 
 def test_the_sharper_picture_keeps_its_pixels_and_nothing_is_enlarged_by_much() -> None:
     """The second picture has half the pixels a radian, so it is shown enlarged, and says nothing."""
-    for focals in ((700.0, 700.0), (350.0, 700.0), (700.0, 350.0)):
-        views = rig((0, 0, 0), (25, 0, 0), focals=focals)
+    for focals in ((175.0, 175.0), (90.0, 175.0), (175.0, 90.0)):
+        views = rig((0, 0, 0), (25, 0, 0), size=(200, 150), focals=focals)
         projection = framed(views, kind="pannini", distance=0.5)
         warp = warps(views)(projection)
         areas = []
