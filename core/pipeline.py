@@ -167,8 +167,8 @@ class StitchResult:
         asked = self.report["options"]
         if asked["holes"] != "inpaint" or asked["blend"] == "linear":
             return filled
-        shown = self.layers[0].alpha > 0
-        for layer, hidden in zip(self.layers[1:], self.occluded[1:], strict=True):
+        shown = np.zeros(filled.shape, bool)
+        for layer, hidden in zip(self.layers, self.occluded, strict=True):
             filled |= hidden & (layer.alpha > 0)
             shown = shown | (~hidden & (layer.alpha > 0))
         return filled & ~shown
