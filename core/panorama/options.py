@@ -317,6 +317,12 @@ class CarryOptions:
     same_px: float = 0.5
     """See `same_share`."""
 
+    behind_share: float = 0.1
+    """Share of its inverse depth, with `behind_px` px of parallax, by which a surface hides what lies behind it."""
+
+    behind_px: float = 2.0
+    """See `behind_share`."""
+
     least_shift_px: float = 1e-3
     """px beside the epipolar line below which a map counts as on it: this is rounding."""
 
