@@ -191,11 +191,9 @@ def _level(rays: Array, d: Array, down: Array) -> NDArray[np.bool_]:
     return level
 
 
-def _geometry(
-    shown: Sequence[_Shown], viewpoint: Viewpoint, down: Array | None
-) -> tuple[float, float, float, float]:
+def _geometry(shown: Sequence[_Shown], viewpoint: Viewpoint, down: Array | None) -> tuple[float, float, float, float]:
     """Bend (px) and lean (degrees) of the edges of all pictures, and shares of their cells enlarged and folded."""
-    bends, weights, lean, upright_weights, ratios = ([] for _ in range(5))
+    bends, weights, lean, upright_weights, enlarged, folded = ([] for _ in range(6))
     for one in shown:
         normals, off = planes_through(viewpoint.seen_from(one.edges.q, one.edges.d)[0])
         bends.append(np.minimum(CHOICE.px_per_radian * off, CHOICE.max_bend_px))
@@ -203,11 +201,28 @@ def _geometry(
         if down is not None:
             lean.append(np.minimum(np.degrees(leans(normals[one.upright], down)), CHOICE.max_lean_deg))
             upright_weights.append(one.lengths[one.upright])
-        ratios.append((_areas(viewpoint.seen_from(one.grid.q, one.grid.d)[0]) / one.areas).ravel())
-    ratio = np.concatenate(ratios)
-    with np.errstate(invalid="ignore"):
-        enlarged, folded = ratio > CHOICE.max_enlarged**2, ratio < CHOICE.least_area
-    return _mean(bends, weights), _mean(lean, upright_weights, CHOICE.least_upright), float(enlarged.mean()), float(folded.mean())
+        rays, d = viewpoint.seen_from(one.grid.q, one.grid.d)
+        with np.errstate(invalid="ignore"):
+            ratio = _areas(rays) / one.areas
+            enlarged.append((ratio > CHOICE.max_enlarged**2).ravel())
+            turns = np.isfinite(one.areas) & (_turning(viewpoint, rays, d)[CORNERS[0]] < CHOICE.least_area)
+            folded.append((turns | (ratio < CHOICE.least_area)).ravel())
+    shares = [float(np.concatenate(one).mean()) for one in (enlarged, folded)]
+    return _mean(bends, weights), _mean(lean, upright_weights, CHOICE.least_upright), shares[0], shares[1]
+
+
+def _turning(viewpoint: Viewpoint, rays: Array, d: Array) -> Array:
+    """Solid angle (…), as the reference's place has it, per solid angle around unit rays (…, 3) of the sliding
+    viewpoint, on surfaces of inverse range d (…): below 0 where the slide goes back faster than things move on."""
+    across = np.stack([rays[..., 2], np.zeros_like(d), -rays[..., 0]], axis=-1)
+    across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
+    up = np.cross(rays, across)
+    here, right, above = (
+        ray + d[..., None] * viewpoint.place(ray)
+        for ray in (rays, rays + CHOICE.small_angle * across, rays + CHOICE.small_angle * up)
+    )
+    turning: Array = (np.cross(right - here, above - here) * here).sum(axis=-1) / CHOICE.small_angle**2
+    return turning / np.linalg.norm(here, axis=-1) ** 3
 
 
 def _mean(values: Sequence[Array], weights: Sequence[Array], least: float = 1e-9) -> float:

@@ -199,6 +199,9 @@ class ChoiceOptions:
     per_folded: float = 15.0
     """Price of all being folded."""
 
+    small_angle: float = 1e-4
+    """Radians over which it is looked at how the slide changes from ray to ray."""
+
     max_folded: float = 0.01
     """Share of folded cells, more than without any slide, from which a slide is out of the question."""
 
