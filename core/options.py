@@ -117,6 +117,12 @@ class StitchOptions:
         return self.ignore[number] if number < len(self.ignore) else None
 
     @property
+    def surface(self) -> tuple[str, float | None]:
+        """The projection's kind, and the distance that "pannini:D" names."""
+        kind, _, distance = self.projection.partition(":")
+        return kind, float(distance) if distance else None
+
+    @property
     def has_seam(self) -> bool:
         """An average has none; bands need one, if only that which lies midway between the borders."""
         return self.blend == "multiband" or (self.blend == "feather" and self.seam != "none")
@@ -140,6 +146,8 @@ class StitchOptions:
         ):  # fmt: skip
             if value not in known:
                 raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")
+        if not (self.slide == "auto" if isinstance(self.slide, str) else 0 <= self.slide <= 1):
+            raise BadRequest(f"a slide of {self.slide}: it is a number from 0 (the reference's place) to 1, or auto")
         if not LEAST_SCALE <= self.scale <= 1.0:  # NaN too
             raise BadRequest(f"a scale of {self.scale:g}: it must lie between {LEAST_SCALE:g} and 1 (the full size)")
         if not 0 <= self.seed < 2**31:
@@ -167,6 +175,6 @@ class StitchOptions:
             raise BadRequest(f"the level {self.level} is not yaw, pitch, roll in degrees")
         elif flat:
             raise BadRequest(
-                "the projection reference keeps the reference's plane and is not turned: leave the level out, or choose "
-                "the projection cylindrical or equirectangular"
+                "the projection reference keeps the reference's plane and is not turned: leave the level out, or "
+                "choose the projection cylindrical or equirectangular"
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,6 +84,10 @@ def make_report(
             "negative_share": field.fit.negative_share,
             "slack_px": field.slack_px if isinstance(field, SlackField) else 0.0,
             "dense": _dense_entry(alignment.dense),
+        },
+        "slide": {
+            "s1": alignment.slide.s1, "costs": [asdict(one) for one in alignment.slide.costs],
+            "why": alignment.slide.why,
         },
         "canvas": {
             "width": canvas.width, "height": canvas.height,
@@ -181,7 +186,7 @@ def _projection_entry(canvas: Canvas, two_view: TwoView) -> dict[str, Any]:
     return {
         "kind": kind, "focal_px": focal, "centre": centre + np.array(canvas.offset), "rotation": rotation,
         "level": angles_of(rotation),
-    }  # fmt: skip
+    } | ({"distance": canvas.projection.distance} if canvas.projection and kind == "pannini" else {})  # fmt: skip
 
 
 def _picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:

@@ -145,19 +145,19 @@ def _from_far(values: Plane, halvings: int) -> Plane:
     missing = values < 0
     if not missing.any():
         return values
-    beyond = np.float32(np.inf)
+    beyond = np.finfo(np.float32).max  # what OpenCV takes for the border too
     out = np.where(missing, beyond, values)
     for _ in range(CARRY.rounds):
         grown = cv2.erode(out, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
         np.copyto(out, grown, where=missing)
-        missing = np.isinf(out)
+        missing = out == beyond
         if not missing.any():
             return out
     if halvings:
         height, width = (side + side % 2 for side in out.shape)
         padded = np.pad(out, ((0, height - out.shape[0]), (0, width - out.shape[1])), constant_values=beyond)
         coarse = padded.reshape(height // 2, 2, width // 2, 2).min(axis=(1, 3))
-        coarse = _from_far(np.where(np.isinf(coarse), np.float32(-1), coarse), halvings - 1)
+        coarse = _from_far(np.where(coarse == beyond, np.float32(-1), coarse), halvings - 1)
         rest = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)[: out.shape[0], : out.shape[1]]
     else:
         rest = filled(np.where(missing, np.float32(0), out)[..., None], ~missing)[..., 0]

@@ -41,8 +41,15 @@ class WarpOptions:
     """Longer sides of the reference beside it within which fields end in their plane, in round panoramas: the grid that
     is laid over the reference's plane has to end somewhere."""
 
+    takeover: float = 0.05
+    """Share of the reference's longer side, beyond its border, over which what continues beyond the overlap takes over
+    from the field."""
+
     max_node_factor: float = 4.0
     """Nodes of that grid at most, in units of those of any other grid: time and memory grow with it."""
+
+    node_share: float = 0.5
+    """Distance between nodes of that grid at least, in those between the canvas's own: a coarse map needs fewer."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +62,14 @@ class LayerOptions:
 
 @dataclass(frozen=True)
 class ProjectionOptions:
-    """Round panoramas (`projection`)."""
+    """Surfaces of a panorama (`projection`)."""
 
-    max_cylinder_slope: float = 3.0
-    """tan φ at which a cylinder is cut off (72°): it grows without end towards zenith and nadir."""
+    max_slope: float = 3.0
+    """Focal lengths from the middle at which a plane, Pannini's projection and the height of a cylinder are cut off (a
+    plane at 72°): they grow without end."""
+
+    least_forward: float = 1e-9
+    """Cosines below which a ray counts as one that a plane, Pannini's projection or a cylinder cannot show."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +108,17 @@ class LevellingOptions:
     chance_factor: float = 1.0
     """Edges of any direction favour some direction by about the root of the sum of their squared lengths. Only beyond
     so many times that do edges have a say."""
+
+
+    confirming_tilts_deg: tuple[float, float] = (20.0, 1.5)
+    """Degrees off upright within which edges are asked whether down is right, and within which they say so: trunks of
+    palms lean any way, walls do not."""
+
+    confirming_share: float = 0.4
+    """Share of the length of those asked that has to say so; at random it would be a thirteenth."""
+
+    confirming_length: float = 0.5
+    """Length of the edges that say so at least, in shares of a picture's longer side."""
 
 
 @dataclass(frozen=True)
@@ -305,10 +327,80 @@ class CarryOptions:
     """Nodes along the longer side of the base at which the pictures' bounds are looked for."""
 
 
+@dataclass(frozen=True)
+class FramingOptions:
+    """What of the world the panorama shows, and how (`framing`)."""
+
+    side_px: int = 160
+    """px of the coarse map's longest picture, and of the frames that are tried on it: a rectangle is then known to
+    within a percent."""
+
+    outermost_percent: float = 0.3
+    """Percent of what is shown that may lie beyond the ends on each side: thin spikes of a map move no frame."""
+
+    max_roll_deg: float = 10.0
+    """Degrees of roll of the reference beyond which edges are not believed: nobody holds a camera so by mistake."""
+
+    max_pitch_deg: float = 35.0
+    """The same of pitch: so far up or down few edges are upright ones."""
+
+    least_kept: float = 0.85
+    """Share of the rectangle that the poses' own direction down leaves room for, which that by edges has to leave too:
+    where edges are wrong, the frame leans and the rectangle collapses."""
+
+    full_pitch_deg: float = 12.0
+    """Degrees up or down that are levelled fully. What is beyond is kept: uprights that converge a little look better
+    than a picture that is stretched at one end."""
+
+    flat_fov_deg: float = 60.0
+    """Degrees from left to right up to which a plane looks natural."""
+
+    fov_per_distance_deg: float = 60.0
+    """Degrees beyond that per unit of Pannini's distance."""
+
+    max_distance: float = 0.7
+    """Pannini's distance at most: beyond, level lines bow visibly."""
+
+    cylinder_fov_deg: float = 130.0
+    """Degrees from left to right beyond which Pannini's projection stretches its ends, and a cylinder is taken."""
+
+    sphere_elevation_deg: float = 60.0
+    """Degrees up or down beyond which all of those stretch, and a sphere is taken."""
+
+    frontal_distance: float = 0.15
+    """Pannini's distance at most for a scene that is seen frontally, whose level lines may not bow."""
+
+    frontal_length: float = 1.5
+    """Sides of a picture of level lines square to the view, weighted by the sine of their elevation, beyond which a
+    scene is frontal: façades and stadiums have 1.8 or more, others less than 1."""
+
+    frontal_turn_deg: float = 20.0
+    """Degrees to either side of ahead within which a frontal scene may face the camera."""
+
+    frontal_step_deg: float = 2.0
+    """Degrees between directions that are tried for that."""
+
+    frontal_sine: float = 0.02
+    """Sine of the angle by which such a line may be off level and off square."""
+
+    frontal_elevation_deg: float = 4.0
+    """Degrees above or below the horizon from which level lines count: on the horizon no projection bends them."""
+
+    frontal_least_length: float = 0.04
+    """Sides of a picture that such a line has at least."""
+
+    max_enlarged: float = 1.35
+    """Canvas px per px of the sharper picture, in length, that all but the most enlarged percent stay below."""
+
+    enlarged_percent: float = 99.0
+    """Percent of the canvas for which that holds."""
+
+
 CANVAS = CanvasOptions()
 WARP = WarpOptions()
 LAYER = LayerOptions()
 PROJECTION = ProjectionOptions()
+FRAMING = FramingOptions()
 LEVELLING = LevellingOptions()
 EDGES = EdgeOptions()
 STRAIGHTNESS = StraightnessOptions()
