@@ -201,28 +201,26 @@ def _geometry(shown: Sequence[_Shown], viewpoint: Viewpoint, down: Array | None)
         if down is not None:
             lean.append(np.minimum(np.degrees(leans(normals[one.upright], down)), CHOICE.max_lean_deg))
             upright_weights.append(one.lengths[one.upright])
-        rays, d = viewpoint.seen_from(one.grid.q, one.grid.d)
         with np.errstate(invalid="ignore"):
-            ratio = _areas(rays) / one.areas
+            ratio = _areas(viewpoint.seen_from(one.grid.q, one.grid.d)[0]) / one.areas
             enlarged.append((ratio > CHOICE.max_enlarged**2).ravel())
-            turns = np.isfinite(one.areas) & (_turning(viewpoint, rays, d)[CORNERS[0]] < CHOICE.least_area)
-            folded.append((turns | (ratio < CHOICE.least_area)).ravel())
+            twice = np.isfinite(one.areas) & _twice(viewpoint, one.grid)[CORNERS[0]]
+            folded.append((twice | (ratio < CHOICE.least_area)).ravel())
     shares = [float(np.concatenate(one).mean()) for one in (enlarged, folded)]
     return _mean(bends, weights), _mean(lean, upright_weights, CHOICE.least_upright), shares[0], shares[1]
 
 
-def _turning(viewpoint: Viewpoint, rays: Array, d: Array) -> Array:
-    """Solid angle (…), as the reference's place has it, per solid angle around unit rays (…, 3) of the sliding
-    viewpoint, on surfaces of inverse range d (…): below 0 where the slide goes back faster than things move on."""
-    across = np.stack([rays[..., 2], np.zeros_like(d), -rays[..., 0]], axis=-1)
-    across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
-    up = np.cross(rays, across)
-    here, right, above = (
-        ray + d[..., None] * viewpoint.place(ray)
-        for ray in (rays, rays + CHOICE.small_angle * across, rays + CHOICE.small_angle * up)
-    )
-    turning: Array = (np.cross(right - here, above - here) * here).sum(axis=-1) / CHOICE.small_angle**2
-    return turning / np.linalg.norm(here, axis=-1) ** 3
+def _twice(viewpoint: Viewpoint, things: Things) -> NDArray[np.bool_]:
+    """Which things (…) the panorama shows more than once: the slide goes back over them faster than they move on.
+
+    A thing is seen wherever the viewpoint of the ray towards it is the one that the ray starts from.
+    """
+    past = []
+    for slide in np.linspace(0, viewpoint.s1, CHOICE.fold_steps):
+        rays = things.q - (slide * things.d)[..., None] * viewpoint.c
+        past.append(viewpoint.slide_at(rays) > slide + CHOICE.same_slide)
+    twice: NDArray[np.bool_] = np.diff(np.stack(past), axis=0).sum(axis=0) > 1
+    return twice
 
 
 def _mean(values: Sequence[Array], weights: Sequence[Array], least: float = 1e-9) -> float:

@@ -221,8 +221,11 @@ class ChoiceOptions:
     per_folded: float = 15.0
     """Price of all being folded."""
 
-    small_angle: float = 1e-4
-    """Radians over which it is looked at how the slide changes from ray to ray."""
+    fold_steps: int = 17
+    """Viewpoints along the way from which it is looked whether a thing is seen more than once."""
+
+    same_slide: float = 1e-6
+    """Slides that differ by no more are the same: rounding."""
 
     max_folded: float = 0.01
     """Share of folded cells, more than without any slide, from which a slide is out of the question."""

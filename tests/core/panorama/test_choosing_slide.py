@@ -132,7 +132,7 @@ def test_what_would_be_enlarged_beyond_the_overlap_is_shown_as_it_was_taken(
 def test_a_slide_that_folds_is_out_of_the_question(by_hand: SimpleNamespace) -> None:
     # from the right the target looks far to the left: the way goes against the parallax
     base, views = rig(by_hand, lambda heading, rise: np.full_like(heading, 0.3), turn=-52.0)
-    choice = choose_slide(base, views, NONE, DOWN, better_far(1000))
+    choice = choose_slide(base, views, NONE, DOWN, better_far(25))
     assert 0 < choice.s1 < 1 and choice.costs[-1].folded > 0.02 and "fold" in choice.why
     assert next(one for one in choice.costs if one.s1 == choice.s1).folded < 0.01
 
