@@ -221,6 +221,12 @@ class ChoiceOptions:
     per_folded: float = 15.0
     """Price of all being folded."""
 
+    fold_steps: int = 17
+    """Viewpoints along the way from which it is looked whether a thing is seen more than once."""
+
+    same_slide: float = 1e-6
+    """Slides that differ by no more are the same: rounding."""
+
     max_folded: float = 0.01
     """Share of folded cells, more than without any slide, from which a slide is out of the question."""
 
