@@ -37,6 +37,12 @@ def known(image: bpy.types.Image | None) -> dict[str, Any]:
     return found
 
 
+def report_of(context: Any) -> dict[str, Any] | None:
+    """The report of the panorama that is meant (see `panorama`); None where there is none."""
+    found = result.read(panorama(context))
+    return None if found is None else found["report"]
+
+
 def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:
     """What an image is in the stitch: REFERENCE, TARGET or PANORAMA, also a mask that is painted over one of them, or
     None."""

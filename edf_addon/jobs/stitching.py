@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from .. import pair, properties
+from .. import engine_options, pair, properties
 from ..bridge import cameras, compat, images, ownership, result
 from ..bridge.images import Unusable
 
@@ -50,7 +50,7 @@ def make_job(
     editor = context.space_data if isinstance(context.space_data, bpy.types.SpaceImageEditor) else None
     user = None if editor is None else editor.image_user
     job: dict[str, Any] = {side: images.describe(image, side, folder, scene, user) for side, image in chosen.items()}
-    job["options"] = properties.options_of(settings, scale)
+    job["options"] = engine_options.options_of(settings, scale)
     wanted = [name for name in ("layers", "masks", "depth") if getattr(settings, f"take_{name}")]
     job["take"] = wanted if scale is None else []
     job["masks"] = {}

@@ -132,6 +132,20 @@ class EDF_OT_reset(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
+class EDF_OT_reference_frame(bpy.types.Operator):  # noqa: N801
+    """Keep the reference's own plane, place and every pixel of it, on a canvas that holds both pictures: for plates"""
+
+    bl_idname = idnames.Operator.REFERENCE_FRAME
+    bl_label = "Reference Frame"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: Any) -> set[str]:
+        settings = properties.settings_of(context.scene)
+        settings.projection, settings.crop = "REFERENCE", "FULL"
+        settings.slide_auto, settings.slide = False, 0.0
+        return {"FINISHED"}
+
+
 def bring_back(context: Any, image: bpy.types.Image | None) -> list[str]:
     """Settings, pictures and matches of a panorama; returns what has changed since, in words. Raises Unusable."""
     settings = properties.settings_of(context.scene)
@@ -147,7 +161,8 @@ def bring_back(context: Any, image: bpy.types.Image | None) -> list[str]:
     return ownership.changes(image) + ownership.camera_changes(image, context)
 
 
-CLASSES = (EDF_OT_stitch, EDF_OT_preview, EDF_OT_restitch, EDF_OT_restore, EDF_OT_cancel, EDF_OT_reset)
+CLASSES = (EDF_OT_stitch, EDF_OT_preview, EDF_OT_restitch, EDF_OT_restore, EDF_OT_cancel, EDF_OT_reset,
+           EDF_OT_reference_frame)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)
