@@ -2,13 +2,16 @@
 
 import dataclasses
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.options import StitchOptions
 
+bpy = pytest.importorskip("bpy")
 properties = pytest.importorskip("edf_stitch.edf_addon.properties")
-from edf_stitch.edf_addon import earlier, engine_options  # noqa: E402
+from edf_stitch.edf_addon import earlier, engine_options, status  # noqa: E402
 
 # What the panel asks for until an artist changes something.
 DEFAULTS = StitchOptions(fade="continue", slide="auto", projection="auto", crop="auto", holes="auto")
@@ -68,8 +71,6 @@ def test_every_property_has_a_tooltip(blender):
 
 
 def test_swapping_twice_changes_nothing_and_once_everything(blender):
-    import bpy
-
     settings = blender.settings
     settings.reference, settings.target = (bpy.data.images.new(name, 8, 8) for name in "ab")
     settings.focal, settings.target_focal = 24, 50
@@ -86,8 +87,6 @@ def test_swapping_twice_changes_nothing_and_once_everything(blender):
 
 
 def test_reset_keeps_the_pictures(blender):
-    import bpy
-
     settings = blender.settings
     settings.reference = bpy.data.images.new("a", 8, 8)
     settings.field, settings.crop, settings.scale, settings.focal = "PAPER", "BOX", 0.5, 50
@@ -99,8 +98,6 @@ def test_reset_keeps_the_pictures(blender):
 
 
 def test_what_goes_on_is_neither_saved_nor_undone(blender, tmp_path):
-    import bpy
-    from edf_stitch.edf_addon import status
 
     status.begin()
     assert blender.window_manager.edf_stitch_job.running
@@ -133,8 +130,6 @@ def test_the_frame_is_moved_and_sized_in_degrees_and_the_reference_keeps_its_own
     options = engine_options.options_of(settings)
     assert options["centre"] == pytest.approx([10, -4], abs=1e-5) and options["fov"] == pytest.approx(90, abs=1e-5)
     assert options["slide"] == 0.25
-    import bpy
-
     bpy.ops.edf.reference_frame()
     options = engine_options.options_of(settings)
     assert (options["projection"], options["slide"], options["crop"]) == ("reference", 0.0, "full")
@@ -171,8 +166,6 @@ def test_files_keep_the_numbers_that_earlier_releases_gave_the_choices(blender):
 
 def test_scenes_that_an_earlier_release_left_untouched_mean_its_defaults(blender):
     """Choosing pictures marks a scene as of now; a scene without pictures has nothing to keep."""
-    import bpy
-
     settings = blender.settings
     properties.bring_up_to_date()
     assert options_in_words(settings) == DEFAULTS
@@ -184,3 +177,34 @@ def test_scenes_that_an_earlier_release_left_untouched_mean_its_defaults(blender
     options = options_in_words(settings)
     assert (options.projection, options.fade, options.holes, options.slide) == ("reference", "plane", "transparent", 0)
     assert options.crop == "inscribed", "what was set stays"
+
+
+# Saved in Blender 4.3 by the release before the settings had a version: a scene for each case, named after it.
+EARLIER = Path(__file__).parent / "earlier_release.blend"
+
+
+@pytest.mark.parametrize(("scene", "expected"), [
+    ("untouched", dict(projection="reference", fade="plane", crop="full", holes="transparent", slide=0.0)),
+    ("perspective", dict(projection="reference", fade="infinity", crop="inscribed", holes="transparent", slide=0.0)),
+    ("cylindrical", dict(projection="cylindrical", fade="plane", crop=[0, 0, 1000, 1000], holes="inpaint", slide=0.0)),
+    ("equirectangular", dict(projection="equirectangular", crop="reference", holes="transparent", slide=0.0)),
+    ("without pictures", dict(projection="auto", fade="continue", crop="auto", holes="auto", slide="auto")),
+])  # fmt: skip
+def test_a_file_of_an_earlier_release_opens_as_it_was_meant(blender, scene, expected):
+    bpy.ops.wm.open_mainfile(filepath=str(EARLIER))
+    options = engine_options.options_of(bpy.data.scenes[scene].edf_stitch)
+    assert {name: options[name] for name in expected} == expected
+
+
+def test_a_file_of_this_release_opens_with_what_nobody_set_as_it_is_now(blender, tmp_path):
+    blender.settings.reference = bpy.data.images.new("a", 8, 8)
+    blender.settings.crop = "FULL"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "now.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "now.blend"))
+    assert options_in_words(bpy.context.scene.edf_stitch) == replace(DEFAULTS, crop="full")
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 3, 0), reason="this Blender tells nobody of what is appended")
+def test_an_appended_scene_of_an_earlier_release_means_the_same(blender):
+    bpy.ops.wm.append(directory=f"{EARLIER}/Scene/", filename="untouched")
+    assert engine_options.options_of(bpy.data.scenes["untouched"].edf_stitch)["projection"] == "reference"
