@@ -11,7 +11,10 @@ from typing import Any
 
 VERSION = 2
 # What was meant where nothing was said.
-THEN = {"projection": "REFERENCE", "fade": "PLANE", "holes": "TRANSPARENT", "crop": "FULL", "slide_auto": False}
+THEN = {
+    "projection": "REFERENCE", "fade": "PLANE", "holes": "TRANSPARENT", "crop": "FULL", "slide_auto": False,
+    "slide": 0.0, "centre": (0.0, 0.0), "fov": 0.0,
+}  # fmt: skip
 # A setting that only came with version 2.
 _NEW = "slide_auto"
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
 
-from . import properties
+from . import earlier, engine_options, properties
 from .bridge import images, ownership, photo, result
 
 REFERENCE, TARGET, PANORAMA = "reference", "target", "panorama"
@@ -41,6 +42,16 @@ def report_of(context: Any) -> dict[str, Any] | None:
     """The report of the panorama that is meant (see `panorama`); None where there is none."""
     found = result.read(panorama(context))
     return None if found is None else found["report"]
+
+
+def is_behind(settings: Any, image: bpy.types.Image | None) -> bool:
+    """Whether an image is a panorama of the chosen pictures that was made for another frame or viewpoint than is chosen
+    now."""
+    found = result.read(image)
+    if found is None or ownership.pictures(image) != [settings.reference, settings.target]:
+        return False
+    then = SimpleNamespace(**earlier.kept_now(found["settings"]))
+    return engine_options.frame_of(then) != engine_options.frame_of(settings)
 
 
 def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:

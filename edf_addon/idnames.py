@@ -11,6 +11,7 @@ class Operator(StrEnum):
     STITCH = "edf.stitch"
     PREVIEW = "edf.preview"
     RESTITCH = "edf.restitch"
+    FOLLOW = "edf.follow"
     CANCEL = "edf.cancel"
     OPEN_PAIR = "edf.open_pair"
     SWAP = "edf.swap"
