@@ -28,7 +28,9 @@ from .fields import fit_field
 from .options import StitchOptions
 from .panorama.levelling import rotation_for
 from .panorama.projection import Projection, round_projection
+from .panorama.slid_warp import slid_warp
 from .panorama.upright_edges import edges
+from .panorama.viewpoint import viewpoint_between
 from .panorama.warp import Warp, build_warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
@@ -239,9 +241,20 @@ def fit_and_warp(
     # the field's own geometry: a rival knows no depth, so its views have none
     views = views_of(field.two_view, cameras)
     refined = None if dense is None else dense.refined
-    warp = build_warp(field, views, _projection(options, views, frames[0]), refined)
+    projection = _projection(options, views, frames[0])
+    warp = build_warp(field, views, projection, refined)
+    if projection is not None:
+        warp = _slid(warp, options, views, projection)
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense)
+
+
+def _slid(base: Warp, options: StitchOptions, views: Sequence[View], projection: Projection) -> Warp:
+    """The maps as a viewpoint that slides as far as is asked for sees them; those given where it stands still."""
+    viewpoint = viewpoint_between(base, views) if options.slide and options.slide != "auto" else None
+    if viewpoint is None:
+        return base
+    return slid_warp(base, views, viewpoint.sliding(float(options.slide)), projection)
 
 
 def _refined(

@@ -140,6 +140,8 @@ class StitchOptions:
         ):  # fmt: skip
             if value not in known:
                 raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")
+        if not (self.slide == "auto" if isinstance(self.slide, str) else 0 <= self.slide <= 1):
+            raise BadRequest(f"a slide of {self.slide}: it is a number from 0 (the reference's place) to 1, or auto")
         if not LEAST_SCALE <= self.scale <= 1.0:  # NaN too
             raise BadRequest(f"a scale of {self.scale:g}: it must lie between {LEAST_SCALE:g} and 1 (the full size)")
         if not 0 <= self.seed < 2**31:

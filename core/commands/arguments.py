@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..choices import BLENDS, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS
+from ..choices import BLENDS, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS, Slide
 
 if TYPE_CHECKING:
     from ..options import StitchOptions
@@ -92,6 +92,11 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
         help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
     )  # fmt: skip
     how.add_argument(
+        "--slide", default="0", type=_slide, metavar="S",
+        help="how far the viewpoint slides from REF (0, default) to TARGET (1) across the overlap: beyond it, each is "
+        "shown the more as it was taken; no effect in the plane of REF",
+    )  # fmt: skip
+    how.add_argument(
         "--projection", default="reference", type=_choice(PROJECTIONS), metavar="PROJECTION",
         help="reference (default: the plane of REF, which keeps every pixel), cylindrical, or equirectangular (the whole sphere)",
     )  # fmt: skip
@@ -151,6 +156,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         ),
         matches=args.matches,
         ignore=(args.ignore_ref, args.ignore_target) if args.ignore_ref or args.ignore_target else (),
+        slide=args.slide,
         projection=args.projection,
         level=parse_level(args.level),
         scale=args.scale,
@@ -172,6 +178,16 @@ def _numbers(text: str) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 1200 or 1200,1180") from None
+
+
+def _slide(text: str) -> Slide:
+    """A share, or what chooses one; whether it is from 0 to 1, StitchOptions checks."""
+    if text == "auto":
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor a number from 0 to 1") from None
 
 
 def _choice(known: tuple[str, ...]) -> Callable[[str], str]:

@@ -126,9 +126,8 @@ def composed(
     -------
     Composition
     """
-    out, shape = layers[0], layers[0].alpha.shape
-    nothing = np.broadcast_to(np.False_, shape)
-    steps = [_Step(out, out, Decided(nothing, nothing, unchanged(out.light.shape[2])), np.zeros(0, bool))]
+    steps = [_first(layers, warp, views, options, decided[0] if decided else None)]
+    out = steps[0].panorama
     for number, layer in enumerate(layers[1:], 1):
         added = _Added(
             layer, warp.maps[number].arrays(), warp.nearness(views, number), warp, options,
@@ -144,7 +143,7 @@ def composed(
     holes = [step.holes for step in steps if step.holes.size]
     if holes:
         out = inpainted(out, np.logical_or.reduce(holes) & (out.alpha == 0), warp.depth)
-    return Composition(out, exposed, found, _labels(layers[0], found))
+    return Composition(out, exposed, found, _labels(steps[0].panorama, found))
 
 
 @dataclass(frozen=True)
@@ -173,6 +172,26 @@ class _Step:
     layer: Layer
     decided: Decided
     holes: NDArray[np.bool_]
+
+
+def _first(
+    layers: Sequence[Layer], warp: Warp, views: Sequence[View], options: StitchOptions, decided: Decided | None
+) -> _Step:
+    """The reference, with which the panorama begins: of what a sliding viewpoint shows, the part that it sees."""
+    layer, none = layers[0], np.zeros(0, bool)
+    nothing = np.broadcast_to(np.False_, layer.alpha.shape)
+    start = Decided(nothing, nothing, unchanged(layer.light.shape[2]))
+    if warp.slide is None:
+        return _Step(layer, layer, start, none)
+    if decided is None:
+        picture_map = warp.maps[0].arrays()
+        hidden = occluded(picture_map, warp.nearness(views, 0)) | turned_over(turning(picture_map))
+        hidden = without_specks(hidden) & (layer.alpha > 0)
+        alone = hidden & ~np.logical_or.reduce([one.alpha > 0 for one in layers[1:]])
+        decided = replace(start, hidden=hidden, hidden_by_depth=hidden, holes=int(alone.sum()))
+    return _Step(
+        _without(layer, decided.hidden), layer, decided, decided.hidden if options.holes == "inpaint" else none
+    )
 
 
 def _add(

@@ -119,9 +119,80 @@ class EdgeOptions:
     """Share of the edges that are upright, in a usual picture, beside the density (per rad) of those that are not."""
 
 
+@dataclass(frozen=True)
+class SlideOptions:
+    """How the viewpoint slides (`viewpoint`)."""
+
+    percentiles: tuple[float, float] = (1.5, 98.5)
+    """Per cent of the overlap, along the line between the pictures' centres, between which it slides: its corners do
+    not count."""
+
+    margin: float = 0.04
+    """Share of that range by which the slide ends sooner on either side: what lies there is seen best."""
+
+    straightened: float = 2.0
+    """How many times as far apart in heading as in elevation (or the reverse) the centres are for the slide to go by
+    that alone: then uprights stay upright."""
+
+    least_apart: float = 0.02
+    """Radians between the pictures' centres: of closer ones, neither has a side."""
+
+    least_alone: float = 0.03
+    """Share of each picture that it alone shows: with less the other one surrounds it."""
+
+    nodes: int = 400
+    """Nodes along the longer side of the base at which the overlap is looked at."""
+
+    rounds: int = 6
+    """Steps of false position for s: below a thousandth where the parallax is no more than the width of the slide."""
+
+    least_range: float = 1e-9
+    """Range, in that of the reference, of a point that the viewpoint slides through."""
+
+
+@dataclass(frozen=True)
+class CarryOptions:
+    """Inverse depth carried to the sliding viewpoint (`carried_depth`, `slid_warp`)."""
+
+    jump_px: float = 2.5
+    """px of parallax between neighbours, with `jump_share` of the nearer one's, from which they lie on two surfaces."""
+
+    jump_share: float = 0.06
+    """See `jump_px`: what is near has steeper slopes."""
+
+    sharpenings: int = 2
+    """Rounds in which pixels between two surfaces are given to the nearer in depth; a jump is 2 to 4 px wide."""
+
+    speck_px: int = 3
+    """px, side of the median that takes single points out of the surface that they fall on."""
+
+    rounds: int = 2
+    """px by which gaps are filled from their far side at each size."""
+
+    halvings: int = 6
+    """Times that the canvas is halved for gaps that are still there: up to 2 · 2⁶ px wide."""
+
+    refinements: int = 2
+    """Times that a pixel's depth is looked up where its point lies: it settles at once on smooth surfaces."""
+
+    same_share: float = 0.06
+    """Share of d, with `same_px` px of parallax, by which a surface may differ from what was carried over."""
+
+    same_px: float = 0.5
+    """See `same_share`."""
+
+    least_shift_px: float = 1e-3
+    """px beside the epipolar line below which a map counts as on it: this is rounding."""
+
+    reach_nodes: int = 200
+    """Nodes along the longer side of the base at which the pictures' bounds are looked for."""
+
+
 CANVAS = CanvasOptions()
 WARP = WarpOptions()
 LAYER = LayerOptions()
 PROJECTION = ProjectionOptions()
 LEVELLING = LevellingOptions()
 EDGES = EdgeOptions()
+SLIDE = SlideOptions()
+CARRY = CarryOptions()

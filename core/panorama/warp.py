@@ -34,6 +34,7 @@ from .reference_map import ReferenceMap
 
 if TYPE_CHECKING:
     from ..field.refined_depth import RefinedDepth
+    from .viewpoint import Viewpoint
 
 
 @dataclass(frozen=True)
@@ -50,12 +51,19 @@ class Warp:
         `raster.lazy`).
     lazy_confidence : (H, W) image or None
         Confidence of dense refinement, 0..1, float32, likewise; None without it.
+    slide : (H, W) image or None
+        How far each pixel's viewpoint lies from the reference's place towards the target's, 0..1, float32; None if all
+        are seen from the reference's place.
+    viewpoint : Viewpoint or None
+        The same for any direction.
     """
 
     canvas: Canvas
     maps: tuple[CanvasMap, ...]
     depth: AnyImage
     lazy_confidence: AnyImage | None = None
+    slide: AnyImage | None = None
+    viewpoint: Viewpoint | None = None
 
     @property
     def inverse_depth(self) -> NDArray[np.float32]:
@@ -75,14 +83,19 @@ class Warp:
         left, top, width, height = box
         maps = tuple(one.within(box, in_place) for one in self.maps)
         depth = Placed(self.depth, (-top, -left), (height, width), np.nan)
-        confidence = None
-        if self.lazy_confidence is not None:
-            confidence = Placed(self.lazy_confidence, (-top, -left), (height, width))
-        return Warp(self.canvas.within(box), maps, depth, confidence)
+        confidence, slide = (
+            None if values is None else Placed(values, (-top, -left), (height, width))
+            for values in (self.lazy_confidence, self.slide)
+        )
+        return Warp(self.canvas.within(box), maps, depth, confidence, slide, self.viewpoint)
 
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
-        return Nearness(self.canvas, views[0].camera, views[number], self.depth)
+        view = views[number]
+        if self.slide is None or self.viewpoint is None:
+            return Nearness(self.canvas, views[0].camera, view, self.depth)
+        nearer = float(view.H_inf[2] @ views[0].K @ self.viewpoint.c)
+        return Nearness(self.canvas, views[0].camera, view, self.depth, self.slide, nearer)
 
 
 def build_warp(
@@ -130,7 +143,7 @@ def build_warp(
 
     canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
     warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined)
-    return _trimmed(warp)
+    return trimmed(warp)
 
 
 def _at_nodes(values: FieldValues, view: View, number: int, grid: Grid, plane: Canvas, camera: Camera) -> Array:
@@ -241,7 +254,7 @@ def _in_plane(points: Array) -> Array:
     return project(points)
 
 
-def _trimmed(warp: Warp) -> Warp:
+def trimmed(warp: Warp) -> Warp:
     """The warp without the outer rows and columns that no picture reaches."""
     shown = np.zeros((warp.canvas.height, warp.canvas.width), bool)
     for one in warp.maps[1:]:
