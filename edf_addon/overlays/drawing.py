@@ -178,7 +178,7 @@ def points_on(settings: Any, matches: dict[str, Any], side: str, picture: bpy.ty
     known = result.read(picture)
     if known is None or ownership.pictures(picture) != [settings.reference, settings.target]:
         return None
-    return overlay_geometry.on_panorama(known, matches[editor.REFERENCE])
+    return overlay_geometry.on_panorama(known, matches[editor.REFERENCE], matches[editor.TARGET])
 
 
 def _draw_lines(view: _View) -> None:
@@ -189,6 +189,7 @@ def _draw_lines(view: _View) -> None:
     if known is None or shows is None or _pointer["point"] is None:
         return
     side, point = _pointer["side"], _pointer["point"][None]
+    pointed = point if side == editor.PANORAMA else None
     if side == editor.PANORAMA:
         side, point = editor.REFERENCE, geometry_of.from_panorama(known, point)
     found = geometry_of.epipolar_lines(known["geometry"], point[0], side)
@@ -203,7 +204,9 @@ def _draw_lines(view: _View) -> None:
         _lines(ends, SHADE, view, 2 * LINE_WIDTH)
         _lines(ends, LINE, view)
     if here == side:
-        at = geometry_of.on_panorama(known, point) if shows == editor.PANORAMA else point
+        at = point
+        if shows == editor.PANORAMA:
+            at = geometry_of.on_panorama(known, point) if pointed is None else pointed
         _lines(geometry_of.rings(view.at(at), 6 * view.unit), POINTER, view)
 
 
