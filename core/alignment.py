@@ -6,7 +6,7 @@ their matches are pooled, so that the panorama does not wobble from frame to fra
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,10 +26,10 @@ from .field.slack import SlackField
 from .field.strict import StrictField
 from .fields import fit_field
 from .options import StitchOptions
-from .panorama.levelling import rotation_for
-from .panorama.projection import Projection, round_projection
+from .panorama.framing import FrameRequest, frame_for
+from .panorama.projection import Projection, focal_of, round_projection
 from .panorama.slid_warp import slid_warp
-from .panorama.upright_edges import edges
+from .panorama.upright_edges import straight_edges
 from .panorama.viewpoint import viewpoint_between
 from .panorama.warp import Warp, build_warp
 from .pictures.masks import read_mask, read_painted, without
@@ -241,19 +241,25 @@ def fit_and_warp(
     # the field's own geometry: a rival knows no depth, so its views have none
     views = views_of(field.two_view, cameras)
     refined = None if dense is None else dense.refined
-    projection = _projection(options, views, frames[0])
-    warp = build_warp(field, views, projection, refined)
-    if projection is not None:
-        warp = _slid(warp, options, views, projection)
+
+    def warp_on(projection: Projection | None) -> Warp:
+        return build_warp(field, views, projection, refined)
+
+    projection = _projection(options, views, frames[0], warp_on)
+    warp = warp_on(projection) if projection is None or not options.slide else _slid(warp_on, options, views, projection)
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense)
 
 
-def _slid(base: Warp, options: StitchOptions, views: Sequence[View], projection: Projection) -> Warp:
+def _slid(
+    warp_on: Callable[[Projection], Warp], options: StitchOptions, views: Sequence[View], projection: Projection
+) -> Warp:
     """The maps as a viewpoint that slides as far as is asked for sees them; those given where it stands still."""
-    viewpoint = viewpoint_between(base, views) if options.slide and options.slide != "auto" else None
+    K = views[0].K
+    base = warp_on(round_projection("cylindrical", K, projection.rotation, focal_of(K)))
+    viewpoint = viewpoint_between(base, views)
     if viewpoint is None:
-        return base
+        return warp_on(projection)
     return slid_warp(base, views, viewpoint.sliding(float(options.slide)), projection)
 
 
@@ -274,22 +280,23 @@ def size_of(picture: Picture) -> tuple[int, int]:
     return width, height
 
 
-def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> Projection | None:
-    """The round projection that is asked for, levelled; None for a flat panorama."""
+def _projection(
+    options: StitchOptions, views: Sequence[View], frame: Frame, warp_on: Callable[[Projection], Warp]
+) -> Projection | None:
+    """The projection that is asked for, framed by what a coarse warp shows; None for the reference's own plane."""
     if options.projection == "reference":
         return None
-    known = [view.R for view in views if np.isfinite(view.R).all()]
-    upright = None
-    if options.level == "auto":
+    kind, distance = options.surface
+    asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
+    lines = None
+    if asked.needs_edges:
         found = [
-            (normals if number == 0 else normals @ view.R, lengths)
-            for number, (picture, view) in enumerate(zip(frame.pictures, views, strict=True))
+            straight_edges(picture, view.camera, view.K).in_reference(view.R)
+            for picture, view in zip(frame.pictures, views, strict=True)
             if np.isfinite(view.R).all()
-            for normals, lengths in (edges(picture, view.camera, view.K),)
         ]
-        normals, lengths = zip(*found, strict=True)
-        upright = np.vstack(normals), np.concatenate(lengths)
-    return round_projection(options.projection, views[0].K, rotation_for(options.level, known, upright))
+        lines = np.vstack([one.normals for one in found]), np.concatenate([one.lengths for one in found])
+    return frame_for(asked, views, lines, warp_on)
 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:

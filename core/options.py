@@ -117,6 +117,12 @@ class StitchOptions:
         return self.ignore[number] if number < len(self.ignore) else None
 
     @property
+    def surface(self) -> tuple[str, float | None]:
+        """The projection's kind, and the distance that "pannini:D" names."""
+        kind, _, distance = self.projection.partition(":")
+        return kind, float(distance) if distance else None
+
+    @property
     def has_seam(self) -> bool:
         """An average has none; bands need one, if only that which lies midway between the borders."""
         return self.blend == "multiband" or (self.blend == "feather" and self.seam != "none")

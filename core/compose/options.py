@@ -127,6 +127,14 @@ class SeamOptions:
 
 
 @dataclass(frozen=True)
+class RoughSeamOptions:
+    """What a seam would cut through, in small pictures (`rough_seam`)."""
+
+    visible_tone: float = 0.1
+    """Tones by which the pictures differ at a seam that is seen: blending evens out less."""
+
+
+@dataclass(frozen=True)
 class BandOptions:
     """Blending in bands (`multiband`; Burt and Adelson, ACM TOG 1983), and feathering as widely."""
 
@@ -170,5 +178,6 @@ OVERLAP = OverlapOptions()
 MOVING_THINGS = MovingThingsOptions()
 MIN_CUT = MinCutOptions()
 SEAM = SeamOptions()
+ROUGH_SEAM = RoughSeamOptions()
 BANDS = BandOptions()
 INPAINT = InpaintOptions()

@@ -181,7 +181,7 @@ def _projection_entry(canvas: Canvas, two_view: TwoView) -> dict[str, Any]:
     return {
         "kind": kind, "focal_px": focal, "centre": centre + np.array(canvas.offset), "rotation": rotation,
         "level": angles_of(rotation),
-    }  # fmt: skip
+    } | ({"distance": canvas.projection.distance} if canvas.projection and kind == "pannini" else {})  # fmt: skip
 
 
 def _picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:

@@ -148,7 +148,7 @@ def _from_far(values: Plane, halvings: int) -> Plane:
     beyond = np.finfo(np.float32).max  # what OpenCV takes for the border too
     out = np.where(missing, beyond, values)
     for _ in range(CARRY.rounds):
-        grown = cv2.erode(out, np.ones((3, 3), np.uint8))
+        grown = cv2.erode(out, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
         np.copyto(out, grown, where=missing)
         missing = out == beyond
         if not missing.any():

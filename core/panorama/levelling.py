@@ -99,7 +99,7 @@ def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array)
     rotations : sequence of (3, 3) arrays
         See `gravity`.
     normals, lengths : (N, 3) and (N,) arrays
-        Of straight edges, in the reference's frame (see `upright_edges.edges`).
+        Of straight edges, in the reference's frame (see `upright_edges.straight_edges`).
 
     Returns
     -------

@@ -44,6 +44,9 @@ class WarpOptions:
     max_node_factor: float = 4.0
     """Nodes of that grid at most, in units of those of any other grid: time and memory grow with it."""
 
+    node_share: float = 0.5
+    """Distance between nodes of that grid at least, in those between the canvas's own: a coarse map needs fewer."""
+
 
 @dataclass(frozen=True)
 class LayerOptions:
@@ -55,10 +58,14 @@ class LayerOptions:
 
 @dataclass(frozen=True)
 class ProjectionOptions:
-    """Round panoramas (`projection`)."""
+    """Surfaces of a panorama (`projection`)."""
 
-    max_cylinder_slope: float = 3.0
-    """tan φ at which a cylinder is cut off (72°): it grows without end towards zenith and nadir."""
+    max_slope: float = 3.0
+    """Focal lengths from the middle at which a plane, Pannini's projection and the height of a cylinder are cut off (a
+    plane at 72°): they grow without end."""
+
+    least_forward: float = 1e-9
+    """Cosines below which a ray counts as one that a plane, Pannini's projection or a cylinder cannot show."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +124,120 @@ class EdgeOptions:
 
     upright_share: float = 0.3
     """Share of the edges that are upright, in a usual picture, beside the density (per rad) of those that are not."""
+
+
+@dataclass(frozen=True)
+class StraightnessOptions:
+    """How straight a panorama keeps an edge (`straightness`)."""
+
+    points: int = 16
+    """Places along an edge that are looked up: its shape between them is smooth."""
+
+    end_margin: float = 0.02
+    """Share of an edge at either end that is left out: detection ends it a little beyond what it lies on."""
+
+    percentile: float = 90.0
+    """Percentile of a place's distance from the edge's plane that counts as its bend: a single place at a jump of depth
+    does not make it crooked."""
+
+
+@dataclass(frozen=True)
+class OwnDepthOptions:
+    """Depth along each picture's own rays (`own_depth`)."""
+
+    rounds: int = 2
+    """Times that a depth is looked up again where the last one leads: more change nothing on surfaces."""
+
+    same_share: float = 0.06
+    """Share of an inverse range by which two may differ and still be one surface's."""
+
+    same_parallax: float = 5e-4
+    """The same in radians of parallax, in addition: half a pixel of a picture of 900."""
+
+
+@dataclass(frozen=True)
+class ChoiceOptions:
+    """Choosing how far the viewpoint slides (`choosing_slide`). Prices are in px of bend, and were chosen so that the
+    least cost is what the eye prefers on 33 pairs of photographs."""
+
+    candidates: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
+    """Slides that are tried: the cost is smooth between them."""
+
+    seam_candidates: tuple[float, ...] = (0.0, 0.5, 1.0)
+    """Slides at which a seam is cut and holes are counted, which takes longest; interpolated between."""
+
+    base_px_per_radian: float = 300.0
+    """Resolution of the coarse map: depth edges to about 3 px of a picture of 900."""
+
+    seam_px_per_radian: float = 150.0
+    """Resolution at which the seam is cut: finer costs more time and tells hardly more."""
+
+    px_per_radian: float = 900.0
+    """Resolution in whose px bends and seams are given: about that of a picture that fills a screen."""
+
+    least_length: float = 0.05
+    """Share of a picture's longer side from which an edge counts: of a shorter one nobody sees the bend."""
+
+    max_bend_px: float = 6.0
+    """px of bend that an edge counts at most: more of it is a wrong depth, which no slide mends."""
+
+    upright_within: float = 0.012
+    """Radians off gravity within which an edge is upright, as its own picture shows it."""
+
+    least_upright: float = 0.5
+    """Length of all upright edges together, in longer sides, below which their lean counts for less: two or three may
+    be something else."""
+
+    max_lean_deg: float = 8.0
+    """Degrees of lean that an edge counts at most."""
+
+    per_lean_deg: float = 0.25
+    """Price of a degree of mean lean."""
+
+    max_enlarged: float = 1.3
+    """Canvas px per px of a picture, in length, from which a cell is enlarged."""
+
+    per_enlarged: float = 6.0
+    """Price of all being enlarged."""
+
+    least_area: float = 0.05
+    """Share of its area in the picture below which a cell is folded, or about to."""
+
+    per_folded: float = 15.0
+    """Price of all being folded."""
+
+    max_folded: float = 0.01
+    """Share of folded cells, more than without any slide, from which a slide is out of the question."""
+
+    per_seam_px: float = 0.0044
+    """Price of a px of seam that is seen."""
+
+    max_seam_px: float = 175.0
+    """px of such seam that count at most: of two bad ones, the longer is no worse."""
+
+    per_hole: float = 40.0
+    """Price of all being holes."""
+
+    hole_radius: float = 0.03
+    """Radians from what is shown within which what is not shown, on all sides, is a hole."""
+
+    tie_px: float = 0.005
+    """Cost by which candidates may differ and still be as good: the one that slides least is taken."""
+
+    tie_share: float = 0.03
+    """The same as a share of the least cost; the larger counts."""
+
+    cells: int = 90
+    """Cells along a picture's longer side in which enlargement and folds are looked at."""
+
+    smoothing: float = 0.006
+    """σ, in longer sides, of the blur over depth before that: noise in depth is no fold that anyone sees."""
+
+    least_jump_px: float = 4.0
+    """px of parallax across a cell below which it lies on one surface, at `px_per_radian`."""
+
+    jump_share: float = 0.12
+    """The same as a share of its parallax, in addition: surfaces that are seen at a slant."""
 
 
 @dataclass(frozen=True)
@@ -188,11 +309,84 @@ class CarryOptions:
     """Nodes along the longer side of the base at which the pictures' bounds are looked for."""
 
 
+@dataclass(frozen=True)
+class FramingOptions:
+    """What of the world the panorama shows, and how (`framing`)."""
+
+    side_px: int = 160
+    """px of the coarse map's longest picture, and of the frames that are tried on it: a rectangle is then known to
+    within a percent."""
+
+    outermost_percent: float = 0.3
+    """Percent of what is shown that may lie beyond the ends on each side: thin spikes of a map move no frame."""
+
+    max_roll_deg: float = 10.0
+    """Degrees of roll of the reference beyond which edges are not believed: nobody holds a camera so by mistake."""
+
+    max_pitch_deg: float = 35.0
+    """The same of pitch: so far up or down few edges are upright ones."""
+
+    least_kept: float = 0.85
+    """Share of the rectangle that the poses' own direction down leaves room for, which that by edges has to leave too:
+    where edges are wrong, the frame leans and the rectangle collapses."""
+
+    full_pitch_deg: float = 12.0
+    """Degrees up or down that are levelled fully. What is beyond is kept: uprights that converge a little look better
+    than a picture that is stretched at one end."""
+
+    flat_fov_deg: float = 60.0
+    """Degrees from left to right up to which a plane looks natural."""
+
+    fov_per_distance_deg: float = 60.0
+    """Degrees beyond that per unit of Pannini's distance."""
+
+    max_distance: float = 0.7
+    """Pannini's distance at most: beyond, level lines bow visibly."""
+
+    cylinder_fov_deg: float = 130.0
+    """Degrees from left to right beyond which Pannini's projection stretches its ends, and a cylinder is taken."""
+
+    sphere_elevation_deg: float = 60.0
+    """Degrees up or down beyond which all of those stretch, and a sphere is taken."""
+
+    frontal_distance: float = 0.15
+    """Pannini's distance at most for a scene that is seen frontally, whose level lines may not bow."""
+
+    frontal_length: float = 1.5
+    """Sides of a picture of level lines square to the view, weighted by the sine of their elevation, beyond which a
+    scene is frontal: façades and stadiums have 1.8 or more, others less than 1."""
+
+    frontal_turn_deg: float = 20.0
+    """Degrees to either side of ahead within which a frontal scene may face the camera."""
+
+    frontal_step_deg: float = 2.0
+    """Degrees between directions that are tried for that."""
+
+    frontal_sine: float = 0.02
+    """Sine of the angle by which such a line may be off level and off square."""
+
+    frontal_elevation_deg: float = 4.0
+    """Degrees above or below the horizon from which level lines count: on the horizon no projection bends them."""
+
+    frontal_least_length: float = 0.04
+    """Sides of a picture that such a line has at least."""
+
+    max_enlarged: float = 1.35
+    """Canvas px per px of the sharper picture, in length, that all but the most enlarged percent stay below."""
+
+    enlarged_percent: float = 99.0
+    """Percent of the canvas for which that holds."""
+
+
 CANVAS = CanvasOptions()
 WARP = WarpOptions()
 LAYER = LayerOptions()
 PROJECTION = ProjectionOptions()
+FRAMING = FramingOptions()
 LEVELLING = LevellingOptions()
 EDGES = EdgeOptions()
+STRAIGHTNESS = StraightnessOptions()
+OWN_DEPTH = OwnDepthOptions()
+CHOICE = ChoiceOptions()
 SLIDE = SlideOptions()
 CARRY = CarryOptions()

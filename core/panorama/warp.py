@@ -29,7 +29,7 @@ from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
 from .depth import Confidence, Depth, Nearness
 from .options import WARP
-from .projection import Projection
+from .projection import Projection, focal_of
 from .reference_map import ReferenceMap
 
 if TYPE_CHECKING:
@@ -220,7 +220,8 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     margin = int(np.ceil(min(field.fit.fade_px, WARP.max_fade * max(camera.size))))
     across, down = width + 2 * margin, height + 2 * margin
     share = min(WARP.max_node_factor, max(1.0, across * down / (2 * width * height)))
-    flat = Grid.over(-margin, -margin, across, down, int(share * GRID.nodes))
+    step = WARP.node_share * grid.step * focal_of(canvas.projection.K) / canvas.projection.focal
+    flat = Grid.over(-margin, -margin, across, down, int(min(share * GRID.nodes, across * down / step**2)))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)
     if values.far is None:

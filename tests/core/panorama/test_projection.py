@@ -165,7 +165,7 @@ def test_a_cylinder_has_the_pixels_whose_centres_lie_within_a_turn_and_below_its
     for inside, outside, most, at in (
         (left, left - 1, np.pi, projection.headings),
         (right - 1, right, np.pi, projection.headings),
-        (top, top - 1, np.arctan(PROJECTION.max_cylinder_slope), projection.elevations),
-        (bottom - 1, bottom, np.arctan(PROJECTION.max_cylinder_slope), projection.elevations),
+        (top, top - 1, np.arctan(PROJECTION.max_slope), projection.elevations),
+        (bottom - 1, bottom, np.arctan(PROJECTION.max_slope), projection.elevations),
     ):
         assert abs(at(inside)) <= most + 1e-12 < abs(at(outside))
