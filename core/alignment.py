@@ -6,7 +6,7 @@ their matches are pooled, so that the panorama does not wobble from frame to fra
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,18 +20,16 @@ from .cameras.lens import undistort
 from .cameras.matches import Matches
 from .cameras.sources import cameras_for, role
 from .cameras.view import View, views_of
+from .continuation.continuation import Continuation
 from .dense.refine import Dense, refine
 from .field.field import Field
 from .field.slack import SlackField
 from .field.strict import StrictField
 from .fields import fit_field
+from .mapping import map_pictures
 from .options import StitchOptions
-from .panorama.framing import FrameRequest, frame_for
-from .panorama.projection import Projection, focal_of, round_projection
-from .panorama.slid_warp import slid_warp
-from .panorama.upright_edges import straight_edges
-from .panorama.viewpoint import viewpoint_between
-from .panorama.warp import Warp, build_warp
+from .panorama.choosing_slide import SlideChoice
+from .panorama.warp import Warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
 from .pose import features
@@ -64,6 +62,10 @@ class Alignment:
         In plain words.
     dense : Dense or None
         Dense refinement of the field; None where it was not asked for.
+    continuation : Continuation or None
+        What goes on beyond the overlap; None where the field itself does.
+    slide : SlideChoice
+        How far the viewpoint slides, and why.
     """
 
     cameras: tuple[Camera, ...]
@@ -73,6 +75,8 @@ class Alignment:
     warp: Warp
     warnings: tuple[str, ...]
     dense: Dense | None = None
+    continuation: Continuation | None = None
+    slide: SlideChoice = SlideChoice(0.0, (), "")
 
 
 @dataclass(frozen=True)
@@ -241,26 +245,11 @@ def fit_and_warp(
     # the field's own geometry: a rival knows no depth, so its views have none
     views = views_of(field.two_view, cameras)
     refined = None if dense is None else dense.refined
-
-    def warp_on(projection: Projection | None) -> Warp:
-        return build_warp(field, views, projection, refined)
-
-    projection = _projection(options, views, frames[0], warp_on)
-    warp = warp_on(projection) if projection is None or not options.slide else _slid(warp_on, options, views, projection)
+    mapped = map_pictures(field, views, refined, frames[0].pictures, options, progress)
     edges = (replace(edge, two_view=field.two_view),)
-    return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense)
-
-
-def _slid(
-    warp_on: Callable[[Projection], Warp], options: StitchOptions, views: Sequence[View], projection: Projection
-) -> Warp:
-    """The maps as a viewpoint that slides as far as is asked for sees them; those given where it stands still."""
-    K = views[0].K
-    base = warp_on(round_projection("cylindrical", K, projection.rotation, focal_of(K)))
-    viewpoint = viewpoint_between(base, views)
-    if viewpoint is None:
-        return warp_on(projection)
-    return slid_warp(base, views, viewpoint.sliding(float(options.slide)), projection)
+    return Alignment(
+        cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide
+    )
 
 
 def _refined(
@@ -278,25 +267,6 @@ def size_of(picture: Picture) -> tuple[int, int]:
     """(W, H) px of a picture."""
     height, width = picture.light.shape[:2]
     return width, height
-
-
-def _projection(
-    options: StitchOptions, views: Sequence[View], frame: Frame, warp_on: Callable[[Projection], Warp]
-) -> Projection | None:
-    """The projection that is asked for, framed by what a coarse warp shows; None for the reference's own plane."""
-    if options.projection == "reference":
-        return None
-    kind, distance = options.surface
-    asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
-    lines = None
-    if asked.needs_edges:
-        found = [
-            straight_edges(picture, view.camera, view.K).in_reference(view.R)
-            for picture, view in zip(frame.pictures, views, strict=True)
-            if np.isfinite(view.R).all()
-        ]
-        lines = np.vstack([one.normals for one in found]), np.concatenate([one.lengths for one in found])
-    return frame_for(asked, views, lines, warp_on)
 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:

@@ -175,6 +175,6 @@ class StitchOptions:
             raise BadRequest(f"the level {self.level} is not yaw, pitch, roll in degrees")
         elif flat:
             raise BadRequest(
-                "the projection reference keeps the reference's plane and is not turned: leave the level out, or choose "
-                "the projection cylindrical or equirectangular"
+                "the projection reference keeps the reference's plane and is not turned: leave the level out, or "
+                "choose the projection cylindrical or equirectangular"
             )

@@ -16,8 +16,8 @@ ADDON = ROOT / "edf_addon"
 
 # Which rooms each may import, itself left out. Rooms stand in the order of the data.
 BELOW_POSE = ("system", "raster", "pictures", "cameras")
-BELOW_MEASURE = (*BELOW_POSE, "pose", "field", "dense", "panorama", "compose")
-TOP = ("choices", "options", "fields", "alignment", "pipeline")
+BELOW_MEASURE = (*BELOW_POSE, "pose", "field", "dense", "continuation", "panorama", "compose")
+TOP = ("choices", "options", "fields", "mapping", "alignment", "pipeline")
 MAY_IMPORT = {
     "system": (),
     "raster": ("system",),
@@ -27,7 +27,8 @@ MAY_IMPORT = {
     "field": ("system", "raster", "cameras"),
     "rivals": ("system", "raster", "cameras", "pose", "field"),
     "dense": (*BELOW_POSE, "field"),
-    "panorama": (*BELOW_POSE, "field", "choices"),
+    "continuation": ("system", "raster", "cameras", "field"),
+    "panorama": (*BELOW_POSE, "field", "continuation", "choices"),
     "compose": (*BELOW_POSE, "field", "panorama", "choices", "options"),
     "measure": BELOW_MEASURE,
     "output": (*BELOW_MEASURE, "measure", "pipeline"),
@@ -37,7 +38,8 @@ MAY_IMPORT = {
     "choices": (),
     "options": ("system", "cameras", "choices"),
     "fields": ("cameras", "field", "rivals"),
-    "alignment": (*BELOW_MEASURE, "options", "fields"),
+    "mapping": (*BELOW_MEASURE, "options"),
+    "alignment": (*BELOW_MEASURE, "options", "fields", "mapping"),
     "pipeline": (*BELOW_MEASURE, "measure", "options", "alignment"),
 }
 # The same for the add-on. What lies beside its rooms is known to all of them, or to those after it.

@@ -98,7 +98,8 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
     )  # fmt: skip
     how.add_argument(
         "--projection", default="reference", type=_choice(PROJECTIONS), metavar="PROJECTION",
-        help="reference (default: the plane of REF, which keeps every pixel), cylindrical, or equirectangular (the whole sphere)",
+        help="reference (default: the plane of REF, which keeps every pixel), cylindrical, or equirectangular (the whole "
+        "sphere)",
     )  # fmt: skip
     how.add_argument(
         "--level", default="auto", metavar="LEVEL",

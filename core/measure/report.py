@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,6 +84,10 @@ def make_report(
             "negative_share": field.fit.negative_share,
             "slack_px": field.slack_px if isinstance(field, SlackField) else 0.0,
             "dense": _dense_entry(alignment.dense),
+        },
+        "slide": {
+            "s1": alignment.slide.s1, "costs": [asdict(one) for one in alignment.slide.costs],
+            "why": alignment.slide.why,
         },
         "canvas": {
             "width": canvas.width, "height": canvas.height,

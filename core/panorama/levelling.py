@@ -136,6 +136,14 @@ def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array)
     return best
 
 
+def confirmed(down: Array, normals: Array, lengths: Array) -> bool:
+    """Whether most of the edges that are nearly upright agree on which way is down (3,); normals, lengths: see
+    `gravity_by_edges`."""
+    tilt = np.abs(normals @ down)
+    near, agreeing = (lengths[tilt < np.sin(np.radians(limit))].sum() for limit in LEVELLING.confirming_tilts_deg)
+    return bool(agreeing > max(LEVELLING.confirming_share * near, LEVELLING.confirming_length))
+
+
 def upright(down: Array) -> Array:
     """The rotation (3, 3) to the reference's frame from a panorama whose y axis is `down` (3,), given in that frame.
 

@@ -41,6 +41,10 @@ class WarpOptions:
     """Longer sides of the reference beside it within which fields end in their plane, in round panoramas: the grid that
     is laid over the reference's plane has to end somewhere."""
 
+    takeover: float = 0.05
+    """Share of the reference's longer side, beyond its border, over which what continues beyond the overlap takes over
+    from the field."""
+
     max_node_factor: float = 4.0
     """Nodes of that grid at most, in units of those of any other grid: time and memory grow with it."""
 
@@ -104,6 +108,17 @@ class LevellingOptions:
     chance_factor: float = 1.0
     """Edges of any direction favour some direction by about the root of the sum of their squared lengths. Only beyond
     so many times that do edges have a say."""
+
+
+    confirming_tilts_deg: tuple[float, float] = (20.0, 1.5)
+    """Degrees off upright within which edges are asked whether down is right, and within which they say so: trunks of
+    palms lean any way, walls do not."""
+
+    confirming_share: float = 0.4
+    """Share of the length of those asked that has to say so; at random it would be a thirteenth."""
+
+    confirming_length: float = 0.5
+    """Length of the edges that say so at least, in shares of a picture's longer side."""
 
 
 @dataclass(frozen=True)

@@ -27,12 +27,14 @@ from ..raster.picture_map import CanvasMap, PictureMap
 from ..system.errors import BadRequest, NoOverlap
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
+from .continued_depth import ContinuedDepth
 from .depth import Confidence, Depth, Nearness
 from .options import WARP
 from .projection import Projection, focal_of
 from .reference_map import ReferenceMap
 
 if TYPE_CHECKING:
+    from ..continuation.continuation import Continuation
     from ..field.refined_depth import RefinedDepth
     from .viewpoint import Viewpoint
 
@@ -99,8 +101,9 @@ class Warp:
 
 
 def build_warp(
-    field: Field, views: Sequence[View], projection: Projection | None = None, refined: RefinedDepth | None = None
-) -> Warp:
+    field: Field, views: Sequence[View], projection: Projection | None = None, refined: RefinedDepth | None = None,
+    continuation: Continuation | None = None,
+) -> Warp:  # fmt: skip
     """Lay out a canvas that holds all pictures, and map them onto it.
 
     Parameters
@@ -112,6 +115,8 @@ def build_warp(
         Of a round panorama; by default the panorama is flat.
     refined : RefinedDepth, optional
         What dense refinement found.
+    continuation : Continuation, optional
+        What goes on where the reference shows nothing; by default the field does.
 
     Returns
     -------
@@ -128,7 +133,7 @@ def build_warp(
     """
     camera, further = views[0].camera, views[1:]
     planes = [_plane_map(field, view) for view in further]
-    outlines = [_outline(plane, view) for plane, view in zip(planes, further, strict=True)]
+    outlines = [_outline(plane, view, continuation) for plane, view in zip(planes, further, strict=True)]
     sizes = [view.size for view in further]
     if projection is None:
         reference: Box = (0, 0, *camera.size)
@@ -139,10 +144,13 @@ def build_warp(
 
     def pictures_at(grid: Grid) -> list[Array]:
         values = _node_values(field, grid, plane, camera)
+        continued = ContinuedDepth.over(continuation, plane, camera, grid)
+        if continued is not None:
+            values = continued.blended(values)
         return [_at_nodes(values, view, number, grid, plane, camera) for number, view in enumerate(further, 1)]
 
     canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
-    warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined)
+    warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined, continuation)
     return trimmed(warp)
 
 
@@ -156,8 +164,9 @@ def _at_nodes(values: FieldValues, view: View, number: int, grid: Grid, plane: C
 
 
 def build_map(
-    field: Field, views: Sequence[View], canvas: Canvas, refined: RefinedDepth | None = None
-) -> Warp:
+    field: Field, views: Sequence[View], canvas: Canvas, refined: RefinedDepth | None = None,
+    continuation: Continuation | None = None,
+) -> Warp:  # fmt: skip
     """Map all pictures onto a given canvas, strip by strip.
 
     Parameters
@@ -168,6 +177,8 @@ def build_map(
     canvas : Canvas
     refined : RefinedDepth, optional
         What dense refinement found.
+    continuation : Continuation, optional
+        What goes on where the reference shows nothing.
 
     Returns
     -------
@@ -185,20 +196,23 @@ def build_map(
     shape = (canvas.height, canvas.width)
     maps = [PictureMap(np.empty(shape, np.float32), np.empty(shape, np.float32), view.size) for view in views[1:]]
     xs, ys = canvas.xs, canvas.ys
-    depth = Depth(canvas, camera, grid, values.inverse_depth, refined)
+    continued = ContinuedDepth.over(continuation, canvas, camera, grid)
+    depth = Depth(canvas, camera, grid, values.inverse_depth, refined, continued)
 
     def put(part: slice) -> None:
         start, stop = part.start, part.stop
         strip = (left, top + start, canvas.width, stop - start)
-        d, sideways = depth.strip(part)
+        d, sideways, share = depth.strip(part)
         for number, (view, out) in enumerate(zip(views[1:], maps, strict=True), 1):
             x, y = transfer(view, canvas.project_rows(view.H_inf, xs, ys[start:stop], camera), d)
+            beside = []
             if values.shift is not None and values.picture == number:
-                x += grid.to_pixels(values.shift[..., 0], *strip)
-                y += grid.to_pixels(values.shift[..., 1], *strip)
+                beside.append([grid.to_pixels(values.shift[..., k], *strip) for k in (0, 1)])
             if refined is not None and sideways is not None and refined.picture == number:
-                x += sideways[..., 0]
-                y += sideways[..., 1]
+                beside.append([sideways[..., 0], sideways[..., 1]])
+            for across, down in beside:
+                x += across if share is None else share * across
+                y += down if share is None else share * down
             if view.camera.distortion.any():
                 x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
             out.x[part], out.y[part] = x, y
@@ -242,9 +256,12 @@ def _plane_map(field: Field, view: View) -> Array:
     return view.H_inf + np.outer(view.e_prime, field.plane)
 
 
-def _outline(H_plane: Array, view: View) -> Array:
-    """A picture's border (N, 3), in order, as canvas points p that H_plane (3, 3) maps to it."""
+def _outline(H_plane: Array, view: View, continuation: Continuation | None) -> Array:
+    """A picture's border (N, 3), in order, as canvas points p that show it by a continuation, or else that H_plane
+    (3, 3) maps to it."""
     ideal = undistort(border(view.size), view.camera)
+    if continuation is not None:
+        return continuation.outline(ideal) @ continuation.K.T
     return homogeneous(ideal) @ np.linalg.inv(H_plane).T
 
 
