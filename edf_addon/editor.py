@@ -44,14 +44,20 @@ def report_of(context: Any) -> dict[str, Any] | None:
     return None if found is None else found["report"]
 
 
+def frame_then(settings: Any, image: bpy.types.Image | None) -> dict[str, Any] | None:
+    """The frame and viewpoint (see `engine_options.frame_of`) that an image was made for, where it is a panorama of the
+    pictures that are chosen now."""
+    found = result.read(image)
+    if found is None or ownership.pictures(image) != [settings.reference, settings.target]:
+        return None
+    return engine_options.frame_of(SimpleNamespace(**earlier.kept_now(found["settings"])))
+
+
 def is_behind(settings: Any, image: bpy.types.Image | None) -> bool:
     """Whether an image is a panorama of the chosen pictures that was made for another frame or viewpoint than is chosen
     now."""
-    found = result.read(image)
-    if found is None or ownership.pictures(image) != [settings.reference, settings.target]:
-        return False
-    then = SimpleNamespace(**earlier.kept_now(found["settings"]))
-    return engine_options.frame_of(then) != engine_options.frame_of(settings)
+    then = frame_then(settings, image)
+    return then is not None and then != engine_options.frame_of(settings)
 
 
 def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:

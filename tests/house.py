@@ -57,7 +57,7 @@ ADDON_MAY_IMPORT = {
     "editor": ("bridge", "earlier", "engine_options", "properties"),
     "jobs": ("bridge", "idnames", "pair", "properties", "engine_options", "editor", "status", "explain"),
     "scene": ("bridge", "properties", "editor"),
-    "overlays": ("bridge", "scene", "idnames", "properties", "editor"),
+    "overlays": ("bridge", "scene", "idnames", "properties", "engine_options", "editor"),
     "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "pair", "properties", "editor"),
     "panels": ("bridge", "jobs", "scene", "overlays", "operators", *BESIDE),
 }

@@ -56,7 +56,7 @@ def on_panorama(known: dict[str, Any], points: Array, others: Array | None = Non
     projection, viewpoint = projection_of(known), viewpoint_of(known)
     if projection is None:
         return project(homogeneous(points) @ matrix(known["geometry"]["S"]).T)
-    cameras = _cameras(known["geometry"])
+    cameras = cameras_of(known["geometry"])
     ideal = undistort(points, cameras[REFERENCE])
     if viewpoint is None:
         return projection.of_reference(ideal)
@@ -75,10 +75,10 @@ def from_panorama(known: dict[str, Any], points: Array) -> Array:
         return project(homogeneous(points) @ np.linalg.inv(matrix(known["geometry"]["S"])).T)
     seen = projection.rays(points)
     if viewpoint is not None:
-        seen = _from_reference(viewpoint, seen, _depth_at(known, points))
+        seen = _from_reference(viewpoint, seen, depth_at(known, points))
     seen = seen @ projection.K.T
     ahead = np.where(seen[:, 2:] > 1e-6, seen[:, 2:], np.nan)
-    return distort(seen[:, :2] / ahead, _cameras(known["geometry"])[REFERENCE])
+    return distort(seen[:, :2] / ahead, cameras_of(known["geometry"])[REFERENCE])
 
 
 def _from_reference(viewpoint: Viewpoint, rays: Array, d: Array) -> Array:
@@ -87,7 +87,7 @@ def _from_reference(viewpoint: Viewpoint, rays: Array, d: Array) -> Array:
     return directions
 
 
-def _depth_at(known: dict[str, Any], points: Array) -> Array:
+def depth_at(known: dict[str, Any], points: Array) -> Array:
     """The inverse depth (N,) that a panorama has at its node nearest to px (N, 2); 0 where it is not known."""
     grid, size = known["depth"], np.array(known["geometry"]["canvas"])
     nodes = np.array([int(grid["columns"]), int(grid["rows"])])
@@ -101,7 +101,7 @@ def _depth_nearby(known: dict[str, Any], projection: Projection, viewpoint: View
     grid, (width, height) = known["depth"], known["geometry"]["canvas"]
     x, y = np.linspace(0, width - 1, int(grid["columns"])), np.linspace(0, height - 1, int(grid["rows"]))
     nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    d = _depth_at(known, nodes)
+    d = depth_at(known, nodes)
     seen = _from_reference(viewpoint, projection.rays(nodes), d)
     seen, d = seen[seen[:, 2] > 1e-6], d[seen[:, 2] > 1e-6]
     there, d = seen[:, :2] / seen[:, 2:], d / seen[:, 2]
@@ -125,7 +125,7 @@ def line_on_panorama(known: dict[str, Any], polyline: Array) -> NDArray[np.float
     if projection is not None:
         at = np.linspace(0, len(polyline) - 1, _CURVE)
         polyline = np.stack([np.interp(at, np.arange(len(polyline)), polyline[:, axis]) for axis in (0, 1)], axis=-1)
-        ideal = undistort(polyline, _cameras(known["geometry"])[REFERENCE])
+        ideal = undistort(polyline, cameras_of(known["geometry"])[REFERENCE])
         points = projection.of_reference(ideal)
     else:
         points = on_panorama(known, polyline)
@@ -221,7 +221,7 @@ def epipolar_lines(geometry: dict[str, Any], point: Array, side: str) -> dict[st
     if not has_lines(geometry):
         return {}
     F = matrix(geometry["F"])
-    cameras = _cameras(geometry)
+    cameras = cameras_of(geometry)
     x = homogeneous(undistort(np.asarray(point, np.float64), cameras[side]))
     other = TARGET if side == REFERENCE else REFERENCE
     far = F @ x if side == REFERENCE else F.T @ x
@@ -249,7 +249,8 @@ def _bent(line: Array, camera: Camera) -> Array | None:
     return raw[inside] if inside.sum() > 1 else None
 
 
-def _cameras(geometry: dict[str, Any]) -> dict[str, Camera]:
+def cameras_of(geometry: dict[str, Any]) -> dict[str, Camera]:
+    """The cameras of a result's pictures, by side."""
     sizes = [tuple(int(side) for side in size) for size in geometry["full_sizes"]]
     found = {}
     for name, K, dist, size in (

@@ -125,7 +125,7 @@ def test_a_match_lies_where_the_sliding_viewpoint_sees_its_point(slid):
     geometry, normal = slid["geometry"], slid["normal"]
     q = np.array([[-0.25, 0.1, 1], [0.0, 0, 1], [0.2, -0.1, 1], [0.35, 0.15, 1]])
     X = q / (q @ normal)[:, None]
-    cameras = og._cameras(geometry)
+    cameras = og.cameras_of(geometry)
     x = distort(q[:, :2] @ np.diag([350.0, 350]) + np.array(geometry["K"])[:2, 2], cameras["reference"])
     y = project((X @ np.array(geometry["R"]).T + np.array(geometry["t"])) @ np.array(geometry["K_prime"]).T)
     there = og.on_panorama(slid, x, y)
@@ -141,7 +141,7 @@ def test_an_epipolar_line_is_the_same_curve_wherever_the_viewpoint_stands(slid):
     geometry = slid["geometry"]
     x = np.array([230.0, 140.0])
     line = og.line_on_panorama(slid, og.epipolar_lines(geometry, x, "reference")["reference"]).astype(float)
-    ideal = undistort(x[None], og._cameras(geometry)["reference"])
+    ideal = undistort(x[None], og.cameras_of(geometry)["reference"])
     q = homogeneous(ideal) @ np.linalg.inv(np.array(geometry["K"])).T
     for d in (0.02, 0.2, 0.4):  # the same px of the reference, near and far
         seen = og.projection_of(slid).points(og.viewpoint_of(slid).seen_from(q, np.array([d]))[0])[0]
