@@ -7,6 +7,7 @@ panorama's size.
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import cv2
@@ -52,8 +53,9 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
     dict
         JSON-ready but for arrays. `full_sizes`: (W, H) of each picture. `F`, `K`, `K_prime`, `R`, `t`, `model`: the
         geometry of the pair. `distortion`, `distortion_prime` (5,). `canvas`: (W, H) px. `S` (3, 3): from px of the
-        reference to the canvas. `K_canvas` (3, 3): intrinsics of the canvas. A cylinder or sphere is no pinhole image:
-        S and K_canvas are NaN there, and the report's `canvas.projection` says what the canvas shows.
+        reference to the canvas. `K_canvas` (3, 3): intrinsics of the canvas. S and K_canvas are NaN unless the canvas
+        is the reference's own plane; the report's `canvas.projection` says what it shows. `viewpoint`: the attributes
+        of a `Viewpoint` that slides, None where all is seen from the reference's place.
     """
     edge, canvas = result.edges[0], result.canvas
     view, (S, S_prime) = edge.two_view, edge.pair(scales(result))
@@ -64,6 +66,7 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
         "K_prime": np.linalg.inv(S_prime) @ view.K_prime, "R": view.R, "t": view.t, "model": view.model,
         "distortion": result.cameras[edge.i].distortion, "distortion_prime": result.cameras[edge.j].distortion,
         "S": shift @ S, "canvas": (canvas.width, canvas.height), "K_canvas": shift @ view.K,
+        "viewpoint": None if result.warp.viewpoint is None else asdict(result.warp.viewpoint),
     }  # fmt: skip
 
 

@@ -101,9 +101,19 @@ def frame_for(
     -------
     Projection
     """
+    return frame_of(asked, views, edges, _shown(warp_on(coarse_sphere(views))))
+
+
+def coarse_sphere(views: Sequence[View]) -> Projection:
+    """The sphere on which what the pictures show is sampled."""
     K = views[0].K
     coarse = FRAMING.side_px / max(max(view.size) for view in views)
-    shown = _shown(warp_on(round_projection("equirectangular", K, np.eye(3), coarse * focal_of(K))))
+    return round_projection("equirectangular", K, np.eye(3), coarse * focal_of(K))
+
+
+def frame_of(asked: FrameRequest, views: Sequence[View], edges: Edges | None, shown: Shown) -> Projection:
+    """As `frame_for`, where it is known what the pictures show."""
+    K = views[0].K
     if asked.level == "auto":
         frame = _levelled(asked, views, edges, down, shown, K)
     else:
