@@ -101,7 +101,7 @@ def frame_for(
     -------
     Projection
     """
-    return frame_of(asked, views, edges, _shown(warp_on(coarse_sphere(views))))
+    return frame_of(asked, views, edges, down, _shown(warp_on(coarse_sphere(views))))
 
 
 def coarse_sphere(views: Sequence[View]) -> Projection:
@@ -111,7 +111,9 @@ def coarse_sphere(views: Sequence[View]) -> Projection:
     return round_projection("equirectangular", K, np.eye(3), coarse * focal_of(K))
 
 
-def frame_of(asked: FrameRequest, views: Sequence[View], edges: Edges | None, shown: Shown) -> Projection:
+def frame_of(
+    asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None, shown: Shown
+) -> Projection:
     """As `frame_for`, where it is known what the pictures show."""
     K = views[0].K
     if asked.level == "auto":
