@@ -143,6 +143,11 @@ class StitchOptions:
         return self.blend == "multiband" or (self.blend == "feather" and self.seam != "none")
 
     @property
+    def may_slide(self) -> bool:
+        """On the reference's own plane the viewpoint stays."""
+        return self.projection != "reference" and self.slide != 0
+
+    @property
     def preview(self) -> bool:
         """A plain average by a smooth field is only looked at: it gets fewer features, at a smaller size."""
         return self.blend == "linear" and not self.dense

@@ -72,9 +72,9 @@ def make_report(
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
         "options": {
             "field": options.field, "fade": options.fade, "dense": options.dense, "projection": options.projection,
-            "slide": options.slide, "level": options.level, "centre": options.centre, "fov": options.fov,
-            "scale": options.scale, "crop": options.crop, "blend": options.blend, "seam": options.seam,
-            "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
+            "slide": options.slide if options.may_slide else 0, "level": options.level, "centre": options.centre,
+            "fov": options.fov, "scale": options.scale, "crop": options.crop, "blend": options.blend,
+            "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
         },
         "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
         "two_view": {
@@ -134,7 +134,13 @@ def _measured(
     cameras, edge = alignment.cameras, alignment.edges[0]
     field, warp, two_view = alignment.field, alignment.warp, edge.two_view
     inliers = edge.matches.subset(two_view.inliers)
-    error = np.linalg.norm(look_up(warp, inliers.x, cameras[0], edge.j) - inliers.y, axis=1)
+    # Matches and pixels are compared in the reference's own frame, where only one of the two pictures is resampled.
+    flat = warp
+    if warp.slide is not None or (options.measure and warp.canvas.projection is not None):
+        refinement = None if alignment.dense is None else alignment.dense.refined
+        flat = build_map(field, alignment.views, Canvas(*cameras[0].size, (0, 0)), refinement)
+    asked = warp if warp.slide is None else flat
+    error = np.linalg.norm(look_up(asked, inliers.x, cameras[0], edge.j) - inliers.y, axis=1)
     error = error[np.isfinite(error)]
     shown = coverage_samples(warp, cameras, edge.j)
     measured = {
@@ -148,11 +154,6 @@ def _measured(
     # a pair without a baseline has no F: whatever matches give would mean nothing
     independent = independent_fundamental(edge.ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
     unseen = held_out(field, edge.inliers, shown, options.seed)
-    # pixels are compared in the reference's own frame, where only one of the two pictures is resampled
-    flat = warp
-    if warp.canvas.projection is not None:
-        refinement = None if alignment.dense is None else alignment.dense.refined
-        flat = build_map(field, alignment.views, Canvas(*cameras[0].size, (0, 0)), refinement)
     return measured | overlap_quality(pictures, flat, edge.j) | {
         "projectivity_own_px": projectivity(two_view.F, shown),
         "projectivity_independent_px": projectivity(independent, shown),

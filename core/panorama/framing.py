@@ -104,9 +104,21 @@ def frame_for(
     -------
     Projection
     """
+    return frame_of(asked, views, edges, down, coverage(warp_on(coarse_sphere(views))))
+
+
+def coarse_sphere(views: Sequence[View]) -> Projection:
+    """The sphere on which what the pictures show is sampled."""
     K = views[0].K
     coarse = FRAMING.side_px / max(max(view.size) for view in views)
-    covered = _coverage(warp_on(round_projection("equirectangular", K, np.eye(3), coarse * focal_of(K))))
+    return round_projection("equirectangular", K, np.eye(3), coarse * focal_of(K))
+
+
+def frame_of(
+    asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None, covered: Coverage
+) -> Projection:
+    """As `frame_for`, where it is known what the pictures show."""
+    K = views[0].K
     if asked.level == "auto":
         frame = _levelled(asked, views, edges, down, covered, K)
     else:
@@ -118,7 +130,7 @@ def frame_for(
     return _windowed(frame, covered, asked.centre or (0.0, 0.0), asked.fov)
 
 
-def _coverage(warp: Warp) -> Coverage:
+def coverage(warp: Warp) -> Coverage:
     """What a coarse warp on a sphere shows."""
     canvas = warp.canvas
     projection = canvas.projection

@@ -221,6 +221,12 @@ class ChoiceOptions:
     per_folded: float = 15.0
     """Price of all being folded."""
 
+    fold_steps: int = 17
+    """Viewpoints along the way from which it is looked whether a thing is seen more than once."""
+
+    same_slide: float = 1e-6
+    """Slides that differ by no more are the same: rounding."""
+
     max_folded: float = 0.01
     """Share of folded cells, more than without any slide, from which a slide is out of the question."""
 
@@ -316,6 +322,12 @@ class CarryOptions:
 
     same_px: float = 0.5
     """See `same_share`."""
+
+    behind_share: float = 0.1
+    """Share of its inverse depth, with `behind_px` px of parallax, by which a surface hides what lies behind it."""
+
+    behind_px: float = 2.0
+    """See `behind_share`."""
 
     least_shift_px: float = 1e-3
     """px beside the epipolar line below which a map counts as on it: this is rounding."""

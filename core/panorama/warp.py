@@ -19,7 +19,7 @@ from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..cameras.view import View
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Box, box_of, strips
+from ..raster.arrays import Array, Box, box_of, cut, strips
 from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, Placed, whole
 from ..raster.options import GRID
@@ -56,8 +56,10 @@ class Warp:
     slide : (H, W) image or None
         How far each pixel's viewpoint lies from the reference's place towards the target's, 0..1, float32; None if all
         are seen from the reference's place.
+    behind : (H, W) bool array or None
+        What the reference cannot see though its map falls inside it, likewise: something nearer hides it.
     viewpoint : Viewpoint or None
-        The same for any direction.
+        How far it slides in any direction.
     """
 
     canvas: Canvas
@@ -65,6 +67,7 @@ class Warp:
     depth: AnyImage
     lazy_confidence: AnyImage | None = None
     slide: AnyImage | None = None
+    behind: NDArray[np.bool_] | None = None
     viewpoint: Viewpoint | None = None
 
     @property
@@ -89,7 +92,8 @@ class Warp:
             None if values is None else Placed(values, (-top, -left), (height, width))
             for values in (self.lazy_confidence, self.slide)
         )
-        return Warp(self.canvas.within(box), maps, depth, confidence, slide, self.viewpoint)
+        behind = None if self.behind is None else cut(self.behind, box)
+        return Warp(self.canvas.within(box), maps, depth, confidence, slide, behind, self.viewpoint)
 
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
