@@ -245,7 +245,7 @@ def _margins(result: StitchResult) -> list[tuple[int, int]]:
     ({"projection": "equirectangular", "level": "straight"}, "level 'straight' is not known"),
     ({"projection": "cylindrical", "level": (1.0, 2.0)}, "yaw, pitch, roll"),
     ({"projection": "cylindrical", "level": (1.0, 2.0, float("nan"))}, "yaw, pitch, roll"),
-    ({"level": (1.0, 2.0, 3.0)}, "the projection reference keeps the reference's plane"),
+    ({"level": (1.0, 2.0, 3.0)}, "the projection reference keeps the reference's own plane"),
 ])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_words(options: dict, word: str) -> None:
     with pytest.raises(BadRequest, match=word) as caught:
