@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError, fields
+from dataclasses import FrozenInstanceError, fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
-from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, SEAMS
+from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, HOLES, SEAMS
 from edf_stitch.core.options import LEAST_SCALE, StitchOptions
 from edf_stitch.core.system.errors import BadRequest
+
+from ..pairs import ON_REFERENCE
 
 
 def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore": (),
-        "projection": "reference", "level": "auto", "scale": 1.0, "crop": "full",
-        "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "holes": "transparent",
-        "seed": 0,
-        "measure": True, "cache": None,
+        "slide": 0.0, "projection": "reference", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
+        "crop": "full", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True,
+        "holes": "transparent", "seed": 0, "measure": True, "cache": None,
     }  # fmt: skip
 
 
@@ -38,14 +39,14 @@ def test_nothing_changes_them_afterwards() -> None:
 
 @pytest.mark.parametrize("asked", [
     *({"field": name} for name in FIELDS), *({"fade": name} for name in FADES), *({"blend": name} for name in BLENDS),
-    *({"seam": name} for name in SEAMS), {"mask": Path("m.png")}, {"exposure": False},
-    {"holes": "inpaint"},
+    *({"seam": name} for name in SEAMS), *({"holes": name} for name in HOLES), {"mask": Path("m.png")},
+    {"exposure": False},
     *({"crop": name} for name in CROPS), {"crop": (0, 0, 1, 1)}, {"crop": (3, 4, 500, 600)}, {"scale": 1},
     {"scale": LEAST_SCALE}, {"scale": 0.5}, {"seed": 0}, {"seed": 2**31 - 1}, {"matches": Path("m.csv")},
     {"matches": np.zeros((20, 4))}, {"ignore": (Path("a.png"),)}, {"ignore": (None, np.zeros((4, 4), bool))},
 ])  # fmt: skip
 def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
-    options = StitchOptions(**asked)
+    options = replace(ON_REFERENCE, **asked)
     for name, value in asked.items():
         assert getattr(options, name) is value
 
@@ -53,11 +54,12 @@ def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
 @pytest.mark.parametrize(("asked", "words"), [
     *(({"field": name}, ("field", repr(name), "choose from: slack, strict, paper"))
       for name in ("", "Slack", "slack ")),
-    *(({"fade": name}, ("fade", repr(name), "choose from: plane, infinity")) for name in ("none", "", "Plane")),
+    *(({"fade": name}, ("fade", repr(name), "choose from: continue, plane, infinity"))
+      for name in ("none", "", "Plane")),
     *(({"blend": name}, ("blend", repr(name), "choose from: multiband, feather, linear")) for name in ("", "Linear")),
     *(({"seam": name}, ("seam", repr(name), "choose from: graphcut, none")) for name in ("", "voronoi")),
-    *(({"holes": name}, ("holes", repr(name), "choose from: transparent, inpaint")) for name in ("", "fill")),
-    *(({"crop": name}, ("crop", repr(name), "choose from: full, inscribed, reference, or X, Y, W, H"))
+    *(({"holes": name}, ("holes", repr(name), "choose from: auto, transparent, inpaint")) for name in ("", "fill")),
+    *(({"crop": name}, ("crop", repr(name), "choose from: auto, full, inscribed, reference, or X, Y, W, H"))
       for name in ("tight", "", "1,2,3,4", "Full")),
     *(({"scale": scale}, ("scale", "between 0.02 and 1"))
       for scale in (0, 0.0199, 1.001, -1, 2, math.nan, math.inf, -math.inf)),
@@ -65,7 +67,7 @@ def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
 ])  # fmt: skip
 def test_what_is_not_offered_is_refused_with_what_is(asked: dict, words: tuple[str, ...]) -> None:
     with pytest.raises(BadRequest) as refused:
-        StitchOptions(**asked)
+        replace(ON_REFERENCE, **asked)
     assert refused.value.exit_code == 2
     for word in words:
         assert word in str(refused.value)
