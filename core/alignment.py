@@ -20,18 +20,16 @@ from .cameras.lens import undistort
 from .cameras.matches import Matches
 from .cameras.sources import cameras_for, role
 from .cameras.view import View, views_of
-from .continuation.continuation import Continuation, continue_beyond
+from .continuation.continuation import Continuation
 from .dense.refine import Dense, refine
 from .field.field import Field
-from .field.refined_depth import RefinedDepth
 from .field.slack import SlackField
 from .field.strict import StrictField
 from .fields import fit_field
+from .mapping import map_pictures
 from .options import StitchOptions
-from .panorama.levelling import confirmed, gravity_by_edges, rotation_for
-from .panorama.projection import Projection, round_projection
-from .panorama.upright_edges import straight_edges
-from .panorama.warp import Warp, build_warp
+from .panorama.choosing_slide import SlideChoice
+from .panorama.warp import Warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
 from .pose import features
@@ -66,6 +64,8 @@ class Alignment:
         Dense refinement of the field; None where it was not asked for.
     continuation : Continuation or None
         What goes on beyond the overlap; None where the field itself does.
+    slide : SlideChoice
+        How far the viewpoint slides, and why.
     """
 
     cameras: tuple[Camera, ...]
@@ -76,6 +76,7 @@ class Alignment:
     warnings: tuple[str, ...]
     dense: Dense | None = None
     continuation: Continuation | None = None
+    slide: SlideChoice = SlideChoice(0.0, (), "")
 
 
 @dataclass(frozen=True)
@@ -244,28 +245,10 @@ def fit_and_warp(
     # the field's own geometry: a rival knows no depth, so its views have none
     views = views_of(field.two_view, cameras)
     refined = None if dense is None else dense.refined
-    continuation = _continued(field, views, refined, frames) if options.fade == "continue" else None
-    warp = build_warp(field, views, _projection(options, views, frames[0]), refined, continuation)
+    mapped = map_pictures(field, views, refined, frames[0].pictures, options, progress)
     edges = (replace(edge, two_view=field.two_view),)
-    return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense, continuation)
-
-
-def _continued(
-    field: Field, views: tuple[View, ...], refined: RefinedDepth | None, frames: Sequence[Frame]
-) -> Continuation | None:
-    """What goes on beyond the overlap; None where the field has no depth, and for clips: what moves in a frame must
-    not make the rest swim."""
-    if len(frames) > 1 or not isinstance(field, (StrictField, SlackField)) or not np.isfinite(views[1].R).all():
-        return None
-    found = [
-        straight_edges(picture, view.camera, view.K)
-        for picture, view in zip(frames[0].pictures, views, strict=True)
-    ]
-    turned = [edges.in_reference(view.R) for edges, view in zip(found, views, strict=True)]
-    normals, lengths = np.vstack([one.normals for one in turned]), np.concatenate([one.lengths for one in turned])
-    down = gravity_by_edges([view.R for view in views], normals, lengths)
-    return continue_beyond(
-        field, views, refined, frames[0].pictures[1].view, found[1].rays, down, confirmed(down, normals, lengths)
+    return Alignment(
+        cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide
     )
 
 
@@ -284,22 +267,6 @@ def size_of(picture: Picture) -> tuple[int, int]:
     """(W, H) px of a picture."""
     height, width = picture.light.shape[:2]
     return width, height
-
-
-def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> Projection | None:
-    """The round projection that is asked for, levelled; None for a flat panorama."""
-    if options.projection == "reference":
-        return None
-    known = [view.R for view in views if np.isfinite(view.R).all()]
-    upright = None
-    if options.level == "auto":
-        found = [
-            straight_edges(picture, view.camera, view.K).in_reference(view.R)
-            for picture, view in zip(frame.pictures, views, strict=True)
-            if np.isfinite(view.R).all()
-        ]
-        upright = np.vstack([one.normals for one in found]), np.concatenate([one.lengths for one in found])
-    return round_projection(options.projection, views[0].K, rotation_for(options.level, known, upright))
 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:

@@ -96,10 +96,16 @@ class Confidence(OnCanvas):
 
 @dataclass(frozen=True, eq=False)
 class Nearness(OnCanvas):
-    """Baselines per distance (H, W) from a view's camera (see `visibility.nearness_of`); camera: the reference's."""
+    """Baselines per distance (H, W) from a view's camera (see `visibility.nearness_of`); camera: the reference's.
+
+    slide (H, W): that of each pixel's viewpoint, None if all are seen from the reference's place; nearer: by how much
+    nearer the view's camera is to the place of the target than to that of the reference, along its axis.
+    """
 
     view: View
     depth: AnyImage
+    slide: AnyImage | None = None
+    nearer: float = 0.0
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         rows, columns = within(part, self.shape)
@@ -107,7 +113,10 @@ class Nearness(OnCanvas):
         (infinite,) = self.canvas.project_rows(self.view.H_inf[2:], xs, ys, self.camera)
         d = np.asarray(self.depth[part])
         with np.errstate(invalid="ignore", divide="ignore"):
-            return nearness_of(d, d * np.float32(self.view.e_prime[2]) + infinite.astype(np.float32))
+            ahead = d * np.float32(self.view.e_prime[2]) + infinite.astype(np.float32)
+            if self.slide is not None:
+                ahead += d * np.asarray(self.slide[part]) * np.float32(self.nearer)
+            return nearness_of(d, ahead)
 
 
 def _taken_over(d: Array, beyond: Array, share: Array) -> Array:

@@ -19,7 +19,7 @@ from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..cameras.view import View
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Box, box_of, strips
+from ..raster.arrays import Array, Box, box_of, cut, strips
 from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, Placed, whole
 from ..raster.options import GRID
@@ -30,12 +30,13 @@ from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
 from .continued_depth import ContinuedDepth
 from .depth import Confidence, Depth, Nearness
 from .options import WARP
-from .projection import Projection
+from .projection import Projection, focal_of
 from .reference_map import ReferenceMap
 
 if TYPE_CHECKING:
     from ..continuation.continuation import Continuation
     from ..field.refined_depth import RefinedDepth
+    from .viewpoint import Viewpoint
 
 
 @dataclass(frozen=True)
@@ -52,12 +53,22 @@ class Warp:
         `raster.lazy`).
     lazy_confidence : (H, W) image or None
         Confidence of dense refinement, 0..1, float32, likewise; None without it.
+    slide : (H, W) image or None
+        How far each pixel's viewpoint lies from the reference's place towards the target's, 0..1, float32; None if all
+        are seen from the reference's place.
+    behind : (H, W) bool array or None
+        What the reference cannot see though its map falls inside it, likewise: something nearer hides it.
+    viewpoint : Viewpoint or None
+        How far it slides in any direction.
     """
 
     canvas: Canvas
     maps: tuple[CanvasMap, ...]
     depth: AnyImage
     lazy_confidence: AnyImage | None = None
+    slide: AnyImage | None = None
+    behind: NDArray[np.bool_] | None = None
+    viewpoint: Viewpoint | None = None
 
     @property
     def inverse_depth(self) -> NDArray[np.float32]:
@@ -77,14 +88,20 @@ class Warp:
         left, top, width, height = box
         maps = tuple(one.within(box, in_place) for one in self.maps)
         depth = Placed(self.depth, (-top, -left), (height, width), np.nan)
-        confidence = None
-        if self.lazy_confidence is not None:
-            confidence = Placed(self.lazy_confidence, (-top, -left), (height, width))
-        return Warp(self.canvas.within(box), maps, depth, confidence)
+        confidence, slide = (
+            None if values is None else Placed(values, (-top, -left), (height, width))
+            for values in (self.lazy_confidence, self.slide)
+        )
+        behind = None if self.behind is None else cut(self.behind, box)
+        return Warp(self.canvas.within(box), maps, depth, confidence, slide, behind, self.viewpoint)
 
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
-        return Nearness(self.canvas, views[0].camera, views[number], self.depth)
+        view = views[number]
+        if self.slide is None or self.viewpoint is None:
+            return Nearness(self.canvas, views[0].camera, view, self.depth)
+        nearer = float(view.H_inf[2] @ views[0].K @ self.viewpoint.c)
+        return Nearness(self.canvas, views[0].camera, view, self.depth, self.slide, nearer)
 
 
 def build_warp(
@@ -116,7 +133,7 @@ def build_warp(
     OutputTooLarge
         The canvas would have too many pixels.
     BadRequest
-        The panorama is round, and the field knows the reference's plane only.
+        The panorama has a projection, and the field knows the reference's plane only; or its window shows nothing.
     """
     camera, further = views[0].camera, views[1:]
     planes = [_plane_map(field, view) for view in further]
@@ -138,7 +155,7 @@ def build_warp(
 
     canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
     warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined, continuation)
-    return _trimmed(warp)
+    return trimmed(warp)
 
 
 def _at_nodes(values: FieldValues, view: View, number: int, grid: Grid, plane: Canvas, camera: Camera) -> Array:
@@ -221,7 +238,8 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     margin = int(np.ceil(min(field.fit.fade_px, WARP.max_fade * max(camera.size))))
     across, down = width + 2 * margin, height + 2 * margin
     share = min(WARP.max_node_factor, max(1.0, across * down / (2 * width * height)))
-    flat = Grid.over(-margin, -margin, across, down, int(share * GRID.nodes))
+    step = WARP.node_share * grid.step * focal_of(canvas.projection.K) / canvas.projection.focal
+    flat = Grid.over(-margin, -margin, across, down, int(min(share * GRID.nodes, across * down / step**2)))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)
     if values.far is None:
@@ -258,12 +276,16 @@ def _in_plane(points: Array) -> Array:
     return project(points)
 
 
-def _trimmed(warp: Warp) -> Warp:
+def trimmed(warp: Warp) -> Warp:
     """The warp without the outer rows and columns that no picture reaches."""
     shown = np.zeros((warp.canvas.height, warp.canvas.width), bool)
     for one in warp.maps[1:]:
         shown |= one.inside()
-    if not shown.any():
+    projection = warp.canvas.projection
+    framed = projection is not None and projection.window is not None
+    if not shown.any() and not framed:
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
     shown |= warp.maps[0].inside()
+    if not shown.any():
+        raise BadRequest("the frame lies beside both pictures: give a centre nearer to 0,0, or a larger field of view")
     return warp.within(box_of(shown), in_place=True)
