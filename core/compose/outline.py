@@ -42,7 +42,7 @@ def frame_outline(
     shown = _shown(coarse_sphere(views), views, outlines)
     if shown is None:
         return None
-    frame = frame_of(asked, views, None, shown)
+    frame = frame_of(asked, views, None, None, shown)
     limits, points = frame.limits, frame.points(shown.rays)
     low, high = np.maximum(points.min(axis=0), limits[:2]), np.minimum(points.max(axis=0), limits[2:])
     if frame.window is not None:

@@ -21,6 +21,7 @@ from ..measure.metrics import look_up
 from ..pipeline import StitchResult
 from ..raster.arrays import Array
 from ..raster.colour import encode
+from ..raster.lazy import whole
 from ..raster.resizing import size_change
 from .match_table import match_file
 from .options import INSPECTION
@@ -122,13 +123,17 @@ def _states(used: NDArray[np.bool_]) -> list[str]:
 
 
 def displacement_px(result: StitchResult) -> NDArray[np.float32]:
-    """Distance (H, W), in px of the full target, between where each canvas pixel is seen and where it would be seen at
-    infinity; 0 for a model without depth, NaN behind the camera."""
+    """Distance (H, W), in px of the full target, between where each canvas pixel is seen and where it would be seen if
+    what the reference shows there were infinitely far; 0 for a model without depth, NaN behind the camera."""
     warp, number = result.warp, result.edges[0].j
     view, picture_map = result.views[number], warp.maps[number].arrays()
     if not view.e_prime.any():
         return np.zeros(picture_map.shape, np.float32)
     infinite = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, result.cameras[0])
+    if warp.slide is not None and warp.viewpoint is not None:
+        away = whole(warp.slide) * warp.inverse_depth
+        towards = view.H_inf @ result.views[0].K @ warp.viewpoint.c
+        infinite = [part + away * step for part, step in zip(infinite, towards, strict=True)]
     far = distort(np.stack(transfer(view, infinite, np.zeros(1)), axis=-1), view.camera)
     moved = np.hypot(picture_map.x - far[..., 0], picture_map.y - far[..., 1])
     in_full_px: NDArray[np.float32] = (moved / scales(result)[number][0, 0]).astype(np.float32)
@@ -172,16 +177,20 @@ def depth_grid(result: StitchResult) -> dict[str, Any]:
     -------
     dict
         `columns`, `rows`: nodes in either direction. `inverse_depth` and `shows` (1 where the panorama is not
-        transparent): one value for each node, row by row from the top.
+        transparent): one value for each node, row by row from the top. `slide` likewise where the viewpoint slides: a
+        node's depth is measured from s times the target's place.
     """
     height, width = result.panorama.alpha.shape
     longest = max(width, height)
     columns, rows = (max(2, round(INSPECTION.longest_grid * side / longest)) for side in (width, height))
     x, y = (np.rint(np.linspace(0, side - 1, n)).astype(int) for side, n in ((width, columns), (height, rows)))
     depth = result.warp.inverse_depth[np.ix_(y, x)].ravel()
+    slide = {}
+    if result.warp.slide is not None:
+        slide["slide"] = [round(float(s), 4) for s in whole(result.warp.slide)[np.ix_(y, x)].ravel()]
     return {
         "columns": columns, "rows": rows, "inverse_depth": [float(f"{d:.5g}") for d in depth],
-        "shows": (result.panorama.alpha[np.ix_(y, x)] > 0).astype(int).ravel(),
+        "shows": (result.panorama.alpha[np.ix_(y, x)] > 0).astype(int).ravel(), **slide,
     }  # fmt: skip
 
 

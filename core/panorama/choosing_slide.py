@@ -191,11 +191,9 @@ def _level(rays: Array, d: Array, down: Array) -> NDArray[np.bool_]:
     return level
 
 
-def _geometry(
-    shown: Sequence[_Shown], viewpoint: Viewpoint, down: Array | None
-) -> tuple[float, float, float, float]:
+def _geometry(shown: Sequence[_Shown], viewpoint: Viewpoint, down: Array | None) -> tuple[float, float, float, float]:
     """Bend (px) and lean (degrees) of the edges of all pictures, and shares of their cells enlarged and folded."""
-    bends, weights, lean, upright_weights, ratios = ([] for _ in range(5))
+    bends, weights, lean, upright_weights, enlarged, folded = ([] for _ in range(6))
     for one in shown:
         normals, off = planes_through(viewpoint.seen_from(one.edges.q, one.edges.d)[0])
         bends.append(np.minimum(CHOICE.px_per_radian * off, CHOICE.max_bend_px))
@@ -203,11 +201,26 @@ def _geometry(
         if down is not None:
             lean.append(np.minimum(np.degrees(leans(normals[one.upright], down)), CHOICE.max_lean_deg))
             upright_weights.append(one.lengths[one.upright])
-        ratios.append((_areas(viewpoint.seen_from(one.grid.q, one.grid.d)[0]) / one.areas).ravel())
-    ratio = np.concatenate(ratios)
-    with np.errstate(invalid="ignore"):
-        enlarged, folded = ratio > CHOICE.max_enlarged**2, ratio < CHOICE.least_area
-    return _mean(bends, weights), _mean(lean, upright_weights, CHOICE.least_upright), float(enlarged.mean()), float(folded.mean())
+        with np.errstate(invalid="ignore"):
+            ratio = _areas(viewpoint.seen_from(one.grid.q, one.grid.d)[0]) / one.areas
+            enlarged.append((ratio > CHOICE.max_enlarged**2).ravel())
+            twice = np.isfinite(one.areas) & _twice(viewpoint, one.grid)[CORNERS[0]]
+            folded.append((twice | (ratio < CHOICE.least_area)).ravel())
+    shares = [float(np.concatenate(one).mean()) for one in (enlarged, folded)]
+    return _mean(bends, weights), _mean(lean, upright_weights, CHOICE.least_upright), shares[0], shares[1]
+
+
+def _twice(viewpoint: Viewpoint, things: Things) -> NDArray[np.bool_]:
+    """Which things (…) the panorama shows more than once: the slide goes back over them faster than they move on.
+
+    A thing is seen wherever the viewpoint of the ray towards it is the one that the ray starts from.
+    """
+    past = []
+    for slide in np.linspace(0, viewpoint.s1, CHOICE.fold_steps):
+        rays = things.q - (slide * things.d)[..., None] * viewpoint.c
+        past.append(viewpoint.slide_at(rays) > slide + CHOICE.same_slide)
+    twice: NDArray[np.bool_] = np.diff(np.stack(past), axis=0).sum(axis=0) > 1
+    return twice
 
 
 def _mean(values: Sequence[Array], weights: Sequence[Array], least: float = 1e-9) -> float:

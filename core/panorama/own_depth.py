@@ -109,7 +109,8 @@ def _nearest(base: Warp, number: int, d: Array, size: tuple[int, int]) -> NDArra
     for _ in range(max(size)):
         if np.isfinite(out).all():
             break
-        out = np.where(np.isfinite(out), out, cv2.erode(out, np.ones((3, 3), np.uint8)))
+        beside = cv2.erode(out, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
+        out = np.where(np.isfinite(out), out, beside)
     return np.where(np.isfinite(out), out, np.float32(0))
 
 

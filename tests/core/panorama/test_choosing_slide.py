@@ -40,14 +40,14 @@ def slid(warp: Warp) -> float:
 
 
 def rig(by_hand: SimpleNamespace, depth: Callable, turn: float = 28.0) -> tuple[Warp, tuple[View, ...]]:
-    """Two cameras side by side, the target turned to the right, and the panorama of depth(heading, rise), d along rays
+    """Two cameras side by side, the target on the right, turned to the right, and the panorama of depth(heading, rise), d along rays
     of that heading and tan of elevation."""
     camera = by_hand.camera(SIZE, FOCAL)
     first, second = views_of(by_hand.view(camera, camera, (0, -turn, 0), (-1.0, 0, 0)), (camera, camera))
     t = -second.R @ PLACE
     views = first, replace(second, t=t, e_prime=second.K @ t)
     projection = replace(round_projection("cylindrical", views[0].K, np.eye(3)), focal=CHOICE.base_px_per_radian)
-    canvas = Canvas(720, 400, (240, 200), projection=projection)
+    canvas = Canvas(840, 400, (420, 200), projection=projection)
     heading, rise = np.meshgrid(canvas.xs / projection.focal, canvas.ys / projection.focal)
     d = depth(heading, rise)
     a, b, c = (
@@ -89,7 +89,8 @@ def chosen_without(monkeypatch: pytest.MonkeyPatch, price: str, choose: Callable
 
 def test_long_lines_across_a_wall_keep_it_where_it_is(by_hand: SimpleNamespace) -> None:
     base, views = rig(by_hand, wall)
-    edges = lines(*(((-1.0, y, 4.0), (3.0, y, 4.0)) for y in (-1.2, -0.6, 0.7, 1.1)))
+    # aslant: those along the way from one camera to the other stay straight in any case
+    edges = lines(*(((1.1, y, 4.0), (1.9, y + 0.5, 4.0)) for y in (-1.3, -0.9, 0.1, 0.6)))
     choice = choose_slide(base, views, edges, DOWN, better_far(20))
     assert choice.s1 == 0 and choice.costs[0].bend_px < 0.05, "the wall's own depth keeps them straight"
     bends = [one.bend_px for one in choice.costs]
@@ -123,15 +124,17 @@ def test_what_would_be_enlarged_beyond_the_overlap_is_shown_as_it_was_taken(
         return choose_slide(base, views, NONE, DOWN, steady)
 
     choice = choose()
-    assert choice.s1 == 1 and choice.costs[0].enlarged > 0.1 and choice.costs[-1].enlarged < 0.02
+    assert choice.s1 > 0 and choice.costs[0].enlarged > 0.03
+    assert next(one for one in choice.costs if one.s1 == choice.s1).enlarged < 0.005
     assert chosen_without(monkeypatch, "per_enlarged", choose) == 0
 
 
 def test_a_slide_that_folds_is_out_of_the_question(by_hand: SimpleNamespace) -> None:
-    base, views = rig(by_hand, lambda heading, rise: np.full_like(heading, 0.45), turn=20.0)
-    choice = choose_slide(base, views, NONE, DOWN, better_far(1000))
+    # from the right the target looks far to the left: the way goes against the parallax
+    base, views = rig(by_hand, lambda heading, rise: np.full_like(heading, 0.3), turn=-52.0)
+    choice = choose_slide(base, views, NONE, DOWN, better_far(25))
     assert 0 < choice.s1 < 1 and choice.costs[-1].folded > 0.02 and "fold" in choice.why
-    assert [one for one in choice.costs if one.s1 == choice.s1][0].folded < 0.01
+    assert next(one for one in choice.costs if one.s1 == choice.s1).folded < 0.01
 
 
 def test_a_seam_that_runs_unseen_is_worth_it(by_hand: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
