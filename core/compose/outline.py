@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..cameras.view import View
 from ..choices import Crop
 from ..panorama.framing import FrameRequest, Shown, coarse_sphere, frame_of
-from ..panorama.options import FRAMING
+from ..panorama.framing_options import FRAMING
 from ..panorama.projection import Projection
 from ..raster.arrays import Array
 from ..system.errors import BadRequest
