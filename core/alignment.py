@@ -20,16 +20,16 @@ from .cameras.lens import undistort
 from .cameras.matches import Matches
 from .cameras.sources import cameras_for, role
 from .cameras.view import View, views_of
+from .continuation.continuation import Continuation
 from .dense.refine import Dense, refine
 from .field.field import Field
 from .field.slack import SlackField
 from .field.strict import StrictField
 from .fields import fit_field
+from .mapping import map_pictures
 from .options import StitchOptions
-from .panorama.levelling import rotation_for
-from .panorama.projection import Projection, round_projection
-from .panorama.upright_edges import edges
-from .panorama.warp import Warp, build_warp
+from .panorama.choosing_slide import SlideChoice
+from .panorama.warp import Warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
 from .pose import features
@@ -62,6 +62,10 @@ class Alignment:
         In plain words.
     dense : Dense or None
         Dense refinement of the field; None where it was not asked for.
+    continuation : Continuation or None
+        What goes on beyond the overlap; None where the field itself does.
+    slide : SlideChoice
+        How far the viewpoint slides, and why.
     """
 
     cameras: tuple[Camera, ...]
@@ -71,6 +75,8 @@ class Alignment:
     warp: Warp
     warnings: tuple[str, ...]
     dense: Dense | None = None
+    continuation: Continuation | None = None
+    slide: SlideChoice = SlideChoice(0.0, (), "")
 
 
 @dataclass(frozen=True)
@@ -239,9 +245,11 @@ def fit_and_warp(
     # the field's own geometry: a rival knows no depth, so its views have none
     views = views_of(field.two_view, cameras)
     refined = None if dense is None else dense.refined
-    warp = build_warp(field, views, _projection(options, views, frames[0]), refined)
+    mapped = map_pictures(field, views, refined, frames[0].pictures, options, progress)
     edges = (replace(edge, two_view=field.two_view),)
-    return Alignment(cameras, edges, views, field, warp, geometry.warnings, dense)
+    return Alignment(
+        cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide
+    )
 
 
 def _refined(
@@ -259,24 +267,6 @@ def size_of(picture: Picture) -> tuple[int, int]:
     """(W, H) px of a picture."""
     height, width = picture.light.shape[:2]
     return width, height
-
-
-def _projection(options: StitchOptions, views: Sequence[View], frame: Frame) -> Projection | None:
-    """The round projection that is asked for, levelled; None for a flat panorama."""
-    if options.projection == "reference":
-        return None
-    known = [view.R for view in views if np.isfinite(view.R).all()]
-    upright = None
-    if options.level == "auto":
-        found = [
-            (normals if number == 0 else normals @ view.R, lengths)
-            for number, (picture, view) in enumerate(zip(frame.pictures, views, strict=True))
-            if np.isfinite(view.R).all()
-            for normals, lengths in (edges(picture, view.camera, view.K),)
-        ]
-        normals, lengths = zip(*found, strict=True)
-        upright = np.vstack(normals), np.concatenate(lengths)
-    return round_projection(options.projection, views[0].K, rotation_for(options.level, known, upright))
 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:

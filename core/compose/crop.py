@@ -1,4 +1,7 @@
-"""Which part of the panorama is kept: all of it, what is full everywhere, the reference's frame, or a given box."""
+"""Which part of the panorama is kept: all of it, what is full everywhere, the reference's frame, or a given box.
+
+"auto" keeps what is full everywhere if that is most of what is shown, else the smallest box of all that is shown.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..choices import CROPS, Crop
-from ..raster.arrays import Box
+from ..raster.arrays import Box, box_of
+from ..raster.rectangle import largest_rectangle
 from ..system.errors import BadRequest
+from .options import CROP
 
 
 def parse_crop(text: str) -> Crop:
@@ -54,8 +59,12 @@ def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Bo
         return whole
     if kind == "reference":
         return reference_box
-    if kind == "inscribed":
-        return largest_rectangle(shows)
+    if kind in ("auto", "inscribed"):
+        if not shows.any():
+            raise BadRequest("the panorama shows nothing that a crop could keep")
+        box = largest_rectangle(shows)
+        keeps = kind == "inscribed" or box[2] * box[3] >= CROP.least_kept * np.count_nonzero(shows)
+        return box if keeps else box_of(shows)
     if isinstance(kind, str) or len(kind) != 4:
         raise BadRequest(f"the crop {kind!r} is not known; choose from: {', '.join(CROPS)}, or give X, Y, W, H in px")
     x, y, w, h = kind
@@ -68,30 +77,3 @@ def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Bo
     if not shows[max(0, y) : max(0, y + h), max(0, x) : max(0, x + w)].size:
         raise BadRequest(f"the crop {x - left},{y - top},{w},{h} (X,Y,W,H) lies beside both pictures")
     return x, y, w, h
-
-
-def largest_rectangle(shows: NDArray[np.bool_]) -> Box:
-    """The largest axis-parallel rectangle (left, top, width, height) of True pixels of a mask (H, W).
-
-    Exact; of equals the one that ends first, from the top, then from the left. Raises BadRequest where nothing is True.
-    """
-    height, width = shows.shape
-    column = np.arange(width, dtype=np.int64)
-    # For each pixel of a row: how far its column is True upwards, and how far a rectangle of that height can be
-    # widened. The largest rectangle is found from some pixel of its last row; each step works on a whole row at once.
-    up, left, right = np.zeros(width, np.int64), np.zeros(width, np.int64), np.full(width, width, np.int64)
-    best, box = 0, (0, 0, 0, 0)
-    for row, here in enumerate(shows):
-        row_left = np.maximum.accumulate(np.where(here, 0, column + 1))
-        row_right = np.minimum.accumulate(np.where(here, width, column)[::-1])[::-1]
-        up = np.where(here, up + 1, 0)
-        left = np.where(here, np.maximum(left, row_left), 0)
-        right = np.where(here, np.minimum(right, row_right), width)
-        area = up * (right - left)
-        at = int(area.argmax())
-        if area[at] > best:
-            best = int(area[at])
-            box = (int(left[at]), row + 1 - int(up[at]), int(right[at] - left[at]), int(up[at]))
-    if not best:
-        raise BadRequest("the panorama shows nothing that a crop could keep")
-    return box

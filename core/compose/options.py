@@ -127,6 +127,14 @@ class SeamOptions:
 
 
 @dataclass(frozen=True)
+class RoughSeamOptions:
+    """What a seam would cut through, in small pictures (`rough_seam`)."""
+
+    visible_tone: float = 0.1
+    """Tones by which the pictures differ at a seam that is seen: blending evens out less."""
+
+
+@dataclass(frozen=True)
 class BandOptions:
     """Blending in bands (`multiband`; Burt and Adelson, ACM TOG 1983), and feathering as widely."""
 
@@ -164,11 +172,25 @@ class InpaintOptions:
     """Weight of what lies nearer than halfway to the thing that hid the hole, beside what lies behind: it decides only
     where nothing lies behind."""
 
+    small_share: float = 1e-3
+    """Share of the canvas up to which a closed hole is small: filled, it is hardly seen, and left open it would cut the
+    inscribed rectangle in two."""
+
+
+@dataclass(frozen=True)
+class CropOptions:
+    """What of the panorama is kept (`crop`)."""
+
+    least_kept: float = 0.7
+    """Share of what is shown that the inscribed rectangle keeps at least to be taken: below, too much would be lost."""
+
 
 EXPOSURE = ExposureOptions()
 OVERLAP = OverlapOptions()
 MOVING_THINGS = MovingThingsOptions()
 MIN_CUT = MinCutOptions()
 SEAM = SeamOptions()
+ROUGH_SEAM = RoughSeamOptions()
 BANDS = BandOptions()
 INPAINT = InpaintOptions()
+CROP = CropOptions()

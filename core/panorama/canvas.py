@@ -19,7 +19,7 @@ from ..raster.grid import Grid
 from ..raster.picture_map import falls_inside
 from ..system.errors import OutputTooLarge
 from .options import CANVAS
-from .projection import Projection, extent
+from .projection import Projection, extent, focal_of
 
 
 @dataclass(frozen=True)
@@ -138,8 +138,9 @@ def bounding_canvas(
     """
     left, top, right, bottom = reach
     limits = np.array([-np.inf, -np.inf, np.inf, np.inf]) if projection is None else projection.limits
-    # nothing stretches without end on a sphere
-    max_stretch = np.inf if projection is not None and projection.sphere else CANVAS.max_stretch
+    max_stretch = CANVAS.max_stretch
+    if projection is not None:  # nothing stretches without end on a sphere
+        max_stretch = np.inf if projection.sphere else max_stretch * projection.focal / focal_of(projection.K)
     cropped = False
     for _ in range(2):  # the second pass has a finer grid over what the first found
         width, height = max(1, int(right - left)), max(1, int(bottom - top))
@@ -250,12 +251,14 @@ def round_reach(
         for outline, matrix, picture in zip((own, *outlines), (np.eye(3), *planes), cameras, strict=True)
     ]
     limits = projection.limits
-    margin = CANVAS.margin * max(cameras[0].size)
+    margin = CANVAS.margin * max(cameras[0].size) * projection.focal / focal_of(projection.K)
     low, high = np.min(extents, axis=0)[:2], np.max(extents, axis=0)[2:]
-    cut = projection.sphere is None and bool((low < limits[:2]).any() or (high > limits[2:]).any())
-    reach = np.concatenate([np.maximum(low - margin, limits[:2]), np.minimum(high + margin, limits[2:])])
-    left, top = np.floor(np.maximum(extents[0][:2], limits[:2])).astype(int)
-    right, bottom = np.ceil(np.minimum(extents[0][2:], limits[2:])).astype(int) + 1
+    # a sphere leaves out nothing, and what a window leaves out was asked for
+    bounded = projection.sphere is None and projection.window is None
+    cut = bounded and bool((low < limits[:2]).any() or (high > limits[2:]).any())
+    reach = np.clip(np.concatenate([low - margin, high + margin]), np.tile(limits[:2], 2), np.tile(limits[2:], 2))
+    left, top = np.floor(np.clip(extents[0][:2], limits[:2], limits[2:] - 1)).astype(int)
+    right, bottom = np.ceil(np.clip(extents[0][2:], limits[:2], limits[2:] - 1)).astype(int) + 1
     return (int(left), int(top), int(right - left), int(bottom - top)), reach, cut
 
 

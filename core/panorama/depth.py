@@ -15,6 +15,7 @@ from ..raster.arrays import Array, Part, strips, within
 from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, LazyImage
 from .canvas import Canvas
+from .continued_depth import ContinuedDepth
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +33,13 @@ class OnCanvas(LazyImage):
 
 @dataclass(frozen=True, eq=False)
 class Depth(OnCanvas):
-    """The inverse depth (H, W) of a canvas, from a field's at the nodes of a grid and its dense refinement."""
+    """The inverse depth (H, W) of a canvas, from a field's at the nodes of a grid, its dense refinement, and what
+    continues both beyond the overlap."""
 
     grid: Grid
     nodes: Array
     refined: RefinedDepth | None
+    continued: ContinuedDepth | None = None
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         rows, columns = within(part, self.shape)
@@ -49,20 +52,25 @@ class Depth(OnCanvas):
                 out[low - rows.start : high - rows.start] = d[low - strip.start : high - strip.start, columns]
         return out
 
-    def strip(self, rows: slice) -> tuple[Array, NDArray[np.float32] | None]:
-        """Whole rows of inverse depth, and px (h, W, 2) that dense refinement adds in its picture, None without it."""
-        canvas, d = self.canvas, self._of_field(rows)
-        if self.refined is None:
-            return d, None
-        more, sideways, _ = _refined_at(self.refined, canvas, canvas.xs, canvas.ys[rows], self.camera)
-        return d + more, sideways
+    def strip(self, rows: slice) -> tuple[Array, NDArray[np.float32] | None, Array | None]:
+        """Whole rows of inverse depth; px (h, W, 2) that dense refinement adds in its picture, None without it; and
+        what the field counts there (h, W), in depth and in px beside the epipolar lines, None if all of it."""
+        canvas, d, sideways = self.canvas, self._of_field(rows), None
+        if self.refined is not None:
+            more, sideways, _ = _refined_at(self.refined, canvas, canvas.xs, canvas.ys[rows], self.camera)
+            d = d + more
+        if self.continued is None:
+            return d, sideways, None
+        beyond, share = self.continued.strip(rows)
+        return _taken_over(d, beyond, share), sideways, share
 
     def _depth(self, rows: slice) -> Array:
         """Whole rows of inverse depth, without what dense refinement adds in its picture."""
         canvas, refined = self.canvas, self.refined
         if refined is None or canvas.projection is not None:
             return self.strip(rows)[0]
-        return self._of_field(rows) + refined.part_over(refined.inverse_depth, canvas.xs, canvas.ys[rows])
+        d = self._of_field(rows) + refined.part_over(refined.inverse_depth, canvas.xs, canvas.ys[rows])
+        return d if self.continued is None else _taken_over(d, *self.continued.strip(rows))
 
     def _of_field(self, rows: slice) -> Array:
         """Whole rows of the field's inverse depth."""
@@ -88,10 +96,16 @@ class Confidence(OnCanvas):
 
 @dataclass(frozen=True, eq=False)
 class Nearness(OnCanvas):
-    """Baselines per distance (H, W) from a view's camera (see `visibility.nearness_of`); camera: the reference's."""
+    """Baselines per distance (H, W) from a view's camera (see `visibility.nearness_of`); camera: the reference's.
+
+    slide (H, W): that of each pixel's viewpoint, None if all are seen from the reference's place; nearer: by how much
+    nearer the view's camera is to the place of the target than to that of the reference, along its axis.
+    """
 
     view: View
     depth: AnyImage
+    slide: AnyImage | None = None
+    nearer: float = 0.0
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         rows, columns = within(part, self.shape)
@@ -99,7 +113,15 @@ class Nearness(OnCanvas):
         (infinite,) = self.canvas.project_rows(self.view.H_inf[2:], xs, ys, self.camera)
         d = np.asarray(self.depth[part])
         with np.errstate(invalid="ignore", divide="ignore"):
-            return nearness_of(d, d * np.float32(self.view.e_prime[2]) + infinite.astype(np.float32))
+            ahead = d * np.float32(self.view.e_prime[2]) + infinite.astype(np.float32)
+            if self.slide is not None:
+                ahead += d * np.asarray(self.slide[part]) * np.float32(self.nearer)
+            return nearness_of(d, ahead)
+
+
+def _taken_over(d: Array, beyond: Array, share: Array) -> Array:
+    """Inverse depth d (h, W) with its share, what continues it with the rest; d itself where that is all."""
+    return np.where(share < 1, beyond + share * (d - beyond), d)
 
 
 def _refined_at(

@@ -99,7 +99,7 @@ def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array)
     rotations : sequence of (3, 3) arrays
         See `gravity`.
     normals, lengths : (N, 3) and (N,) arrays
-        Of straight edges, in the reference's frame (see `upright_edges.edges`).
+        Of straight edges, in the reference's frame (see `upright_edges.straight_edges`).
 
     Returns
     -------
@@ -134,6 +134,14 @@ def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array)
         best, middle = down[found], (float(np.degrees(pitch[found])), float(np.degrees(roll[found])))
         pitch_reach = roll_reach = LEVELLING.narrowing * step
     return best
+
+
+def confirmed(down: Array, normals: Array, lengths: Array) -> bool:
+    """Whether most of the edges that are nearly upright agree on which way is down (3,); normals, lengths: see
+    `gravity_by_edges`."""
+    tilt = np.abs(normals @ down)
+    near, agreeing = (lengths[tilt < np.sin(np.radians(limit))].sum() for limit in LEVELLING.confirming_tilts_deg)
+    return bool(agreeing > max(LEVELLING.confirming_share * near, LEVELLING.confirming_length))
 
 
 def upright(down: Array) -> Array:

@@ -41,8 +41,15 @@ class WarpOptions:
     """Longer sides of the reference beside it within which fields end in their plane, in round panoramas: the grid that
     is laid over the reference's plane has to end somewhere."""
 
+    takeover: float = 0.05
+    """Share of the reference's longer side, beyond its border, over which what continues beyond the overlap takes over
+    from the field."""
+
     max_node_factor: float = 4.0
     """Nodes of that grid at most, in units of those of any other grid: time and memory grow with it."""
+
+    node_share: float = 0.5
+    """Distance between nodes of that grid at least, in those between the canvas's own: a coarse map needs fewer."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +62,14 @@ class LayerOptions:
 
 @dataclass(frozen=True)
 class ProjectionOptions:
-    """Round panoramas (`projection`)."""
+    """Surfaces of a panorama (`projection`)."""
 
-    max_cylinder_slope: float = 3.0
-    """tan φ at which a cylinder is cut off (72°): it grows without end towards zenith and nadir."""
+    max_slope: float = 3.0
+    """Focal lengths from the middle at which a plane, Pannini's projection and the height of a cylinder are cut off (a
+    plane at 72°): they grow without end."""
+
+    least_forward: float = 1e-9
+    """Cosines below which a ray counts as one that a plane, Pannini's projection or a cylinder cannot show."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +110,17 @@ class LevellingOptions:
     so many times that do edges have a say."""
 
 
+    confirming_tilts_deg: tuple[float, float] = (20.0, 1.5)
+    """Degrees off upright within which edges are asked whether down is right, and within which they say so: trunks of
+    palms lean any way, walls do not."""
+
+    confirming_share: float = 0.4
+    """Share of the length of those asked that has to say so; at random it would be a thirteenth."""
+
+    confirming_length: float = 0.5
+    """Length of the edges that say so at least, in shares of a picture's longer side."""
+
+
 @dataclass(frozen=True)
 class EdgeOptions:
     """Straight edges that show what is upright (`upright_edges`)."""
@@ -119,9 +141,209 @@ class EdgeOptions:
     """Share of the edges that are upright, in a usual picture, beside the density (per rad) of those that are not."""
 
 
+@dataclass(frozen=True)
+class StraightnessOptions:
+    """How straight a panorama keeps an edge (`straightness`)."""
+
+    points: int = 16
+    """Places along an edge that are looked up: its shape between them is smooth."""
+
+    end_margin: float = 0.02
+    """Share of an edge at either end that is left out: detection ends it a little beyond what it lies on."""
+
+    percentile: float = 90.0
+    """Percentile of a place's distance from the edge's plane that counts as its bend: a single place at a jump of depth
+    does not make it crooked."""
+
+
+@dataclass(frozen=True)
+class OwnDepthOptions:
+    """Depth along each picture's own rays (`own_depth`)."""
+
+    rounds: int = 2
+    """Times that a depth is looked up again where the last one leads: more change nothing on surfaces."""
+
+    same_share: float = 0.06
+    """Share of an inverse range by which two may differ and still be one surface's."""
+
+    same_parallax: float = 5e-4
+    """The same in radians of parallax, in addition: half a pixel of a picture of 900."""
+
+
+@dataclass(frozen=True)
+class ChoiceOptions:
+    """Choosing how far the viewpoint slides (`choosing_slide`). Prices are in px of bend, and were chosen so that the
+    least cost is what the eye prefers on 33 pairs of photographs."""
+
+    candidates: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
+    """Slides that are tried: the cost is smooth between them."""
+
+    seam_candidates: tuple[float, ...] = (0.0, 0.5, 1.0)
+    """Slides at which a seam is cut and holes are counted, which takes longest; interpolated between."""
+
+    base_px_per_radian: float = 300.0
+    """Resolution of the coarse map: depth edges to about 3 px of a picture of 900."""
+
+    seam_px_per_radian: float = 150.0
+    """Resolution at which the seam is cut: finer costs more time and tells hardly more."""
+
+    px_per_radian: float = 900.0
+    """Resolution in whose px bends and seams are given: about that of a picture that fills a screen."""
+
+    least_length: float = 0.05
+    """Share of a picture's longer side from which an edge counts: of a shorter one nobody sees the bend."""
+
+    max_bend_px: float = 6.0
+    """px of bend that an edge counts at most: more of it is a wrong depth, which no slide mends."""
+
+    upright_within: float = 0.012
+    """Radians off gravity within which an edge is upright, as its own picture shows it."""
+
+    least_upright: float = 0.5
+    """Length of all upright edges together, in longer sides, below which their lean counts for less: two or three may
+    be something else."""
+
+    max_lean_deg: float = 8.0
+    """Degrees of lean that an edge counts at most."""
+
+    per_lean_deg: float = 0.25
+    """Price of a degree of mean lean."""
+
+    max_enlarged: float = 1.3
+    """Canvas px per px of a picture, in length, from which a cell is enlarged."""
+
+    per_enlarged: float = 6.0
+    """Price of all being enlarged."""
+
+    least_area: float = 0.05
+    """Share of its area in the picture below which a cell is folded, or about to."""
+
+    per_folded: float = 15.0
+    """Price of all being folded."""
+
+    fold_steps: int = 17
+    """Viewpoints along the way from which it is looked whether a thing is seen more than once."""
+
+    same_slide: float = 1e-6
+    """Slides that differ by no more are the same: rounding."""
+
+    max_folded: float = 0.01
+    """Share of folded cells, more than without any slide, from which a slide is out of the question."""
+
+    per_seam_px: float = 0.0044
+    """Price of a px of seam that is seen."""
+
+    max_seam_px: float = 175.0
+    """px of such seam that count at most: of two bad ones, the longer is no worse."""
+
+    per_hole: float = 40.0
+    """Price of all being holes."""
+
+    hole_radius: float = 0.03
+    """Radians from what is shown within which what is not shown, on all sides, is a hole."""
+
+    tie_px: float = 0.005
+    """Cost by which candidates may differ and still be as good: the one that slides least is taken."""
+
+    tie_share: float = 0.03
+    """The same as a share of the least cost; the larger counts."""
+
+    cells: int = 90
+    """Cells along a picture's longer side in which enlargement and folds are looked at."""
+
+    smoothing: float = 0.006
+    """σ, in longer sides, of the blur over depth before that: noise in depth is no fold that anyone sees."""
+
+    least_jump_px: float = 4.0
+    """px of parallax across a cell below which it lies on one surface, at `px_per_radian`."""
+
+    jump_share: float = 0.12
+    """The same as a share of its parallax, in addition: surfaces that are seen at a slant."""
+
+
+@dataclass(frozen=True)
+class SlideOptions:
+    """How the viewpoint slides (`viewpoint`)."""
+
+    percentiles: tuple[float, float] = (1.5, 98.5)
+    """Per cent of the overlap, along the line between the pictures' centres, between which it slides: its corners do
+    not count."""
+
+    margin: float = 0.04
+    """Share of that range by which the slide ends sooner on either side: what lies there is seen best."""
+
+    straightened: float = 2.0
+    """How many times as far apart in heading as in elevation (or the reverse) the centres are for the slide to go by
+    that alone: then uprights stay upright."""
+
+    least_apart: float = 0.02
+    """Radians between the pictures' centres: of closer ones, neither has a side."""
+
+    least_alone: float = 0.03
+    """Share of each picture that it alone shows: with less the other one surrounds it."""
+
+    nodes: int = 400
+    """Nodes along the longer side of the base at which the overlap is looked at."""
+
+    rounds: int = 6
+    """Steps of false position for s: below a thousandth where the parallax is no more than the width of the slide."""
+
+    least_range: float = 1e-9
+    """Range, in that of the reference, of a point that the viewpoint slides through."""
+
+
+@dataclass(frozen=True)
+class CarryOptions:
+    """Inverse depth carried to the sliding viewpoint (`carried_depth`, `slid_warp`)."""
+
+    jump_px: float = 2.5
+    """px of parallax between neighbours, with `jump_share` of the nearer one's, from which they lie on two surfaces."""
+
+    jump_share: float = 0.06
+    """See `jump_px`: what is near has steeper slopes."""
+
+    sharpenings: int = 2
+    """Rounds in which pixels between two surfaces are given to the nearer in depth; a jump is 2 to 4 px wide."""
+
+    speck_px: int = 3
+    """px, side of the median that takes single points out of the surface that they fall on."""
+
+    rounds: int = 2
+    """px by which gaps are filled from their far side at each size."""
+
+    halvings: int = 6
+    """Times that the canvas is halved for gaps that are still there: up to 2 · 2⁶ px wide."""
+
+    refinements: int = 2
+    """Times that a pixel's depth is looked up where its point lies: it settles at once on smooth surfaces."""
+
+    same_share: float = 0.06
+    """Share of d, with `same_px` px of parallax, by which a surface may differ from what was carried over."""
+
+    same_px: float = 0.5
+    """See `same_share`."""
+
+    behind_share: float = 0.1
+    """Share of its inverse depth, with `behind_px` px of parallax, by which a surface hides what lies behind it."""
+
+    behind_px: float = 2.0
+    """See `behind_share`."""
+
+    least_shift_px: float = 1e-3
+    """px beside the epipolar line below which a map counts as on it: this is rounding."""
+
+    reach_nodes: int = 200
+    """Nodes along the longer side of the base at which the pictures' bounds are looked for."""
+
+
 CANVAS = CanvasOptions()
 WARP = WarpOptions()
 LAYER = LayerOptions()
 PROJECTION = ProjectionOptions()
 LEVELLING = LevellingOptions()
 EDGES = EdgeOptions()
+STRAIGHTNESS = StraightnessOptions()
+OWN_DEPTH = OwnDepthOptions()
+CHOICE = ChoiceOptions()
+SLIDE = SlideOptions()
+CARRY = CarryOptions()

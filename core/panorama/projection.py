@@ -1,18 +1,31 @@
-"""Round panoramas, cylindrical and equirectangular: which ray each of their points shows (docs/method.md, 6).
+"""Surfaces that a panorama is drawn on, and which ray each of their points shows (docs/method.md, 6).
 
 A panorama has axes of its own: x to the right, y down, z ahead; levelled, y points along gravity. Its plane is in px, u
-to the right and v down from the direction ahead. There both kinds have f px per radian, as the reference has:
+to the right and v down from the direction ahead, with x = u / f and y = v / f. Its point shows the ray
 
-    r = (cos φ sin θ, sin φ, cos φ cos θ),  θ = u / f,  tan φ = v / f (cylinder)  or  φ = v / f (equirectangular)
+    r = (cos φ sin θ, sin φ, cos φ cos θ)
+
+    equirectangular   θ = x, φ = y
+    cylindrical       θ = x, tan φ = y
+    pannini           S sin θ = x, S tan φ = y,  S = (D + 1) / (D + cos θ)
+    perspective       the same with D = 0: a plane
+
+Pannini's projection of distance D looks at a cylinder from D behind its middle: uprights and what runs towards the
+middle of the picture stay straight. All kinds have f px per radian in their middle.
 
 All equations for a canvas point p of the reference's plane (x' ~ H_inf p + d e', d = m·p on a plane) hold for the rays
-of a round panorama with p = K r, |r| = 1 in the reference camera's frame, and d = |baseline| / range along r.
+of a panorama with p = K r, |r| = 1 in the reference camera's frame, and d = |baseline| / range along r.
+
+References
+----------
+Sharpless, Postle and German, Pannini: A New Projection for Rendering Wide Angle Perspective Images, CAe 2010.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,19 +36,23 @@ from .options import PROJECTION
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """How a round panorama is unrolled into a plane.
+    """How a panorama is unrolled into a plane.
 
     Attributes
     ----------
-    kind : {"cylindrical", "equirectangular"}
+    kind : {"perspective", "pannini", "cylindrical", "equirectangular"}
     focal : float
-        px per radian.
+        px per radian in the middle.
     centre : (float, float)
         (u, v) of the direction ahead, px of the plane; pixel centres are integers.
     rotation : (3, 3) array
         From the panorama's axes to the reference camera's.
     K : (3, 3) array
         Of the reference, px.
+    distance : float
+        Pannini's, 0 to 1; 0 for all other kinds.
+    window : (left, top, right, bottom), optional
+        px of the plane, the last two exclusive: the part that is shown; all of it by default.
     """
 
     kind: str
@@ -43,45 +60,55 @@ class Projection:
     centre: tuple[float, float]
     rotation: Array
     K: Array
+    distance: float = 0.0
+    window: tuple[float, float, float, float] | None = None
 
     @property
     def sphere(self) -> tuple[int, int, int, int] | None:
-        """left, top, width, height (px of the plane) of the whole sphere; None for a cylinder."""
+        """left, top, width, height (px of the plane) of the whole sphere; None for all other kinds."""
         half = round(np.pi * self.focal)
         return (-half, -half // 2, 2 * half, half) if self.kind == "equirectangular" else None
 
     @property
     def limits(self) -> Array:
-        """left, top, right, bottom (exclusive) of the plane, px."""
+        """left, top, right, bottom (exclusive) of what the plane may show, px."""
         if self.sphere is not None:
             left, top, width, height = self.sphere
             return np.array([left, top, left + width, top + height], np.float64)
-        across, up = np.floor(np.pi * self.focal), np.floor(PROJECTION.max_cylinder_slope * self.focal)
-        return np.array([-across, -up, across + 1, up + 1])
-
-    def headings(self, u: Array) -> Array:
-        """θ in radians of columns u, px of the plane."""
-        return (u - self.centre[0]) / self.focal
-
-    def elevations(self, v: Array) -> Array:
-        """φ in radians, positive downwards, of lines v, px of the plane; not limited to ±90°."""
-        rise = (v - self.centre[1]) / self.focal
-        return np.arctan(rise) if self.kind == "cylindrical" else rise
+        up = np.floor(PROJECTION.max_slope * self.focal)
+        across = np.floor(np.pi * self.focal) if self.kind == "cylindrical" else up
+        limits = np.array([-across, -up, across + 1, up + 1])
+        if self.window is None:
+            return limits
+        left, top, right, bottom = self.window
+        inner: Array = np.concatenate([np.maximum(limits[:2], [left, top]), np.minimum(limits[2:], [right, bottom])])
+        return inner
 
     def rays(self, points: Array) -> Array:
         """Unit rays (…, 3) in the reference camera's frame of points (…, 2) of the plane."""
-        theta, phi = self.headings(points[..., 0]), self.elevations(points[..., 1])
-        own = np.stack([np.cos(phi) * np.sin(theta), np.sin(phi), np.cos(phi) * np.cos(theta)], axis=-1)
-        rays: Array = own @ self.rotation.T
+        x, y = np.moveaxis((points - np.array(self.centre)) / self.focal, -1, 0)
+        sine, cosine, level, rise = self._angles(x, y)
+        rays: Array = np.stack([level * sine, rise, level * cosine], axis=-1) @ self.rotation.T
         return rays
 
     def points(self, rays: Array) -> Array:
-        """Points (…, 2) of the plane that show rays (…, 3) of any length, −π < θ ≤ π: the inverse of `rays`."""
+        """Points (…, 2) of the plane that show rays (…, 3) of any length, −π < θ ≤ π: the inverse of `rays`.
+
+        What a plane or Pannini's projection cannot show lies far beyond the limits, on the ray's side.
+        """
         x, y, z = np.moveaxis(rays @ self.rotation, -1, 0)
         level = np.hypot(x, z)
-        with np.errstate(divide="ignore"):
-            rise = y / level if self.kind == "cylindrical" else np.arctan2(y, level)
-        points: Array = np.stack([np.arctan2(x, z), rise], axis=-1) * self.focal + np.array(self.centre)
+        if self.kind == "equirectangular":
+            out = np.arctan2(x, z), np.arctan2(y, level)
+        else:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                rise, sine, cosine = y / level, x / level, z / level
+            if self.kind == "cylindrical":
+                out = np.arctan2(x, z), rise
+            else:
+                stretch = (self.distance + 1) / np.maximum(self.distance + cosine, PROJECTION.least_forward)
+                out = stretch * sine, stretch * rise
+        points: Array = np.stack(out, axis=-1) * self.focal + np.array(self.centre)
         return points
 
     def of_reference(self, points: Array) -> Array:
@@ -90,15 +117,49 @@ class Projection:
 
     def project_rows(self, rows: Array, u: Array, v: Array) -> list[Array]:
         """rows (k, 3) times p = K r, each (len(v), len(u)), for columns u and lines v, px of the plane."""
-        theta, phi = self.headings(u), self.elevations(v)
-        sine, cosine = np.sin(theta), np.cos(theta)
-        rise, level = np.sin(phi)[:, None], np.cos(phi)[:, None]
+        sine, cosine, level, rise = self._angles(
+            (u - self.centre[0]) / self.focal, ((v - self.centre[1]) / self.focal)[:, None]
+        )
         own = rows @ self.K @ self.rotation
         return [level * (a * sine + c * cosine) + b * rise for a, b, c in own]
 
+    def area(self, rays: Array) -> Array:
+        """px of the plane per steradian (…) around unit rays (…, 3); infinite where the projection shows nothing."""
+        x, y, z = np.moveaxis(rays @ self.rotation, -1, 0)
+        level = np.maximum(np.hypot(x, z), PROJECTION.least_forward)
+        if self.kind == "equirectangular":
+            density = 1 / level
+        elif self.kind == "cylindrical":
+            density = level**-3
+        else:
+            D, cosine = self.distance, z / level
+            ahead = D + cosine
+            # dx/dθ · S, over cos³ φ
+            with np.errstate(divide="ignore", invalid="ignore"):
+                density = (D + 1) ** 2 * (1 + D * cosine) / (ahead * level) ** 3
+            density = np.where(ahead > PROJECTION.least_forward, density, np.inf)
+        return self.focal**2 * density
 
-def round_projection(kind: str, K: Array, rotation: Array) -> Projection:
-    """The projection that has as many px per radian as the middle of the reference.
+    def _angles(self, x: Array, y: Array) -> tuple[Array, Array, Any, Any]:
+        """sin θ and cos θ, as x is shaped, and cos φ and sin φ at x and y, which broadcast against each other."""
+        stretch: Any = 1.0
+        if self.kind in ("cylindrical", "equirectangular"):
+            sine, cosine = np.sin(x), np.cos(x)
+        else:
+            D = self.distance
+            t = np.square(x / (D + 1))
+            cosine = (np.sqrt(1 + t * (1 - D * D)) - D * t) / (1 + t)
+            stretch = (D + 1) / (D + cosine)
+            sine = x / stretch
+        if self.kind == "equirectangular":
+            return sine, cosine, np.cos(y), np.sin(y)
+        rise = y / stretch
+        level = 1 / np.sqrt(1 + rise * rise)
+        return sine, cosine, level, rise * level
+
+
+def round_projection(kind: str, K: Array, rotation: Array, focal: float | None = None) -> Projection:
+    """A cylinder or sphere.
 
     Parameters
     ----------
@@ -107,18 +168,25 @@ def round_projection(kind: str, K: Array, rotation: Array) -> Projection:
         Of the reference, px.
     rotation : (3, 3) array
         From the panorama's axes to the reference camera's.
+    focal : float, optional
+        px per radian; by default as many as the middle of the reference has.
 
     Returns
     -------
     Projection
         An equirectangular one is scaled a little, so that the sphere has a whole number of pixels.
     """
-    focal = float(np.sqrt(K[0, 0] * K[1, 1]))
+    focal = focal_of(K) if focal is None else focal
     if kind == "cylindrical":
         return Projection(kind, focal, (0.0, 0.0), rotation, K)
     # the sphere is 2 h × h px with an even h; its middle lies between pixels
     height = 2 * max(1, round(np.pi * focal / 2))
     return Projection(kind, height / np.pi, (-0.5, -0.5), rotation, K)
+
+
+def focal_of(K: Array) -> float:
+    """px per radian in the middle of a picture with intrinsics K (3, 3)."""
+    return float(np.sqrt(K[0, 0] * K[1, 1]))
 
 
 def extent(projection: Projection, outline: Array, shows: Callable[[Array], bool]) -> Array:

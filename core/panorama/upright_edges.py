@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -14,7 +16,34 @@ from ..raster.resizing import resized_points
 from .options import EDGES
 
 
-def edges(picture: Picture, camera: Camera, K: Array) -> tuple[Array, Array]:
+@dataclass(frozen=True, eq=False)
+class StraightEdges:
+    """Straight edges that one camera sees.
+
+    Attributes
+    ----------
+    rays : (N, 2, 3) array
+        To both ends of each, of any length; the longest edges first.
+    lengths : (N,) array
+        Shares of the picture's longer side.
+    """
+
+    rays: Array
+    lengths: Array
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals (N, 3) of the planes through the camera and each edge."""
+        normals = np.cross(self.rays[:, 0], self.rays[:, 1])
+        unit: Array = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        return unit
+
+    def in_reference(self, R: Array) -> StraightEdges:
+        """The same in the reference's frame; R (3, 3): from that to the camera's."""
+        return StraightEdges(self.rays @ R, self.lengths)
+
+
+def straight_edges(picture: Picture, camera: Camera, K: Array) -> StraightEdges:
     """Detect straight edges away from what is transparent.
 
     Parameters
@@ -27,10 +56,8 @@ def edges(picture: Picture, camera: Camera, K: Array) -> tuple[Array, Array]:
 
     Returns
     -------
-    normals : (N, 3) array
-        Unit normals of the planes through the camera and each edge, in the camera's frame; the longest edges first.
-    lengths : (N,) array
-        Shares of the picture's longer side.
+    StraightEdges
+        In the camera's frame.
 
     References
     ----------
@@ -55,8 +82,7 @@ def edges(picture: Picture, camera: Camera, K: Array) -> tuple[Array, Array]:
     ends, lengths = ends[longest], lengths[longest]
     full = resized_points(ends.reshape(-1, 2), size, (width, height))
     rays = homogeneous(undistort(full, camera)) @ np.linalg.inv(K).T
-    normals = np.cross(rays[::2], rays[1::2])
-    return normals / np.linalg.norm(normals, axis=1, keepdims=True), lengths
+    return StraightEdges(rays.reshape(-1, 2, 3), lengths)
 
 
 def agreement(down: Array, normals: Array, lengths: Array, sigma: float) -> Array:

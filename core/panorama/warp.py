@@ -19,7 +19,7 @@ from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..cameras.view import View
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Box, box_of, strips
+from ..raster.arrays import Array, Box, box_of, cut, strips
 from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, Placed, whole
 from ..raster.options import GRID
@@ -27,13 +27,16 @@ from ..raster.picture_map import CanvasMap, PictureMap
 from ..system.errors import BadRequest, NoOverlap
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
+from .continued_depth import ContinuedDepth
 from .depth import Confidence, Depth, Nearness
 from .options import WARP
-from .projection import Projection
+from .projection import Projection, focal_of
 from .reference_map import ReferenceMap
 
 if TYPE_CHECKING:
+    from ..continuation.continuation import Continuation
     from ..field.refined_depth import RefinedDepth
+    from .viewpoint import Viewpoint
 
 
 @dataclass(frozen=True)
@@ -50,12 +53,22 @@ class Warp:
         `raster.lazy`).
     lazy_confidence : (H, W) image or None
         Confidence of dense refinement, 0..1, float32, likewise; None without it.
+    slide : (H, W) image or None
+        How far each pixel's viewpoint lies from the reference's place towards the target's, 0..1, float32; None if all
+        are seen from the reference's place.
+    behind : (H, W) bool array or None
+        What the reference cannot see though its map falls inside it, likewise: something nearer hides it.
+    viewpoint : Viewpoint or None
+        How far it slides in any direction.
     """
 
     canvas: Canvas
     maps: tuple[CanvasMap, ...]
     depth: AnyImage
     lazy_confidence: AnyImage | None = None
+    slide: AnyImage | None = None
+    behind: NDArray[np.bool_] | None = None
+    viewpoint: Viewpoint | None = None
 
     @property
     def inverse_depth(self) -> NDArray[np.float32]:
@@ -75,19 +88,26 @@ class Warp:
         left, top, width, height = box
         maps = tuple(one.within(box, in_place) for one in self.maps)
         depth = Placed(self.depth, (-top, -left), (height, width), np.nan)
-        confidence = None
-        if self.lazy_confidence is not None:
-            confidence = Placed(self.lazy_confidence, (-top, -left), (height, width))
-        return Warp(self.canvas.within(box), maps, depth, confidence)
+        confidence, slide = (
+            None if values is None else Placed(values, (-top, -left), (height, width))
+            for values in (self.lazy_confidence, self.slide)
+        )
+        behind = None if self.behind is None else cut(self.behind, box)
+        return Warp(self.canvas.within(box), maps, depth, confidence, slide, behind, self.viewpoint)
 
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
-        return Nearness(self.canvas, views[0].camera, views[number], self.depth)
+        view = views[number]
+        if self.slide is None or self.viewpoint is None:
+            return Nearness(self.canvas, views[0].camera, view, self.depth)
+        nearer = float(view.H_inf[2] @ views[0].K @ self.viewpoint.c)
+        return Nearness(self.canvas, views[0].camera, view, self.depth, self.slide, nearer)
 
 
 def build_warp(
-    field: Field, views: Sequence[View], projection: Projection | None = None, refined: RefinedDepth | None = None
-) -> Warp:
+    field: Field, views: Sequence[View], projection: Projection | None = None, refined: RefinedDepth | None = None,
+    continuation: Continuation | None = None,
+) -> Warp:  # fmt: skip
     """Lay out a canvas that holds all pictures, and map them onto it.
 
     Parameters
@@ -99,6 +119,8 @@ def build_warp(
         Of a round panorama; by default the panorama is flat.
     refined : RefinedDepth, optional
         What dense refinement found.
+    continuation : Continuation, optional
+        What goes on where the reference shows nothing; by default the field does.
 
     Returns
     -------
@@ -111,11 +133,11 @@ def build_warp(
     OutputTooLarge
         The canvas would have too many pixels.
     BadRequest
-        The panorama is round, and the field knows the reference's plane only.
+        The panorama has a projection, and the field knows the reference's plane only; or its window shows nothing.
     """
     camera, further = views[0].camera, views[1:]
     planes = [_plane_map(field, view) for view in further]
-    outlines = [_outline(plane, view) for plane, view in zip(planes, further, strict=True)]
+    outlines = [_outline(plane, view, continuation) for plane, view in zip(planes, further, strict=True)]
     sizes = [view.size for view in further]
     if projection is None:
         reference: Box = (0, 0, *camera.size)
@@ -126,11 +148,14 @@ def build_warp(
 
     def pictures_at(grid: Grid) -> list[Array]:
         values = _node_values(field, grid, plane, camera)
+        continued = ContinuedDepth.over(continuation, plane, camera, grid)
+        if continued is not None:
+            values = continued.blended(values)
         return [_at_nodes(values, view, number, grid, plane, camera) for number, view in enumerate(further, 1)]
 
     canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
-    warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined)
-    return _trimmed(warp)
+    warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined, continuation)
+    return trimmed(warp)
 
 
 def _at_nodes(values: FieldValues, view: View, number: int, grid: Grid, plane: Canvas, camera: Camera) -> Array:
@@ -143,8 +168,9 @@ def _at_nodes(values: FieldValues, view: View, number: int, grid: Grid, plane: C
 
 
 def build_map(
-    field: Field, views: Sequence[View], canvas: Canvas, refined: RefinedDepth | None = None
-) -> Warp:
+    field: Field, views: Sequence[View], canvas: Canvas, refined: RefinedDepth | None = None,
+    continuation: Continuation | None = None,
+) -> Warp:  # fmt: skip
     """Map all pictures onto a given canvas, strip by strip.
 
     Parameters
@@ -155,6 +181,8 @@ def build_map(
     canvas : Canvas
     refined : RefinedDepth, optional
         What dense refinement found.
+    continuation : Continuation, optional
+        What goes on where the reference shows nothing.
 
     Returns
     -------
@@ -172,20 +200,23 @@ def build_map(
     shape = (canvas.height, canvas.width)
     maps = [PictureMap(np.empty(shape, np.float32), np.empty(shape, np.float32), view.size) for view in views[1:]]
     xs, ys = canvas.xs, canvas.ys
-    depth = Depth(canvas, camera, grid, values.inverse_depth, refined)
+    continued = ContinuedDepth.over(continuation, canvas, camera, grid)
+    depth = Depth(canvas, camera, grid, values.inverse_depth, refined, continued)
 
     def put(part: slice) -> None:
         start, stop = part.start, part.stop
         strip = (left, top + start, canvas.width, stop - start)
-        d, sideways = depth.strip(part)
+        d, sideways, share = depth.strip(part)
         for number, (view, out) in enumerate(zip(views[1:], maps, strict=True), 1):
             x, y = transfer(view, canvas.project_rows(view.H_inf, xs, ys[start:stop], camera), d)
+            beside = []
             if values.shift is not None and values.picture == number:
-                x += grid.to_pixels(values.shift[..., 0], *strip)
-                y += grid.to_pixels(values.shift[..., 1], *strip)
+                beside.append([grid.to_pixels(values.shift[..., k], *strip) for k in (0, 1)])
             if refined is not None and sideways is not None and refined.picture == number:
-                x += sideways[..., 0]
-                y += sideways[..., 1]
+                beside.append([sideways[..., 0], sideways[..., 1]])
+            for across, down in beside:
+                x += across if share is None else share * across
+                y += down if share is None else share * down
             if view.camera.distortion.any():
                 x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
             out.x[part], out.y[part] = x, y
@@ -207,7 +238,8 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     margin = int(np.ceil(min(field.fit.fade_px, WARP.max_fade * max(camera.size))))
     across, down = width + 2 * margin, height + 2 * margin
     share = min(WARP.max_node_factor, max(1.0, across * down / (2 * width * height)))
-    flat = Grid.over(-margin, -margin, across, down, int(share * GRID.nodes))
+    step = WARP.node_share * grid.step * focal_of(canvas.projection.K) / canvas.projection.focal
+    flat = Grid.over(-margin, -margin, across, down, int(min(share * GRID.nodes, across * down / step**2)))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)
     if values.far is None:
@@ -228,9 +260,12 @@ def _plane_map(field: Field, view: View) -> Array:
     return view.H_inf + np.outer(view.e_prime, field.plane)
 
 
-def _outline(H_plane: Array, view: View) -> Array:
-    """A picture's border (N, 3), in order, as canvas points p that H_plane (3, 3) maps to it."""
+def _outline(H_plane: Array, view: View, continuation: Continuation | None) -> Array:
+    """A picture's border (N, 3), in order, as canvas points p that show it by a continuation, or else that H_plane
+    (3, 3) maps to it."""
     ideal = undistort(border(view.size), view.camera)
+    if continuation is not None:
+        return continuation.outline(ideal) @ continuation.K.T
     return homogeneous(ideal) @ np.linalg.inv(H_plane).T
 
 
@@ -241,12 +276,16 @@ def _in_plane(points: Array) -> Array:
     return project(points)
 
 
-def _trimmed(warp: Warp) -> Warp:
+def trimmed(warp: Warp) -> Warp:
     """The warp without the outer rows and columns that no picture reaches."""
     shown = np.zeros((warp.canvas.height, warp.canvas.width), bool)
     for one in warp.maps[1:]:
         shown |= one.inside()
-    if not shown.any():
+    projection = warp.canvas.projection
+    framed = projection is not None and projection.window is not None
+    if not shown.any() and not framed:
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
     shown |= warp.maps[0].inside()
+    if not shown.any():
+        raise BadRequest("the frame lies beside both pictures: give a centre nearer to 0,0, or a larger field of view")
     return warp.within(box_of(shown), in_place=True)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.panorama.levelling import gravity_by_edges, rotation_for, turned
-from edf_stitch.core.panorama.upright_edges import edges
+from edf_stitch.core.panorama.upright_edges import straight_edges
 
 K = np.array([[500.0, 0, 319.5], [0, 500.0, 239.5], [0, 0, 1]])
 CAMERA = Camera(K, (640, 480), "given", 0.0)
@@ -30,6 +30,12 @@ def street(pitch: float, roll: float, seed: int = 0, upright: bool = True) -> An
         seen = corners @ camera.T @ K.T
         cv2.fillConvexPoly(view, np.rint(16 * seen[:, :2] / seen[:, 2:]).astype(int), (230, 210, 60), shift=4)
     return SimpleNamespace(view=cv2.GaussianBlur(view, (0, 0), 0.8), alpha=None)
+
+
+def edges(picture: Any, camera: Camera, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normals and lengths, as levelling takes them."""
+    found = straight_edges(picture, camera, K)
+    return found.normals, found.lengths
 
 
 def off(down: np.ndarray, pitch: float, roll: float) -> float:
@@ -93,3 +99,14 @@ def test_a_smaller_picture_says_the_same() -> None:
     scaled[:2, 2] = 4 * K[:2, 2] + 1.5
     found = edges(large, replace(CAMERA, K=scaled, size=(2560, 1920)), scaled)
     assert off(gravity_by_edges([np.eye(3)], *found), 8, 2) < 0.3
+
+
+def test_ends_lie_where_the_pole_ends_and_turn_with_the_camera() -> None:
+    view = np.full((480, 640, 3), 120, np.uint8)
+    cv2.rectangle(view, (300, 100), (330, 400), (230, 210, 60), -1)
+    found = straight_edges(SimpleNamespace(view=view, alpha=None), CAMERA, K)
+    ends = np.sort((found.rays @ K.T)[:2, :, 1], axis=1)
+    assert np.abs(ends - [99.5, 400.5]).max() < 4 and np.abs(found.lengths[:2] - 301 / 640).max() < 0.01
+    R = turned(10, 5, -3)
+    turned_back = found.in_reference(R)
+    assert np.allclose(turned_back.normals @ R.T, found.normals) and np.allclose(turned_back.lengths, found.lengths)

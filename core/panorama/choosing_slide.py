@@ -1,0 +1,251 @@
+"""How far the viewpoint slides: what keeps straight things straight, and lets the seam run unseen, decides.
+
+Each candidate is judged on a coarse map, by what an artist sees first: bent lines, leaning uprights, what is enlarged
+or folded, what a seam would cut, and holes (docs/method.md, 6). All of it is measured on what the pictures show, not on
+the canvas, so that candidates with different frames compare.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.lens import undistort
+from ..cameras.projective import homogeneous, inverse_intrinsics
+from ..cameras.view import View
+from ..raster.arrays import Array
+from .options import CHOICE
+from .own_depth import OwnDepth, Things
+from .slid_warp import slid_warp
+from .straightness import along, leans, planes_through
+from .upright_edges import StraightEdges
+from .viewpoint import Viewpoint, viewpoint_between
+from .warp import Warp
+
+# The upper left corner of each cell of a grid (rows, columns, …), that to its right, and that below it.
+CORNERS = np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, :-1]
+
+
+@dataclass(frozen=True)
+class SlideCost:
+    """What a slide costs.
+
+    Attributes
+    ----------
+    s1 : float
+    bend_px : float
+        How far long straight edges are bent, weighted by their length, px at `ChoiceOptions.px_per_radian`.
+    lean_deg : float
+        How far upright ones lean, degrees.
+    enlarged, folded : float
+        Shares of the pictures, on surfaces, that are enlarged or folded.
+    seam_px : float
+        px of a rough seam that is seen.
+    holes : float
+        Share, of what is shown, of holes in it.
+    cost : float
+        All of it, in px of bend.
+    """
+
+    s1: float
+    bend_px: float
+    lean_deg: float
+    enlarged: float
+    folded: float
+    seam_px: float
+    holes: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class SlideChoice:
+    """How far the viewpoint slides (s1), what each candidate costs, and why it was chosen, in plain words."""
+
+    s1: float
+    costs: tuple[SlideCost, ...]
+    why: str
+
+
+def choose_slide(
+    base: Warp, views: Sequence[View], edges: Sequence[StraightEdges], down: Array | None,
+    rough_seam: Callable[[Warp], float], progress: Callable[[float], None] = lambda share: None,
+) -> SlideChoice:  # fmt: skip
+    """Choose how far the viewpoint slides.
+
+    Parameters
+    ----------
+    base : Warp
+        Of both pictures, seen from the reference's place, on a cylinder or sphere that is coarse and holds both.
+    views : sequence of View
+        What is known of the pictures, the reference first.
+    edges : sequence of StraightEdges
+        Of each picture, in the reference's frame.
+    down : (3,) array or None
+        Unit vector along gravity in the reference's frame; None where nothing confirms it.
+    rough_seam : callable
+        px of a rough seam that is seen, on the canvas of a coarse warp.
+    progress : callable, optional
+        progress(share that is done); it may raise to stop.
+
+    Returns
+    -------
+    SlideChoice
+        0 where there is nothing to slide along. Of candidates that cost about as much, the one that slides least.
+    """
+    viewpoint = viewpoint_between(base, views)
+    if viewpoint is None:
+        return SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
+    shown = [
+        _shown(OwnDepth.of(base, view, number), one, down)
+        for number, (view, one) in enumerate(zip(views, edges, strict=True))
+    ]
+    seams: dict[float, tuple[float, float]] = {}
+    for number, s1 in enumerate(CHOICE.seam_candidates):
+        progress(number / len(CHOICE.seam_candidates))
+        seams[s1] = _seam_and_holes(base, views, viewpoint.sliding(s1), rough_seam)
+    costs = []
+    for s1 in CHOICE.candidates:
+        seam_px, holes = (float(np.interp(s1, list(seams), values)) for values in zip(*seams.values(), strict=True))
+        costs.append(_cost(s1, _geometry(shown, viewpoint.sliding(s1), down), seam_px, holes))
+    return _least(tuple(costs))
+
+
+def _least(costs: tuple[SlideCost, ...]) -> SlideChoice:
+    """The choice by the costs of candidates, which slide further and further."""
+    possible = [one for one in costs if one.folded <= costs[0].folded + CHOICE.max_folded]
+    least = min(one.cost for one in possible)
+    tie = max(CHOICE.tie_px, CHOICE.tie_share * least)
+    best = next(one for one in possible if one.cost <= least + tie)
+    why = f"costs {best.cost:.3f} px of bend, the least"
+    if best.cost > least:
+        why = f"costs {best.cost:.3f} px of bend, about as little as any"
+    if len(possible) < len(costs):
+        why += f"; the map would fold at {', '.join(f'{one.s1:g}' for one in costs if one not in possible)}"
+    return SlideChoice(best.s1, costs, why)
+
+
+def _cost(s1: float, geometry: tuple[float, float, float, float], seam_px: float, holes: float) -> SlideCost:
+    """A candidate's cost by bend (px), lean (degrees), shares enlarged and folded, px of the seam, and holes."""
+    bend, lean, enlarged, folded = geometry
+    cost = (
+        bend + CHOICE.per_lean_deg * lean + CHOICE.per_enlarged * enlarged + CHOICE.per_folded * folded
+        + CHOICE.per_seam_px * min(seam_px, CHOICE.max_seam_px) + CHOICE.per_hole * holes
+    )  # fmt: skip
+    return SlideCost(s1, bend, lean, enlarged, folded, seam_px, holes, cost)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """What one picture shows: places along its straight edges (N, points), and a coarse grid of it (rows, columns).
+
+    lengths (N,): of the edges, weights; upright (N,): which of them are upright; areas (rows − 1, columns − 1): solid
+    angles of the grid's cells as the picture shows them, NaN where an edge of depth crosses.
+    """
+
+    edges: Things
+    lengths: Array
+    upright: NDArray[np.bool_]
+    grid: Things
+    areas: Array
+
+
+def _shown(depth: OwnDepth, edges: StraightEdges, down: Array | None) -> _Shown:
+    """What a picture shows, with its depth; edges: in the reference's frame."""
+    view = depth.view
+    long = edges.lengths >= CHOICE.least_length
+    edges = StraightEdges(edges.rays[long], edges.lengths[long])
+    rays = along(edges)
+    places = depth.things(rays)
+    upright = np.zeros(len(edges.lengths), bool)
+    if down is not None:
+        upright = (leans(edges.normals, down) < CHOICE.upright_within) & ~_level(rays, places.d, down)
+    step = max(view.size) / CHOICE.cells
+    columns, rows = (np.arange(0, side, step) for side in view.size)
+    ideal = undistort(np.stack(np.meshgrid(columns, rows), axis=-1), view.camera)
+    grid = homogeneous(ideal) @ (inverse_intrinsics(view.K).T @ view.R)
+    grid /= np.linalg.norm(grid, axis=-1, keepdims=True)
+    rough, smooth = depth.things(grid), depth.smoothed(CHOICE.smoothing).things(grid)
+    parallax = CHOICE.px_per_radian * np.stack([rough.d[part] for part in CORNERS])
+    nearest, farthest = parallax.max(axis=0), parallax.min(axis=0)
+    surface = nearest - farthest < CHOICE.least_jump_px + CHOICE.jump_share * nearest
+    areas = np.where(surface, _areas(grid), np.nan)
+    return _Shown(places, edges.lengths, upright, smooth, areas)
+
+
+def _level(rays: Array, d: Array, down: Array) -> NDArray[np.bool_]:
+    """Which edges (N,) lie on a floor or ceiling rather than upright, by unit rays (N, points, 3) from the camera and
+    inverse range (N, points): those that run straight away from it lie in a plane with gravity, too.
+
+    Along a level edge the height below the camera stays the same, along an upright one the distance.
+    """
+    sine = rays @ down
+    height, distance = (np.log(np.maximum(v, 1e-6)) for v in (np.abs(sine), np.sqrt(1 - np.square(sine))))
+    inverse_range = np.log(np.maximum(d, 1e-6))
+    spread = [np.abs(np.diff(inverse_range - part, axis=1).sum(axis=1)) for part in (height, distance)]
+    crosses = sine.min(axis=1) * sine.max(axis=1) < 0
+    level: NDArray[np.bool_] = ~crosses & (spread[0] < spread[1])
+    return level
+
+
+def _geometry(shown: Sequence[_Shown], viewpoint: Viewpoint, down: Array | None) -> tuple[float, float, float, float]:
+    """Bend (px) and lean (degrees) of the edges of all pictures, and shares of their cells enlarged and folded."""
+    bends, weights, lean, upright_weights, enlarged, folded = ([] for _ in range(6))
+    for one in shown:
+        normals, off = planes_through(viewpoint.seen_from(one.edges.q, one.edges.d)[0])
+        bends.append(np.minimum(CHOICE.px_per_radian * off, CHOICE.max_bend_px))
+        weights.append(one.lengths)
+        if down is not None:
+            lean.append(np.minimum(np.degrees(leans(normals[one.upright], down)), CHOICE.max_lean_deg))
+            upright_weights.append(one.lengths[one.upright])
+        with np.errstate(invalid="ignore"):
+            ratio = _areas(viewpoint.seen_from(one.grid.q, one.grid.d)[0]) / one.areas
+            enlarged.append((ratio > CHOICE.max_enlarged**2).ravel())
+            twice = np.isfinite(one.areas) & _twice(viewpoint, one.grid)[CORNERS[0]]
+            folded.append((twice | (ratio < CHOICE.least_area)).ravel())
+    shares = [float(np.concatenate(one).mean()) for one in (enlarged, folded)]
+    return _mean(bends, weights), _mean(lean, upright_weights, CHOICE.least_upright), shares[0], shares[1]
+
+
+def _twice(viewpoint: Viewpoint, things: Things) -> NDArray[np.bool_]:
+    """Which things (…) the panorama shows more than once: the slide goes back over them faster than they move on.
+
+    A thing is seen wherever the viewpoint of the ray towards it is the one that the ray starts from.
+    """
+    past = []
+    for slide in np.linspace(0, viewpoint.s1, CHOICE.fold_steps):
+        rays = things.q - (slide * things.d)[..., None] * viewpoint.c
+        past.append(viewpoint.slide_at(rays) > slide + CHOICE.same_slide)
+    twice: NDArray[np.bool_] = np.diff(np.stack(past), axis=0).sum(axis=0) > 1
+    return twice
+
+
+def _mean(values: Sequence[Array], weights: Sequence[Array], least: float = 1e-9) -> float:
+    """The weighted mean of all values, towards 0 where all weights together are less than `least`."""
+    total = float(sum(one.sum() for one in weights))
+    return float(sum(one @ weight for one, weight in zip(values, weights, strict=True))) / max(total, least)
+
+
+def _areas(rays: Array) -> Array:
+    """Signed solid angles (rows − 1, columns − 1) between each ray (rows, columns, 3) and its right and lower one."""
+    here, right, below = (rays[part] for part in CORNERS)
+    areas: Array = (np.cross(right - here, below - here) * here).sum(axis=-1)
+    return areas
+
+
+def _seam_and_holes(
+    base: Warp, views: Sequence[View], viewpoint: Viewpoint, rough_seam: Callable[[Warp], float]
+) -> tuple[float, float]:
+    """px (at `ChoiceOptions.px_per_radian`) of a rough seam that is seen, and the share of holes in what is shown."""
+    projection = base.canvas.projection
+    coarse = replace(projection, focal=CHOICE.seam_px_per_radian)
+    warp = slid_warp(base, views, viewpoint, coarse)
+    shown = np.logical_or.reduce([one.inside() for one in warp.maps])
+    side = 2 * max(1, round(CHOICE.hole_radius * coarse.focal)) + 1
+    within = cv2.morphologyEx(np.pad(shown, side).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((side, side), np.uint8))
+    holes = int(within[side:-side, side:-side].sum()) - int(shown.sum())
+    seam_px = rough_seam(warp) * CHOICE.px_per_radian / coarse.focal
+    return seam_px, holes / max(1, int(shown.sum()))
