@@ -254,7 +254,7 @@ class RimOptions:
     coarse_step: int = 2
     """Nodes along the side of a cell for that: four times less work."""
 
-    fold_tolerance: float = 3.0
+    fold_tolerance: float = 1.0
     """By how much of their squared difference the pictures may differ more in a patch afterwards, for each node of it
     that folded before: a surface that folds is none."""
 
