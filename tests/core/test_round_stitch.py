@@ -14,7 +14,7 @@ from edf_stitch.core.measure.metrics import look_up
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.inspection import depth_grid, displacement_px, full_geometry, heat_map, match_rows
 from edf_stitch.core.output.outputs import OutputRequest, warp_bytes, write
-from edf_stitch.core.panorama.levelling import angles_of, rotation_for, turned
+from edf_stitch.core.panorama.levelling import angles_of, gravity, turned, upright
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest
@@ -123,7 +123,9 @@ def test_a_flat_panorama_reports_its_plane(small_result: StitchResult) -> None:
 def test_the_sphere_is_whole_and_the_rest_of_it_empty(results: dict[str, StitchResult]) -> None:
     result = results["equirectangular"]
     height, width = result.alpha.shape
-    assert width == 2 * height and abs(width - 2 * np.pi * result.edges[0].two_view.K[0, 0]) < 4
+    focal = result.report["canvas"]["projection"]["focal_px"]
+    assert width == 2 * height and abs(width - 2 * np.pi * focal) < 1
+    assert 0.8 < focal / result.edges[0].two_view.K[0, 0] < 1.2, "the pictures keep their pixels"
     left, top, whole_width, whole_height = result.spread
     assert (whole_width, whole_height) == (width, height) and left < 0 and top < 0
     part = np.s_[-top : -top + result.warp.canvas.height, -left : -left + result.warp.canvas.width]
@@ -147,8 +149,11 @@ def test_the_horizon_is_that_of_upright_edges_and_of_the_poses_found(results: di
         projection = result.warp.canvas.projection
         assert projection is not None
         yaw, pitch, roll = angles_of(projection.rotation)
-        assert abs(yaw) < 1e-6 and 0 < abs(pitch) < 0.5 and abs(roll) < 0.5, "the scene's edges are upright"
-        level = rotation_for("auto", [view.R for view in result.views])
+        assert 0 < abs(pitch) < 0.5 and abs(roll) < 0.5, "the scene's edges are upright"
+        columns = np.flatnonzero((result.alpha > 0).any(axis=0))
+        middle = result.report["canvas"]["projection"]["centre"][0]
+        assert abs(yaw) > 3 and abs(columns.mean() - middle) < 3, "the frame is centred"
+        level = upright(gravity([view.R for view in result.views]))
         assert abs(angles_of(level)[1]) > 3, "which the poses alone do not tell"
 
 

@@ -13,7 +13,8 @@ from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.commands.cli import main
 from edf_stitch.core.compare import run as run_module
 from edf_stitch.core.compare.pairs import PairFiles, find_pairs
-from edf_stitch.core.compare.run import FILES, ComparisonRequest, run_comparison
+from edf_stitch.core.compare.run import FILES, ComparisonRequest, comparable, run_comparison
+from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest, Cancelled, DegenerateGeometry, UnwritableOutput
 
@@ -149,6 +150,28 @@ def test_what_makes_no_sense_for_several_pairs_is_refused(
     again = PairFiles("again", folder / "reference.png", folder / "target.png")
     with pytest.raises(BadRequest, match=words):
         compared(folder, tmp_path, again, options=replace(ON_REFERENCE, **change))
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ({"projection": "pannini"}, "leave --projection"), ({"projection": "auto", "fov": 60.0}, "--fov out"),
+    ({"projection": "auto", "centre": (1.0, 2.0)}, "--centre"), ({"projection": "auto", "slide": 0.5}, "leave --slide"),
+    ({"projection": "auto", "crop": (0, 0, 9, 9)}, "--crop"),
+])  # fmt: skip
+def test_figures_are_compared_on_the_plane_where_all_fields_exist(change: dict, words: str) -> None:
+    with pytest.raises(BadRequest, match=words):
+        comparable(StitchOptions(**change), ())
+
+
+def test_what_would_be_chosen_by_itself_is_what_can_be_compared() -> None:
+    by_itself = StitchOptions(
+        projection="auto", slide="auto", crop="auto", holes="auto", fade="continue", seed=7, blend="feather"
+    )
+    plain = StitchOptions(
+        projection="reference", slide=0.0, crop="full", holes="transparent", fade="plane", seed=7, blend="feather"
+    )
+    assert comparable(by_itself, ()) == comparable(plain, ()) == plain
+    for asked in ({"fade": "infinity"}, {"holes": "inpaint"}):
+        assert comparable(replace(by_itself, **asked), ()) == replace(plain, **asked)
 
 
 @pytest.mark.parametrize("fields", [(), ("slack", "hugin"), ("slack", "slack")])

@@ -11,7 +11,8 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.compose.composition import Composition, Decided, composed, pooled_decision
-from edf_stitch.core.compose.options import OVERLAP
+from edf_stitch.core.compose.inpaint import closed_holes
+from edf_stitch.core.compose.options import INPAINT, OVERLAP
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.reference_map import ReferenceMap
@@ -79,6 +80,22 @@ def test_holes_are_filled_where_that_is_asked_for_and_nothing_else_changes() -> 
         assert np.array_equal(out.pixels[~holes], left.pixels[~holes]) and (out.pixels[holes] > 0).all()
     average, _, _ = compose(first, second, warp, blend="linear", holes="inpaint")
     assert np.array_equal(average.pixels, compose(first, second, warp, blend="linear")[0].pixels), "it has no holes"
+
+
+def test_small_closed_holes_are_filled_by_themselves_and_larger_ones_are_left() -> None:
+    first, second, warp = pictures()
+    most = int(first.alpha.size * INPAINT.small_share)
+    small, large = np.zeros((2, *SHAPE), bool)
+    small[60:63, 100:104] = True
+    large[100:120, 40 : 41 + most // 20] = True
+    for one in (first, second):
+        one.alpha[small | large] = 0
+    left, out = (compose(first, second, warp, holes=holes)[0] for holes in ("transparent", "auto"))
+    assert not left.alpha[small | large].any() and not out.alpha[large].any()
+    assert (out.alpha[small] == 1).all() and (out.pixels[small] > 0).all()
+    closed = closed_holes(left.alpha > 0, small=True)[0]
+    assert np.array_equal((out.alpha > 0) & (left.alpha == 0), closed) and closed[small].all()
+    assert np.array_equal(out.pixels[~closed], left.pixels[~closed])
 
 
 def test_an_average_hides_nothing() -> None:
