@@ -41,10 +41,6 @@ class WarpOptions:
     """Longer sides of the reference beside it within which fields end in their plane, in round panoramas: the grid that
     is laid over the reference's plane has to end somewhere."""
 
-    takeover: float = 0.05
-    """Share of the reference's longer side, beyond its border, over which what continues beyond the overlap takes over
-    from the field."""
-
     max_node_factor: float = 4.0
     """Nodes of that grid at most, in units of those of any other grid: time and memory grow with it."""
 
