@@ -106,7 +106,7 @@ class Warp:
 
 def build_warp(
     field: Field, views: Sequence[View], projection: Projection | None = None, refined: RefinedDepth | None = None,
-    continuation: Continuation | None = None,
+    continuation: Continuation | None = None, hold: bool = False,
 ) -> Warp:  # fmt: skip
     """Lay out a canvas that holds all pictures, and map them onto it.
 
@@ -121,6 +121,8 @@ def build_warp(
         What dense refinement found.
     continuation : Continuation, optional
         What goes on where the reference shows nothing; by default the field does.
+    hold : bool
+        See `build_map`.
 
     Returns
     -------
@@ -154,7 +156,7 @@ def build_warp(
         return [_at_nodes(values, view, number, grid, plane, camera) for number, view in enumerate(further, 1)]
 
     canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
-    warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined, continuation)
+    warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined, continuation, hold)
     return trimmed(warp)
 
 
@@ -169,7 +171,7 @@ def _at_nodes(values: FieldValues, view: View, number: int, grid: Grid, plane: C
 
 def build_map(
     field: Field, views: Sequence[View], canvas: Canvas, refined: RefinedDepth | None = None,
-    continuation: Continuation | None = None,
+    continuation: Continuation | None = None, hold: bool = False,
 ) -> Warp:  # fmt: skip
     """Map all pictures onto a given canvas, strip by strip.
 
@@ -183,6 +185,8 @@ def build_map(
         What dense refinement found.
     continuation : Continuation, optional
         What goes on where the reference shows nothing.
+    hold : bool
+        Keep inverse depth as an array: all of it will be read.
 
     Returns
     -------
@@ -202,11 +206,14 @@ def build_map(
     xs, ys = canvas.xs, canvas.ys
     continued = ContinuedDepth.over(continuation, canvas, camera, grid)
     depth = Depth(canvas, camera, grid, values.inverse_depth, refined, continued)
+    held = np.empty(shape if hold else (0, 0), np.float32)
 
     def put(part: slice) -> None:
         start, stop = part.start, part.stop
         strip = (left, top + start, canvas.width, stop - start)
         d, sideways, share = depth.strip(part)
+        if hold:
+            held[part] = d
         for number, (view, out) in enumerate(zip(views[1:], maps, strict=True), 1):
             x, y = transfer(view, canvas.project_rows(view.H_inf, xs, ys[start:stop], camera), d)
             beside = []
@@ -223,7 +230,7 @@ def build_map(
 
     each(put, strips(shape))
     confidence = None if refined is None else Confidence(canvas, camera, refined)
-    return Warp(canvas, (ReferenceMap(canvas, camera), *maps), depth, confidence)
+    return Warp(canvas, (ReferenceMap(canvas, camera), *maps), held if hold else depth, confidence)
 
 
 def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> FieldValues:
