@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..choices import BLENDS, FADES, FIELDS, HOLES, SEAMS, Slide
+from ..choices import BLENDS, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS, Slide
 
 if TYPE_CHECKING:
     from ..options import StitchOptions
@@ -84,8 +84,8 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
     """How the pictures are brought onto the canvas, and what canvas that is."""
     how.add_argument(
         "--fade", default="plane", type=_choice(FADES), metavar="FADE",
-        help="what it fades to outside the overlap: plane (default; the one that carries on beyond the border) or "
-        "infinity",
+        help="what becomes of it outside the overlap: plane (default; it fades to the one that carries on beyond the "
+        "border), continue (what lies at the rim goes on as the picture does), or infinity",
     )  # fmt: skip
     how.add_argument(
         "--dense", action=argparse.BooleanOptionalAction, default=True,
@@ -97,7 +97,7 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
         "(default: not at all) to 1",
     )  # fmt: skip
     how.add_argument(
-        "--projection", default="reference", metavar="PROJECTION",
+        "--projection", default="reference", type=_projection, metavar="PROJECTION",
         help="reference (default: the plane and place of REF, every pixel of it kept), auto (by the field of view, "
         "levelled and centred), perspective (a plane), pannini[:D] (D from 0, a plane, to 1), cylindrical, or "
         "equirectangular (the whole sphere)",
@@ -190,6 +190,12 @@ def _numbers(text: str) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 1200 or 1200,1180") from None
+
+
+def _projection(text: str) -> str:
+    """A kind of projection, with whatever stands behind a colon, which StitchOptions checks."""
+    _choice(PROJECTIONS)(text.partition(":")[0])
+    return text
 
 
 def _slide(text: str) -> Slide:

@@ -61,7 +61,7 @@ class PlanesOptions:
     draws: tuple[int, int, int] = (100, 200, 250)
     """Level, upright and free planes that are tried each time, through one, two and three samples."""
 
-    tolerance_px: float = 2.2
+    tolerance_px: float = 1.5
     """Error at which a sample no longer speaks for a plane."""
 
     inlier_factor: float = 1.5
@@ -153,10 +153,10 @@ class LabelOptions:
 class SystemOptions:
     """The least squares that continues inverse depth (`system`). Weights are relative to one sample's."""
 
-    membrane: float = 0.03
+    membrane: float = 0.015
     """Weight of differences to the plane that goes on there, from node to node."""
 
-    carried_slope: float = 0.3
+    carried_slope: float = 0.2
     """Share of the longer side over which slopes carry on."""
 
     lines: float = 0.8

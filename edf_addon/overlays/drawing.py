@@ -218,8 +218,8 @@ def _draw_frame(view: _View, settings: Any, panorama: bpy.types.Image | None, si
     """The outline of the frame that is chosen now, where the panorama was made for another."""
     from . import frame_geometry
 
-    known = result.read(panorama)
-    rays = _frame_rays(settings, panorama, known) if known is not None and editor.is_behind(settings, panorama) else None
+    known = result.read(panorama) if editor.is_behind(settings, panorama) else None
+    rays = None if known is None else _frame_rays(settings, panorama, known)
     if known is None or rays is None:
         return
     on_panorama = side == editor.PANORAMA
