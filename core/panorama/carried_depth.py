@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from ..cameras.lens import distort
 from ..cameras.projective import ahead_of_camera, inverse_intrinsics
 from ..cameras.view import View
-from ..raster.arrays import Array, Plane, strips
+from ..raster.arrays import Array, Plane, beside, bounds, strips, with_margin
+from ..raster.options import PARTS
 from ..raster.picture_map import falls_inside
 from ..raster.pull_push import filled
-from ..system.threads import in_order
+from ..raster.sampling import fetch
+from ..system.threads import each, in_order
 from .canvas import Canvas
 from .options import CARRY
 from .projection import Projection
@@ -96,6 +98,15 @@ def turned(matrix: Array, rays: Rays) -> list[NDArray[Any]]:
     return [kind(a) * x + kind(b) * y + kind(c) * z for a, b, c in matrix]
 
 
+def looked_up(values: NDArray[np.float32], x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Values (H, W[, C]) at places x, y (h, w) px, bilinear; 0 outside."""
+    if max(values.shape[:2]) <= PARTS.max_remap_side:
+        found: NDArray[np.float32] = cv2.remap(values, x, y, cv2.INTER_LINEAR)
+        return found
+    found = fetch(values.reshape(*values.shape[:2], -1), x, y, cv2.INTER_LINEAR)
+    return found.reshape(*x.shape, *values.shape[2:])
+
+
 def small_strips(shape: tuple[int, ...]) -> Iterator[slice]:
     """Rows of a picture (H, W), so few at a time that what is worked out of them stays in the processor's cache."""
     return strips((shape[0], CARRY.smaller_strips * shape[1]))
@@ -161,13 +172,17 @@ def _places_of(
 def _filled(nearest: Plane) -> Plane:
     """Inverse depth (H, W) everywhere, from that of points by the cell above and left of each, -1 where none is.
 
-    Gaps in what is near are closed by it, though something farther shows through; other gaps go on from their farthest
-    neighbours, and what lies beyond all of them from a mean of what is around.
+    Gaps that are narrower than a point are closed by it; others go on from their farthest neighbours, and what lies
+    beyond all points from those at their bounds.
     """
-    square = np.ones((2, 2), np.uint8)
-    out: Plane = cv2.dilate(nearest, square, anchor=(1, 1))
-    out = cv2.medianBlur(out, CARRY.speck_px)
-    return _from_far(out, CARRY.halvings)
+    part = bounds(nearest >= 0)
+    if part is None:
+        return np.zeros(nearest.shape, np.float32)
+    part = with_margin(part, 1, nearest.shape)
+    here: Plane = cv2.dilate(nearest[part], np.ones((2, 2), np.uint8), anchor=(1, 1))
+    here = _from_far(cv2.medianBlur(here, CARRY.speck_px), CARRY.halvings)
+    beyond = [(one.start, side - one.stop) for one, side in zip(part, nearest.shape, strict=True)]
+    return np.pad(here, beyond, mode="edge")
 
 
 def _from_far(values: Plane, halvings: int) -> Plane:
@@ -198,9 +213,19 @@ def _from_far(values: Plane, halvings: int) -> Plane:
 def _sharpened(depth: Plane, projection: Projection) -> Plane:
     """Inverse depth (H, W) without what is in between at jumps: it belongs to neither surface, and would be seen
     between them as specks."""
-    square = np.ones((3, 3), np.uint8)
-    for _ in range(CARRY.sharpenings):
-        near, far = cv2.dilate(depth, square), cv2.erode(depth, square)
-        jumps = near - far > np.float32(CARRY.jump_px / projection.focal) + np.float32(CARRY.jump_share) * near
-        depth = np.where(jumps, np.where(2 * depth > near + far, near, far), depth)
-    return depth
+    out, square = np.empty_like(depth), np.ones((3, 3), np.uint8)
+    least, share = np.float32(CARRY.jump_px / projection.focal), np.float32(1 - CARRY.jump_share)
+
+    def put(rows: slice) -> None:
+        some, own = beside(rows, CARRY.sharpenings, len(depth))
+        here = depth[some]
+        for _ in range(CARRY.sharpenings):
+            near, far = cv2.dilate(here, square), cv2.erode(here, square)
+            jumps = share * near - far > least
+            if not jumps.any():
+                break
+            here = np.where(jumps, np.where(2 * here > near + far, near, far), here)
+        out[rows] = here[own]
+
+    each(put, small_strips(depth.shape))
+    return out

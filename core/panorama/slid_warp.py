@@ -10,7 +10,7 @@ is 0 the reference is only turned, whatever d is; where s is 1, so is the target
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -20,13 +20,12 @@ from ..cameras.lens import distort, undistort
 from ..cameras.projective import homogeneous, inverse_intrinsics
 from ..cameras.view import View
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Part, Plane, bounds
+from ..raster.arrays import Array, Plane
 from ..raster.grid import Grid
 from ..raster.picture_map import PictureMap
-from ..raster.sampling import fetch
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas
-from .carried_depth import Lattice, Rays, Surface, carried_depth, small_strips, turned
+from .carried_depth import Lattice, Rays, Surface, carried_depth, looked_up, small_strips, turned
 from .options import CANVAS, CARRY, SLIDE
 from .projection import Projection
 from .viewpoint import Viewpoint
@@ -58,57 +57,20 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
     OutputTooLarge
         The canvas would have too many pixels.
     """
+    if base.beside is None:
+        raise ValueError("the base's depth, and what lies beside its epipolar lines, are to be held")
     surface = Surface.of(base, views)
     canvas = _canvas(surface, views, viewpoint, projection)
     lattice = Lattice((float(canvas.xs[0]), float(canvas.ys[0])), 1.0, (canvas.height, canvas.width))
     depth = carried_depth(surface, viewpoint, projection, lattice)
-    return trimmed(_mapped(base, _Beside.of(base, views), surface, views, viewpoint, canvas, depth))
-
-
-@dataclass(frozen=True, eq=False)
-class _Beside:
-    """What a base has beside d in a part of it: values (h, w, 3), px x and y that the target's map has beyond its
-    epipolar lines, and confidence; 0 elsewhere."""
-
-    part: Part
-    values: NDArray[np.float32]
-
-    @staticmethod
-    def of(base: Warp, views: Sequence[View]) -> _Beside:
-        """Where the base shows the target."""
-        canvas, target, view = base.canvas, base.maps[1].arrays(), views[1]
-        part = bounds(target.inside()) or (slice(0, 0), slice(0, 0))
-        rows, columns = part
-        out = np.zeros((rows.stop - rows.start, columns.stop - columns.start, 3), np.float32)
-
-        def put(some: slice) -> None:
-            lines = slice(rows.start + some.start, rows.start + some.stop)
-            d = base.depth[lines, columns].astype(np.float64)
-            infinite = canvas.project_rows(view.H_inf, canvas.xs[columns], canvas.ys[lines])
-            x, y = _raw(view, *transfer(view, infinite, d))
-            for k, (shown, strict) in enumerate(((target.x, x), (target.y, y))):
-                shift = np.nan_to_num(shown[lines, columns] - strict)
-                out[some, :, k] = np.where(np.abs(shift) > CARRY.least_shift_px, shift, 0)
-            if base.lazy_confidence is not None:
-                out[some, :, 2] = base.lazy_confidence[lines, columns]
-
-        each(put, small_strips(out.shape))
-        return _Beside(part, out)
-
-    def at(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The values (…, 3) at places (…) px of the base."""
-        rows, columns = self.part
-        values: NDArray[np.float32] = fetch(
-            self.values, x - np.float32(columns.start), y - np.float32(rows.start), cv2.INTER_LINEAR
-        )
-        return values
+    return trimmed(_mapped(base.beside, surface, views, viewpoint, canvas, depth))
 
 
 def _mapped(
-    base: Warp, beside: _Beside, surface: Surface, views: Sequence[View], viewpoint: Viewpoint, canvas: Canvas,
+    beside: NDArray[np.float32], surface: Surface, views: Sequence[View], viewpoint: Viewpoint, canvas: Canvas,
     depth: Plane,
 ) -> Warp:  # fmt: skip
-    """The maps of all pictures on a canvas, by what depth (H, W) was carried to its pixels.
+    """The maps of all pictures on a canvas, by what depth (H, W) was carried to its pixels; beside: see `Warp`.
 
     Where the surface holds about the same at a pixel's point, what it holds takes its place, so that it is known to a
     fraction of a pixel; and everywhere that the viewpoint is the reference's place. Points of the surface are seen by
@@ -125,21 +87,21 @@ def _mapped(
         rays = surface.rays(canvas, xs, ys)
         s = viewpoint.slide_of(*turned(viewpoint.rotation.T @ to_own.T, rays))
         x, y, hidden = _refined(surface, rays, s, c, depth[rows])
-        more = beside.at(x, y)
+        more = looked_up(beside, x, y)
         d, s64 = depth[rows].astype(np.float64), s.astype(np.float64)
         for number, (view, out) in enumerate(zip(views, maps, strict=True)):
             u, v = _seen_at(view, views[0], viewpoint, canvas.project_rows(view.H_inf, xs, ys), d, s64)
             if number == 1:
-                u, v = u + more[..., 0], v + more[..., 1]
-            out.x[rows], out.y[rows] = u, v
+                u += more[..., 0]
+                v += more[..., 1]
+            out.x[rows], out.y[rows] = _raw(view, u, v)
         slide[rows], behind[rows] = s, hidden
         confidence[rows] = np.where(hidden, np.float32(0), more[..., 2])
 
     each(put, small_strips(shape))
     # single pixels are rounding at the edges of near things
     unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.speck_px,) * 2, np.uint8)) > 0
-    held = None if base.lazy_confidence is None else confidence
-    return Warp(canvas, tuple(maps), depth, held, slide, unseen, viewpoint)
+    return Warp(canvas, tuple(maps), depth, confidence, slide, unseen, viewpoint)
 
 
 def _refined(
@@ -149,7 +111,7 @@ def _refined(
     it; rays: from their viewpoints; c (3,): the target's place, both in the surface's own axes."""
     towards = [s * np.float32(part) for part in c]
     x, y = surface.places([ray + d * step for ray, step in zip(rays, towards, strict=True)])
-    here = fetch(surface.depth[..., None], x, y, cv2.INTER_LINEAR)[..., 0]
+    here = looked_up(surface.depth, x, y)
     length = np.sqrt(sum((ray + d * step) ** 2 for ray, step in zip(rays, towards, strict=True)))
     # what the surface holds there, measured from the pixel's viewpoint
     away = np.sqrt(
@@ -168,11 +130,11 @@ def _refined(
 def _seen_at(
     view: View, reference: View, viewpoint: Viewpoint, infinite: list[Array], d: Array, s: Array
 ) -> tuple[Array, Array]:
-    """Raw pixels x, y (…) of a picture where points at inverse depth d (…) from a viewpoint with slide s (…) are seen;
-    infinite: see `transfer`."""
+    """Ideal pixels x, y (…) of a picture where points at inverse depth d (…) from a viewpoint with slide s (…) are
+    seen; infinite: see `transfer`."""
     step = view.H_inf @ reference.K @ viewpoint.c
     moved = d * s
-    return _raw(view, *transfer(view, [part + moved * k for part, k in zip(infinite, step, strict=True)], d))
+    return transfer(view, [part + moved * k for part, k in zip(infinite, step, strict=True)], d)
 
 
 def _raw(view: View, x: Array, y: Array) -> tuple[Array, Array]:
@@ -196,20 +158,26 @@ def _canvas(surface: Surface, views: Sequence[View], viewpoint: Viewpoint, proje
         c = surface.projection.rotation.T @ viewpoint.c
         _refined(surface, rays, s, c, carried)
         d, s64 = carried.astype(np.float64), s.astype(np.float64)
+        infinite = [plane.project_rows(view.H_inf, xs, ys) for view in views]
         return [
-            np.stack(_seen_at(view, views[0], viewpoint, plane.project_rows(view.H_inf, xs, ys), d, s64), axis=-1)
-            for view in views
+            np.stack(_raw(view, *_seen_at(view, views[0], viewpoint, far, d, s64)), axis=-1)
+            for view, far in zip(views, infinite, strict=True)
         ]
 
-    reach = _reach(surface, views, viewpoint, projection)
+    reach, cropped = _reach(surface, views, viewpoint, projection)
     # what the reference shows is looked for like the rest: only its middle is sure to be seen
     middle = (np.array(views[0].size) - 1) / 2
     left, top = (int(v) for v in np.floor(projection.of_reference(undistort(middle, views[0].camera))))
-    return bounding_canvas(pictures_at, (left, top, 1, 1), [view.size for view in views], reach, projection)
+    canvas = bounding_canvas(pictures_at, (left, top, 1, 1), [view.size for view in views], reach, projection)
+    # nodes to both sides of an edge of depth look stretched, but are not
+    return replace(canvas, cropped=cropped)
 
 
-def _reach(surface: Surface, views: Sequence[View], viewpoint: Viewpoint, projection: Projection) -> Array:
-    """left, top, right, bottom, px of the plane, of a rectangle that holds all pictures, with a margin."""
+def _reach(
+    surface: Surface, views: Sequence[View], viewpoint: Viewpoint, projection: Projection
+) -> tuple[Array, bool]:
+    """left, top, right, bottom, px of the plane, of a rectangle that holds all pictures, with a margin; and whether more
+    than some specks of them lie beyond the projection's limits."""
     height, width = surface.depth.shape
     every = max(1, max(height, width) // CARRY.reach_nodes)
     (x, y, z), depth = surface.points(viewpoint, slice(0, height, every), every)
@@ -222,8 +190,10 @@ def _reach(surface: Surface, views: Sequence[View], viewpoint: Viewpoint, projec
     ]
     points = projection.points(np.vstack([np.stack(moved, axis=-1) @ viewpoint.rotation.T, *borders]))
     limits = projection.limits
-    points = np.clip(points[np.isfinite(points).all(axis=1)], limits[:2], limits[2:])
+    points = points[np.isfinite(points).all(axis=1)]
+    beyond = (points < limits[:2] - 1) | (points > limits[2:] + 1)
+    points = np.clip(points, limits[:2], limits[2:])
     margin = CANVAS.margin * max(views[0].size)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     reach: Array = np.concatenate([np.maximum(low, limits[:2]), np.minimum(high, limits[2:])])
-    return reach
+    return reach, projection.sphere is None and float(beyond.any(axis=1).mean()) > CARRY.most_beyond
