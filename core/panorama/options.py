@@ -281,7 +281,7 @@ class SlideOptions:
     nodes: int = 400
     """Nodes along the longer side of the base at which the overlap is looked at."""
 
-    rounds: int = 6
+    rounds: int = 4
     """Steps of false position for s: below a thousandth where the parallax is no more than the width of the slide."""
 
     least_range: float = 1e-9
@@ -310,9 +310,6 @@ class CarryOptions:
     halvings: int = 6
     """Times that the canvas is halved for gaps that are still there: up to 2 · 2⁶ px wide."""
 
-    refinements: int = 2
-    """Times that a pixel's depth is looked up where its point lies: it settles at once on smooth surfaces."""
-
     same_share: float = 0.06
     """Share of d, with `same_px` px of parallax, by which a surface may differ from what was carried over."""
 
@@ -325,11 +322,14 @@ class CarryOptions:
     behind_px: float = 2.0
     """See `behind_share`."""
 
-    least_shift_px: float = 1e-3
-    """px beside the epipolar line below which a map counts as on it: this is rounding."""
+    smaller_strips: int = 16
+    """Times that strips of rows are smaller than `PartOptions.strip_pixels`: they go through many hands."""
 
     reach_nodes: int = 200
     """Nodes along the longer side of the base at which the pictures' bounds are looked for."""
+
+    most_beyond: float = 0.01
+    """Share of what is shown that may lie beyond the projection's limits without a word: stray points do."""
 
 
 CANVAS = CanvasOptions()
