@@ -44,10 +44,24 @@ def make_job(context: bpy.types.Context, folder: Path) -> tuple[dict[str, Any], 
 
 
 def take_over(context: bpy.types.Context, folder: Path, found: dict[str, Any], memory: dict[str, Any]) -> str:
-    """As `stitching.take_over`, shown only where the panorama was that it follows."""
+    """As `stitching.take_over`, shown only where the panorama was that it follows, as large as that."""
     before = compat.by_uid(bpy.data.images, memory["shown"])
-    spaces = [space for _, space in editor.all_spaces(context) if space.image is not None and space.image == before]
-    return stitching.take_over(context, folder, found, memory, "preview", spaces)
+    shown = [(area, space) for area, space in editor.all_spaces(context) if before is not None and space.image == before]
+    width = before.size[0] if before is not None else 0
+    words = stitching.take_over(context, folder, found, memory, "preview", [space for _, space in shown])
+    for area, space in shown:
+        _as_wide(context, area, space, width)
+    return words
+
+
+def _as_wide(context: bpy.types.Context, area: bpy.types.Area, space: bpy.types.SpaceImageEditor, width: int) -> None:
+    """Shows the image of an editor as wide as one of so many px was shown there."""
+    window = next((one for one in context.window_manager.windows if area in one.screen.areas[:]), None)
+    region = next(one for one in area.regions if one.type == "WINDOW")
+    if bpy.app.background or window is None or width == space.image.size[0]:
+        return
+    with context.temp_override(window=window, area=area, region=region):
+        bpy.ops.image.view_zoom_ratio(ratio=space.zoom[0] * width / space.image.size[0])
 
 
 def _begin() -> float | None:
