@@ -46,7 +46,7 @@ def make_job(context: bpy.types.Context, folder: Path) -> tuple[dict[str, Any], 
 def take_over(context: bpy.types.Context, folder: Path, found: dict[str, Any], memory: dict[str, Any]) -> str:
     """As `stitching.take_over`, shown only where the panorama was that it follows, as large as that."""
     before = compat.by_uid(bpy.data.images, memory["shown"])
-    shown = [(area, space) for area, space in editor.all_spaces(context) if before is not None and space.image == before]
+    shown = [both for both in editor.all_spaces(context) if before is not None and both[1].image == before]
     width = before.size[0] if before is not None else 0
     words = stitching.take_over(context, folder, found, memory, "preview", [space for _, space in shown])
     for area, space in shown:
