@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError, fields
+from dataclasses import FrozenInstanceError, fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
-from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, PROJECTIONS, ROUND_FIELDS, SEAMS
+from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, HOLES, PROJECTIONS, ROUND_FIELDS, SEAMS
 from edf_stitch.core.options import LEAST_SCALE, StitchOptions
 from edf_stitch.core.system.errors import BadRequest
+
+from ..pairs import ON_REFERENCE
 
 
 def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore": (),
-        "slide": 0.0, "projection": "reference", "level": "auto", "centre": None, "fov": None,
-        "scale": 1.0, "crop": "full",
-        "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "holes": "transparent",
-        "seed": 0,
-        "measure": True, "cache": None,
+        "slide": 0.0, "projection": "reference", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
+        "crop": "full", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True,
+        "holes": "transparent", "seed": 0, "measure": True, "cache": None,
     }  # fmt: skip
 
 
@@ -39,8 +39,8 @@ def test_nothing_changes_them_afterwards() -> None:
 
 @pytest.mark.parametrize("asked", [
     *({"field": name} for name in FIELDS), *({"fade": name} for name in FADES), *({"blend": name} for name in BLENDS),
-    *({"seam": name} for name in SEAMS), {"mask": Path("m.png")}, {"exposure": False},
-    {"holes": "inpaint"}, {"holes": "auto"}, *({"projection": name} for name in (*PROJECTIONS, "pannini:0.3")),
+    *({"seam": name} for name in SEAMS), *({"holes": name} for name in HOLES), {"mask": Path("m.png")},
+    {"exposure": False}, *({"projection": name} for name in (*PROJECTIONS, "pannini:0.3")),
     {"projection": "auto", "slide": "auto"}, {"projection": "auto", "slide": 1.0}, {"slide": "auto"},
     {"projection": "auto", "field": "apap"}, {"projection": "auto", "centre": (-10.0, 3.0), "fov": 75.0},
     *({"crop": name} for name in CROPS), {"crop": (0, 0, 1, 1)}, {"crop": (3, 4, 500, 600)}, {"scale": 1},
@@ -48,7 +48,7 @@ def test_nothing_changes_them_afterwards() -> None:
     {"matches": np.zeros((20, 4))}, {"ignore": (Path("a.png"),)}, {"ignore": (None, np.zeros((4, 4), bool))},
 ])  # fmt: skip
 def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
-    options = StitchOptions(**asked)
+    options = replace(ON_REFERENCE, **asked)
     for name, value in asked.items():
         assert getattr(options, name) is value
 
@@ -78,7 +78,7 @@ def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
 ])  # fmt: skip
 def test_what_is_not_offered_is_refused_with_what_is(asked: dict, words: tuple[str, ...]) -> None:
     with pytest.raises(BadRequest) as refused:
-        StitchOptions(**asked)
+        replace(ON_REFERENCE, **asked)
     assert refused.value.exit_code == 2
     for word in words:
         assert word in str(refused.value)

@@ -21,6 +21,8 @@ from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.core.system.output_files import OutputFiles
 from edf_stitch.synthetic_scenes.two_planes import FLOOR_Y, WALL_Z, Pair, Textures
 
+from ..pairs import ON_REFERENCE
+
 ROUND = ("cylindrical", "equirectangular")
 
 
@@ -240,11 +242,11 @@ def _margins(result: StitchResult) -> list[tuple[int, int]]:
     ({"projection": "equirectangular", "level": "straight"}, "level 'straight' is not known"),
     ({"projection": "cylindrical", "level": (1.0, 2.0)}, "yaw, pitch, roll"),
     ({"projection": "cylindrical", "level": (1.0, 2.0, float("nan"))}, "yaw, pitch, roll"),
-    ({"level": (1.0, 2.0, 3.0)}, "the projection reference keeps the reference's plane"),
+    ({"level": (1.0, 2.0, 3.0)}, "the projection reference keeps the reference's own plane"),
 ])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_words(options: dict, word: str) -> None:
     with pytest.raises(BadRequest, match=word) as caught:
-        StitchOptions(**options)
+        replace(ON_REFERENCE, **options)
     assert caught.value.exit_code == 2
 
 
@@ -257,7 +259,7 @@ def test_pictures_whose_pose_nobody_knows_are_shown_by_their_homography(small_pa
     y = homogeneous(x) @ H.T
     rows = np.column_stack([x, y[:, :2] / y[:, 2:]])
     rows = rows[((rows[:, 2:] > 1) & (rows[:, 2:] < (width - 2, height - 2))).all(axis=1)]
-    options = replace(StitchOptions(projection="cylindrical"), matches=rows, measure=False)
+    options = replace(ON_REFERENCE, projection="cylindrical", matches=rows, measure=False)
     result = stitch((small_pair.reference, small_pair.target), options)
     assert result.edges[0].two_view.model == "plane"
     assert np.nanmax(np.linalg.norm(look_up(result.warp, rows[:, :2]) - rows[:, 2:], axis=1)) < 0.5

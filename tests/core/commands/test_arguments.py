@@ -55,7 +55,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
 
 @pytest.mark.parametrize(("words", "expected"), [
     (["--field", "strict", "--fade", "plane", "--projection", "reference", "--seam", "none"],
-     {"field": "strict", "seam": "none"}),
+     {"field": "strict", "fade": "plane", "projection": "reference", "seam": "none"}),
     (["--field", "paper", "--fade", "infinity"], {"field": "paper", "fade": "infinity"}),
     (["--matches", "m.csv", "--ignore-ref", "a.png", "--ignore-target", "b.png"],
      {"matches": Path("m.csv"), "ignore": (Path("a.png"), Path("b.png"))}),
@@ -64,10 +64,11 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--crop", "3,4,50,60"], {"crop": (3, 4, 50, 60)}), (["--crop", "reference"], {"crop": "reference"}),
     (["--dense"], {}),
     (["--no-dense", "--no-exposure"], {"dense": False, "exposure": False}), (["--exposure", "--seam", "graphcut"], {}),
-    (["--holes", "inpaint"], {"holes": "inpaint"}), (["--holes", "transparent"], {}),
+    (["--holes", "inpaint"], {"holes": "inpaint"}), (["--holes", "transparent"], {"holes": "transparent"}),
     (["--mask", "m.png"], {"mask": Path("m.png")}),
     (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {"blend": "feather"}),
-    (["--projection", "reference"], {}), (["--projection", "cylindrical"], {"projection": "cylindrical"}),
+    (["--projection", "reference"], {"projection": "reference"}),
+    (["--projection", "cylindrical"], {"projection": "cylindrical"}),
     (["--projection", "equirectangular", "--level=-5,2.5,0"],
      {"projection": "equirectangular", "level": (-5.0, 2.5, 0.0)}),
     (["--level", "auto"], {}), (["--level", "none"], {"level": "none"}),

@@ -14,16 +14,17 @@ from edf_stitch.core.commands.cli import main
 from edf_stitch.core.compare import run as run_module
 from edf_stitch.core.compare.pairs import PairFiles, find_pairs
 from edf_stitch.core.compare.run import FILES, ComparisonRequest, run_comparison
-from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest, Cancelled, DegenerateGeometry, UnwritableOutput
+
+from ...pairs import ON_REFERENCE
 
 FIELDS = ("slack", "homography")
 
 
 def compared(folder: Path, out: Path, *more: PairFiles, fields: tuple[str, ...] = FIELDS, **given):
     request = ComparisonRequest(out, (*find_pairs([folder]), *more), fields)
-    return run_comparison(request, given.pop("options", StitchOptions()), "1.2.3", **given)
+    return run_comparison(request, given.pop("options", ON_REFERENCE), "1.2.3", **given)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +58,7 @@ def test_everything_is_there_and_agrees(done: tuple[dict, Path], folder: Path) -
 def test_it_is_what_a_stitch_of_its_own_measures(done: tuple[dict, Path], folder: Path) -> None:
     """Sharing features and geometry changes nothing."""
     figures = done[0]["pairs"][0]["fields"]["slack"]["figures"]
-    alone = stitch((folder / "reference.png", folder / "target.png")).report["measured"]
+    alone = stitch((folder / "reference.png", folder / "target.png"), ON_REFERENCE).report["measured"]
     for name in ("overlap_psnr_db", "overlap_ssim", "alignment_median_px", "held_out_rms_px", "off_line_mean_px"):
         assert figures[name] == pytest.approx(alone[name], abs=1e-9), name
     assert figures["projectivity_px"] == pytest.approx(alone["projectivity_own_px"], abs=1e-9)
@@ -147,7 +148,7 @@ def test_what_makes_no_sense_for_several_pairs_is_refused(
 ) -> None:
     again = PairFiles("again", folder / "reference.png", folder / "target.png")
     with pytest.raises(BadRequest, match=words):
-        compared(folder, tmp_path, again, options=replace(StitchOptions(), **change))
+        compared(folder, tmp_path, again, options=replace(ON_REFERENCE, **change))
 
 
 @pytest.mark.parametrize("fields", [(), ("slack", "hugin"), ("slack", "slack")])

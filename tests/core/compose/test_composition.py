@@ -12,7 +12,6 @@ from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.compose.composition import Composition, Decided, composed, pooled_decision
 from edf_stitch.core.compose.options import OVERLAP
-from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.reference_map import ReferenceMap
@@ -21,7 +20,7 @@ from edf_stitch.core.raster.arrays import without_specks
 from edf_stitch.core.raster.log_encoding import log_encode
 from edf_stitch.core.raster.picture_map import PictureMap
 
-from ...pairs import with_map
+from ...pairs import ON_REFERENCE, with_map
 from ..field.test_visibility import OFFSET, SHAPE, SIDEWAYS, TARGET, points
 
 FLOATS = (False, False)
@@ -47,7 +46,8 @@ def compose(first: Layer, second: Layer, warp: Warp, decided: Decided | None = N
     """The panorama, the second layer as it was exposed, and what was decided about it."""
     steps = (lambda *step: None) if said is None else (lambda stage, share: said.append(stage))
     both = None if decided is None else (decided, decided)  # about the reference there is nothing to decide
-    made = composed((first, second), warp, SIDEWAYS.views, StitchOptions(**options), FLOATS, painted, steps, both, keep)
+    wanted = replace(ON_REFERENCE, **options)
+    made = composed((first, second), warp, SIDEWAYS.views, wanted, FLOATS, painted, steps, both, keep)
     return made.panorama, made.exposed[1], made.decided[1]
 
 
@@ -191,7 +191,7 @@ def three(lights: Any, columns: tuple[slice, ...] = SIDE_BY_SIDE, **options: Any
     same = PictureMap(x, y, camera.size)
     warp = Warp(canvas, (ReferenceMap(canvas, camera), same, same), np.full((HEIGHT, WIDTH), np.nan, np.float32))
     view = View(camera, np.eye(3), np.eye(3), np.zeros(3), np.eye(3), np.zeros(3))
-    return composed(layers, warp, (view,) * 3, StitchOptions(**options), (True,) * 3, None, lambda *_: None)
+    return composed(layers, warp, (view,) * 3, replace(ON_REFERENCE, **options), (True,) * 3, None, lambda *_: None)
 
 
 def wall() -> np.ndarray:

@@ -25,7 +25,7 @@ from edf_stitch.core.panorama.warp import build_warp
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
-from ...pairs import warp_of, with_map
+from ...pairs import ON_REFERENCE, warp_of, with_map
 
 
 def report_of(
@@ -45,8 +45,9 @@ def report_of(
         hidden = np.zeros(alignment.warp.maps[1].x.shape, bool)
         further = replace(decided[1], hidden=hidden, folds=folds(turning(alignment.warp.maps[1].arrays())))
         decided = decided[0], further
+    options = replace(ON_REFERENCE, measure=measure, holes=holes)
     return make_report(
-        StitchOptions(measure=measure, holes=holes), result.pictures, alignment, alignment.warp.canvas, decided, {},
+        options, result.pictures, alignment, alignment.warp.canvas, decided, {},
     )
 
 
