@@ -17,6 +17,8 @@ from .. import editor, idnames, properties
 from ..bridge import compat, result
 from . import modal, stitching
 
+# Editors in which such a picture was shown.
+_shown_in: set[int] = set()
 # Seconds without another change before it begins, and before it looks again where other work is going on.
 REST, AGAIN = 0.25, 1.0
 # Pixels of the larger picture at most: so many are composed in about a second on two cores.
@@ -49,21 +51,31 @@ def take_over(context: bpy.types.Context, folder: Path, found: dict[str, Any], m
     """As `stitching.take_over`, shown only where the panorama was that it follows, as large as that."""
     before = compat.by_uid(bpy.data.images, memory["shown"])
     shown = [both for both in editor.all_spaces(context) if before is not None and both[1].image == before]
-    width = before.size[0] if before is not None else 0
+    # px of the screen across the whole image; without a window nothing is drawn that wide
+    widths = [0.0 if bpy.app.background else space.zoom[0] * before.size[0] for _, space in shown]
     words = stitching.take_over(context, folder, found, memory, "preview", [space for _, space in shown])
-    for area, space in shown:
+    for (area, space), width in zip(shown, widths, strict=True):
+        _shown_in.add(space.as_pointer())
         _as_wide(context, area, space, width)
     return words
 
 
-def _as_wide(context: bpy.types.Context, area: bpy.types.Area, space: bpy.types.SpaceImageEditor, width: int) -> None:
-    """Shows the image of an editor as wide as one of so many px was shown there."""
+def _as_wide(context: bpy.types.Context, area: bpy.types.Area, space: bpy.types.SpaceImageEditor, width: float) -> None:
+    """Shows the image of an editor so many px of the screen wide."""
     window = next((one for one in context.window_manager.windows if area in one.screen.areas[:]), None)
     region = next(one for one in area.regions if one.type == "WINDOW")
-    if bpy.app.background or window is None or width == space.image.size[0]:
-        return
-    with context.temp_override(window=window, area=area, region=region):
-        bpy.ops.image.view_zoom_ratio(ratio=space.zoom[0] * width / space.image.size[0])
+    if width and window is not None:
+        with context.temp_override(window=window, area=area, region=region):
+            bpy.ops.image.view_zoom_ratio(ratio=width / space.image.size[0])
+
+
+@bpy.app.handlers.persistent
+def _show_again(*_: Any) -> None:
+    """What Blender calls after an undo or a redo: where the picture is gone that was shown, the panorama of then is."""
+    last = properties.settings_of(bpy.context.scene).result
+    for _area, space in editor.all_spaces(bpy.context):
+        if space.as_pointer() in _shown_in and space.image is None and last is not None:
+            space.image = last
 
 
 def _begin() -> float | None:
@@ -80,14 +92,22 @@ def _begin() -> float | None:
     return None
 
 
+_HANDLERS = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
+
+
 def register() -> None:
     """Follow from now on."""
     properties.on_reframe.append(changed)
+    for handlers in _HANDLERS:
+        handlers.append(_show_again)
 
 
 def unregister() -> None:
     """Follow no longer."""
     if changed in properties.on_reframe:
         properties.on_reframe.remove(changed)
+    for handlers in _HANDLERS:
+        if _show_again in handlers:
+            handlers.remove(_show_again)
     if bpy.app.timers.is_registered(_begin):
         bpy.app.timers.unregister(_begin)
