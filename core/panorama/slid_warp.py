@@ -38,7 +38,8 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
     Parameters
     ----------
     base : Warp
-        Of both pictures, seen from the reference's place, on a cylinder or sphere.
+        Of both pictures, seen from the reference's place, on a cylinder or sphere. What lies beside the epipolar lines
+        counts if it holds it.
     views : sequence of View
         What is known of the pictures, the reference first.
     viewpoint : Viewpoint
@@ -57,13 +58,12 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
     OutputTooLarge
         The canvas would have too many pixels.
     """
-    if base.beside is None:
-        raise ValueError("the base's depth, and what lies beside its epipolar lines, are to be held")
     surface = Surface.of(base, views)
+    beside = np.zeros((*surface.depth.shape, 3), np.float32) if base.beside is None else base.beside
     canvas = _canvas(surface, views, viewpoint, projection)
     lattice = Lattice((float(canvas.xs[0]), float(canvas.ys[0])), 1.0, (canvas.height, canvas.width))
     depth = carried_depth(surface, viewpoint, projection, lattice)
-    return trimmed(_mapped(base.beside, surface, views, viewpoint, canvas, depth))
+    return trimmed(_mapped(beside, surface, views, viewpoint, canvas, depth))
 
 
 def _mapped(
@@ -176,8 +176,8 @@ def _canvas(surface: Surface, views: Sequence[View], viewpoint: Viewpoint, proje
 def _reach(
     surface: Surface, views: Sequence[View], viewpoint: Viewpoint, projection: Projection
 ) -> tuple[Array, bool]:
-    """left, top, right, bottom, px of the plane, of a rectangle that holds all pictures, with a margin; and whether more
-    than some specks of them lie beyond the projection's limits."""
+    """left, top, right, bottom, px of the plane, of a rectangle that holds all pictures, with a margin; and whether
+    more than some specks of them lie beyond the projection's limits."""
     height, width = surface.depth.shape
     every = max(1, max(height, width) // CARRY.reach_nodes)
     (x, y, z), depth = surface.points(viewpoint, slice(0, height, every), every)
