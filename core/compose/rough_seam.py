@@ -56,10 +56,12 @@ class RoughSeam:
             seam_cost(overlap, maps[1], None),
             added_price(overlap, hidden, hidden_before[overlap.box].astype(np.int8)),
         )
-        chosen = find_seam(known_labels(before, layer, hidden), cost, price, overlap.box)[overlap.box]
-        seam = overlap.both & dilated(chosen & overlap.both, 1) & dilated(~chosen & overlap.both, 1)
+        chosen = find_seam(known_labels(before, layer, hidden), cost, price, overlap.box)
+        # also where the overlap ends: what the border of one picture cuts off does not go on in the other
+        others = ((before.alpha > 0) | (layer.alpha > 0)) & ~chosen
+        seam = (dilated(chosen, 1) & dilated(others, 1))[overlap.box] & overlap.both
         apart = np.abs(difference).mean(axis=2) > ROUGH_SEAM.visible_tone
-        return float((seam & dilated(apart, 1)).sum()) / 2  # a pixel on either side of the seam
+        return float((seam & apart).sum()) / 2  # a pixel on either side of the seam
 
 
 def _small(picture: Picture, scale: float) -> Picture:
