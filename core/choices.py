@@ -22,8 +22,8 @@ Slide = str | float
 # How a panorama that is not on the reference's plane is turned: one of LEVELS, or yaw, pitch, roll in degrees.
 LEVELS = ("auto", "none")
 Level = str | tuple[float, float, float]
-# What of the panorama is kept: the inscribed rectangle where that holds most of it, else all; or what a name says; or a
-# box (left, top, width, height) in px.
+# What of the panorama is kept: the inscribed rectangle where that holds most of it, else all that is shown, or what a
+# name says; or a box (left, top, width, height) in px.
 CROPS = ("auto", "full", "inscribed", "reference")
 Crop = str | tuple[int, int, int, int]
 # Band by band across the seam; by weights that fade towards the pictures' borders or the seam; or a plain average.

@@ -129,7 +129,7 @@ def map_pictures(
     def warp_on(projection: Projection | None) -> Warp:
         return build_warp(field, views, projection, refined, continuation)
 
-    if options.projection == "reference":
+    if options.surface[0] == "reference":
         return Mapped(warp_on(None), continuation, SlideChoice(0.0, (), "the reference's own plane has one viewpoint"))
     slide = SlideChoice(0.0, (), "as asked for")
     progress("warp", 0.2)
@@ -139,7 +139,8 @@ def map_pictures(
     shown = _seen_from(slide.s1, warp_on, views, lines, CHOICE.base_px_per_radian)
     kind, distance = options.surface
     asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
-    frame = frame_for(asked, views, lines.together if asked.needs_edges else None, shown)
+    edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
+    frame = frame_for(asked, views, edges, down, shown)
     progress("warp", 0.5)
     return Mapped(_seen_from(slide.s1, warp_on, views, lines, focal_of(views[0].K))(frame), continuation, slide)
 

@@ -56,16 +56,17 @@ class StitchOptions:
         The surface that the panorama lies on, one of PROJECTIONS, or "pannini:D" with a distance D from 0 to 1.
         "reference" keeps every pixel of the reference: it implies no slide and the full canvas.
     level : str or (yaw, pitch, roll), default "auto"
-        How a cylindrical or equirectangular panorama is turned: one of LEVELS, or the reference camera's angles in
+        How the panorama is turned: upright ("auto"), as the reference ("none"), or by the reference camera's angles in
         degrees (see `levelling`).
     centre : (yaw, pitch), optional
-        Degrees from the middle of the frame that would be chosen: moves the frame, turns nothing.
+        Degrees right and up from the middle of all that is shown: moves the frame, turns nothing.
     fov : float, optional
         Horizontal field of view of the frame, degrees; all that is shown by default.
     scale : float, default 1
         Factor by which all pictures are resized first, from LEAST_SCALE to 1.
     crop : str or (left, top, width, height), default "full"
-        What is kept of the panorama: one of CROPS, or a box in px of it (see `crop_box`).
+        What is kept of the panorama: one of CROPS, or a box in px of it (see `crop_box`). "auto" keeps all on the
+        reference's plane and of a sphere that is asked for.
     dense : bool, default True
         Whether every pixel of the overlap is searched for along its epipolar line.
     blend : str, default "multiband"
@@ -78,8 +79,8 @@ class StitchOptions:
     exposure : bool, default True
         Whether the target's exposure and white balance are matched to the reference's.
     holes : str, default "transparent"
-        What becomes of pixels that no camera saw because something near hid them, one of HOLES. `linear` blending has
-        no holes.
+        What becomes of pixels that no camera saw, one of HOLES: "auto" fills small closed holes, "inpaint" all that
+        something near hid. `linear` blending has none of the latter.
     seed : int, default 0
         Of every random choice, 0 to 2³¹ − 1.
     measure : bool, default True
@@ -118,14 +119,33 @@ class StitchOptions:
 
     @property
     def surface(self) -> tuple[str, float | None]:
-        """The projection's kind, and the distance that "pannini:D" names."""
+        """The kind of projection that is drawn, and the distance that "pannini:D" names: a field that knows the
+        reference's plane only is drawn there."""
         kind, _, distance = self.projection.partition(":")
+        if kind == "auto" and self.field not in ROUND_FIELDS:
+            kind = "reference"
         return kind, float(distance) if distance else None
+
+    @property
+    def kept(self) -> Crop:
+        """The crop, with "auto" decided where the projection does: on the reference's plane every pixel is kept, and
+        a sphere that is asked for is a whole one."""
+        return "full" if self.crop == "auto" and self.surface[0] in ("reference", "equirectangular") else self.crop
+
+    @property
+    def fills_holes(self) -> bool:
+        """Whether what no camera saw may be filled."""
+        return self.holes != "transparent"
 
     @property
     def has_seam(self) -> bool:
         """An average has none; bands need one, if only that which lies midway between the borders."""
         return self.blend == "multiband" or (self.blend == "feather" and self.seam != "none")
+
+    @property
+    def may_slide(self) -> bool:
+        """On the reference's own plane the viewpoint stays."""
+        return self.projection != "reference" and self.slide != 0
 
     @property
     def preview(self) -> bool:
@@ -141,8 +161,7 @@ class StitchOptions:
     def __post_init__(self) -> None:
         for name, value, known in (
             ("field", self.field, FIELDS), ("fade", self.fade, FADES), ("blend", self.blend, BLENDS),
-            ("projection", self.projection, PROJECTIONS), ("seam", self.seam, SEAMS),
-            ("holes", self.holes, HOLES),
+            ("seam", self.seam, SEAMS), ("holes", self.holes, HOLES),
         ):  # fmt: skip
             if value not in known:
                 raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")
@@ -152,7 +171,9 @@ class StitchOptions:
             raise BadRequest(f"a scale of {self.scale:g}: it must lie between {LEAST_SCALE:g} and 1 (the full size)")
         if not 0 <= self.seed < 2**31:
             raise BadRequest("the seed must be a whole number from 0 to 2147483647")
+        self._check_projection()
         self._check_level()
+        self._check_frame()
         if isinstance(self.crop, str) and self.crop not in CROPS:
             raise BadRequest(f"the crop {self.crop!r} is not known; choose from: {', '.join(CROPS)}, or X, Y, W, H")
         if not isinstance(self.crop, str) and (len(self.crop) != 4 or min(self.crop[:2]) < 0 or min(self.crop[2:]) < 1):
@@ -160,21 +181,54 @@ class StitchOptions:
                 f"the crop {self.crop} is no box: X, Y, W, H in px are needed, X and Y from 0, W and H at least 1"
             )
 
-    def _check_level(self) -> None:
-        flat = self.projection == "reference"
-        if not flat and self.field not in ROUND_FIELDS:
+    def _check_projection(self) -> None:
+        kind, colon, distance = self.projection.partition(":")
+        if kind not in PROJECTIONS or (colon and kind != "pannini"):
+            raise BadRequest(
+                f"projection {self.projection!r} is not offered; choose from: {', '.join(PROJECTIONS)}; pannini:D with "
+                "a distance D from 0 (a plane) to 1"
+            )
+        try:
+            known = not colon or 0 <= float(distance) <= 1
+        except ValueError:
+            known = False
+        if not known:
+            raise BadRequest(f"the distance in {self.projection!r} must be a number from 0 (a plane) to 1")
+        if kind not in ("auto", "reference") and self.field not in ROUND_FIELDS:
             raise BadRequest(
                 f"the field {self.field!r} knows the reference's plane only: for a {self.projection} panorama choose "
                 f"from: {', '.join(ROUND_FIELDS)}"
             )
+
+    def _check_level(self) -> None:
         if isinstance(self.level, str):
             if self.level not in LEVELS:
                 known = ", ".join(LEVELS)
                 raise BadRequest(f"the level {self.level!r} is not known; choose from: {known}, or yaw, pitch, roll")
         elif len(self.level) != 3 or not np.isfinite(self.level).all():
             raise BadRequest(f"the level {self.level} is not yaw, pitch, roll in degrees")
-        elif flat:
+
+    def _check_frame(self) -> None:
+        if self.centre is not None and (len(self.centre) != 2 or not np.abs(self.centre).max() <= 180):  # NaN too
+            raise BadRequest(f"the centre {self.centre} is not yaw, pitch in degrees, each from -180 to 180")
+        if self.fov is not None and not 1 <= self.fov <= 360:
+            raise BadRequest(f"a field of view of {self.fov:g} degrees: it must lie between 1 and 360")
+        kind, framed = self.surface[0], self.centre is not None or self.fov is not None
+        if kind == "equirectangular" and framed:
             raise BadRequest(
-                "the projection reference keeps the reference's plane and is not turned: leave the level out, or "
-                "choose the projection cylindrical or equirectangular"
+                "an equirectangular panorama is the whole sphere: leave centre and fov out, turn it by level, or cut a "
+                "part out by crop"
             )
+        if kind != "reference":
+            return
+        why = (
+            "the projection reference keeps the reference's own plane and place" if self.projection == "reference" else
+            f"the field {self.field!r} knows the reference's plane only"
+        )  # fmt: skip
+        for name, given in (
+            ("level", not isinstance(self.level, str)), ("centre", self.centre is not None),
+            ("fov", self.fov is not None), ("slide", self.slide not in ("auto", 0)),
+        ):  # fmt: skip
+            if given:
+                other = "projection" if self.projection == "reference" else "field"
+                raise BadRequest(f"{why}: leave the {name} out, or choose another {other}")

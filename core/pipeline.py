@@ -66,6 +66,8 @@ class StitchResult:
         What a picture cannot see though its map falls inside it.
     labels : ndarray (H, W) int16 or None
         Which picture a pixel comes from, −1 for none; None without a seam.
+    inpainted : ndarray (H, W) bool
+        What no picture shows and was filled.
     decided : tuple of Decided
         What was decided about each picture, on the uncropped canvas.
     edges : tuple of Edge
@@ -93,6 +95,7 @@ class StitchResult:
     warp: Warp
     occluded: tuple[NDArray[np.bool_], ...]
     labels: NDArray[np.int16] | None
+    inpainted: NDArray[np.bool_]
     decided: tuple[Decided, ...]
     edges: tuple[Edge, ...]
     views: tuple[View, ...]
@@ -149,7 +152,7 @@ class StitchResult:
         return replace(
             self, warp=self.warp.within(box), layers=tuple(layer.within(box) for layer in self.layers),
             occluded=tuple(cut(mask, box) for mask in self.occluded),
-            labels=None if self.labels is None else cut(self.labels, box, -1),
+            labels=None if self.labels is None else cut(self.labels, box, -1), inpainted=cut(self.inpainted, box),
         )  # fmt: skip
 
     @property
@@ -158,20 +161,6 @@ class StitchResult:
         confidence = self.warp.confidence
         shape = self.warp.canvas.height, self.warp.canvas.width
         return np.zeros(shape, np.float32) if confidence is None else confidence
-
-    @property
-    def inpainted(self) -> NDArray[np.bool_]:
-        """Pixels (H, W) bool of the layers' canvas that no picture saw and that were filled, because options ask for
-        it."""
-        filled = np.zeros(self.layers[0].alpha.shape, bool)
-        asked = self.report["options"]
-        if asked["holes"] != "inpaint" or asked["blend"] == "linear":
-            return filled
-        shown = self.layers[0].alpha > 0
-        for layer, hidden in zip(self.layers[1:], self.occluded[1:], strict=True):
-            filled |= hidden & (layer.alpha > 0)
-            shown = shown | (~hidden & (layer.alpha > 0))
-        return filled & ~shown
 
     @property
     def bits(self) -> int:
@@ -295,22 +284,25 @@ def compose(
     made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
     panorama, labels = made.panorama, made.labels
     looks = appearance(panorama, made.exposed, labels, any(floats)) if options.measure else {}
-    box = crop_box(options.crop, whole.canvas.whole, panorama.alpha > 0, box_of(whole.maps[0].inside()))
+    box = crop_box(options.kept, whole.canvas.whole, panorama.alpha > 0, box_of(whole.maps[0].inside()))
     panorama, canvas = panorama.within(box), whole.canvas.within(box)
     # of a whole sphere, layers and maps exist only where the pictures lie
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))
 
     progress("write", 0.0)
-    report, more = make_report(options, pictures, alignment, canvas, made.decided, looks)
+    report, more = make_report(
+        options, pictures, alignment, canvas, made.decided, looks, panorama.alpha > 0, int(made.filled.sum())
+    )
     warnings = (*(line for picture in pictures for line in _named(picture)), *alignment.warnings, *more)
     report["warnings"] = list(warnings)
     progress("write", 0.5)
     return StitchResult(
         panorama=panorama, canvas=canvas, pictures=pictures, layers=tuple(layer.within(box) for layer in layers),
         warp=whole.within(box), occluded=tuple(cut(one.hidden, box) for one in made.decided),
-        labels=None if labels is None else cut(labels, box, -1), decided=made.decided, edges=alignment.edges,
-        views=alignment.views, field=alignment.field, cameras=alignment.cameras, warnings=warnings, report=report,
-        seconds=progress.seconds, full_sizes=frame.full_sizes,
+        labels=None if labels is None else cut(labels, box, -1), inpainted=cut(made.filled, box),
+        decided=made.decided, edges=alignment.edges, views=alignment.views, field=alignment.field,
+        cameras=alignment.cameras, warnings=warnings, report=report, seconds=progress.seconds,
+        full_sizes=frame.full_sizes,
     )  # fmt: skip
 
 

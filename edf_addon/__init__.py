@@ -12,15 +12,15 @@ from typing import Any
 import bpy
 
 from . import properties
-from .jobs import command, modal
+from .jobs import command, following, modal
 from .operators import mask_painting, match_editing, match_pointing, pictures, scene_objects, stitch
 from .overlays import drawing
 from .panels import presets, sidebar
 
 # Registered in this order, unregistered in the opposite one; each has register() and unregister().
 REGISTERED = (
-    properties, modal, stitch, pictures, match_editing, match_pointing, mask_painting, scene_objects, presets, sidebar,
-    drawing,
+    properties, modal, following, stitch, pictures, match_editing, match_pointing, mask_painting, scene_objects,
+    presets, sidebar, drawing,
 )  # fmt: skip
 _commands: list[Any] = []
 _registered: list[Any] = []

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
 
-from . import properties
+from . import earlier, engine_options, properties
 from .bridge import images, ownership, photo, result
 
 REFERENCE, TARGET, PANORAMA = "reference", "target", "panorama"
@@ -35,6 +36,28 @@ def known(image: bpy.types.Image | None) -> dict[str, Any]:
     if found is None:
         raise ValueError("this image is no panorama that was stitched here")
     return found
+
+
+def report_of(context: Any) -> dict[str, Any] | None:
+    """The report of the panorama that is meant (see `panorama`); None where there is none."""
+    found = result.read(panorama(context))
+    return None if found is None else found["report"]
+
+
+def frame_then(settings: Any, image: bpy.types.Image | None) -> dict[str, Any] | None:
+    """The frame and viewpoint (see `engine_options.frame_of`) that an image was made for, where it is a panorama of the
+    pictures that are chosen now."""
+    found = result.read(image)
+    if found is None or ownership.pictures(image) != [settings.reference, settings.target]:
+        return None
+    return engine_options.frame_of(SimpleNamespace(**earlier.kept_now(found["settings"])))
+
+
+def is_behind(settings: Any, image: bpy.types.Image | None) -> bool:
+    """Whether an image is a panorama of the chosen pictures that was made for another frame or viewpoint than is chosen
+    now."""
+    then = frame_then(settings, image)
+    return then is not None and then != engine_options.frame_of(settings)
 
 
 def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:

@@ -55,6 +55,15 @@ def focal_facts(view: dict[str, Any]) -> list[tuple[str, str]]:
     return [("Focal", lengths), ("Source", view["focal_source"])]
 
 
+def viewpoint(report: dict[str, Any] | None) -> str:
+    """How far the viewpoint of a panorama slides, for an artist who let it be chosen."""
+    told = (report or {}).get("slide")
+    if not told:
+        return "How far it slides is chosen by the next stitch"
+    chosen = f"Chosen: {told['s1']:.2f}"
+    return f"{chosen} ({told['why']})" if told.get("why") else chosen
+
+
 def stage(name: str) -> str:
     """What the engine is doing, in words."""
     return STAGES.get(name, name.capitalize())

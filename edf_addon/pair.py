@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from . import status
+from . import earlier, status
 
 # The settings whose pictures are being chosen one after the other.
 _choosing: list[Any] = []
@@ -26,6 +26,7 @@ def choosing(settings: Any) -> Iterator[None]:
 
 def chosen(settings: Any, _context: Any) -> None:
     """A picture was chosen: the list of matches goes if it belongs to others, with a word."""
+    earlier.mark(settings)
     if _choosing or (settings.reference, settings.target) == (settings.matches_reference, settings.matches_target):
         return
     if count := len(settings.matches):

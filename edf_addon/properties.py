@@ -1,7 +1,8 @@
-"""What an artist decides about a stitch, kept in the scene; and what becomes of it in the engine's words."""
+"""What an artist decides about a stitch, kept in the scene, and with each panorama."""
 
 # No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
 import math
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -17,68 +18,17 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import idnames, pair, status
+from . import earlier, idnames, offered, pair, status
 
-CAMERA_SOURCES = (
-    ("AUTOMATIC", "Automatic", "From the photographs' EXIF; without it, estimated from the matches"),
-    ("FOCAL", "Focal Length", "The lens's focal length in millimetres, with the width of the sensor"),
-    ("FOCAL35", "35 mm Equivalent", "The focal length that would show as much on a 36 × 24 mm frame"),
-    ("FOCAL_PX", "Pixels", "The focal length in pixels of the full picture, as calibration tools give it"),
-    ("CAMERAS", "Scene Cameras", "Two cameras of the scene give lens, shift and place; only the field is fitted"),
-)
-FIELDS = (
-    ("SLACK", "Slack", "Along the epipolar lines, with a little slack for what lens distortion does"),
-    ("STRICT", "Strict", "Exactly along the epipolar lines: every point of the panorama is geometrically right"),
-    ("PAPER", "Paper", "As published: free to leave the epipolar lines"),
-    ("REW", "Elastic Warp", "For comparison: one homography, bent freely towards the matches; no depth, no cameras"),
-    ("APAP", "As-Projective-As-Possible", "For comparison: a homography for each cell of a grid; no depth, no cameras"),
-    ("HOMOGRAPHY", "Homography", "For comparison: what every other stitcher starts from; no depth, no cameras"),
-)
-# Those that round panoramas can be made of.
-ROUND_FIELDS = ("SLACK", "STRICT")
-FADES = (
-    ("PLANE", "Plane", "Outside the overlap the scene carries on as the plane that fits it best"),
-    ("INFINITY", "Infinity", "Outside the overlap the scene is taken as infinitely far"),
-)
-PROJECTIONS = (
-    ("PERSPECTIVE", "Perspective", "Flat: what the reference's camera would see with a larger sensor"),
-    ("CYLINDRICAL", "Cylindrical", "Round, for wide panoramas: upright lines stay straight"),
-    ("EQUIRECTANGULAR", "Equirectangular", "The whole sphere, as a World's environment texture wants it"),
-)
-LEVELS = (
-    ("AUTO", "Automatic", "The horizon is found by how the cameras were held"),
-    ("NONE", "As Taken", "The reference looks straight ahead"),
-    ("ANGLES", "Angles", "Yaw, pitch and roll of the reference in the panorama"),
-)
-BLENDS = (
-    ("MULTIBAND", "Multiband", "Light is evened out across the seam, detail is cut at it: what hides a seam best"),
-    ("FEATHER", "Feather", "A soft change from one picture to the other, across the whole overlap"),
-    ("LINEAR", "Average", "The plain average of both: doubled edges show where they do not fit"),
-)
-HOLES = (
-    ("TRANSPARENT", "Transparent", "Left open, to be painted or filled with another picture"),
-    ("INPAINT", "Inpaint", "Filled smoothly from what lies behind; no detail is made up"),
-)
-SEAMS = (
-    ("GRAPHCUT", "Best Cut", "Where the two pictures look most alike, around things rather than through them"),
-    ("NONE", "Midway", "Midway between the borders of the two pictures"),
-)
-CROPS = (
-    ("FULL", "Full", "All that either picture shows; transparent elsewhere"),
-    ("INSCRIBED", "Inscribed", "The largest rectangle without transparent parts"),
-    ("REFERENCE", "Reference", "Only the reference's own frame"),
-    ("BOX", "Box", "A rectangle in pixels of the full panorama"),
-)
-MATCH_STATES = (
-    ("USED", "Used", "The field stands on it"),
-    ("LEFT_OUT", "Left Out", "It contradicts the others and was not used"),
-    ("ADDED", "Added", "Set by hand since the last stitch"),
-)
-OVERLAYS = (
-    ("NONE", "None", "The picture alone"),
-    ("DIFFERENCE", "Difference", "How much the two pictures differ where both show something; black is the same"),
-    ("DISPLACEMENT", "Displacement", "How far each point slides because it is near: blue little, red much"),
-)
+# Called with a scene's settings when an artist changes what of the scene the panorama shows, or from where.
+on_reframe: list[Callable[[Any], None]] = []
+
+
+def reframe(settings: Any, _context: Any) -> None:
+    """The frame or the viewpoint was changed: the outline is drawn anew, and whoever follows it is told."""
+    look_again(settings, _context)
+    for follow in on_reframe:
+        follow(settings)
 
 
 def look_again(_group: Any, _context: Any) -> None:
@@ -112,7 +62,7 @@ class EDF_PG_match(bpy.types.PropertyGroup):  # noqa: N801 (Blender's own form)
         name="Error", description="How far, in target pixels, the last stitch missed this match; -1: not measured",
         default=-1.0, precision=2,
     )
-    state: EnumProperty(name="State", description="What the last stitch did with it", items=MATCH_STATES)
+    state: EnumProperty(name="State", description="What the last stitch did with it", items=offered.MATCH_STATES)
 
 
 class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
@@ -129,7 +79,7 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
     )
     result: PointerProperty(name="Panorama", type=bpy.types.Image, description="What was stitched last")
 
-    camera: EnumProperty(name="Camera", description="Where the focal length comes from", items=CAMERA_SOURCES)
+    camera: EnumProperty(name="Camera", description="Where the focal length comes from", items=offered.CAMERA_SOURCES)
     focal: FloatProperty(
         name="Focal Length", description="The lens's focal length, as engraved, not its 35 mm equivalent", default=24.0,
         min=0.1, soft_min=1.0, soft_max=300.0, unit="CAMERA", precision=2,
@@ -172,20 +122,51 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         name="Target Camera", type=bpy.types.Object, poll=is_camera, description="The camera that took the target"
     )
 
-    field: EnumProperty(name="Field", description="How the target may be bent to meet the reference", items=FIELDS)
-    fade: EnumProperty(name="Outside", description="What the field becomes outside the overlap", items=FADES)
+    field: EnumProperty(
+        name="Field", description="How the target may be bent to meet the reference", items=offered.FIELDS
+    )
+    fade: EnumProperty(
+        name="Outside", description="What becomes of the field outside the overlap", items=offered.FADES,
+        default="CONTINUE",
+    )
     dense: BoolProperty(
         name="Dense", description="Seek every pixel of the overlap along its epipolar line: sharper edges of near "
         "things, at some more time", default=True,
     )
-    projection: EnumProperty(name="Projection", description="What the panorama is drawn on", items=PROJECTIONS)
-    level: EnumProperty(name="Level", description="How a round panorama is turned", items=LEVELS)
+    projection: EnumProperty(
+        name="Projection", description="What the panorama is drawn on", items=offered.PROJECTIONS, default="AUTO",
+        update=reframe,
+    )
+    pannini_distance: FloatProperty(
+        name="Roundness", description="0 is flat, as Perspective; 1 bends level lines most and stretches the sides "
+        "least", default=0.5, min=0.0, max=1.0, subtype="FACTOR", update=reframe,
+    )
+    slide_auto: BoolProperty(
+        name="Automatic Viewpoint", description="Choose how far the viewpoint slides so that straight things stay "
+        "straight and near things whole", default=True, update=reframe,
+    )
+    slide: FloatProperty(
+        name="Viewpoint", description="Where the panorama is seen from, across the overlap: 0 all of it from the "
+        "reference's place; 1 slides to the target's, so that what the target alone shows looks as it was taken",
+        default=0.0, min=0.0, max=1.0, subtype="FACTOR", update=reframe,
+    )
+    centre: FloatVectorProperty(
+        name="Centre", description="Moves the frame to the right and up, from where it would be; turns nothing",
+        size=2, unit="ROTATION", precision=1, min=-math.pi, max=math.pi, update=reframe,
+    )
+    fov: FloatProperty(
+        name="Field of View", description="How much the frame shows from left to right; 0: all there is", default=0.0,
+        min=0.0, max=2 * math.pi, unit="ROTATION", precision=1, update=reframe,
+    )
+    level: EnumProperty(
+        name="Level", description="How the panorama is turned", items=offered.LEVELS, update=reframe
+    )
     level_angles: FloatVectorProperty(
         name="Yaw, Pitch, Roll", description="Where the reference looks in the panorama: to the right, above the "
-        "horizon, clockwise", size=3, unit="ROTATION", precision=2,
+        "horizon, clockwise", size=3, unit="ROTATION", precision=2, update=reframe,
     )
-    blend: EnumProperty(name="Blend", description="How the two pictures go over into each other", items=BLENDS)
-    seam: EnumProperty(name="Seam", description="Where one picture goes over into the other", items=SEAMS)
+    blend: EnumProperty(name="Blend", description="How the two pictures go over into each other", items=offered.BLENDS)
+    seam: EnumProperty(name="Seam", description="Where one picture goes over into the other", items=offered.SEAMS)
     seam_mask: PointerProperty(
         name="Painted Seam", type=bpy.types.Image,
         description="An image of the whole panorama's shape: black comes from the reference, white "
@@ -197,12 +178,14 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
     )
     holes: EnumProperty(
         name="Holes", description="What neither camera saw, because something near hid it from the only one that "
-        "looked there", items=HOLES,
+        "looked there", items=offered.HOLES, default="AUTO",
     )
-    crop: EnumProperty(name="Crop", description="What of the panorama is kept", items=CROPS)
+    crop: EnumProperty(
+        name="Crop", description="What of the panorama is kept", items=offered.CROPS, default="AUTO", update=reframe
+    )
     crop_box: IntVectorProperty(
         name="Box", description="Left, top, width and height, in pixels of the full panorama, from its top left",
-        size=4, default=(0, 0, 1000, 1000), min=0,
+        size=4, default=(0, 0, 1000, 1000), min=0, update=reframe,
     )
     scale: FloatProperty(
         name="Scale", description="Both pictures are resized by this first", default=1.0, min=0.02, max=1.0,
@@ -255,8 +238,13 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         default=True,
     )
 
+    version: IntProperty(
+        name="Version", options={"HIDDEN"},
+        description="Of what the settings mean; 0 where an earlier release has chosen the pictures, or nobody",
+    )
+
     overlay: EnumProperty(
-        name="Overlay", description="What lies over the panorama", items=OVERLAYS, update=look_again
+        name="Overlay", description="What lies over the panorama", items=offered.OVERLAYS, update=look_again
     )
     overlay_opacity: FloatProperty(
         name="Opacity", description="How much the overlay covers", default=0.8, min=0.0, max=1.0, subtype="FACTOR",
@@ -284,31 +272,13 @@ class EDF_PG_job(bpy.types.PropertyGroup):  # noqa: N801
     failed: BoolProperty(name="Failed", get=lambda _: status.now.failed)
 
 
-# The properties that are options of the engine under the same name: one word of several, or a plain value.
-CHOICES = ("field", "fade", "projection", "seam", "blend", "holes")
-VALUES = ("dense", "exposure", "seed")
 # What changes places when reference and target do; the lenses only where each picture has its own.
 PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))
 # What is no setting: what is stitched, what came of it, and how it is looked at.
 NO_SETTINGS = frozenset({"name", "reference", "target", "result", "matches", "matches_reference", "matches_target",
-                         "match_index", "overlay", "overlay_opacity", "show_matches", "show_epipolar"})  # fmt: skip
-
-
-def options_of(settings: Any, scale: float | None = None) -> dict[str, Any]:
-    """The settings as fields of StitchOptions, JSON-ready; `camera` holds those of CameraRequest. What needs images or
-    scene cameras (masks, matches, CAMERAS) is added by whoever has them. scale: instead of the settings' own."""
-    options: dict[str, Any] = {name: getattr(settings, name).lower() for name in CHOICES}
-    options |= {name: getattr(settings, name) for name in VALUES}
-    options["scale"] = settings.scale if scale is None else scale
-    options["crop"] = settings.crop.lower()
-    if settings.crop == "BOX":
-        options["crop"] = [int(side * options["scale"]) for side in settings.crop_box]
-    options["level"] = "auto" if settings.projection == "PERSPECTIVE" else settings.level.lower()
-    if options["level"] == "angles":
-        options["level"] = [math.degrees(angle) for angle in settings.level_angles]
-    options["camera"] = _camera_of(settings)
-    return options
+                         "match_index", "version", "overlay", "overlay_opacity", "show_matches",
+                         "show_epipolar"})  # fmt: skip
 
 
 def names_of_settings(settings: Any) -> list[str]:
@@ -338,6 +308,7 @@ def pointers(settings: Any) -> dict[str, bpy.types.ID | None]:
 def restore(settings: Any, kept: dict[str, Any], chosen: dict[str, bpy.types.ID]) -> None:
     """Settings that `keep` gave, perhaps in an earlier version: what is not there any more, or not yet, is left out.
     chosen: the images and cameras among them."""
+    kept = earlier.kept_now(kept)
     for name in set(names_of_settings(settings)) & set(kept):
         value = chosen.get(name) if settings.bl_rna.properties[name].type == "POINTER" else kept[name]
         try:
@@ -346,22 +317,23 @@ def restore(settings: Any, kept: dict[str, Any], chosen: dict[str, bpy.types.ID]
             settings.property_unset(name)
 
 
-def _camera_of(settings: EDF_PG_settings) -> dict[str, Any]:
-    def of(name: str) -> list[float]:
-        return [getattr(settings, name), *([getattr(settings, f"target_{name}")] if settings.own_lens else [])]
-
-    if settings.camera == "FOCAL":
-        return {"focal_mm": of("focal"), "sensor_mm": of("sensor")}
-    if settings.camera == "FOCAL35":
-        return {"focal35": of("focal35")}
-    if settings.camera == "FOCAL_PX":
-        return {"focal_px": of("focal_px")}
-    return {}
-
-
 def settings_of(scene: bpy.types.Scene) -> EDF_PG_settings:
     """A scene's settings."""
     return getattr(scene, idnames.SETTINGS)
+
+
+@bpy.app.handlers.persistent
+def bring_up_to_date(*_: Any) -> None:
+    """What Blender calls when a file was opened or something appended: scenes of an earlier release mean the same."""
+    for scene in bpy.data.scenes:
+        if scene.library is None:
+            earlier.bring_up_to_date(settings_of(scene))
+
+
+def _handlers() -> list[list[Any]]:
+    """Where `bring_up_to_date` waits; appending is told of since 4.3."""
+    names = ("load_post", "blend_import_post")
+    return [getattr(bpy.app.handlers, name) for name in names if hasattr(bpy.app.handlers, name)]
 
 
 CLASSES = (EDF_PG_match, EDF_PG_settings, EDF_PG_job)
@@ -373,10 +345,15 @@ def register() -> None:
         bpy.utils.register_class(cls)
     setattr(bpy.types.Scene, idnames.SETTINGS, PointerProperty(type=EDF_PG_settings))
     setattr(bpy.types.WindowManager, idnames.JOB, PointerProperty(type=EDF_PG_job))
+    for handlers in _handlers():
+        handlers.append(bring_up_to_date)
 
 
 def unregister() -> None:
     """Take them away again."""
+    for handlers in _handlers():
+        if bring_up_to_date in handlers:
+            handlers.remove(bring_up_to_date)
     delattr(bpy.types.WindowManager, idnames.JOB)
     delattr(bpy.types.Scene, idnames.SETTINGS)
     for cls in reversed(CLASSES):

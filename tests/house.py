@@ -43,18 +43,21 @@ MAY_IMPORT = {
     "pipeline": (*BELOW_MEASURE, "measure", "options", "alignment"),
 }
 # The same for the add-on. What lies beside its rooms is known to all of them, or to those after it.
-BESIDE = ("idnames", "pair", "properties", "status", "editor", "explain")
+BESIDE = ("idnames", "offered", "pair", "properties", "earlier", "engine_options", "status", "editor", "explain")
 ADDON_MAY_IMPORT = {
     "idnames": (),
     "status": (),
     "explain": (),
-    "pair": ("status",),
-    "properties": ("idnames", "pair", "status"),
+    "offered": (),
+    "engine_options": (),
+    "earlier": (),
+    "pair": ("earlier", "status"),
+    "properties": ("idnames", "offered", "earlier", "pair", "status"),
     "bridge": (),
-    "editor": ("bridge", "properties"),
-    "jobs": ("bridge", "pair", "properties", "status", "explain"),
+    "editor": ("bridge", "earlier", "engine_options", "properties"),
+    "jobs": ("bridge", "idnames", "pair", "properties", "engine_options", "editor", "status", "explain"),
     "scene": ("bridge", "properties", "editor"),
-    "overlays": ("bridge", "scene", "idnames", "properties", "editor"),
+    "overlays": ("bridge", "scene", "idnames", "properties", "engine_options", "editor"),
     "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "pair", "properties", "editor"),
     "panels": ("bridge", "jobs", "scene", "overlays", "operators", *BESIDE),
 }

@@ -94,7 +94,7 @@ class Unit:
         if self._layers:
             names = layer_files(
                 [path.name for path in self.pictures], seam=self.options.has_seam,
-                inpainted=self.options.holes == "inpaint",
+                inpainted=self.options.fills_holes, slides=self.options.may_slide,
             )  # fmt: skip
             out += [self._layers / name for name in names]
         if self.report:

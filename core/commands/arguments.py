@@ -7,11 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..choices import BLENDS, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS, Slide
+from ..choices import BLENDS, FADES, FIELDS, HOLES, SEAMS, Slide
 
 if TYPE_CHECKING:
     from ..options import StitchOptions
-
 
 
 def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> None:
@@ -76,7 +75,8 @@ def _add_control(parser: argparse.ArgumentParser) -> None:
     )
     control.add_argument(
         "--crop", default="full", metavar="CROP",
-        help="full (default), inscribed (the largest full rectangle), reference (its frame), or X,Y,W,H in px",
+        help="full (default), auto (the largest full rectangle if that keeps most, else all that is shown), inscribed "
+        "(that rectangle), reference (its frame), or X,Y,W,H in px",
     )  # fmt: skip
 
 
@@ -92,20 +92,28 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
         help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
     )  # fmt: skip
     how.add_argument(
-        "--slide", default="0", type=_slide, metavar="S",
-        help="how far the viewpoint slides from REF (0, default) to TARGET (1) across the overlap: beyond it, each is "
-        "shown the more as it was taken; no effect in the plane of REF",
+        "--slide", default=0.0, type=_slide, metavar="SLIDE",
+        help="how far the viewpoint slides from REF's place to TARGET's across the overlap: auto, or a share from 0 "
+        "(default: not at all) to 1",
     )  # fmt: skip
     how.add_argument(
-        "--projection", default="reference", type=_choice(PROJECTIONS), metavar="PROJECTION",
-        help="reference (default: the plane of REF, which keeps every pixel), cylindrical, or equirectangular (the whole "
-        "sphere)",
+        "--projection", default="reference", metavar="PROJECTION",
+        help="reference (default: the plane and place of REF, every pixel of it kept), auto (by the field of view, "
+        "levelled and centred), perspective (a plane), pannini[:D] (D from 0, a plane, to 1), cylindrical, or "
+        "equirectangular (the whole sphere)",
     )  # fmt: skip
     how.add_argument(
         "--level", default="auto", metavar="LEVEL",
-        help="of the other two: auto (default: the horizon by how the cameras were held), none, or YAW,PITCH,ROLL of "
+        help="how all but reference are turned: auto (default: upright), none (as REF), or YAW,PITCH,ROLL of "
         "REF in degrees (right, up, clockwise); write --level=-5,0,0 where it begins with a minus",
     )  # fmt: skip
+    how.add_argument(
+        "--centre", type=_numbers, metavar="YAW,PITCH",
+        help="move the frame by so many degrees right and up from the middle of what is shown; turns nothing",
+    )  # fmt: skip
+    how.add_argument(
+        "--fov", type=float, metavar="H", help="degrees that the frame shows from left to right (default: all)"
+    )
 
 
 def _add_composition(how: argparse._ArgumentGroup) -> None:
@@ -128,7 +136,8 @@ def _add_composition(how: argparse._ArgumentGroup) -> None:
     )  # fmt: skip
     how.add_argument(
         "--holes", default="transparent", type=_choice(HOLES), metavar="HOLES",
-        help="what neither camera saw behind something near: transparent (default) or inpaint (filled smoothly)",
+        help="what neither camera saw: transparent (default), auto (small closed holes are filled smoothly), or "
+        "inpaint (all that something near hid)",
     )  # fmt: skip
 
 
@@ -160,6 +169,8 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         slide=args.slide,
         projection=args.projection,
         level=parse_level(args.level),
+        centre=args.centre,
+        fov=args.fov,
         scale=args.scale,
         crop=parse_crop(args.crop),
         dense=args.dense,
@@ -182,13 +193,10 @@ def _numbers(text: str) -> tuple[float, ...]:
 
 
 def _slide(text: str) -> Slide:
-    """A share, or what chooses one; whether it is from 0 to 1, StitchOptions checks."""
-    if text == "auto":
-        return text
     try:
-        return float(text)
+        return text if text == "auto" else float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor a number from 0 to 1") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor a share from 0 to 1") from None
 
 
 def _choice(known: tuple[str, ...]) -> Callable[[str], str]:

@@ -271,7 +271,7 @@ def _stitch(args: argparse.Namespace) -> int:
     outputs = OutputRequest(args.output, args.report, args.layers, args.warp)
     with OutputFiles(args.overwrite, [*args.pictures, *options.files_read]) as files:
         names = [path.name for path in args.pictures]
-        check(outputs, files, names, options.has_seam, options.holes == "inpaint")
+        check(outputs, files, names, options.has_seam, options.fills_holes, options.may_slide)
         with progress_shown(args.quiet) as show:
             result = stitch(args.pictures, options, progress=show)
             show("write", MESSAGES.written_share)

@@ -75,12 +75,18 @@ class PairOutcome:
     exit_code: int = 0
 
 
-def check_options(options: StitchOptions, pairs: Sequence[PairFiles]) -> None:
-    """Raises BadRequest for options with which figures could not be compared."""
-    if options.crop != "full":
+def comparable(options: StitchOptions, pairs: Sequence[PairFiles]) -> StitchOptions:
+    """The options with which figures can be compared: all of the reference's own plane, from its place, where all
+    fields exist, and nothing made up. Raises BadRequest where something else is asked for."""
+    if options.crop not in ("auto", "full"):
         raise BadRequest("a comparison looks at whole panoramas: leave --crop out")
-    if getattr(options, "projection", "reference") != "reference":
-        raise BadRequest("a comparison looks at flat panoramas, where all fields exist: leave --projection out")
+    if options.projection not in ("auto", "reference") or options.centre is not None or options.fov is not None:
+        raise BadRequest(
+            "a comparison looks at the reference's own plane, where all fields exist: leave --projection, --centre and "
+            "--fov out"
+        )
+    if options.slide not in ("auto", 0):
+        raise BadRequest("a comparison looks from the reference's place, where all fields exist: leave --slide out")
     if len(pairs) > 1:
         for name, value in (
             ("--matches", options.matches), ("--ignore-ref", options.ignored(0)),
@@ -88,6 +94,9 @@ def check_options(options: StitchOptions, pairs: Sequence[PairFiles]) -> None:
         ):  # fmt: skip
             if value is not None:
                 raise BadRequest(f"{name} belongs to one pair, and {len(pairs)} are named")
+    fade = "plane" if options.fade == "continue" else options.fade
+    holes = "transparent" if options.holes == "auto" else options.holes
+    return replace(options, crop="full", projection="reference", slide=0.0, fade=fade, holes=holes)
 
 
 def run_comparison(
@@ -126,7 +135,7 @@ def run_comparison(
     Cancelled
         Nothing is left.
     """
-    check_options(options, request.pairs)
+    options = comparable(options, request.pairs)
     read = [path for pair in request.pairs for path in (pair.reference, pair.target)]
     with OutputFiles(request.overwrite, [*read, *options.files_read]) as files:
         files.check_folder(request.folder, FILES)

@@ -31,14 +31,19 @@ def averaged(before: Layer, layer: Layer, count: NDArray[Any]) -> Layer:
     return mixed(before, layer, share)
 
 
-def feathered(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Layer:
+def feathered(
+    before: Layer, layer: Layer, hidden: NDArray[np.bool_], behind: NDArray[np.bool_] | None = None
+) -> Layer:
     """Each weighted by the distance to its own border, so that neither shows an edge.
 
-    hidden (H, W): what the added picture cannot see, and what therefore stays as it was before.
+    hidden (H, W): what the added picture cannot see, and what therefore stays as it was before; behind (H, W): what the
+    panorama before cannot see.
     """
     inner_before, inner = distance_to_border(before.alpha > 0), distance_to_border(layer.alpha > 0)
     share = inner_before / np.maximum(inner_before + inner, 1e-6)
     share[hidden & (before.alpha > 0)] = 1
+    if behind is not None:
+        share[behind & (layer.alpha > 0)] = 0
     return mixed(before, layer, share)
 
 

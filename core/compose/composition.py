@@ -24,7 +24,7 @@ from ..raster.picture_map import PictureMap
 from ..system.progress import ReportProgress
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
 from .exposure import Exposure, match_exposure, pooled, unchanged
-from .inpaint import holes_of, inpainted
+from .inpaint import closed_holes, holes_of, inpainted
 from .min_cut import FREE, SECOND
 from .moving_things import moving_labels
 from .options import EXPOSURE
@@ -83,12 +83,15 @@ class Composition:
         One for each picture, the reference first.
     labels : (H, W) int16 array or None
         Which picture each pixel comes from: 0 the reference, −1 none; None without a seam.
+    filled : (H, W) bool array
+        What no picture shows and was filled.
     """
 
     panorama: Layer
     exposed: tuple[Layer, ...]
     decided: tuple[Decided, ...]
     labels: NDArray[np.int16] | None
+    filled: NDArray[np.bool_]
 
 
 def composed(
@@ -126,8 +129,9 @@ def composed(
     -------
     Composition
     """
-    steps = [_first(layers, warp, views, options, decided[0] if decided else None)]
-    out = steps[0].panorama
+    out, shape = layers[0], layers[0].alpha.shape
+    behind = np.broadcast_to(np.False_, shape) if warp.behind is None else warp.behind & (out.alpha > 0)
+    steps = [_Step(out, out, Decided(behind, behind, unchanged(out.light.shape[2])), np.zeros(0, bool))]
     for number, layer in enumerate(layers[1:], 1):
         added = _Added(
             layer, warp.maps[number].arrays(), warp.nearness(views, number), warp, options,
@@ -140,10 +144,18 @@ def composed(
         steps.append(_add(out, added, painted, report, decided[number] if decided else None, keep))
         out = steps[-1].panorama
     exposed, found = tuple(step.layer for step in steps), tuple(step.decided for step in steps)
+    filled = _filled(out, steps, options)
+    labels = _labels((layers[0].alpha > 0) & (out.alpha > 0), found)
+    return Composition(inpainted(out, filled, warp.depth), exposed, found, labels, filled)
+
+
+def _filled(panorama: Layer, steps: Sequence[_Step], options: StitchOptions) -> NDArray[np.bool_]:
+    """What (H, W) no picture shows and is to be filled."""
+    if options.holes == "auto":
+        return closed_holes(panorama.alpha > 0, small=True)[0]
     holes = [step.holes for step in steps if step.holes.size]
-    if holes:
-        out = inpainted(out, np.logical_or.reduce(holes) & (out.alpha == 0), warp.depth)
-    return Composition(out, exposed, found, _labels(steps[0].panorama, found))
+    nothing = np.broadcast_to(np.False_, panorama.alpha.shape)
+    return np.logical_or.reduce(holes) & (panorama.alpha == 0) if holes else nothing
 
 
 @dataclass(frozen=True)
@@ -174,32 +186,12 @@ class _Step:
     holes: NDArray[np.bool_]
 
 
-def _first(
-    layers: Sequence[Layer], warp: Warp, views: Sequence[View], options: StitchOptions, decided: Decided | None
-) -> _Step:
-    """The reference, with which the panorama begins: of what a sliding viewpoint shows, the part that it sees."""
-    layer, none = layers[0], np.zeros(0, bool)
-    nothing = np.broadcast_to(np.False_, layer.alpha.shape)
-    start = Decided(nothing, nothing, unchanged(layer.light.shape[2]))
-    if warp.slide is None:
-        return _Step(layer, layer, start, none)
-    if decided is None:
-        picture_map = warp.maps[0].arrays()
-        hidden = occluded(picture_map, warp.nearness(views, 0)) | turned_over(turning(picture_map))
-        hidden = without_specks(hidden) & (layer.alpha > 0)
-        alone = hidden & ~np.logical_or.reduce([one.alpha > 0 for one in layers[1:]])
-        decided = replace(start, hidden=hidden, hidden_by_depth=hidden, holes=int(alone.sum()))
-    return _Step(
-        _without(layer, decided.hidden), layer, decided, decided.hidden if options.holes == "inpaint" else none
-    )
-
-
 def _add(
     before: Layer, added: _Added, painted: NDArray[np.int8] | None, progress: ReportProgress, decided: Decided | None,
     keep: bool,
 ) -> _Step:  # fmt: skip
     """Add one picture to the panorama before."""
-    options, layer = added.options, added.layer
+    options, layer, behind = added.options, added.layer, added.warp.behind
     progress("occlusion", 0.0)
     hidden, by_depth, folded = (
         (decided.hidden, decided.hidden_by_depth, decided.folds) if decided else _hidden(before, added)
@@ -212,7 +204,7 @@ def _add(
     if decided:
         exposure = decided.exposure
     elif options.exposure:
-        exposure = match_exposure(before, fetched, hidden, added.floats)
+        exposure = match_exposure(before, fetched, hidden if behind is None else hidden | behind, added.floats)
     else:
         exposure = unchanged(layer.light.shape[2])
     fetched, layer = exposure.applied(fetched), exposure.applied(layer)
@@ -223,16 +215,23 @@ def _add(
         found = Decided(hidden, by_depth, exposure, folds=folded)
         return _Step(averaged(before, fetched, added.count), fetched, found, np.zeros(0, bool))
     holes = holes_of(hidden, before, layer)
+    if behind is not None:
+        holes |= behind & (before.alpha > 0) & (hidden | (layer.alpha == 0))
+        before = _without(before, holes)
     visible, fetched = (_without(one, holes) if holes.any() else one for one in (layer, fetched))
     roll = decided.roll if decided else roll_for(added.warp.canvas, before, visible)
     before, visible, rolled_hidden = rolled_layer(before, roll), rolled_layer(visible, roll), rolled(by_depth, roll)
-    overlap = overlap_of(before, rolled_layer(fetched, roll), rolled_hidden) if options.has_seam else None
+    behind = None if behind is None else rolled(behind, roll)
+    unseen = rolled_hidden if behind is None else rolled_hidden | behind
+    overlap = overlap_of(before, rolled_layer(fetched, roll), unseen) if options.has_seam else None
     del fetched
     if decided:
         found = decided
     else:
         start = Decided(hidden, rolled_hidden, exposure, roll=roll, holes=int(holes.sum()), folds=folded)
-        found = _with_seam(start, before, visible, overlap, added, None if painted is None else rolled(painted, roll))
+        found = _with_seam(
+            start, before, visible, overlap, added, behind, None if painted is None else rolled(painted, roll)
+        )
         chosen = None if found.chosen is None else rolled(found.chosen, -roll)
         found = replace(found, hidden_by_depth=by_depth, chosen=chosen)
         if not keep:
@@ -244,7 +243,7 @@ def _add(
 
     progress("blend", 0.0)
     if found.chosen is None:
-        out = feathered(before, visible, rolled(hidden, roll))
+        out = feathered(before, visible, rolled(hidden, roll), behind)
     else:
         # a decision taken over from another frame may choose pixels that this one does not show
         side = (rolled(found.chosen, roll) & (visible.alpha > 0)) | (before.alpha == 0)
@@ -258,12 +257,15 @@ def _add(
 def _hidden(before: Layer, added: _Added) -> tuple[NDArray[np.bool_], NDArray[np.bool_], float]:
     """What (H, W) a picture cannot see, the part of it that the depth order alone tells, and its share of folds."""
     by_depth = occluded(added.picture_map, added.nearness)
-    hidden = by_agreement(by_depth, added.picture_map, added.warp.lazy_confidence, before.alpha > 0)
+    shown = before.alpha > 0
+    if added.warp.behind is not None:
+        shown &= ~added.warp.behind
+    hidden = by_agreement(by_depth, added.picture_map, added.warp.lazy_confidence, shown)
     by_depth &= hidden
     turns = turning(added.picture_map)
     folded = folds(turns, hidden)
     # the panorama before is right where the map mirrors the picture
-    mirrored = turned_over(turns) & (before.alpha > 0)
+    mirrored = turned_over(turns) & shown
     return hidden | mirrored, by_depth | mirrored, folded
 
 
@@ -275,9 +277,12 @@ def _count(layers: Sequence[Layer]) -> NDArray[np.int16]:
     return count
 
 
-def _labels(reference: Layer, decided: Sequence[Decided]) -> NDArray[np.int16] | None:
-    """Which picture (H, W) each pixel comes from, −1 where none shows it; None without a seam."""
-    labels = np.where(reference.alpha > 0, np.int16(0), np.int16(-1))
+def _labels(reference: NDArray[np.bool_], decided: Sequence[Decided]) -> NDArray[np.int16] | None:
+    """Which picture (H, W) each pixel comes from, −1 where none shows it; None without a seam.
+
+    reference (H, W): what the reference shows of the panorama.
+    """
+    labels = np.where(reference, np.int16(0), np.int16(-1))
     for number, one in enumerate(decided[1:], 1):
         if one.chosen is None:
             return None
@@ -324,9 +329,10 @@ def _without(layer: Layer, holes: NDArray[np.bool_]) -> Layer:
 
 def _with_seam(
     so_far: Decided, before: Layer, layer: Layer, overlap: Overlap | None, added: _Added,
-    painted: NDArray[np.int8] | None,
+    behind: NDArray[np.bool_] | None, painted: NDArray[np.int8] | None,
 ) -> Decided:
-    """What was decided, with the seam. Layers, overlap and painted labels are rolled, the picture's map is not yet."""
+    """What was decided, with the seam. All but the picture's map is rolled; behind (H, W): what the panorama before
+    cannot see."""
     options = added.options
     if not options.has_seam:
         return so_far
@@ -337,11 +343,15 @@ def _with_seam(
         return replace(so_far, chosen=known == SECOND)
     if options.seam == "none":
         nearest = distance_labels(before, layer)
+        if behind is not None:
+            nearest |= behind
         return replace(so_far, chosen=np.where(known == FREE, nearest, known == SECOND))
     picture_map, confidence = rolled_map(added.picture_map, so_far.roll), added.warp.lazy_confidence
     if confidence is not None and so_far.roll:
         confidence = rolled(whole(confidence), so_far.roll)
-    moving = moving_labels(overlap, picture_map, before, layer, so_far.hidden_by_depth)
-    cost, price = seam_cost(overlap, picture_map, confidence), added_price(overlap, so_far.hidden_by_depth, moving)
+    unseen = so_far.hidden_by_depth if behind is None else so_far.hidden_by_depth | behind
+    moving = moving_labels(overlap, picture_map, before, layer, unseen)
+    cost = seam_cost(overlap, picture_map, confidence)
+    price = added_price(overlap, so_far.hidden_by_depth, moving, behind)
     chosen = find_seam(known, cost, price, overlap.box)
     return replace(so_far, chosen=chosen, known=known, cost=cost, price=price, box=overlap.box)

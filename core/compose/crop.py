@@ -1,4 +1,7 @@
-"""Which part of the panorama is kept: all of it, what is full everywhere, the reference's frame, or a given box."""
+"""Which part of the panorama is kept: all of it, what is full everywhere, the reference's frame, or a given box.
+
+"auto" keeps what is full everywhere if that is most of what is shown, else the smallest box of all that is shown.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..choices import CROPS, Crop
-from ..raster.arrays import Box
+from ..raster.arrays import Box, box_of
 from ..raster.rectangle import largest_rectangle
 from ..system.errors import BadRequest
+from .options import CROP
 
 
 def parse_crop(text: str) -> Crop:
@@ -55,10 +59,12 @@ def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Bo
         return whole
     if kind == "reference":
         return reference_box
-    if kind == "inscribed":
+    if kind in ("auto", "inscribed"):
         if not shows.any():
             raise BadRequest("the panorama shows nothing that a crop could keep")
-        return largest_rectangle(shows)
+        box = largest_rectangle(shows)
+        keeps = kind == "inscribed" or box[2] * box[3] >= CROP.least_kept * np.count_nonzero(shows)
+        return box if keeps else box_of(shows)
     if isinstance(kind, str) or len(kind) != 4:
         raise BadRequest(f"the crop {kind!r} is not known; choose from: {', '.join(CROPS)}, or give X, Y, W, H in px")
     x, y, w, h = kind

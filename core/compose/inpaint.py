@@ -1,4 +1,4 @@
-"""Filling holes that no camera saw, if asked for: smoothly, from what lies behind. No detail is invented."""
+"""Filling holes that no camera saw: smoothly, from what lies behind. No detail is invented."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import Part, bounds, dilated, with_margin
-from ..raster.lazy import AnyImage, Retouched
+from ..raster.arrays import Box, Part, dilated, meet
+from ..raster.lazy import AnyImage, LazyImage
 from ..raster.log_encoding import log_decode, log_encode
 from ..raster.pull_push import filled
 from .options import INPAINT
@@ -21,6 +21,33 @@ def holes_of(hidden: NDArray[np.bool_], before: Layer, layer: Layer) -> NDArray[
     """Where (H, W) no camera saw anything: hidden (H, W) from the added picture, not shown by the panorama before."""
     holes: NDArray[np.bool_] = hidden & (before.alpha == 0) & (layer.alpha > 0)
     return holes
+
+
+def closed_holes(shows: NDArray[np.bool_], small: bool) -> tuple[NDArray[np.bool_], list[Box]]:
+    """Holes of a panorama that do not reach its border.
+
+    Parameters
+    ----------
+    shows : (H, W) bool array
+        What the panorama shows.
+    small : bool
+        Only those of at most `InpaintOptions.small_share` of it, or only those that are larger.
+
+    Returns
+    -------
+    holes : (H, W) bool array
+    boxes : list of Box
+        That hold each of them, px, the largest hole first.
+    """
+    height, width = shows.shape
+    count, number, about, _ = cv2.connectedComponentsWithStats((~shows).view(np.uint8), connectivity=4)
+    left, top, across, down, area = about.T
+    picked = (left > 0) & (top > 0) & (left + across < width) & (top + down < height)
+    picked &= (area <= INPAINT.small_share * shows.size) == small
+    picked[0] = False  # what is shown
+    largest_first = about[picked][np.argsort(-area[picked], kind="stable")].tolist()
+    boxes = [(x, y, w, h) for x, y, w, h, _ in largest_first]
+    return picked[number] if count > 1 else np.zeros_like(shows), boxes
 
 
 def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage) -> Layer:
@@ -39,19 +66,22 @@ def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage
     -------
     Layer
     """
-    extent = bounds(holes)
-    if extent is None:
+    if not holes.any():
         return panorama
-    box = with_margin(extent, INPAINT.reach_px, holes.shape)
-    missing = holes[box]
-    beside = dilated(missing, INPAINT.reach_px) & ~missing & (panorama.alpha[box] > 0)
-    far = _far(inverse_depth[box], missing, beside)
-    weight = beside * np.where(far, np.float32(1), np.float32(INPAINT.near_weight))
-    tones = filled(log_encode(panorama.light[box]), weight)
-    at = box[0].start, box[1].start
-    alpha = panorama.alpha.copy()
-    alpha[box][missing] = 1
-    return Layer(Patched(panorama.light, at, missing, log_decode(tones)), alpha)
+    # holes near each other are filled together, from what lies around them all
+    count, number, about, _ = cv2.connectedComponentsWithStats(dilated(holes, INPAINT.reach_px).view(np.uint8))
+    alpha, patches = panorama.alpha.copy(), []
+    for one in range(1, count):
+        left, top, width, height = about[one][:4]
+        box = slice(top, top + height), slice(left, left + width)
+        missing = holes[box] & (number[box] == one)
+        beside = dilated(missing, INPAINT.reach_px) & ~missing & (panorama.alpha[box] > 0)
+        far = _far(inverse_depth[box], missing, beside)
+        weight = beside * np.where(far, np.float32(1), np.float32(INPAINT.near_weight))
+        tones = filled(log_encode(panorama.light[box]), weight)
+        alpha[box][missing] = 1
+        patches.append(Patch((int(top), int(left)), missing, log_decode(tones)))
+    return Layer(Patched(panorama.light, tuple(patches)), alpha)
 
 
 def _far(inverse_depth: NDArray[Any], missing: NDArray[np.bool_], beside: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -65,12 +95,35 @@ def _far(inverse_depth: NDArray[Any], missing: NDArray[np.bool_], beside: NDArra
 
 
 @dataclass(frozen=True, eq=False)
-class Patched(Retouched):
-    """Light with the pixels of a patch (h, w, C) in place of those that are touched."""
+class Patch:
+    """Light (h, w, C) for the pixels that are touched (h, w), from `at` (row, column) on."""
 
-    patch: NDArray[np.float32]
+    at: tuple[int, int]
+    touched: NDArray[np.bool_]
+    light: NDArray[np.float32]
 
-    def anew(self, before: NDArray[np.float32], there: Part) -> NDArray[np.float32]:
-        """See `Retouched`."""
-        pixels: NDArray[np.float32] = self.patch[there][self.touched[there]]
-        return pixels
+
+@dataclass(frozen=True, eq=False)
+class Patched(LazyImage):
+    """Light with patches, none of which touches another's pixels."""
+
+    light: AnyImage
+    patches: tuple[Patch, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.light.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        before = out = self.light[part]
+        for patch in self.patches:
+            meeting = meet(part, self.shape, patch.at, patch.touched.shape)
+            if meeting is None:
+                continue
+            here, there = meeting
+            if out is before:
+                out = before.copy()
+            touched = patch.touched[there]
+            out[here][touched] = patch.light[there][touched]
+        return out

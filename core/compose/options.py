@@ -172,6 +172,18 @@ class InpaintOptions:
     """Weight of what lies nearer than halfway to the thing that hid the hole, beside what lies behind: it decides only
     where nothing lies behind."""
 
+    small_share: float = 1e-3
+    """Share of the canvas up to which a closed hole is small: filled, it is hardly seen, and left open it would cut the
+    inscribed rectangle in two."""
+
+
+@dataclass(frozen=True)
+class CropOptions:
+    """What of the panorama is kept (`crop`)."""
+
+    least_kept: float = 0.7
+    """Share of what is shown that the inscribed rectangle keeps at least to be taken: below, too much would be lost."""
+
 
 EXPOSURE = ExposureOptions()
 OVERLAP = OverlapOptions()
@@ -181,3 +193,4 @@ SEAM = SeamOptions()
 ROUGH_SEAM = RoughSeamOptions()
 BANDS = BandOptions()
 INPAINT = InpaintOptions()
+CROP = CropOptions()

@@ -141,12 +141,13 @@ def _padded(values: NDArray[np.float32], axis: int, before: int, after: int) -> 
 
 
 def added_price(
-    overlap: Overlap, hidden: NDArray[np.bool_], moving: NDArray[np.int8] | None = None
-) -> NDArray[np.float32]:
+    overlap: Overlap, hidden: NDArray[np.bool_], moving: NDArray[np.int8] | None = None,
+    behind: NDArray[np.bool_] | None = None,
+) -> NDArray[np.float32]:  # fmt: skip
     """What it costs to show the added picture at each pixel of the overlap.
 
     What it cannot see costs by how different it looks, and so does what moved and is to be shown from the other
-    picture.
+    picture; what the panorama before cannot see costs where that is shown.
 
     Parameters
     ----------
@@ -155,6 +156,8 @@ def added_price(
         What the added picture cannot see.
     moving : (h, w) int8 array, optional
         See `moving_labels`.
+    behind : (H, W) bool array, optional
+        What the panorama before cannot see.
 
     Returns
     -------
@@ -162,6 +165,8 @@ def added_price(
         In the overlap's box, in units of a border between opposite tones; negative where it costs not to show it.
     """
     misplaced = hidden[overlap.box].astype(np.int8)
+    if behind is not None:
+        misplaced -= behind[overlap.box]
     if moving is not None:
         misplaced -= moving
     price = np.zeros(misplaced.shape, np.float32)

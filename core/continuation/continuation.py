@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -17,7 +17,7 @@ from ..field.refined_depth import RefinedDepth
 from ..raster.arrays import Array
 from ..raster.grid import Grid
 from .options import GRID, LOOKUP, SYSTEM
-from .plane_labels import labelled
+from .plane_labels import agreement, labelled
 from .planes import find_planes
 from .samples import Samples, Seen, samples_of, seen_at
 from .system import Guides, Surroundings, nearest, surface
@@ -100,7 +100,8 @@ class Continuation:
         ahead = np.maximum(seen[:, 2], 0.05)
         K = self.grid.view.K
         points = seen[:, :2] / ahead[:, None] @ K[:2, :2].T + K[:2, 2]
-        return self._surface(points) * ahead - depth
+        excess: Array = self._surface(points) * ahead - depth
+        return excess
 
     def _surface(self, points: Array) -> Array:
         """δ (…) at ideal pixels (…, 2) of the target; beyond the nodes that of the last."""
@@ -169,20 +170,21 @@ def _solved(grid: TargetGrid, samples: Samples, seen: Seen, guides: Guides) -> A
     ramp = np.where(seen.inside, 1, np.clip(seen.away / (SYSTEM.attraction_ramp * GRID.nodes), 0, 1))
     pull = np.where(label >= 0, free[np.maximum(label, 0)] * ramp, 0)
     goes_on = Surroundings(label, np.where(label >= 0, on, 0), pull, values)
-    return surface(grid, samples, seen, guides, goes_on, SYSTEM.rounds)
+    trusted = replace(samples, trust=samples.trust * agreement(grid, samples, seen, planes, label))
+    return surface(grid, trusted, seen, guides, goes_on, SYSTEM.rounds)
 
 
 def _colours(grid: TargetGrid, picture: NDArray[np.uint8]) -> Array:
-    """8-bit Lab (rows, columns, 3) of the target at the nodes, averaged over about a node's cell."""
+    """Luma and chroma, 0 to 255 (rows, columns, 3) of the target at the nodes, averaged over about a node's cell."""
     height, width = picture.shape[:2]
     step = grid.grid.step
     size = max(1, round(3 * width / step)), max(1, round(3 * height / step))
     small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).reshape(size[1], size[0], -1)
     if small.shape[2] == 1:
         small = np.repeat(small, 3, axis=2)
-    lab = cv2.cvtColor(cv2.GaussianBlur(small[..., :3], (0, 0), 1.0), cv2.COLOR_RGB2LAB).astype(np.float32)
+    toned = cv2.cvtColor(cv2.GaussianBlur(small[..., :3], (0, 0), 1.0), cv2.COLOR_RGB2YCrCb).astype(np.float32)
     raw = distort(grid.grid.points, grid.view.camera)
     place = (raw + 0.5) * np.array([size[0] / width, size[1] / height]) - 0.5
     x, y = np.moveaxis(place, -1, 0).astype(np.float32)
-    colours: Array = cv2.remap(lab, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
+    colours: Array = cv2.remap(toned, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
     return colours

@@ -119,13 +119,13 @@ class LabelOptions:
     """Weight of the logarithm of how likely a plane has a node's colour."""
 
     colour_bins: tuple[int, int, int] = (8, 16, 16)
-    """Bins of lightness and of both chroma."""
+    """Bins of luma and of both chroma."""
 
     colour_floor: float = 0.03
     """Probability that is added to each colour."""
 
     contrast: float = 10.0
-    """Difference in colour (8-bit Lab) over which a border between planes costs half."""
+    """Difference in colour (luma and chroma of 8 bit) over which a border between planes costs half."""
 
     min_contrast: float = 0.15
     """Share that it costs at least."""
@@ -135,6 +135,12 @@ class LabelOptions:
 
     island: float = 2.5
     """Cost of a plane where it is not connected to where it was seen: planes go on, and do not appear."""
+
+    agreeing_nodes: int = 2
+    """Nodes around the nearest one beyond the overlap whose planes a sample may agree with: creases lie there."""
+
+    agreeing_factor: float = 2.0
+    """Tolerances at which a sample that lies off these planes counts a quarter."""
 
     sweeps: int = 6
     """Rounds of messages through the grid, in four directions each."""
@@ -211,7 +217,7 @@ class SystemOptions:
     """A jump larger than this is none that the surface may bend over."""
 
     contrast: float = 10.0
-    """Difference in colour (8-bit Lab) over which neighbours are tied half as much."""
+    """Difference in colour (luma and chroma of 8 bit) over which neighbours are tied half as much."""
 
     min_contrast: float = 0.05
     """Share that they are tied at least."""

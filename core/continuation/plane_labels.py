@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..raster.arrays import Array, Part
 from .options import LABELS, PLANES
 from .planes import ScenePlane
-from .samples import Seen
+from .samples import Samples, Seen
 from .target_grid import TargetGrid
 
 
@@ -28,7 +28,7 @@ def labelled(
     seen : Seen
         What both pictures say at the nodes.
     colours : (rows, columns, 3) array
-        8-bit Lab at the nodes.
+        luma and chroma, 0 to 255, at the nodes.
     smooth : (rows, columns) array
         δ of the smooth continuation, which stands for no plane.
     most : float
@@ -60,6 +60,34 @@ def labelled(
     label = np.where(label == len(planes), -1, label)
     rows, columns = (np.arange(side) // every for side in grid.shape)
     return label[np.ix_(rows, columns)], values
+
+
+def agreement(
+    grid: TargetGrid, samples: Samples, seen: Seen, planes: Sequence[ScenePlane], label: NDArray[np.intp]
+) -> Array:
+    """How far (N,), 0 to 1, samples agree with a plane that goes on next to them beyond the overlap; 1 where none does.
+
+    Of leaves in front of a wall the wall goes on: what lies off it must not pull it along. label: see `labelled`.
+    """
+    beyond = grid.in_picture & ~seen.inside
+    _, part = cv2.distanceTransformWithLabels(
+        (~beyond).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    # the node beyond the overlap that is nearest to each
+    nearest = np.zeros(int(part.max()) + 1, np.intp)
+    nearest[part[beyond]] = np.flatnonzero(beyond)
+    window = np.ones((2 * LABELS.agreeing_nodes + 1,) * 2, np.uint8)
+    place = np.rint((samples.points - [grid.grid.xs[0], grid.grid.ys[0]]) / grid.grid.step).astype(np.intp)
+    column, row = (np.clip(place[:, k], 0, side - 1) for k, side in ((0, grid.grid.columns), (1, grid.grid.rows)))
+    at = nearest[part[row, column]]
+    rays = grid.rays_of(samples.points)
+    s = grid.sensitivity_of(rays) / (LABELS.agreeing_factor * PLANES.tolerance_px)
+    misfit = np.full(len(samples.points), np.inf)
+    for k, plane in enumerate(planes):
+        goes_on = cv2.dilate((beyond & (label == k)).astype(np.uint8), window).ravel()[at] > 0
+        misfit = np.where(goes_on, np.minimum(misfit, np.abs(rays @ plane.normal - samples.inverse_depth) * s), misfit)
+    none = (label.ravel()[at] < 0) | np.isinf(misfit)
+    return np.where(none, 1.0, 1 / np.square(1 + np.square(np.where(none, 0, misfit))))
 
 
 @dataclass(frozen=True)
@@ -114,7 +142,8 @@ def _costs(
         np.where(inside, misfit * sure, unseen), np.where(inside, LABELS.none_seen * sure, LABELS.none_unseen)
     ], axis=-1)  # fmt: skip
     cost += np.where(inside, 0, LABELS.colour * _unlikely(coarse, cost.argmin(axis=-1)))
-    return cost.astype(np.float32)
+    rounded: NDArray[np.float32] = cost.astype(np.float32)
+    return rounded
 
 
 def _order(coarse: _Coarse, first: NDArray[np.intp], planes: Sequence[ScenePlane]) -> Array:

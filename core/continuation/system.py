@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..cameras.projective import project
 from ..raster.arrays import Array, Part
-from .banded import Equations, solved
+from .banded import Equations, LeastSquares
 from .options import GRID, SYSTEM
 from .samples import Samples, Seen
 from .target_grid import TargetGrid
@@ -42,7 +42,7 @@ class Surroundings:
 class Guides:
     """What the target's picture shows of how surfaces go on.
 
-    colours (rows, columns, 3): 8-bit Lab at the nodes; edges (M, 2, 3): rays to both ends of straight edges in the
+    colours (rows, columns, 3): luma and chroma, 0 to 255, at the nodes; edges (M, 2, 3): rays to both ends of straight edges in the
     target camera's frame; confirmed: whether such edges confirm which way is down.
     """
 
@@ -65,22 +65,23 @@ def surface(
     s2 = np.square(_flat(grid, grid.sensitivity))
     pull = SYSTEM.attraction * s2 * _flat(grid, goes_on.attraction)
     there = np.maximum(_flat(grid, goes_on.inverse_depth), 0)
+    problem = LeastSquares(count, (data, membrane, bends, lines, uprights))
     weights, stiffness, upright_weights = weight, stiff, np.ones(len(uprights.wanted))
+    straight = np.full(len(lines.wanted), slope * SYSTEM.lines)
     boost, bound, at = np.ones(len(tied)), np.zeros(count), np.zeros(count)
     z = np.zeros(count)
     for number in range(rounds):
         held = SYSTEM.bound_weight * s2 * bound
-        z = solved(
-            count,
-            [(data, weights), (membrane, SYSTEM.membrane * tied * boost), (bends, slope * stiffness),
-             (lines, np.full(len(lines.wanted), slope * SYSTEM.lines)),
-             (uprights, SYSTEM.membrane * upright * upright_weights)],
+        z = problem.solved(
+            (weights, SYSTEM.membrane * tied * boost, slope * stiffness, straight,
+             SYSTEM.membrane * upright * upright_weights),
             pull + held + 1e-9 * s2, pull * there + held * at,
         )  # fmt: skip
-        weights = weight / np.maximum(1, np.abs(data.residual(z)) / SYSTEM.sample_px)
-        upright_weights = 1 / np.maximum(1, np.abs(uprights.residual(z)) / SYSTEM.upright_px)
+        missed, _, bent, _, leaning = (np.abs(one) for one in problem.residuals(z))
+        weights = weight / np.maximum(1, missed / SYSTEM.sample_px)
+        upright_weights = 1 / np.maximum(1, leaning / SYSTEM.upright_px)
         if number < SYSTEM.bending_rounds:
-            stiffness = stiff / np.maximum(1, np.abs(bends.residual(z)) / SYSTEM.bend_px)
+            stiffness = stiff / np.maximum(1, bent / SYSTEM.bend_px)
         # what was held at a bound stays there while it does not move away from it
         rest = (bound > 0) & ((z <= 1e-6 * most) | (z >= most * (1 - 1e-6)))
         bound = ((z < 0) | (z > most) | rest).astype(np.float64)

@@ -122,7 +122,8 @@ class TargetGrid:
         nodes, weights = self.taps(points)
         flat = values.reshape(len(points), -1)
         sums = [np.bincount(nodes.ravel(), (weights * column[:, None]).ravel(), self.numbers.size) for column in flat.T]
-        return np.stack(sums, axis=-1)[self.numbers].reshape(*self.shape, *values.shape[1:])
+        at_nodes: Array = np.stack(sums, axis=-1)[self.numbers].reshape(*self.shape, *values.shape[1:])
+        return at_nodes
 
     def panorama_rays(self, inverse_depth: Array) -> Array:
         """Vectors Rᵀ (r' − δ t) (rows, columns, 3) towards the nodes from the reference's place, in its frame."""

@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ..cameras.camera import Camera
 from ..cameras.lens import undistort
@@ -22,7 +23,7 @@ from ..raster.arrays import Array, Part, beside, bounds, strips
 from ..raster.colour import encode
 from ..raster.lazy import AnyImage
 from ..raster.log_encoding import log_encode
-from ..raster.picture_map import falls_inside
+from ..raster.picture_map import PictureMap, falls_inside
 from ..raster.sampling import fetch
 from ..system.threads import each, in_order
 from .options import QUALITY
@@ -224,7 +225,7 @@ def _seam_visibility(
 
 
 def look_up(warp: Warp, x: Array, camera: Camera | None = None, number: int = 1) -> Array:
-    """The map of picture `number` at points of the reference, bilinear between canvas pixels.
+    """The map of picture `number` where the canvas shows points of the reference, bilinear between canvas pixels.
 
     Parameters
     ----------
@@ -239,21 +240,38 @@ def look_up(warp: Warp, x: Array, camera: Camera | None = None, number: int = 1)
     Returns
     -------
     (N, 2) array
-        Raw px of that picture; NaN outside the canvas.
+        Raw px of that picture; NaN where the canvas does not show the point.
     """
-    picture_map = warp.maps[number].arrays()
-    at = warp.canvas.of_reference(x, camera)
-    limit = np.array([warp.canvas.width, warp.canvas.height]) - 1
-    outside = ((at < 0) | (at > limit)).any(axis=1)
-    corner = np.clip(np.floor(at).astype(int), 0, np.maximum(limit - 1, 0))
-    (u, v), (column, row) = (at - corner).T, corner.T
-    next_column, next_row = np.minimum(column + 1, limit[0]), np.minimum(row + 1, limit[1])
-    out = []
-    for values in (picture_map.x, picture_map.y):
-        upper = values[row, column] * (1 - u) + values[row, next_column] * u
-        lower = values[next_row, column] * (1 - u) + values[next_row, next_column] * u
-        out.append(np.where(outside, np.nan, upper * (1 - v) + lower * v))
-    return np.column_stack(out)
+    at = warp.canvas.of_reference(x, camera) if warp.slide is None else shown_at(warp.maps[0].arrays(), x)
+    return warp.maps[number].arrays().between(at)
+
+
+def shown_at(picture_map: PictureMap, x: Array) -> Array:
+    """Where a canvas shows points (N, 2) px of a picture: px (N, 2) of the canvas, NaN where it does not.
+
+    The pixel of a coarse grid that shows the nearest point, and Newton's steps from there.
+    """
+    step = QUALITY.inverse_step
+    nodes = np.stack([values[::step, ::step] for values in (picture_map.x, picture_map.y)], axis=-1)
+    rows, columns = np.nonzero(np.isfinite(nodes).all(axis=-1))
+    if not rows.size:
+        return np.full(x.shape, np.nan)
+    nearest = cKDTree(nodes[rows, columns]).query(x)[1]
+    at = np.column_stack([columns[nearest], rows[nearest]]).astype(np.float64) * step
+    limit = np.array(picture_map.shape[::-1]) - 1.0
+    for _ in range(QUALITY.inverse_steps):
+        here, right, below = (picture_map.between(np.minimum(at, limit - 1) + by) for by in np.eye(3, 2, -1))
+        off, across, down = x - picture_map.between(at), right - here, below - here
+        area = across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0]
+        area = np.where(np.abs(area) > QUALITY.least_area, area, np.nan)
+        move = np.column_stack([
+            (off[:, 0] * down[:, 1] - off[:, 1] * down[:, 0]) / area,
+            (across[:, 0] * off[:, 1] - across[:, 1] * off[:, 0]) / area,
+        ])  # fmt: skip
+        at = np.clip(at + np.clip(move, -2 * step, 2 * step), 0, limit)
+    missed = ~(np.linalg.norm(picture_map.between(at) - x, axis=1) <= QUALITY.inverse_error_px)
+    at[missed] = np.nan
+    return at
 
 
 @dataclass(frozen=True)
@@ -297,7 +315,11 @@ def coverage_samples(
     if canvas.projection is None:
         points = np.argwhere(shows)[:, ::-1] * float(step) + step // 2 - np.array(canvas.offset)
     else:
-        points = canvas.on_reference(canvas.xs[nodes[1]], canvas.ys[nodes[0]], reference)[0][shows]
+        if warp.slide is None:
+            points = canvas.on_reference(canvas.xs[nodes[1]], canvas.ys[nodes[0]], reference)[0][shows]
+        else:
+            seen = warp.maps[0].arrays()
+            points = np.stack([seen.x[nodes], seen.y[nodes]], axis=-1)[shows].astype(np.float64)
         far = CANVAS.max_reach * max(*reference.size, *camera.size)
         with np.errstate(invalid="ignore"):
             flat = ((points >= -far) & (points <= np.array(reference.size) + far)).all(axis=1)

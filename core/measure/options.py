@@ -32,6 +32,19 @@ class QualityOptions:
     map_samples: int = 20_000
     """Canvas pixels, evenly spread, that say how far a map leaves the epipolar lines: a field is smooth."""
 
+    inverse_step: int = 4
+    """px between the nodes from which it is looked for where a canvas shows a picture's pixel: maps are smooth but at
+    depth edges."""
+
+    inverse_steps: int = 4
+    """Newton's steps from there."""
+
+    inverse_error_px: float = 0.5
+    """px by which what is found may miss the picture's pixel: more, and the canvas does not show it."""
+
+    least_area: float = 1e-3
+    """px² of the picture for each of the canvas, below which a step would have no direction."""
+
 
 @dataclass(frozen=True)
 class IndependentOptions:

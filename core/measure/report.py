@@ -8,7 +8,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..compose.inpaint import closed_holes
 from ..field.slack import SlackField
 from ..panorama.canvas import Canvas
 from ..panorama.levelling import angles_of
@@ -33,7 +35,7 @@ SCHEMA = 1
 
 def make_report(
     options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment, canvas: Canvas,
-    decided: Sequence[Decided], appearance: dict[str, float],
+    decided: Sequence[Decided], appearance: dict[str, float], shows: NDArray[np.bool_], inpainted: int,
 ) -> tuple[dict[str, Any], list[str]]:
     """The report of a stitch. It holds no times and no dates: the same input gives the same report.
 
@@ -49,6 +51,10 @@ def make_report(
         About the composition of each picture: what is hidden, holes, exposure, folds.
     appearance : dict
         See `metrics.appearance`.
+    shows : (H, W) bool array
+        Where the panorama shows something.
+    inpainted : int
+        Pixels that were filled, before cropping.
 
     Returns
     -------
@@ -66,7 +72,8 @@ def make_report(
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
         "options": {
             "field": options.field, "fade": options.fade, "dense": options.dense, "projection": options.projection,
-            "level": options.level, "scale": options.scale, "crop": options.crop, "blend": options.blend,
+            "slide": options.slide if options.may_slide else 0, "level": options.level, "centre": options.centre,
+            "fov": options.fov, "scale": options.scale, "crop": options.crop, "blend": options.blend,
             "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
         },
         "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
@@ -97,18 +104,24 @@ def make_report(
         "composition": {
             "exposure_gain": further.exposure.gain, "exposure_spread": further.exposure.spread,
             "exposure_blocks": further.exposure.blocks, "occluded_px": int(further.hidden.sum()),
-            "hole_px": holes, "inpainted_px": holes if options.holes == "inpaint" else 0,
+            "hole_px": holes, "inpainted_px": inpainted, "holes": closed_holes(shows, small=False)[1],
         },
         "measured": measured,
     }  # fmt: skip
     warnings = _warnings(alignment, measured["folds"])
-    if holes > WARNING.hole_share * further.hidden.size:
+    if options.projection == "auto" and canvas.projection is None:
+        warnings.append(
+            f"the field {field.name!r} knows the reference's plane only: the panorama is drawn on it, as by "
+            "--projection reference"
+        )
+    open_holes = holes - inpainted if options.holes == "auto" else holes
+    if open_holes > WARNING.hole_share * further.hidden.size:
         shown = (
             "filled smoothly from around there" if options.holes == "inpaint" else
             "transparent there (black in a JPEG); --holes inpaint fills them"
         )  # fmt: skip
         warnings.append(
-            f"{holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
+            f"{open_holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
             f"{shown}; --crop reference shows none of them"
         )
     return plain(report), warnings
@@ -121,7 +134,13 @@ def _measured(
     cameras, edge = alignment.cameras, alignment.edges[0]
     field, warp, two_view = alignment.field, alignment.warp, edge.two_view
     inliers = edge.matches.subset(two_view.inliers)
-    error = np.linalg.norm(look_up(warp, inliers.x, cameras[0], edge.j) - inliers.y, axis=1)
+    # Matches and pixels are compared in the reference's own frame, where only one of the two pictures is resampled.
+    flat = warp
+    if warp.slide is not None or (options.measure and warp.canvas.projection is not None):
+        refinement = None if alignment.dense is None else alignment.dense.refined
+        flat = build_map(field, alignment.views, Canvas(*cameras[0].size, (0, 0)), refinement)
+    asked = warp if warp.slide is None else flat
+    error = np.linalg.norm(look_up(asked, inliers.x, cameras[0], edge.j) - inliers.y, axis=1)
     error = error[np.isfinite(error)]
     shown = coverage_samples(warp, cameras, edge.j)
     measured = {
@@ -135,11 +154,6 @@ def _measured(
     # a pair without a baseline has no F: whatever matches give would mean nothing
     independent = independent_fundamental(edge.ideal, options.seed) if np.isfinite(two_view.F).all() else two_view.F
     unseen = held_out(field, edge.inliers, shown, options.seed)
-    # pixels are compared in the reference's own frame, where only one of the two pictures is resampled
-    flat = warp
-    if warp.canvas.projection is not None:
-        refinement = None if alignment.dense is None else alignment.dense.refined
-        flat = build_map(field, alignment.views, Canvas(*cameras[0].size, (0, 0)), refinement)
     return measured | overlap_quality(pictures, flat, edge.j) | {
         "projectivity_own_px": projectivity(two_view.F, shown),
         "projectivity_independent_px": projectivity(independent, shown),
@@ -163,8 +177,8 @@ def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
         out.append("the target shows nothing beyond the reference's edges: the panorama is no larger than that")
     if warp.canvas.cropped:
         out.append(
-            "the pictures reach too far up or down for a cylinder and were cropped there; --projection equirectangular "
-            "shows them whole"
+            f"the pictures reach too far for a {warp.canvas.projection.kind} panorama and were cropped there; "
+            "--projection equirectangular shows them whole"
             if warp.canvas.projection
             else "the target reaches too far to the side to be shown whole in a flat picture: its far end was cropped; "
             "--projection cylindrical or equirectangular shows it"

@@ -7,6 +7,7 @@ panorama's size.
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import cv2
@@ -20,6 +21,7 @@ from ..measure.metrics import look_up
 from ..pipeline import StitchResult
 from ..raster.arrays import Array
 from ..raster.colour import encode
+from ..raster.lazy import whole
 from ..raster.resizing import size_change
 from .match_table import match_file
 from .options import INSPECTION
@@ -51,8 +53,9 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
     dict
         JSON-ready but for arrays. `full_sizes`: (W, H) of each picture. `F`, `K`, `K_prime`, `R`, `t`, `model`: the
         geometry of the pair. `distortion`, `distortion_prime` (5,). `canvas`: (W, H) px. `S` (3, 3): from px of the
-        reference to the canvas. `K_canvas` (3, 3): intrinsics of the canvas. A cylinder or sphere is no pinhole image:
-        S and K_canvas are NaN there, and the report's `canvas.projection` says what the canvas shows.
+        reference to the canvas. `K_canvas` (3, 3): intrinsics of the canvas. S and K_canvas are NaN unless the canvas
+        is the reference's own plane; the report's `canvas.projection` says what it shows. `viewpoint`: the attributes
+        of a `Viewpoint` that slides, None where all is seen from the reference's place.
     """
     edge, canvas = result.edges[0], result.canvas
     view, (S, S_prime) = edge.two_view, edge.pair(scales(result))
@@ -63,6 +66,7 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
         "K_prime": np.linalg.inv(S_prime) @ view.K_prime, "R": view.R, "t": view.t, "model": view.model,
         "distortion": result.cameras[edge.i].distortion, "distortion_prime": result.cameras[edge.j].distortion,
         "S": shift @ S, "canvas": (canvas.width, canvas.height), "K_canvas": shift @ view.K,
+        "viewpoint": None if result.warp.viewpoint is None else asdict(result.warp.viewpoint),
     }  # fmt: skip
 
 
@@ -119,13 +123,17 @@ def _states(used: NDArray[np.bool_]) -> list[str]:
 
 
 def displacement_px(result: StitchResult) -> NDArray[np.float32]:
-    """Distance (H, W), in px of the full target, between where each canvas pixel is seen and where it would be seen at
-    infinity; 0 for a model without depth, NaN behind the camera."""
+    """Distance (H, W), in px of the full target, between where each canvas pixel is seen and where it would be seen if
+    what the reference shows there were infinitely far; 0 for a model without depth, NaN behind the camera."""
     warp, number = result.warp, result.edges[0].j
     view, picture_map = result.views[number], warp.maps[number].arrays()
     if not view.e_prime.any():
         return np.zeros(picture_map.shape, np.float32)
     infinite = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, result.cameras[0])
+    if warp.slide is not None and warp.viewpoint is not None:
+        away = whole(warp.slide) * warp.inverse_depth
+        towards = view.H_inf @ result.views[0].K @ warp.viewpoint.c
+        infinite = [part + away * step for part, step in zip(infinite, towards, strict=True)]
     far = distort(np.stack(transfer(view, infinite, np.zeros(1)), axis=-1), view.camera)
     moved = np.hypot(picture_map.x - far[..., 0], picture_map.y - far[..., 1])
     in_full_px: NDArray[np.float32] = (moved / scales(result)[number][0, 0]).astype(np.float32)
@@ -169,16 +177,20 @@ def depth_grid(result: StitchResult) -> dict[str, Any]:
     -------
     dict
         `columns`, `rows`: nodes in either direction. `inverse_depth` and `shows` (1 where the panorama is not
-        transparent): one value for each node, row by row from the top.
+        transparent): one value for each node, row by row from the top. `slide` likewise where the viewpoint slides: a
+        node's depth is measured from s times the target's place.
     """
     height, width = result.panorama.alpha.shape
     longest = max(width, height)
     columns, rows = (max(2, round(INSPECTION.longest_grid * side / longest)) for side in (width, height))
     x, y = (np.rint(np.linspace(0, side - 1, n)).astype(int) for side, n in ((width, columns), (height, rows)))
     depth = result.warp.inverse_depth[np.ix_(y, x)].ravel()
+    slide = {}
+    if result.warp.slide is not None:
+        slide["slide"] = [round(float(s), 4) for s in whole(result.warp.slide)[np.ix_(y, x)].ravel()]
     return {
         "columns": columns, "rows": rows, "inverse_depth": [float(f"{d:.5g}") for d in depth],
-        "shows": (result.panorama.alpha[np.ix_(y, x)] > 0).astype(int).ravel(),
+        "shows": (result.panorama.alpha[np.ix_(y, x)] > 0).astype(int).ravel(), **slide,
     }  # fmt: skip
 
 

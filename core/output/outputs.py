@@ -21,6 +21,7 @@ from ..pictures.encoding import encode_picture, output_bits
 from ..pipeline import StitchResult
 from ..raster.arrays import cut
 from ..raster.colour import decode
+from ..raster.lazy import whole
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
 from .match_table import match_file
@@ -71,8 +72,9 @@ class OutputRequest:
 
 
 def check(
-    request: OutputRequest, files: OutputFiles, pictures: Sequence[str], seam: bool = True, inpainted: bool = True
-) -> None:
+    request: OutputRequest, files: OutputFiles, pictures: Sequence[str], seam: bool = True, inpainted: bool = True,
+    slides: bool = True,
+) -> None:  # fmt: skip
     """Checks, before the work begins, that everything asked for could be written.
 
     Parameters
@@ -82,8 +84,8 @@ def check(
         What is written through later.
     pictures : sequence of str
         Names of the pictures' files, after which their layers are called.
-    seam, inpainted : bool
-        Whether the stitch will have a seam, and whether its holes are to be filled.
+    seam, inpainted, slides : bool
+        Whether the stitch will have a seam, whether its holes are to be filled, and whether its viewpoint may slide.
 
     Raises
     ------
@@ -101,7 +103,7 @@ def check(
     if request.layers is not None:
         names = layer_files(pictures, (".png", ".exr"))
         files.check_folder(request.layers, names)
-        _refuse_other_files(request.layers, layer_files(pictures, (".png", ".exr"), seam, inpainted))
+        _refuse_other_files(request.layers, layer_files(pictures, (".png", ".exr"), seam, inpainted, slides))
         taken = {(request.layers / name).resolve() for name in names}
         for path in single:
             if path.resolve() in taken:
@@ -112,7 +114,7 @@ def _refuse_other_files(folder: Path, names: Sequence[str]) -> None:
     """Raises BadRequest if the folder holds files of another stitch that would stay: they would be taken for this
     one's."""
     layers = sorted(path.name for path in folder.glob("[0-9][0-9]_*.*") if path.suffix in (".png", ".exr"))
-    masks = [f"{mask}.png" for mask in (LABELS, SEAM, INPAINTED) if (folder / f"{mask}.png").exists()]
+    masks = [f"{mask}.png" for mask in (LABELS, SEAM, INPAINTED, _occluded(0)) if (folder / f"{mask}.png").exists()]
     others = [name for name in (*layers, *masks) if name not in names]
     if others:
         raise BadRequest(
@@ -128,12 +130,13 @@ def layer_stem(number: int, name: str) -> str:
 
 
 def layer_files(
-    pictures: Sequence[str], suffixes: Sequence[str] = (".png",), seam: bool = True, inpainted: bool = True
-) -> list[str]:
-    """Names of all files of a layers' folder, for pictures of these names; seam, inpainted: whether to count the files
-    that only a stitch with a seam, or with filled holes, has."""
+    pictures: Sequence[str], suffixes: Sequence[str] = (".png",), seam: bool = True, inpainted: bool = True,
+    slides: bool = True,
+) -> list[str]:  # fmt: skip
+    """Names of all files of a layers' folder, for pictures of these names; seam, inpainted, slides: whether to count
+    the files that only a stitch with a seam, with filled holes, or with a viewpoint that may slide has."""
     out = [layer_stem(number, name) + suffix for number, name in enumerate(pictures) for suffix in suffixes]
-    masks = [_occluded(number) for number in range(1, len(pictures))] + [CONFIDENCE]
+    masks = [_occluded(number) for number in range(0 if slides else 1, len(pictures))] + [CONFIDENCE]
     masks += [LABELS, SEAM] if seam else []
     masks += [INPAINTED] if inpainted else []
     return out + [f"{mask}.png" for mask in masks] + [CANVAS]
@@ -192,9 +195,14 @@ def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
     place = result.spread
     for number, (picture, layer) in enumerate(zip(result.pictures, result.layers, strict=True)):
         _add_layer(files, folder, layer_stem(number, picture.name), layer.within(place), result)
-    masks = {_occluded(number): _mask_bytes(cut(mask, place)) for number, mask in enumerate(result.occluded) if number}
+    asked = result.report["options"]
+    first = 0 if asked["slide"] else 1  # from its own place the reference sees all that it shows
+    masks = {
+        _occluded(number): _mask_bytes(cut(mask, place)) for number, mask in enumerate(result.occluded)
+        if number >= first
+    }  # fmt: skip
     masks[CONFIDENCE] = _mask_bytes(cut(result.confidence, place))
-    if result.report["options"]["holes"] == "inpaint":
+    if asked["holes"] != "transparent":
         masks[INPAINTED] = _mask_bytes(cut(result.inpainted, place))
     if result.labels is not None:
         labels = cut(result.labels, place, -1)
@@ -237,10 +245,11 @@ def _mask_bytes(mask: NDArray[Any], shown: NDArray[np.bool_] | None = None) -> b
 def warp_bytes(result: StitchResult) -> bytes:
     """The content of the warp's file: geometry and maps, from which each layer can be made again.
 
-    Canvas pixel p + offset is seen at x ~ H_inf p + inverse_depth e_prime. On a cylinder or sphere p = K r for the unit
+    Canvas pixel p + offset is seen at x ~ H_inf p + inverse_depth e_prime. On other surfaces p = K r for the unit
     ray r of the pixel instead; there is no offset, but `projection` (its name), `focal` (px per radian), `centre`
-    (canvas px of the direction ahead) and `rotation` (from its axes to the reference camera's). docs/formats.md lists
-    every key.
+    (canvas px of the direction ahead) and `rotation` (from its axes to the reference camera's). Where the viewpoint
+    slides, by `slide` s, which is `s1` at most, that ray starts at s c, c = −Rᵀ t of the target, and inverse_depth is
+    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). docs/formats.md lists every key.
 
     Parameters
     ----------
@@ -278,8 +287,11 @@ def warp_bytes(result: StitchResult) -> bytes:
     if projection is not None:
         arrays |= {
             "offset": np.full(2, np.nan), "projection": np.array(projection.kind), "focal": np.array(projection.focal),
+            "distance": np.array(projection.distance),
             "centre": np.array(projection.centre) + canvas.offset, "rotation": projection.rotation,
         }  # fmt: skip
+    if warp.slide is not None and warp.viewpoint is not None:
+        arrays |= {"slide": whole(warp.slide), "s1": np.array(warp.viewpoint.s1)}
     return npz_bytes(arrays)
 
 

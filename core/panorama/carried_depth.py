@@ -22,7 +22,7 @@ from ..raster.pull_push import filled
 from ..raster.sampling import fetch
 from ..system.threads import each, in_order
 from .canvas import Canvas
-from .options import CARRY
+from .options import CARRY, SLIDE
 from .projection import Projection
 from .viewpoint import Viewpoint
 from .warp import Warp
@@ -178,34 +178,49 @@ def _sharpened(depth: Plane, projection: Projection) -> Plane:
 
 def refined(
     surface: Surface, viewpoint: Viewpoint, canvas: Canvas, depth: Plane
-) -> Plane:
-    """Inverse depth (H, W) of a canvas to a fraction of a pixel, from what was carried to its pixels.
+) -> tuple[Plane, NDArray[np.bool_]]:
+    """What was carried to the pixels of a canvas, to a fraction of a pixel; and what of it the reference cannot see.
 
-    What the surface holds where a pixel's point lies takes its place, where that is the same surface; and everywhere
-    that the viewpoint is the reference's place.
+    Where the surface holds about the same at a pixel's point, what it holds takes its place; and everywhere that the
+    viewpoint is the reference's place. Points of the surface are seen by the reference. What lies behind it there was
+    filled in.
+
+    Parameters
+    ----------
+    surface : Surface
+    viewpoint : Viewpoint
+    canvas : Canvas
+    depth : (H, W) float32
+        See `carried_depth`; written over.
+
+    Returns
+    -------
+    (H, W) float32
+        Inverse depth.
+    (H, W) bool
+        What lies behind the surface, as the reference sees it.
     """
-    projection, matrix = canvas.projection, surface.to_ray
-    if projection is None:
-        raise ValueError("a sliding viewpoint sees no flat canvas of the reference")
-    out = depth.copy()
-    c = viewpoint.c.astype(np.float32)
+    projection = surface.projection if canvas.projection is None else canvas.projection
     height, width = surface.depth.shape
+    c = viewpoint.c.astype(np.float32)
+    behind = np.zeros(depth.shape, np.uint8)
 
     def put(rows: slice) -> None:
-        rays = np.stack(canvas.project_rows(matrix, canvas.xs, canvas.ys[rows]), axis=-1).astype(np.float32)
+        rays = np.stack(canvas.project_rows(surface.to_ray, canvas.xs, canvas.ys[rows]), axis=-1).astype(np.float32)
         slide = viewpoint.slide_at(rays)
-        d = out[rows]
+        d = depth[rows]
         for _ in range(CARRY.refinements):
             point = rays + (d * slide)[..., None] * c
             x, y = surface.places(point)
             here = fetch(surface.depth[..., None], x, y, cv2.INTER_LINEAR)[..., 0]
             point /= np.linalg.norm(point, axis=-1, keepdims=True)
             point -= (here * slide)[..., None] * c
-            new = here / np.maximum(np.linalg.norm(point, axis=-1), np.float32(1e-9))
+            new = here / np.maximum(np.linalg.norm(point, axis=-1), np.float32(SLIDE.least_range))
+            there = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
             same = np.abs(new - d) < CARRY.same_share * d + np.float32(CARRY.same_px / projection.focal)
-            same |= slide == 0
-            same &= (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
-            np.copyto(d, new, where=same)
+            np.copyto(d, new, where=there & (same | (slide == 0)))
+            behind[rows] = there & (new > d + CARRY.behind_share * new + np.float32(CARRY.behind_px / projection.focal))
 
-    each(put, strips(out.shape))
-    return out
+    each(put, strips(depth.shape))
+    # single pixels are rounding at the edges of near things
+    return depth, cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.speck_px,) * 2, np.uint8)) > 0

@@ -17,8 +17,8 @@ from ..cameras.view import View
 from ..choices import Level
 from ..raster.arrays import Array
 from ..raster.rectangle import largest_rectangle
-from .levelling import gravity, gravity_by_edges, turned, upright
-from .options import FRAMING
+from .framing_options import FRAMING
+from .levelling import gravity, turned, upright
 from .projection import Projection, focal_of, round_projection
 from .warp import Warp
 
@@ -80,8 +80,9 @@ class Shown:
 
 
 def frame_for(
-    asked: FrameRequest, views: Sequence[View], edges: Edges | None, warp_on: Callable[[Projection], Warp]
-) -> Projection:
+    asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None,
+    warp_on: Callable[[Projection], Warp],
+) -> Projection:  # fmt: skip
     """Choose the surface that the panorama is drawn on, how it is turned, and how large it is.
 
     Parameters
@@ -91,6 +92,8 @@ def frame_for(
         What is known of the pictures, the reference's first.
     edges : ((N, 3) array, (N,) array) or None
         Normals, in the reference's frame, and lengths of straight edges (see `gravity_by_edges`); None if not needed.
+    down : (3,) array or None
+        Which way is down by these edges; None if the panorama is not levelled.
     warp_on : callable
         Gives the maps of all pictures on a projection.
 
@@ -98,11 +101,23 @@ def frame_for(
     -------
     Projection
     """
+    return frame_of(asked, views, edges, down, _shown(warp_on(coarse_sphere(views))))
+
+
+def coarse_sphere(views: Sequence[View]) -> Projection:
+    """The sphere on which what the pictures show is sampled."""
     K = views[0].K
     coarse = FRAMING.side_px / max(max(view.size) for view in views)
-    shown = _shown(warp_on(round_projection("equirectangular", K, np.eye(3), coarse * focal_of(K))))
+    return round_projection("equirectangular", K, np.eye(3), coarse * focal_of(K))
+
+
+def frame_of(
+    asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None, shown: Shown
+) -> Projection:
+    """As `frame_for`, where it is known what the pictures show."""
+    K = views[0].K
     if asked.level == "auto":
-        frame = _levelled(asked, views, edges, shown, K)
+        frame = _levelled(asked, views, edges, down, shown, K)
     else:
         angles = (0.0, 0.0, 0.0) if isinstance(asked.level, str) else asked.level
         frame = _surface(asked, turned(*angles), edges, shown, K)
@@ -132,17 +147,15 @@ def _shown(warp: Warp) -> Shown:
 
 
 def _levelled(
-    asked: FrameRequest, views: Sequence[View], edges: Edges | None, shown: Shown, K: Array
+    asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None, shown: Shown, K: Array
 ) -> Projection:
     """The frame that is turned upright: by edges where they can be believed, else by how the cameras were held."""
-    rotations = [view.R for view in views if np.isfinite(view.R).all()]
-    held = gravity(rotations)
+    held = gravity([view.R for view in views if np.isfinite(view.R).all()])
     frame = _surface(asked, _centred(held, shown), edges, shown, K)
-    if edges is None:
+    if down is None or np.allclose(down, held):
         return frame
-    down = gravity_by_edges(rotations, *edges)
     roll, pitch = np.degrees([np.arctan2(down[0], down[1]), np.arcsin(np.clip(down[2], -1, 1))])
-    if np.allclose(down, held) or abs(roll) > FRAMING.max_roll_deg or abs(pitch) > FRAMING.max_pitch_deg:
+    if abs(roll) > FRAMING.max_roll_deg or abs(pitch) > FRAMING.max_pitch_deg:
         return frame
     by_edges = _surface(asked, _centred(down, shown), edges, shown, K)
     room, room_by_edges = (_room(one, shown) for one in (frame, by_edges))

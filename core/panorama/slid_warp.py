@@ -48,7 +48,7 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
     Returns
     -------
     Warp
-        With `slide` and `viewpoint`; its depth is measured from the viewpoint of each pixel.
+        With `slide`, `behind` and `viewpoint`; its depth is measured from the viewpoint of each pixel.
 
     Raises
     ------
@@ -61,14 +61,16 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
     canvas = _canvas(surface, views, viewpoint, projection)
     lattice = Lattice((float(canvas.xs[0]), float(canvas.ys[0])), 1.0, (canvas.height, canvas.width))
     depth = carried_depth(surface, viewpoint, projection, lattice)
-    depth = refined(surface, viewpoint, canvas, depth)
-    return trimmed(_mapped(base, surface, views, viewpoint, canvas, depth))
+    depth, behind = refined(surface, viewpoint, canvas, depth)
+    return trimmed(_mapped(base, surface, views, viewpoint, canvas, depth, behind))
 
 
 def _mapped(
-    base: Warp, surface: Surface, views: Sequence[View], viewpoint: Viewpoint, canvas: Canvas, depth: Plane
-) -> Warp:
-    """The maps of all pictures on a canvas of known inverse depth (H, W)."""
+    base: Warp, surface: Surface, views: Sequence[View], viewpoint: Viewpoint, canvas: Canvas, depth: Plane,
+    behind: NDArray[np.bool_],
+) -> Warp:  # fmt: skip
+    """The maps of all pictures on a canvas of known inverse depth (H, W); behind (H, W): what the reference cannot see.
+    """
     extra = _beside_lines(base, views)
     shape = depth.shape
     maps = [PictureMap(np.empty(shape, np.float32), np.empty(shape, np.float32), view.size) for view in views]
@@ -85,11 +87,11 @@ def _mapped(
             if number == 1:
                 x, y = x + more[..., 0], y + more[..., 1]
             out.x[rows], out.y[rows] = x, y
-        slide[rows], confidence[rows] = s, more[..., 2]
+        slide[rows], confidence[rows] = s, more[..., 2] * ~behind[rows]
 
     each(put, strips(shape))
     held = None if base.lazy_confidence is None else confidence
-    return Warp(canvas, tuple(maps), depth, held, slide, viewpoint)
+    return Warp(canvas, tuple(maps), depth, held, slide, behind, viewpoint)
 
 
 def _seen_at(

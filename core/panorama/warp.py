@@ -19,7 +19,7 @@ from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..cameras.view import View
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Box, box_of, strips
+from ..raster.arrays import Array, Box, box_of, cut, strips
 from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, Placed, whole
 from ..raster.options import GRID
@@ -56,8 +56,10 @@ class Warp:
     slide : (H, W) image or None
         How far each pixel's viewpoint lies from the reference's place towards the target's, 0..1, float32; None if all
         are seen from the reference's place.
+    behind : (H, W) bool array or None
+        What the reference cannot see though its map falls inside it, likewise: something nearer hides it.
     viewpoint : Viewpoint or None
-        The same for any direction.
+        How far it slides in any direction.
     """
 
     canvas: Canvas
@@ -65,6 +67,7 @@ class Warp:
     depth: AnyImage
     lazy_confidence: AnyImage | None = None
     slide: AnyImage | None = None
+    behind: NDArray[np.bool_] | None = None
     viewpoint: Viewpoint | None = None
 
     @property
@@ -89,7 +92,8 @@ class Warp:
             None if values is None else Placed(values, (-top, -left), (height, width))
             for values in (self.lazy_confidence, self.slide)
         )
-        return Warp(self.canvas.within(box), maps, depth, confidence, slide, self.viewpoint)
+        behind = None if self.behind is None else cut(self.behind, box)
+        return Warp(self.canvas.within(box), maps, depth, confidence, slide, behind, self.viewpoint)
 
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
@@ -129,7 +133,7 @@ def build_warp(
     OutputTooLarge
         The canvas would have too many pixels.
     BadRequest
-        The panorama is round, and the field knows the reference's plane only.
+        The panorama has a projection, and the field knows the reference's plane only; or its window shows nothing.
     """
     camera, further = views[0].camera, views[1:]
     planes = [_plane_map(field, view) for view in further]
@@ -277,7 +281,11 @@ def trimmed(warp: Warp) -> Warp:
     shown = np.zeros((warp.canvas.height, warp.canvas.width), bool)
     for one in warp.maps[1:]:
         shown |= one.inside()
-    if not shown.any():
+    projection = warp.canvas.projection
+    framed = projection is not None and projection.window is not None
+    if not shown.any() and not framed:
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
     shown |= warp.maps[0].inside()
+    if not shown.any():
+        raise BadRequest("the frame lies beside both pictures: give a centre nearer to 0,0, or a larger field of view")
     return warp.within(box_of(shown), in_place=True)

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Box, cut, cut_in_place
+from .arrays import Array, Box, cut, cut_in_place
 
 
 class CanvasMap(Protocol):
@@ -53,6 +53,21 @@ class PictureMap:
     def inside(self) -> NDArray[np.bool_]:
         """Where (H, W) the map falls inside the picture."""
         return falls_inside(self.x, self.y, self.size)
+
+    def between(self, at: Array) -> Array:
+        """The pixels (N, 2) that the map has at places (N, 2) px of the canvas, bilinear; NaN outside it."""
+        limit = np.array(self.shape[::-1]) - 1
+        outside = ~((at >= 0) & (at <= limit)).all(axis=1)
+        at = np.where(outside[:, None], 0.0, at)
+        corner = np.clip(np.floor(at).astype(int), 0, np.maximum(limit - 1, 0))
+        (u, v), (column, row) = (at - corner).T, corner.T
+        next_column, next_row = np.minimum(column + 1, limit[0]), np.minimum(row + 1, limit[1])
+        out = []
+        for values in (self.x, self.y):
+            upper = values[row, column] * (1 - u) + values[row, next_column] * u
+            lower = values[next_row, column] * (1 - u) + values[next_row, next_column] * u
+            out.append(np.where(outside, np.nan, upper * (1 - v) + lower * v))
+        return np.column_stack(out)
 
     def within(self, box: Box, in_place: bool = False) -> PictureMap:
         """The part in a box (left, top, width, height) of the canvas; NaN where that reaches over its edges.

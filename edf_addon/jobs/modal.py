@@ -17,11 +17,19 @@ from . import health, job
 TICK = 0.1
 
 _current: job.Job | None = None
+# Whether that is a picture which follows the frame: nobody waits for it, and it makes way for any other work.
+_is_following = False
 
 
 def is_working() -> bool:
-    """Whether a worker is at it; there is one at a time."""
-    return _current is not None
+    """Whether a worker is at what an artist asked for; there is one at a time."""
+    return _current is not None and not _is_following
+
+
+def make_way() -> None:
+    """End the picture that follows the frame, without a word, if one is being made."""
+    if _is_following:
+        _end()
 
 
 def cancel() -> None:
@@ -33,21 +41,23 @@ def cancel() -> None:
 
 def stop(words: str) -> None:
     """End the work at once, without a result: a file is loaded, the extension is switched off, Blender quits."""
-    if _current is not None:
-        _end()
+    if is_working():
         status.end(words)
+    _end()
 
 
 def _end() -> None:
-    global _current
+    global _current, _is_following
     if _current is not None:
         _current.close()
-        _current = None
+    _current, _is_following = None, False
 
 
 class LongWork:
     """A mix-in for operators: `prepare` makes the job, `finish` takes its result into the file."""
 
+    # Of a picture that follows the frame: its progress is not shown.
+    follows = False
     _job: job.Job
     _timer: Any = None
 
@@ -89,7 +99,7 @@ class LongWork:
         if _current is not self._job:  # stopped by somebody else
             self._forget_timer(context)
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
+        if event.type == "ESC" and event.value == "PRESS" and not self.follows:
             cancel()
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
@@ -109,14 +119,16 @@ class LongWork:
 
     def _look(self) -> job.Outcome | None:
         outcome = self._job.poll()
-        status.now.stage, status.now.share = self._job.stage, self._job.share
+        if not self.follows:
+            status.now.stage, status.now.share = self._job.stage, self._job.share
         return outcome
 
     def _start(self, context: bpy.types.Context) -> bool:
-        global _current
+        global _current, _is_following
         if is_working():
             self.report({"ERROR"}, "EDF Stitch is still at work: wait for it, or cancel it.")  # type: ignore[attr-defined]
             return False
+        make_way()
         folder = None
         try:
             folder = job.new_folder(bpy.app.tempdir)
@@ -126,7 +138,9 @@ class LongWork:
             if folder is not None:
                 job.remove(folder)
             return self._refuse(_in_words(error))
-        status.begin()
+        _is_following = self.follows
+        if not self.follows:
+            status.begin()
         return True
 
     def _refuse(self, words: str) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from .. import pair, properties
+from .. import engine_options, pair, properties
 from ..bridge import cameras, compat, images, ownership, result
 from ..bridge.images import Unusable
 
@@ -34,11 +34,11 @@ def why_not(settings: Any) -> str:
 
 
 def make_job(
-    context: bpy.types.Context, folder: Path, scale: float | None = None
+    context: bpy.types.Context, folder: Path, scale: float | None = None, found: dict[str, Any] | None = None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The job for the scene's settings, its files in `folder`; and what has to be remembered until it is done.
 
-    scale: instead of the settings' own. Raises Unusable.
+    scale: instead of the settings' own; found: a result whose matches are used, instead of a search. Raises Unusable.
     """
     import numpy as np
 
@@ -50,7 +50,7 @@ def make_job(
     editor = context.space_data if isinstance(context.space_data, bpy.types.SpaceImageEditor) else None
     user = None if editor is None else editor.image_user
     job: dict[str, Any] = {side: images.describe(image, side, folder, scene, user) for side, image in chosen.items()}
-    job["options"] = properties.options_of(settings, scale)
+    job["options"] = engine_options.options_of(settings, scale)
     wanted = [name for name in ("layers", "masks", "depth") if getattr(settings, f"take_{name}")]
     job["take"] = wanted if scale is None else []
     job["masks"] = {}
@@ -64,7 +64,8 @@ def make_job(
         job["masks"]["seam"] = "seam.npy"
     if settings.camera == "CAMERAS":
         job["cameras"] = cameras.describe_both(settings, scene, context.evaluated_depsgraph_get())
-    if settings.edited_matches and (file := untouched_matches(settings)):
+    file = untouched_matches(settings) if settings.edited_matches else (found or {"matches": {}})["matches"].get("file")
+    if file:
         job["matches"] = "matches.csv"
         (folder / job["matches"]).write_text(file, "utf-8")
     elif settings.edited_matches:
@@ -116,10 +117,12 @@ def _lies_at(match: Any, row: Any) -> bool:
 
 
 def take_over(
-    context: bpy.types.Context, folder: Path, found: dict[str, Any], memory: dict[str, Any], kind: str
-) -> str:
+    context: bpy.types.Context, folder: Path, found: dict[str, Any], memory: dict[str, Any], kind: str,
+    spaces: list[bpy.types.SpaceImageEditor] | None = None,
+) -> str:  # fmt: skip
     """Makes the panorama an image of the file, with all that belongs to it, or leaves the file as it was. kind:
-    "panorama" or "preview" (which takes the place of the last one). Returns words about it."""
+    "panorama" or "preview" (which takes the place of the last one); spaces: where it is shown, instead of where the
+    work was started from. Returns words about it."""
     made: list[bpy.types.Image] = []
     try:
         image = _bring_all(folder, found, memory, kind, made)
@@ -137,7 +140,10 @@ def take_over(
             fill_matches(settings, found["matches"], memory["edited"])
         else:
             words += " Other pictures are chosen by now: Restore Settings brings its own, and their matches."
-    show(context, image)
+    if spaces is None:
+        show(context, image)
+    for space in spaces or ():
+        space.image = image
     return words
 
 

@@ -13,7 +13,7 @@ from ..scene import take_along
 ROLES = (
     ("REFERENCE", "Reference", "The camera that took the reference"),
     ("TARGET", "Target", "The camera that took the target"),
-    ("PANORAMA", "Panorama", "The reference's camera with a sensor as large as the panorama"),
+    ("PANORAMA", "Panorama", "A camera that sees the panorama, from where its middle is seen"),
 )
 _BASELINE = {
     "name": "Baseline", "default": 1.0, "min": 1e-4, "soft_max": 100.0, "unit": "LENGTH", "precision": 3,
@@ -60,10 +60,11 @@ class EDF_OT_create_cameras(_OfAPanorama, bpy.types.Operator):  # noqa: N801
         for words in ownership.changes(image):
             self.report({"WARNING"}, words)
         if "PANORAMA" not in made:
-            words = "Blender has cylindrical lenses from 4.3 on: the panorama's own camera is left out"
-            self.report({"WARNING"}, words)
+            self.report({"WARNING"}, take_along.no_lens(image))
         elif self.look:
             take_along.look_through(context.scene, made["PANORAMA"])
+        if "PANORAMA" in made and editor.known(image)["geometry"].get("viewpoint"):
+            self.report({"INFO"}, f"The panorama's camera stands {made['PANORAMA']['place']}")
         if "TARGET" not in made:
             self.report({"WARNING"}, "The target's camera is not known: one plane does not tell where it stood")
         return {"FINISHED"}

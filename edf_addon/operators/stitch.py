@@ -8,7 +8,7 @@ from bpy.props import StringProperty
 
 from .. import editor, idnames, pair, properties
 from ..bridge import images, ownership, result
-from ..jobs import modal, stitching
+from ..jobs import following, modal, stitching
 
 
 class _Stitching(modal.LongWork):
@@ -78,6 +78,23 @@ class EDF_OT_restitch(_Stitching, bpy.types.Operator):  # noqa: N801
         return super().prepare(context, folder)
 
 
+class EDF_OT_follow(_Stitching, bpy.types.Operator):  # noqa: N801
+    """Show the frame and the viewpoint that are chosen now, small and soon, from the matches of the last panorama"""
+
+    bl_idname = idnames.Operator.FOLLOW
+    bl_label = "Follow the Frame"
+    bl_options = {"UNDO", "INTERNAL"}
+    kind = "preview"
+    follows = True
+
+    def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
+        job, self.memory = following.make_job(context, folder)
+        return job
+
+    def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
+        return following.take_over(context, folder, found, self.memory)
+
+
 class EDF_OT_restore(bpy.types.Operator):  # noqa: N801
     """Bring the settings, pictures and matches of a panorama back, to change one thing and stitch again"""
 
@@ -132,6 +149,20 @@ class EDF_OT_reset(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
+class EDF_OT_reference_frame(bpy.types.Operator):  # noqa: N801
+    """Keep the reference's own plane, place and every pixel of it, on a canvas that holds both pictures: for plates"""
+
+    bl_idname = idnames.Operator.REFERENCE_FRAME
+    bl_label = "Reference Frame"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: Any) -> set[str]:
+        settings = properties.settings_of(context.scene)
+        settings.projection, settings.crop = "REFERENCE", "FULL"
+        settings.slide_auto, settings.slide = False, 0.0
+        return {"FINISHED"}
+
+
 def bring_back(context: Any, image: bpy.types.Image | None) -> list[str]:
     """Settings, pictures and matches of a panorama; returns what has changed since, in words. Raises Unusable."""
     settings = properties.settings_of(context.scene)
@@ -147,7 +178,8 @@ def bring_back(context: Any, image: bpy.types.Image | None) -> list[str]:
     return ownership.changes(image) + ownership.camera_changes(image, context)
 
 
-CLASSES = (EDF_OT_stitch, EDF_OT_preview, EDF_OT_restitch, EDF_OT_restore, EDF_OT_cancel, EDF_OT_reset)
+CLASSES = (EDF_OT_stitch, EDF_OT_preview, EDF_OT_restitch, EDF_OT_follow, EDF_OT_restore, EDF_OT_cancel,
+           EDF_OT_reset, EDF_OT_reference_frame)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

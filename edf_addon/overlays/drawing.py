@@ -9,11 +9,12 @@ from typing import Any
 
 import bpy
 
-from .. import editor, idnames, properties
+from .. import editor, engine_options, idnames, properties
 from ..bridge import compat, ownership, result
 
 MATCH_RADIUS, LINE_WIDTH = 3.5, 1.6
 LINE, POINTER = (1.0, 0.85, 0.2, 0.95), (1.0, 1.0, 1.0, 0.9)
+FRAME = (1.0, 0.45, 0.1, 1.0)
 CHOSEN, WAITING = (1.0, 1.0, 1.0, 1.0), (0.2, 1.0, 0.9, 1.0)
 SHADE = (0.0, 0.0, 0.0, 0.55)
 PAINTED_OUT, FROM_TARGET = (0.9, 0.08, 0.05, 0.6), (1.0, 0.55, 0.1, 0.6)
@@ -26,8 +27,9 @@ _keys: list[tuple[Any, Any]] = []
 _pointer: dict[str, Any] = {"panorama": None, "side": None, "point": None}
 # The point that was clicked and waits for its counterpart, by side; px of the upright picture.
 pending: dict[str, tuple[float, float]] = {}
-# Textures made of pictures, by what they were made of.
+# Textures made of pictures, by what they were made of; and rays around the frame, by what was chosen.
 _textures: dict[tuple, Any] = {}
+_frames: dict[tuple, Any] = {}
 
 
 class EDF_OT_pointer(bpy.types.Operator):  # noqa: N801
@@ -106,6 +108,8 @@ def draw() -> None:
         _draw_cover(view, settings, image)
     elif view.picture != image:
         _draw_under_mask(view, view.picture, image, PAINTED_OUT)
+    if side is not None:
+        _draw_frame(view, settings, image if side == editor.PANORAMA else settings.result, side)
     if settings.show_matches and side is not None:
         _draw_matches(view, settings, side)
     if settings.show_epipolar:
@@ -178,7 +182,7 @@ def points_on(settings: Any, matches: dict[str, Any], side: str, picture: bpy.ty
     known = result.read(picture)
     if known is None or ownership.pictures(picture) != [settings.reference, settings.target]:
         return None
-    return overlay_geometry.on_panorama(known, matches[editor.REFERENCE])
+    return overlay_geometry.on_panorama(known, matches[editor.REFERENCE], matches[editor.TARGET])
 
 
 def _draw_lines(view: _View) -> None:
@@ -189,6 +193,7 @@ def _draw_lines(view: _View) -> None:
     if known is None or shows is None or _pointer["point"] is None:
         return
     side, point = _pointer["side"], _pointer["point"][None]
+    pointed = point if side == editor.PANORAMA else None
     if side == editor.PANORAMA:
         side, point = editor.REFERENCE, geometry_of.from_panorama(known, point)
     found = geometry_of.epipolar_lines(known["geometry"], point[0], side)
@@ -203,8 +208,37 @@ def _draw_lines(view: _View) -> None:
         _lines(ends, SHADE, view, 2 * LINE_WIDTH)
         _lines(ends, LINE, view)
     if here == side:
-        at = geometry_of.on_panorama(known, point) if shows == editor.PANORAMA else point
+        at = point
+        if shows == editor.PANORAMA:
+            at = geometry_of.on_panorama(known, point) if pointed is None else pointed
         _lines(geometry_of.rings(view.at(at), 6 * view.unit), POINTER, view)
+
+
+def _draw_frame(view: _View, settings: Any, panorama: bpy.types.Image | None, side: str) -> None:
+    """The outline of the frame that is chosen now, where the panorama was made for another."""
+    from . import frame_geometry
+
+    known = result.read(panorama)
+    rays = _frame_rays(settings, panorama, known) if known is not None and editor.is_behind(settings, panorama) else None
+    if known is None or rays is None:
+        return
+    on_panorama = side == editor.PANORAMA
+    points = frame_geometry.on_panorama(known, rays) if on_panorama else frame_geometry.on_picture(known, rays, side)
+    ends = view.at(frame_geometry.closed_pieces(points, view.size[0] / 2 if on_panorama else 1e6))
+    _lines(ends, SHADE, view, 2 * LINE_WIDTH)
+    _lines(ends, FRAME, view)
+
+
+def _frame_rays(settings: Any, panorama: Any, known: dict[str, Any]) -> Any:
+    """Rays around the frame that is chosen now; worked out once for each choice."""
+    from . import frame_geometry
+
+    frame, then = engine_options.frame_of(settings), editor.frame_then(settings, panorama) or {}
+    key = (panorama.session_uid, repr(frame), repr(then))
+    if key not in _frames:
+        _frames.clear()
+        _frames[key] = frame_geometry.frame_border(known, frame, then)
+    return _frames[key]
 
 
 def _draw_waiting(view: _View, shown: str | None) -> None:
@@ -352,6 +386,7 @@ def unregister() -> None:
     while _handlers:
         bpy.types.SpaceImageEditor.draw_handler_remove(_handlers.pop(), "WINDOW")
     _textures.clear()
+    _frames.clear()
     pending.clear()
     _pointer.update(panorama=None, side=None, point=None)
     for cls in reversed(CLASSES):

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from ...core.cameras.camera import Camera
 from ...core.cameras.lens import distort, undistort
 from ...core.cameras.projective import homogeneous, project
+from ...core.panorama.projection import Projection
+from ...core.panorama.viewpoint import Viewpoint
 from ...core.raster.arrays import Array
-from ..scene.scene_geometry import matrix, projection_of
+from ..scene.scene_geometry import matrix, projection_of, viewpoint_of
 
 Colours = NDArray[np.float32]
 Size = tuple[int, int]
@@ -48,31 +50,86 @@ def to_region(points: Array, size: Size, seen: Array, region: Size) -> Array:
     return (to_view(points, size) - low) / (high - low) * np.array(region)
 
 
-def on_panorama(known: dict[str, Any], points: Array) -> Array:
-    """Reference px (N, 2) to px of a result's panorama."""
-    projection = projection_of(known)
-    if projection is not None:
-        return projection.of_reference(undistort(points, _cameras(known["geometry"])[REFERENCE]))
-    return project(homogeneous(points) @ matrix(known["geometry"]["S"]).T)
+def on_panorama(known: dict[str, Any], points: Array, others: Array | None = None) -> Array:
+    """Reference px (N, 2) to px of a result's panorama. Where its viewpoint slides, depth decides: as px of the target
+    that show the same, `others` (N, 2), have it, or else as the panorama has it nearby."""
+    projection, viewpoint = projection_of(known), viewpoint_of(known)
+    if projection is None:
+        return project(homogeneous(points) @ matrix(known["geometry"]["S"]).T)
+    cameras = cameras_of(known["geometry"])
+    ideal = undistort(points, cameras[REFERENCE])
+    if viewpoint is None:
+        return projection.of_reference(ideal)
+    q = homogeneous(ideal) @ np.linalg.inv(projection.K).T
+    if others is None:
+        d = _depth_nearby(known, projection, viewpoint, q)
+    else:
+        d = _depth_of_matches(known["geometry"], q, undistort(others, cameras[TARGET]))
+    return projection.points(viewpoint.seen_from(q, d)[0])
 
 
 def from_panorama(known: dict[str, Any], points: Array) -> Array:
     """px of the panorama (N, 2) to reference px: the inverse of `on_panorama`; NaN behind the reference camera."""
-    projection = projection_of(known)
+    projection, viewpoint = projection_of(known), viewpoint_of(known)
     if projection is None:
         return project(homogeneous(points) @ np.linalg.inv(matrix(known["geometry"]["S"])).T)
-    seen = projection.rays(points) @ projection.K.T
+    seen = projection.rays(points)
+    if viewpoint is not None:
+        seen = _from_reference(viewpoint, seen, depth_at(known, points))
+    seen = seen @ projection.K.T
     ahead = np.where(seen[:, 2:] > 1e-6, seen[:, 2:], np.nan)
-    return distort(seen[:, :2] / ahead, _cameras(known["geometry"])[REFERENCE])
+    return distort(seen[:, :2] / ahead, cameras_of(known["geometry"])[REFERENCE])
+
+
+def _from_reference(viewpoint: Viewpoint, rays: Array, d: Array) -> Array:
+    """In which directions (N, 3), as long as 1/d is to be taken, the reference's place has what rays (N, 3) show."""
+    directions: Array = rays + d[:, None] * viewpoint.place(rays)
+    return directions
+
+
+def depth_at(known: dict[str, Any], points: Array) -> Array:
+    """The inverse depth (N,) that a panorama has at its node nearest to px (N, 2); 0 where it is not known."""
+    grid, size = known["depth"], np.array(known["geometry"]["canvas"])
+    nodes = np.array([int(grid["columns"]), int(grid["rows"])])
+    column, row = np.rint(np.clip(points / np.maximum(size - 1, 1), 0, 1) * (nodes - 1)).astype(int).T
+    d = np.nan_to_num(matrix(grid["inverse_depth"]).ravel()[row * nodes[0] + column])
+    return np.maximum(d, 0.0)
+
+
+def _depth_nearby(known: dict[str, Any], projection: Projection, viewpoint: Viewpoint, q: Array) -> Array:
+    """The inverse depth (N,) of what the reference shows in directions q (N, 3), z = 1, by the panorama's nodes."""
+    grid, (width, height) = known["depth"], known["geometry"]["canvas"]
+    x, y = np.linspace(0, width - 1, int(grid["columns"])), np.linspace(0, height - 1, int(grid["rows"]))
+    nodes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    d = depth_at(known, nodes)
+    seen = _from_reference(viewpoint, projection.rays(nodes), d)
+    seen, d = seen[seen[:, 2] > 1e-6], d[seen[:, 2] > 1e-6]
+    there, d = seen[:, :2] / seen[:, 2:], d / seen[:, 2]
+    return np.array([d[np.linalg.norm(there - one, axis=1).argmin()] if len(d) else 0.0 for one in q[:, :2]])
+
+
+def _depth_of_matches(geometry: dict[str, Any], q: Array, ideal: Array) -> Array:
+    """The inverse depth d ≥ 0 (N,) at which K' (R q + d t) is nearest to ideal px (N, 2) of the target; q (N, 3)."""
+    R, t, K_prime = (matrix(geometry[name]) for name in ("R", "t", "K_prime"))
+    ray = homogeneous(ideal) @ np.linalg.inv(K_prime).T
+    at_infinity, moved = np.cross(ray, q @ R.T), np.cross(ray, t)
+    d = -(at_infinity * moved).sum(axis=-1) / np.maximum((moved * moved).sum(axis=-1), 1e-12)
+    return np.maximum(d, 0.0)
 
 
 def line_on_panorama(known: dict[str, Any], polyline: Array) -> NDArray[np.float32]:
-    """A polyline of reference px as line segments (2·N, 2) of panorama px: bent where the panorama is round, and cut
-    where that ends on one side and goes on on the other."""
-    if projection_of(known) is not None:
+    """An epipolar line, a polyline of reference px, as line segments (2·N, 2) of panorama px: bent where the panorama
+    is round, and cut where that ends on one side and goes on on the other. Wherever between the two places a viewpoint
+    stands, it sees the plane of that line in the same directions."""
+    projection = projection_of(known)
+    if projection is not None:
         at = np.linspace(0, len(polyline) - 1, _CURVE)
         polyline = np.stack([np.interp(at, np.arange(len(polyline)), polyline[:, axis]) for axis in (0, 1)], axis=-1)
-    pieces = segments(on_panorama(known, polyline)).reshape(-1, 2, 2)
+        ideal = undistort(polyline, cameras_of(known["geometry"])[REFERENCE])
+        points = projection.of_reference(ideal)
+    else:
+        points = on_panorama(known, polyline)
+    pieces = segments(points).reshape(-1, 2, 2)
     width = known["geometry"]["canvas"][0]
     return pieces[np.abs(pieces[:, 1, 0] - pieces[:, 0, 0]) < width / 2].reshape(-1, 2)
 
@@ -164,7 +221,7 @@ def epipolar_lines(geometry: dict[str, Any], point: Array, side: str) -> dict[st
     if not has_lines(geometry):
         return {}
     F = matrix(geometry["F"])
-    cameras = _cameras(geometry)
+    cameras = cameras_of(geometry)
     x = homogeneous(undistort(np.asarray(point, np.float64), cameras[side]))
     other = TARGET if side == REFERENCE else REFERENCE
     far = F @ x if side == REFERENCE else F.T @ x
@@ -192,7 +249,8 @@ def _bent(line: Array, camera: Camera) -> Array | None:
     return raw[inside] if inside.sum() > 1 else None
 
 
-def _cameras(geometry: dict[str, Any]) -> dict[str, Camera]:
+def cameras_of(geometry: dict[str, Any]) -> dict[str, Camera]:
+    """The cameras of a result's pictures, by side."""
     sizes = [tuple(int(side) for side in size) for size in geometry["full_sizes"]]
     found = {}
     for name, K, dist, size in (

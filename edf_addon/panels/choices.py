@@ -1,4 +1,4 @@
-"""How to stitch: camera, field, output."""
+"""How to stitch: camera, field, frame, output."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 
 import bpy
 
-from .. import editor, idnames, properties
+from .. import editor, explain, idnames, offered
 from ..bridge import photo
 from ..idnames import Operator
-from .rows import Row, SubPanel, rows, words
+from .rows import NOTE, Row, SubPanel, rows, words
 
 
 def _camera_is(*sources: str) -> Callable[[Any], bool]:
@@ -25,13 +25,13 @@ def _pack_why_not(settings: Any) -> str:
     return "" if settings.fake_user else "Images without a fake user may be dropped on save, packed or not"
 
 
-def _is_round(settings: Any) -> bool:
-    return settings.projection != "PERSPECTIVE"
+def _is_framed(settings: Any) -> bool:
+    return settings.projection != "REFERENCE"
 
 
 def _projection_why_not(settings: Any) -> str:
-    if _is_round(settings) and settings.field not in properties.ROUND_FIELDS:
-        return "A round panorama needs a field that knows depth everywhere: Slack or Strict"
+    if _is_framed(settings) and settings.field not in offered.ROUND_FIELDS:
+        return "This needs a field that knows depth everywhere, Slack or Strict; or choose Reference"
     return ""
 
 
@@ -50,16 +50,23 @@ CAMERA = (
     Row("target_camera", shown=_camera_is("CAMERAS"), text="Target"),
 )
 FIELD = (Row("field"), Row("fade"), Row("dense"))
-OUTPUT = (
+FRAME = (
     Row("projection", why_not=_projection_why_not),
-    Row("level", shown=_is_round),
-    Row("level_angles", shown=lambda settings: _is_round(settings) and settings.level == "ANGLES"),
+    Row("pannini_distance", shown=lambda settings: settings.projection == "PANNINI"),
+    Row("slide_auto", shown=_is_framed),
+    Row("slide", shown=lambda settings: _is_framed(settings) and not settings.slide_auto),
+    Row("level", shown=_is_framed),
+    Row("level_angles", shown=lambda settings: _is_framed(settings) and settings.level == "ANGLES"),
+    Row("centre", shown=_is_framed),
+    Row("fov", shown=_is_framed),
+    Row("crop"),
+    Row("crop_box", shown=lambda settings: settings.crop == "BOX"),
+)
+OUTPUT = (
     Row("blend"),
     Row("seam", why_not=lambda settings: "An average has no seam" if settings.blend == "LINEAR" else ""),
     Row("exposure"),
     Row("holes", why_not=lambda settings: "An average has no holes" if settings.blend == "LINEAR" else ""),
-    Row("crop"),
-    Row("crop_box", shown=lambda settings: settings.crop == "BOX"),
     Row("scale"),
     Row("seed"),
 )
@@ -84,6 +91,19 @@ class EDF_PT_field(SubPanel, bpy.types.Panel):  # noqa: N801
 
     def draw_rows(self, context: Any, settings: Any, width: float) -> None:
         rows(self.layout, settings, FIELD, width)
+
+
+class EDF_PT_frame(SubPanel, bpy.types.Panel):  # noqa: N801
+    bl_idname = idnames.Panel.FRAME
+    bl_label = "Frame"
+
+    def draw_rows(self, context: Any, settings: Any, width: float) -> None:
+        rows(self.layout, settings, FRAME, width)
+        if _is_framed(settings) and settings.slide_auto:
+            words(self.layout, explain.viewpoint(editor.report_of(context)), width, NOTE)
+        elif not _is_framed(settings):
+            words(self.layout, "Seen from the reference's own place, with every pixel of it", width, NOTE)
+        self.layout.operator(Operator.REFERENCE_FRAME, icon="IMAGE_REFERENCE")
 
 
 class EDF_PT_output(SubPanel, bpy.types.Panel):  # noqa: N801

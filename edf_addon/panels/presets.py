@@ -1,19 +1,34 @@
 """Named sets of settings, by Blender's own mechanism: files in the user's presets folder."""
 
+import re
+from pathlib import Path
 from typing import Any
 
 import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
-from .. import idnames, properties
+from .. import earlier, idnames, properties
 
 SUBFOLDER = "edf_stitch"
 # What a preset does not hold: pictures, cameras and masks of one file.
 _OF_ONE_FILE = {"POINTER", "COLLECTION"}
 
 
-class EDF_MT_presets(bpy.types.Menu):  # noqa: N801
+class _Presets:
+    """What Blender looks for at whatever lists presets."""
+
+    @staticmethod
+    def post_cb(context: Any, path: str) -> None:
+        """A preset that an earlier release wrote was just run: it means what it meant then."""
+        settings = properties.settings_of(context.scene)
+        held = re.findall(rf"\.{idnames.SETTINGS}\.(\w+)", Path(path).read_text("utf-8"))
+        for name, value in earlier.kept_now({name: getattr(settings, name, None) for name in held}).items():
+            if name in earlier.THEN:
+                setattr(settings, name, value)
+
+
+class EDF_MT_presets(_Presets, bpy.types.Menu):  # noqa: N801
     bl_idname = idnames.Menu.PRESETS
     bl_label = "Stitch Presets"
     preset_subdir = SUBFOLDER
@@ -21,7 +36,7 @@ class EDF_MT_presets(bpy.types.Menu):  # noqa: N801
     draw = bpy.types.Menu.draw_preset
 
 
-class EDF_PT_presets(PresetPanel, bpy.types.Panel):  # noqa: N801
+class EDF_PT_presets(_Presets, PresetPanel, bpy.types.Panel):  # noqa: N801
     bl_idname = idnames.Panel.PRESETS
     bl_label = "Stitch Presets"
     preset_subdir = SUBFOLDER

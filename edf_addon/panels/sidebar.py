@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import bpy
 
-from .choices import EDF_PT_camera, EDF_PT_field, EDF_PT_output
+from .choices import EDF_PT_camera, EDF_PT_field, EDF_PT_frame, EDF_PT_output
 from .editing import EDF_MT_matches, EDF_PT_masks, EDF_PT_matches, EDF_UL_matches
 from .finished import EDF_PT_overlays, EDF_PT_result, EDF_PT_take_along
 from .main import EDF_PT_main
 
 PANELS = (
     EDF_PT_main, EDF_PT_result, EDF_PT_overlays, EDF_PT_camera, EDF_PT_field, EDF_PT_matches, EDF_PT_masks,
-    EDF_PT_output, EDF_PT_take_along,
+    EDF_PT_frame, EDF_PT_output, EDF_PT_take_along,
 )  # fmt: skip
 
 

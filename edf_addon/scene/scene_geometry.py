@@ -1,7 +1,7 @@
 """Cameras and a mesh out of a finished stitch, as numbers for Blender's scene. No bpy.
 
 The world that they stand in has the reference camera at its origin, looking along +y with z up, and the baseline as its
-unit, unless told otherwise; under a round panorama it is the panorama that looks along +y, levelled.
+unit, unless told otherwise; under a levelled panorama it is that which looks along +y.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from ...core.cameras.blender_camera import BlenderLens, lens_for, matrix_world_of
 from ...core.cameras.projective import homogeneous
 from ...core.panorama.projection import Projection
+from ...core.panorama.viewpoint import Viewpoint
 from ...core.raster.arrays import Array
 
 # From the reference camera's axes (x right, y down, z ahead) to a world with z up.
 UPRIGHT = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
-# R, t of the reference camera.
+# R, t of the reference camera, and where that is.
 ORIGIN = np.eye(3), np.zeros(3)
+AT_REFERENCE = "the reference's place"
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,12 @@ class RoundLens:
 
 @dataclass(frozen=True)
 class PlacedCamera:
-    """A camera of the scene: its lens (with the picture's size), and its world matrix (4, 4)."""
+    """A camera of the scene: its lens (with the picture's size), its world matrix (4, 4), where it stands in words."""
 
     name: str
     lens: BlenderLens | RoundLens
     matrix_world: Array
+    place: str
 
 
 @dataclass(frozen=True)
@@ -54,13 +57,25 @@ class DepthMesh:
 
 
 def projection_of(known: dict[str, Any]) -> Projection | None:
-    """How the canvas px of a result's round panorama become rays (its plane is the canvas); None for a flat one."""
+    """How the canvas px of a result's panorama become rays (its plane is the canvas); None where the canvas is the
+    reference's own plane."""
     told = known["report"]["canvas"]["projection"]
-    if told["kind"] == "perspective":
+    if told["kind"] == "perspective" and np.isfinite(matrix(known["geometry"]["K_canvas"])).all():
         return None
     x, y = told["centre"]
-    K = matrix(known["geometry"]["K"])
-    return Projection(told["kind"], float(told["focal_px"]), (float(x), float(y)), matrix(told["rotation"]), K)
+    return Projection(
+        told["kind"], float(told["focal_px"]), (float(x), float(y)), matrix(told["rotation"]),
+        matrix(known["geometry"]["K"]), float(told.get("distance", 0.0)),
+    )  # fmt: skip
+
+
+def viewpoint_of(known: dict[str, Any]) -> Viewpoint | None:
+    """From where a result's panorama is seen; None where that is the reference's place for all of it."""
+    told = known["geometry"].get("viewpoint")
+    if told is None:
+        return None
+    start, end = told["ends"]
+    return Viewpoint(float(told["s1"]), *(matrix(told[name]) for name in ("c", "rotation", "along")), (start, end))
 
 
 def axes(known: dict[str, Any]) -> Array:
@@ -70,24 +85,51 @@ def axes(known: dict[str, Any]) -> Array:
 
 
 def placed_cameras(known: dict[str, Any], baseline: float = 1.0) -> list[PlacedCamera]:
-    """The reference's, the target's and the panorama's camera; the target's only where the model knows its place.
+    """The reference's, the target's and the panorama's camera; the target's only where the model knows its place, the
+    panorama's only where Blender has such a lens. One whose viewpoint slides stands where its middle is seen from.
 
-    known: a result's `geometry` (K, K_prime, R, t, full_sizes, K_canvas, canvas) and `report`; baseline: distance of
-    the cameras, in the scene's units.
+    known: a result's `geometry` (K, K_prime, R, t, full_sizes, K_canvas, canvas, viewpoint) and `report`; baseline:
+    distance of the cameras, in the scene's units.
     """
     geometry, world = known["geometry"], axes(known)
     sizes = [(int(width), int(height)) for width, height in geometry["full_sizes"]]
-    wanted: list[tuple[str, BlenderLens | RoundLens, tuple[Array, Array]]] = [
-        ("Reference", flat_lens(geometry["K"], sizes[0]), ORIGIN)
+    wanted: list[tuple[str, BlenderLens | RoundLens, tuple[Array, Array], str]] = [
+        ("Reference", flat_lens(geometry["K"], sizes[0]), ORIGIN, AT_REFERENCE)
     ]
     if (pose := target_pose(geometry, baseline)) is not None:
-        wanted.append(("Target", flat_lens(geometry["K_prime"], sizes[1]), pose))
+        wanted.append(("Target", flat_lens(geometry["K_prime"], sizes[1]), pose, "the target's place"))
     canvas, projection = (int(geometry["canvas"][0]), int(geometry["canvas"][1])), projection_of(known)
     if projection is None:
-        wanted.append(("Panorama", flat_lens(geometry["K_canvas"], canvas), ORIGIN))
-    else:
-        wanted.append(("Panorama", round_lens(projection, canvas), (projection.rotation.T, np.zeros(3))))
-    return [PlacedCamera(name, lens, in_world(R, t, world)) for name, lens, (R, t) in wanted]
+        wanted.append(("Panorama", flat_lens(geometry["K_canvas"], canvas), ORIGIN, AT_REFERENCE))
+    elif (lens := panorama_lens(projection, canvas)) is not None:
+        place, words = _middle_place(known, projection, canvas)
+        R = projection.rotation.T
+        wanted.append(("Panorama", lens, (R, -R @ place * baseline), words))
+    return [PlacedCamera(name, lens, in_world(R, t, world), words) for name, lens, (R, t), words in wanted]
+
+
+def _middle_place(known: dict[str, Any], projection: Projection, canvas: tuple[int, int]) -> tuple[Array, str]:
+    """From where the middle of a canvas is seen (3,), in baselines in the reference's frame; and that in words."""
+    viewpoint = viewpoint_of(known)
+    if viewpoint is None:
+        return np.zeros(3), AT_REFERENCE
+    ray = projection.rays((np.array(canvas) - 1) / 2)
+    share = float(viewpoint.slide_at(ray))
+    return viewpoint.place(ray), (
+        f"{share:.0%} of the way from the reference's place to the target's, from where the middle is seen; the "
+        f"panorama's viewpoint slides from 0% to {viewpoint.s1:.0%}"
+    )
+
+
+def panorama_lens(projection: Projection, size: tuple[int, int]) -> BlenderLens | RoundLens | None:
+    """The lens that sees a canvas of (W, H) px; None where Blender has none like it."""
+    if projection.kind == "pannini" and projection.distance > 0:
+        return None
+    if projection.kind in ("perspective", "pannini"):
+        K = np.diag([projection.focal, projection.focal, 1.0])
+        K[:2, 2] = projection.centre
+        return lens_for(K, size)
+    return round_lens(projection, size)
 
 
 def flat_lens(K: Any, size: tuple[int, int]) -> BlenderLens:
@@ -125,7 +167,7 @@ def square_pixels(K: Array) -> Array:
 
 
 def depth_mesh(known: dict[str, Any], baseline: float = 1.0, farthest: float = 20.0) -> DepthMesh:
-    """The panorama as a surface: nodes on their rays from the panorama's camera, at the depth that was found.
+    """The panorama as a surface: nodes on their rays from where each is seen, at the depth that was found.
 
     known: a result's `geometry`, `report` and `depth`: `columns`, `rows`, `inverse_depth` (in 1/baseline) and `shows`,
     row by row from the top, nodes corner to corner of the canvas; farthest: × the median depth, where everything beyond
@@ -144,7 +186,11 @@ def depth_mesh(known: dict[str, Any], baseline: float = 1.0, farthest: float = 2
     if not near.size:
         raise ValueError("the panorama has no depth: nothing of it lies nearer than infinity")
     d = np.maximum(np.where(there, d, 0.0), float(np.median(near)) / farthest)
-    vertices = (rays(known, pixels) / d[:, None] * baseline) @ axes(known).T
+    viewpoint, seen = viewpoint_of(known), rays(known, pixels)
+    points = seen / d[:, None]
+    if viewpoint is not None:
+        points += viewpoint.place(seen)
+    vertices = points * baseline @ axes(known).T
 
     at = np.arange(columns * rows).reshape(rows, columns)
     # the lower left corner first, then on to the right
@@ -156,8 +202,8 @@ def depth_mesh(known: dict[str, Any], baseline: float = 1.0, farthest: float = 2
 
 
 def rays(known: dict[str, Any], pixels: Array) -> Array:
-    """What canvas px (N, 2) show, in the reference camera's frame, as long as 1/d is to be taken: with z = 1 in a flat
-    panorama, unit rays in a round one."""
+    """What canvas px (N, 2) show, in the reference camera's frame, as long as 1/d is to be taken: with z = 1 on the
+    reference's own plane, unit rays elsewhere."""
     projection = projection_of(known)
     if projection is not None:
         return projection.rays(pixels)

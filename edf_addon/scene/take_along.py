@@ -38,6 +38,19 @@ def lacking(image: bpy.types.Image | None, depth: bool = False) -> str:
     return ""
 
 
+def no_lens(image: bpy.types.Image) -> str:
+    """Why no camera of Blender's sees a panorama as it is; "" where one does."""
+    told = editor.known(image)["report"]["canvas"]["projection"]
+    if told["kind"] == "pannini" and told["distance"] > 0:
+        return (
+            "Blender has no lens that sees as Panini's projection does: the panorama's own camera is left out; "
+            "stitched with Projection Perspective, Reference or Cylindrical it has one"
+        )
+    if told["kind"] == "cylindrical" and not compat.sees_cylinders():
+        return "Blender has cylindrical lenses from 4.3 on: the panorama's own camera is left out"
+    return ""
+
+
 def known_baseline(known: dict[str, Any]) -> float | None:
     """How far apart the scene's own cameras stood, where a panorama's pictures were taken with them."""
     if known["cameras"] is None:
@@ -54,7 +67,7 @@ def usual_baseline(image: bpy.types.Image) -> float:
 
 def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> dict[str, bpy.types.Object]:
     """The cameras of a panorama, by role; those that are there already are set anew. The panorama's own is missing
-    where Blender has no lens like it. Raises ValueError."""
+    where Blender has no lens like it (see `no_lens`). Raises ValueError."""
     from . import scene_geometry
 
     reference, target = ownership.pictures(image)
@@ -63,7 +76,7 @@ def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: flo
     made = {}
     for placed in scene_geometry.placed_cameras(editor.known(image), baseline):
         role, lens = placed.name.upper(), placed.lens
-        if isinstance(lens, scene_geometry.RoundLens) and lens.kind == "cylindrical" and not compat.sees_cylinders():
+        if role == "PANORAMA" and no_lens(image):
             continue
         camera = find(image, role) or _link(scene, image, role, bpy.data.cameras.new(f"{placed.name} of {image.name}"))
         data = camera.data
@@ -75,7 +88,7 @@ def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: flo
             data.shift_x, data.shift_y = lens.shift_x, lens.shift_y
         data.clip_start, data.clip_end = 0.01 * baseline, 1e4 * baseline
         _put_behind(data, pictures[role])
-        camera["resolution"] = lens.resolution
+        camera["resolution"], camera["place"] = lens.resolution, placed.place
         camera.parent, camera.matrix_parent_inverse = rig, Matrix()
         camera.matrix_basis = Matrix(placed.matrix_world.tolist())
         made[role] = camera

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
-from edf_stitch.core.cameras.lens import distort
+from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.projective import homogeneous, project, rotation_from_vector
 from edf_stitch.core.pictures.decoding import turn
 from hypothesis import assume, given, settings
@@ -26,7 +26,7 @@ def geometry(by_hand):
     return {
         "full_sizes": [list(SIZE), list(SIZE_PRIME)], "F": view.F.tolist(), "K": view.K.tolist(),
         "K_prime": view.K_prime.tolist(), "R": view.R.tolist(), "t": view.t.tolist(),
-        "S": [[0.5, 0, 70.25], [0, 0.5, 11.75], [0, 0, 1]],
+        "S": [[0.5, 0, 70.25], [0, 0.5, 11.75], [0, 0, 1]], "K_canvas": np.eye(3).tolist(),
     }  # fmt: skip
 
 
@@ -72,12 +72,14 @@ def test_points_go_to_the_panorama_and_back(geometry):
     np.testing.assert_allclose(og.from_panorama(known, there), points, atol=1e-9)
 
 
-@pytest.fixture(scope="module", params=["cylindrical", "equirectangular"])
+@pytest.fixture(scope="module", params=["cylindrical", "equirectangular", "perspective", "pannini"])
 def round_one(request, geometry):
-    """A round panorama, turned by 20° so that the reference reaches over its left edge, through a lens that bends."""
+    """A panorama of its own, turned by 20° so that the reference reaches over its left edge, through a lens that
+    bends."""
     turn_ = rotation_from_vector(np.radians((5.0, -20.0, 3.0)))
-    told = {"kind": request.param, "focal_px": 200.0, "centre": [100.0, 150.0], "rotation": turn_.tolist()}
-    bent = {**geometry, "distortion": [-0.1, 0.01, 0, 0, 0], "canvas": [1256, 628]}
+    told = {"kind": request.param, "focal_px": 200.0, "centre": [100.0, 150.0], "rotation": turn_.tolist(),
+            "distance": 0.4 if request.param == "pannini" else 0.0}  # fmt: skip
+    bent = {**geometry, "distortion": [-0.1, 0.01, 0, 0, 0], "canvas": [1256, 628], "K_canvas": [[None] * 3] * 3}
     return {"geometry": bent, "report": {"canvas": {"projection": told}}}
 
 
@@ -89,7 +91,8 @@ def test_points_go_to_a_round_panorama_and_back(round_one):
 
 
 def test_what_lies_behind_the_reference_has_no_px_there(round_one):
-    assert np.isnan(og.from_panorama(round_one, np.array([[100 + 200 * np.pi, 150.0]]))).all()
+    if round_one["report"]["canvas"]["projection"]["kind"] in ("cylindrical", "equirectangular"):
+        assert np.isnan(og.from_panorama(round_one, np.array([[100 + 200 * np.pi, 150.0]]))).all()
 
 
 def test_a_line_on_a_round_panorama_is_a_curve_of_short_pieces(round_one):
@@ -100,6 +103,49 @@ def test_a_line_on_a_round_panorama_is_a_curve_of_short_pieces(round_one):
     along = np.array([399.0, 280]) / np.hypot(399, 280)
     off = (back - [0, 10]) @ [-along[1], along[0]]
     assert np.abs(off).max() < 1e-2
+
+
+@pytest.fixture(scope="module")
+def slid(round_one):
+    """The same seen from a viewpoint that slides three quarters of the way, of a scene that is one slanted plane."""
+    geometry = round_one["geometry"]
+    R, t = np.array(geometry["R"]), np.array(geometry["t"])
+    viewpoint = {"s1": 0.75, "c": (-R.T @ t).tolist(), "rotation": np.eye(3).tolist(), "along": [1.0, 0.0],
+                 "ends": [-0.3, 0.35]}  # fmt: skip
+    found = {**round_one, "geometry": {**geometry, "canvas": [480, 300], "viewpoint": viewpoint}}
+    columns, rows = 97, 61
+    nodes = np.stack(np.meshgrid(np.linspace(0, 479, columns), np.linspace(0, 299, rows)), axis=-1).reshape(-1, 2)
+    rays, normal = og.projection_of(found).rays(nodes), np.array([0.1, -0.05, 0.3])
+    d = rays @ normal / (1 - og.viewpoint_of(found).place(rays) @ normal)
+    return {**found, "depth": {"columns": columns, "rows": rows, "inverse_depth": d.tolist()}, "normal": normal}
+
+
+def test_a_match_lies_where_the_sliding_viewpoint_sees_its_point(slid):
+    """With the target's px exactly, without by the panorama's own depth nearby; and back."""
+    geometry, normal = slid["geometry"], slid["normal"]
+    q = np.array([[-0.25, 0.1, 1], [0.0, 0, 1], [0.2, -0.1, 1], [0.35, 0.15, 1]])
+    X = q / (q @ normal)[:, None]
+    cameras = og.cameras_of(geometry)
+    x = distort(q[:, :2] @ np.diag([350.0, 350]) + np.array(geometry["K"])[:2, 2], cameras["reference"])
+    y = project((X @ np.array(geometry["R"]).T + np.array(geometry["t"])) @ np.array(geometry["K_prime"]).T)
+    there = og.on_panorama(slid, x, y)
+    projection, viewpoint = og.projection_of(slid), og.viewpoint_of(slid)
+    seen = X - viewpoint.place(projection.rays(there))
+    np.testing.assert_allclose(projection.points(seen), there, atol=1e-3)
+    assert np.linalg.norm(there - projection.of_reference(x), axis=1).max() > 5, "it is not where s = 0 has it"
+    np.testing.assert_allclose(og.on_panorama(slid, x), there, atol=0.5)
+    np.testing.assert_allclose(og.from_panorama(slid, there), x, atol=0.5)
+
+
+def test_an_epipolar_line_is_the_same_curve_wherever_the_viewpoint_stands(slid):
+    geometry = slid["geometry"]
+    x = np.array([230.0, 140.0])
+    line = og.line_on_panorama(slid, og.epipolar_lines(geometry, x, "reference")["reference"]).astype(float)
+    ideal = undistort(x[None], og.cameras_of(geometry)["reference"])
+    q = homogeneous(ideal) @ np.linalg.inv(np.array(geometry["K"])).T
+    for d in (0.02, 0.2, 0.4):  # the same px of the reference, near and far
+        seen = og.projection_of(slid).points(og.viewpoint_of(slid).seen_from(q, np.array([d]))[0])[0]
+        assert distance(line[::2], seen) < 0.3, d
 
 
 @given(seed=st.integers(0, 10_000), side=sides)

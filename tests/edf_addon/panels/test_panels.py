@@ -155,7 +155,7 @@ def test_a_panorama_says_how_it_went(draw, stitched):
 def test_what_has_no_effect_says_why(draw, stitched):
     settings = stitched.settings
     settings.blend, settings.fake_user, settings.projection, settings.field = "LINEAR", False, "CYLINDRICAL", "PAPER"
-    said = text(draw(choices.EDF_PT_output))
+    said = text(draw(choices.EDF_PT_output, choices.EDF_PT_frame))
     for words in ("An average has no seam", "may be dropped on save", "Slack or Strict"):
         assert words in said, words
 
@@ -165,14 +165,17 @@ def test_every_setting_is_in_some_panel(draw, stitched):
     settings, seen = stitched.settings, set()
     settings.own_lens, settings.crop, settings.projection, settings.level = True, "BOX", "CYLINDRICAL", "ANGLES"
     settings.overlay = "DISPLACEMENT"
+    seen |= set(draw().props)
+    settings.projection, settings.slide_auto = "PANNINI", False
     for source in settings.bl_rna.properties["camera"].enum_items.keys():
         settings.camera = source
         seen |= set(draw().props)
     missing = {one for one in properties.EDF_PG_settings.bl_rna.properties.keys()} - seen
-    assert missing == {"rna_type", "name", "result", "matches_reference", "matches_target"}
+    assert missing == {"rna_type", "name", "result", "matches_reference", "matches_target", "version"}
 
 
 def test_every_property_that_a_table_names_is_there(blender):
-    for table in (choices.CAMERA, choices.FIELD, choices.OUTPUT, finished.OVERLAYS, choices.KEEP, choices.TAKE):
+    tables = (choices.CAMERA, choices.FIELD, choices.FRAME, choices.OUTPUT, choices.KEEP, choices.TAKE)
+    for table in (*tables, finished.OVERLAYS):
         for row in table:
             assert row.name in blender.settings.bl_rna.properties

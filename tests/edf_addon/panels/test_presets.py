@@ -4,8 +4,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from edf_stitch.edf_addon import properties  # noqa: E402
+from edf_stitch.edf_addon import engine_options  # noqa: E402
 from edf_stitch.edf_addon.panels import presets  # noqa: E402
+
+OLD = {"field": "STRICT", "fade": "PLANE", "projection": "PERSPECTIVE", "crop": "INSCRIBED", "holes": "TRANSPARENT"}
 
 
 @pytest.fixture
@@ -43,8 +45,23 @@ def test_a_preset_brings_back_what_it_was_made_of_and_nothing_else(blender, reso
     assert settings.reference.name == "b" and settings.show_matches
 
 
+def test_a_preset_of_an_earlier_release_means_what_it_meant_then(blender, resources):
+    settings, file = blender.settings, resources / "old.py"
+    lines = ("import bpy", *(f"bpy.context.scene.edf_stitch.{name} = {value!r}" for name, value in OLD.items()))
+    file.write_text("\n".join(lines), "utf-8")
+    bpy.ops.script.execute_preset(filepath=str(file), menu_idname="EDF_PT_presets")
+    assert (settings.projection, settings.fade, settings.crop) == ("REFERENCE", "PLANE", "INSCRIBED")
+    assert (settings.slide_auto, settings.holes) == (False, "TRANSPARENT")
+    settings.projection = "PERSPECTIVE"
+    bpy.ops.edf.preset_add(name="New")
+    settings.projection = "AUTO"
+    (new,) = resources.rglob("New.py")
+    bpy.ops.script.execute_preset(filepath=str(new), menu_idname="EDF_PT_presets")
+    assert settings.projection == "PERSPECTIVE"
+
+
 def test_a_preset_holds_every_setting_and_no_picture():
     held = set(presets.names())
-    assert {*properties.CHOICES, *properties.VALUES, "camera", "crop", "focal", "take_layers", "pack"} <= held
+    assert {*engine_options.CHOICES, *engine_options.VALUES, "camera", "crop", "focal", "take_layers", "pack"} <= held
     assert not held & {"reference", "target", "result", "matches", "ignore_reference", "reference_camera",
                        "edited_matches"}  # fmt: skip

@@ -86,6 +86,55 @@ def test_a_rotation_puts_both_cameras_in_one_place(known):
     assert not np.allclose(turned[1].matrix_world, turned[0].matrix_world)
 
 
+@pytest.fixture(params=[None, 0.8])
+def framed(request, known):
+    """A result on a level plane of its own, and the same with a viewpoint that slides."""
+    one = round_one(known, "perspective")
+    if request.param is None:
+        return one
+    R, t = (np.array(one["geometry"][name]) for name in ("R", "t"))
+    viewpoint = {"s1": request.param, "c": (-R.T @ t).tolist(), "rotation": np.eye(3).tolist(), "along": [1.0, 0.0],
+                 "ends": [-0.2, 0.5]}  # fmt: skip
+    return with_(one, viewpoint=viewpoint)
+
+
+def test_a_plane_of_its_own_has_a_shifted_camera_that_sees_its_px(framed):
+    """From where its middle is seen: there exactly, whatever the distance."""
+    panorama = sg.placed_cameras(framed, 2.0)[-1]
+    assert panorama.name == "Panorama" and panorama.lens.size == CANVAS
+    projection, viewpoint = sg.projection_of(framed), sg.viewpoint_of(framed)
+    middle = (np.array(CANVAS) - 1) / 2
+    ray = projection.rays(middle)
+    place = np.zeros(3) if viewpoint is None else viewpoint.place(ray)
+    world = (place + ray * np.array([[3.0], [40.0]])) * 2.0 @ sg.axes(framed).T
+    np.testing.assert_allclose(seen_by(panorama, world), [middle, middle], atol=1e-7)
+    if viewpoint is None:
+        assert panorama.place == "the reference's place"
+        away = projection.rays(np.array([[0.0, 0], [559, 359]])) * 7.0
+        np.testing.assert_allclose(seen_by(panorama, away * 2.0 @ sg.axes(framed).T), [[0, 0], [559, 359]], atol=1e-7)
+    else:
+        assert "of the way" in panorama.place and "0% to 80%" in panorama.place
+
+
+def test_the_mesh_holds_the_points_that_were_seen_from_wherever_the_viewpoint_is(framed):
+    """A plane is a plane, and the same one."""
+    projection, viewpoint, normal = sg.projection_of(framed), sg.viewpoint_of(framed), np.array([0.1, -0.05, 0.3])
+    nodes = np.stack(np.meshgrid(np.linspace(0, 559, 29), np.linspace(0, 359, 19)), axis=-1).reshape(-1, 2)
+    rays = projection.rays(nodes)
+    places = np.zeros_like(rays) if viewpoint is None else viewpoint.place(rays)
+    d = (rays @ normal) / (1 - places @ normal)
+    mesh = sg.depth_mesh({**framed, "depth": grid_of(29, 19, d)}, 3.0, farthest=1e6)
+    X = mesh.vertices @ sg.axes(framed) / 3.0
+    np.testing.assert_allclose(X @ normal, 1, atol=1e-9)
+
+
+def test_panini_has_no_camera_but_as_a_plane(framed):
+    told = {**framed["report"]["canvas"]["projection"], "kind": "pannini"}
+    for distance, names in ((0.5, ["Reference", "Target"]), (0.0, ["Reference", "Target", "Panorama"])):
+        one = {**framed, "report": {"canvas": {"projection": {**told, "distance": distance}}}}
+        assert [camera.name for camera in sg.placed_cameras(one)] == names
+
+
 def test_the_sizes_of_the_lenses_are_those_of_the_pictures(known):
     assert [camera.lens.size for camera in sg.placed_cameras(known)] == [SIZE, SIZE_PRIME, CANVAS]
 

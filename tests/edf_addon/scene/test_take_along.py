@@ -188,6 +188,21 @@ def sphere(stitched):
     return stitched
 
 
+def test_a_panini_panorama_has_no_camera_and_says_what_has(sphere, capfd):
+    sphere["report"]["canvas"]["projection"] |= {"kind": "pannini", "distance": 0.5}
+    assert bpy.ops.edf.create_cameras() == {"FINISHED"}
+    panorama = bpy.context.scene.edf_stitch.result
+    assert take_along.find(panorama, "PANORAMA") is None and take_along.find(panorama, "REFERENCE") is not None
+    assert "with Projection Perspective" in "".join(capfd.readouterr())
+
+
+def test_a_camera_says_where_it_stands(stitched):
+    bpy.ops.edf.create_cameras()
+    panorama = bpy.context.scene.edf_stitch.result
+    places = {role: take_along.find(panorama, role)["place"] for role in ("REFERENCE", "TARGET", "PANORAMA")}
+    assert places["PANORAMA"] == places["REFERENCE"] == "the reference's place" != places["TARGET"]
+
+
 def test_a_blender_without_a_cylindrical_lens_leaves_out_that_camera(sphere, monkeypatch):
     sphere["report"]["canvas"]["projection"]["kind"] = "cylindrical"
     monkeypatch.setattr(compat, "sees_cylinders", lambda: False)

@@ -1,0 +1,45 @@
+"""Settings that an earlier release left in files, panoramas and presets, as they have to stand now to mean the same.
+
+Until version 2 of the settings there was one flat projection, the reference's own plane, called PERSPECTIVE; the
+viewpoint stayed where the reference was taken, everything was kept, and the field faded to a plane. Imports nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+VERSION = 2
+# What was meant where nothing was said.
+THEN = {
+    "projection": "REFERENCE", "fade": "PLANE", "holes": "TRANSPARENT", "crop": "FULL", "slide_auto": False,
+    "slide": 0.0, "centre": (0.0, 0.0), "fov": 0.0,
+}  # fmt: skip
+# A setting that only came with version 2.
+_NEW = "slide_auto"
+
+
+def kept_now(kept: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by name that a panorama or a preset keeps, of whatever version, as they are written now."""
+    if _NEW in kept:
+        return dict(kept)
+    now = {**THEN, **kept}
+    if now["projection"] == "PERSPECTIVE":
+        now["projection"] = "REFERENCE"
+    return now
+
+
+def mark(settings: Any) -> None:
+    """The settings are decided in this version: what nobody set in them means its default of now."""
+    if settings.version != VERSION:
+        settings.version = VERSION
+
+
+def bring_up_to_date(settings: Any) -> None:
+    """A scene's settings with pictures that an earlier release has chosen: what nobody set there gets the value that
+    was its default then. Choices that were set say what they said, by their numbers (see `offered`)."""
+    if settings.version == 0 and (settings.reference is not None or settings.target is not None):
+        for name, value in THEN.items():
+            if not settings.is_property_set(name):
+                setattr(settings, name, value)
+        mark(settings)

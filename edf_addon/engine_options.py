@@ -1,0 +1,55 @@
+"""What an artist decides, in the engine's words: the settings as fields of StitchOptions. No bpy."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+# The properties that are options of the engine under the same name: one word of several, or a plain value.
+CHOICES = ("field", "fade", "seam", "blend", "holes")
+VALUES = ("dense", "exposure", "seed")
+
+
+def options_of(settings: Any, scale: float | None = None) -> dict[str, Any]:
+    """The settings as fields of StitchOptions, JSON-ready; `camera` holds those of CameraRequest. What needs images or
+    scene cameras (masks, matches, CAMERAS) is added by whoever has them. scale: instead of the settings' own."""
+    options: dict[str, Any] = {name: getattr(settings, name).lower() for name in CHOICES}
+    options |= {name: getattr(settings, name) for name in VALUES}
+    options["scale"] = settings.scale if scale is None else scale
+    options |= frame_of(settings, options["scale"])
+    options["camera"] = _camera_of(settings)
+    return options
+
+
+def frame_of(settings: Any, scale: float = 1.0) -> dict[str, Any]:
+    """What of the scene the panorama shows, and from where: the options of the engine that need no new matches, field
+    or depth. scale: of the pictures, for a box in px."""
+    is_reference = settings.projection == "REFERENCE"
+    frame: dict[str, Any] = {"projection": settings.projection.lower(), "crop": settings.crop.lower()}
+    if settings.projection == "PANNINI":
+        frame["projection"] = f"pannini:{settings.pannini_distance:.3g}"
+    if settings.crop == "BOX":
+        frame["crop"] = [int(side * scale) for side in settings.crop_box]
+    elif is_reference and settings.crop == "AUTO":
+        frame["crop"] = "full"
+    frame["slide"] = 0.0 if is_reference else "auto" if settings.slide_auto else settings.slide
+    frame["level"] = "auto" if is_reference else settings.level.lower()
+    if frame["level"] == "angles":
+        frame["level"] = [math.degrees(angle) for angle in settings.level_angles]
+    is_moved = not is_reference and any(settings.centre)
+    frame["centre"] = [math.degrees(angle) for angle in settings.centre] if is_moved else None
+    frame["fov"] = math.degrees(settings.fov) if settings.fov and not is_reference else None
+    return frame
+
+
+def _camera_of(settings: Any) -> dict[str, Any]:
+    def of(name: str) -> list[float]:
+        return [getattr(settings, name), *([getattr(settings, f"target_{name}")] if settings.own_lens else [])]
+
+    if settings.camera == "FOCAL":
+        return {"focal_mm": of("focal"), "sensor_mm": of("sensor")}
+    if settings.camera == "FOCAL35":
+        return {"focal35": of("focal35")}
+    if settings.camera == "FOCAL_PX":
+        return {"focal_px": of("focal_px")}
+    return {}
