@@ -155,7 +155,7 @@ def _slide(
         if viewpoint_between(base, views) is None:
             return SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
         return SlideChoice(float(options.slide), (), "as asked for")
-    seam = RoughSeam.of(pictures, views, CHOICE.seam_px_per_radian)
+    seam = RoughSeam.of(pictures, views, CHOICE.base_px_per_radian)
     return choose_slide(base, views, lines.each, lines.down if lines.down_is_sure else None, seam, progress)
 
 

@@ -99,6 +99,7 @@ def choose_slide(
     viewpoint = viewpoint_between(base, views)
     if viewpoint is None:
         return SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
+    base = replace(base, depth=base.inverse_depth, lazy_confidence=None)  # read more than once
     shown = [
         _shown(OwnDepth.of(base, view, number), one, down)
         for number, (view, one) in enumerate(zip(views, edges, strict=True))
@@ -241,11 +242,11 @@ def _seam_and_holes(
 ) -> tuple[float, float]:
     """px (at `ChoiceOptions.px_per_radian`) of a rough seam that is seen, and the share of holes in what is shown."""
     projection = base.canvas.projection
-    coarse = replace(projection, focal=CHOICE.seam_px_per_radian)
-    warp = slid_warp(base, views, viewpoint, coarse)
+    assert projection is not None
+    warp = slid_warp(base, views, viewpoint, projection) if viewpoint.s1 else base
     shown = np.logical_or.reduce([one.inside() for one in warp.maps])
-    side = 2 * max(1, round(CHOICE.hole_radius * coarse.focal)) + 1
+    side = 2 * max(1, round(CHOICE.hole_radius * projection.focal)) + 1
     within = cv2.morphologyEx(np.pad(shown, side).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((side, side), np.uint8))
     holes = int(within[side:-side, side:-side].sum()) - int(shown.sum())
-    seam_px = rough_seam(warp) * CHOICE.px_per_radian / coarse.focal
+    seam_px = rough_seam(warp) * CHOICE.px_per_radian / projection.focal
     return seam_px, holes / max(1, int(shown.sum()))

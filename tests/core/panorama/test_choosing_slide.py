@@ -40,8 +40,8 @@ def slid(warp: Warp) -> float:
 
 
 def rig(by_hand: SimpleNamespace, depth: Callable, turn: float = 28.0) -> tuple[Warp, tuple[View, ...]]:
-    """Two cameras side by side, the target on the right, turned to the right, and the panorama of depth(heading, rise), d along rays
-    of that heading and tan of elevation."""
+    """Two cameras side by side, the target on the right, turned to the right, and the panorama of depth(heading, rise):
+    d along rays of that heading and tan of elevation."""
     camera = by_hand.camera(SIZE, FOCAL)
     first, second = views_of(by_hand.view(camera, camera, (0, -turn, 0), (-1.0, 0, 0)), (camera, camera))
     t = -second.R @ PLACE
