@@ -37,6 +37,9 @@ from .system.progress import ReportProgress
 if TYPE_CHECKING:
     from .pictures.picture import Picture
 
+# The maps on a projection, and whether to keep its depth as an array.
+WarpOn = Callable[..., Warp]
+
 
 @dataclass(frozen=True)
 class Mapped:
@@ -126,8 +129,8 @@ def map_pictures(
             ),
         )  # fmt: skip
 
-    def warp_on(projection: Projection | None) -> Warp:
-        return build_warp(field, views, projection, refined, continuation)
+    def warp_on(projection: Projection | None, hold: bool = False) -> Warp:
+        return build_warp(field, views, projection, refined, continuation, hold)
 
     if options.surface[0] == "reference":
         return Mapped(warp_on(None), continuation, SlideChoice(0.0, (), "the reference's own plane has one viewpoint"))
@@ -146,7 +149,7 @@ def map_pictures(
 
 
 def _slide(
-    warp_on: Callable[[Projection], Warp], views: tuple[View, ...], pictures: Sequence[Picture], lines: Lines,
+    warp_on: WarpOn, views: tuple[View, ...], pictures: Sequence[Picture], lines: Lines,
     options: StitchOptions, progress: Callable[[float], None],
 ) -> SlideChoice:  # fmt: skip
     """How far the viewpoint slides: as asked for, or chosen."""
@@ -160,7 +163,7 @@ def _slide(
 
 
 def _seen_from(
-    s1: float, warp_on: Callable[[Projection], Warp], views: tuple[View, ...], lines: Lines, px_per_radian: float
+    s1: float, warp_on: WarpOn, views: tuple[View, ...], lines: Lines, px_per_radian: float
 ) -> Callable[[Projection], Warp]:
     """Gives the maps on a projection as the viewpoint that slides by s1 sees them; depth is carried over from a map of
     some px per radian."""
@@ -174,9 +177,7 @@ def _seen_from(
     return lambda projection: slid_warp(base, views, sliding, projection)
 
 
-def _base(
-    warp_on: Callable[[Projection], Warp], views: Sequence[View], lines: Lines, px_per_radian: float
-) -> Warp:
+def _base(warp_on: WarpOn, views: Sequence[View], lines: Lines, px_per_radian: float) -> Warp:
     """The maps on a levelled cylinder, seen from the reference's place."""
     projection = round_projection("cylindrical", views[0].K, upright(lines.down))
-    return warp_on(replace(projection, focal=px_per_radian))
+    return warp_on(replace(projection, focal=px_per_radian), True)

@@ -7,10 +7,10 @@ import pytest
 from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.projective import homogeneous, project
 from edf_stitch.core.output import inspection
-from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
-from ...pairs import with_map, with_two_view
+from ...pairs import ON_REFERENCE, with_map, with_two_view
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def half(pair: Pair) -> StitchResult:
 
     K = pair.reference_camera.K
     camera = CameraRequest(focal_px=(float(K[0, 0]),), principal=(float(K[0, 2]), float(K[1, 2])))
-    options = StitchOptions(camera=camera, scale=0.5, crop="reference", measure=False)
+    options = replace(ON_REFERENCE, camera=camera, scale=0.5, crop="reference", measure=False)
     return stitch((pair.reference, pair.target), options)
 
 
