@@ -245,7 +245,9 @@ def fit_and_warp(
     # the field's own geometry: a rival knows no depth, so its views have none
     views = views_of(field.two_view, cameras)
     refined = None if dense is None else dense.refined
-    mapped = map_pictures(field, views, refined, frames[0].pictures, options, progress)
+    # what goes on beyond the overlap follows colours and edges, which are another frame's in a clip
+    shown = options if len(frames) == 1 or options.fade != "continue" else replace(options, fade="plane")
+    mapped = map_pictures(field, views, refined, frames[0].pictures, shown, progress)
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(
         cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide

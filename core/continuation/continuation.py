@@ -16,11 +16,11 @@ from ..field.field import Field
 from ..field.refined_depth import RefinedDepth
 from ..raster.arrays import Array
 from ..raster.grid import Grid
-from .options import GRID, LOOKUP, SYSTEM
+from .options import GRID, LOOKUP, SYSTEM, TAKEOVER
 from .plane_labels import agreement, labelled
 from .planes import find_planes
 from .samples import Samples, Seen, samples_of, seen_at
-from .system import Guides, Surroundings, nearest, surface
+from .system import Guides, Surroundings, nearest, surface, without_folds
 from .target_grid import TargetGrid
 
 
@@ -39,6 +39,8 @@ class Continuation:
         The same between the nodes, LOOKUP.oversampling to each.
     every : int
         px of the target between these values, the first at the first node.
+    takeover_px : float
+        px of the reference's plane, beyond its border, over which the surface takes over from the field.
     """
 
     K: Array
@@ -46,9 +48,10 @@ class Continuation:
     inverse_depth: Array
     fine: Array
     every: int
+    takeover_px: float
 
     @staticmethod
-    def of(K: Array, grid: TargetGrid, inverse_depth: Array) -> Continuation:
+    def of(K: Array, grid: TargetGrid, inverse_depth: Array, takeover_px: float) -> Continuation:
         """A surface from its nodes (rows, columns); K (3, 3) of the reference."""
         nodes = grid.grid
         every = max(1, nodes.step // LOOKUP.oversampling)
@@ -61,7 +64,7 @@ class Continuation:
         )  # fmt: skip
         padded = np.pad(inverse_depth, margin, mode="edge")
         fine = wider.to_pixels(padded, left, top, width, height, every).astype(np.float64)
-        return Continuation(K, grid, inverse_depth, fine, every)
+        return Continuation(K, grid, inverse_depth, fine, every, takeover_px)
 
     def at(self, rays: Array) -> Array:
         """Inverse depth (…) = 1 / range along unit rays (…, 3) in the reference's frame, 1 / baseline, ≥ 0.
@@ -146,19 +149,31 @@ def continue_beyond(
         return None
     seen = seen_at(grid, samples)
     guides = Guides(_colours(grid, picture), edges, confirmed)
-    return Continuation.of(reference.K, grid, _solved(grid, samples, seen, guides))
+    solution = without_folds(grid, _solved(grid, samples, seen, guides), seen)
+    return Continuation.of(reference.K, grid, solution, _takeover(reference, grid, samples, seen, solution))
+
+
+def _takeover(reference: View, grid: TargetGrid, samples: Samples, seen: Seen, solution: Array) -> float:
+    """px of the reference over which the solution (rows, columns) takes over from the field: more where the two differ
+    by so much at the border that the map would fold over less."""
+    side = max(reference.size)
+    low, high = (share * side for share in TAKEOVER.shares)
+    nodes, weights = grid.taps(samples.points)
+    goes_on = samples.at_border & ((weights * grid.by_number(seen.to_border)[nodes]).sum(axis=1) < TAKEOVER.near_nodes)
+    if not goes_on.any():
+        return low
+    there = (weights * grid.by_number(solution)[nodes]).sum(axis=1)
+    off = np.abs(there - samples.inverse_depth) * grid.sensitivity_of(grid.rays_of(samples.points)) / GRID.side_px
+    return float(np.clip(TAKEOVER.px_per_px * side * np.percentile(off[goes_on], TAKEOVER.percentile), low, high))
 
 
 def _solved(grid: TargetGrid, samples: Samples, seen: Seen, guides: Guides) -> Array:
     """Inverse depth (rows, columns) at the nodes."""
-    rows, columns = grid.shape
     nodes, weights = grid.taps(samples.points)
-    to_border = np.empty(rows * columns)
-    to_border[grid.numbers] = seen.to_border
-    border_px = (weights * to_border[nodes]).sum(axis=1) * grid.grid.step
+    border_px = (weights * grid.by_number(seen.to_border)[nodes]).sum(axis=1) * grid.grid.step
     planes = find_planes(grid, samples, border_px)
     nothing = Surroundings(
-        np.full(grid.shape, -1), np.zeros(grid.shape), np.zeros(grid.shape), np.zeros((rows, columns, 0))
+        np.full(grid.shape, -1), np.zeros(grid.shape), np.zeros(grid.shape), np.zeros((*grid.shape, 0))
     )
     no_edges = Guides(guides.colours, np.zeros((0, 2, 3)), guides.confirmed)
     smooth = surface(grid, samples, seen, no_edges, nothing, SYSTEM.first_rounds)

@@ -231,11 +231,38 @@ class SystemOptions:
     areas: tuple[float, float] = (0.35, 2.2)
     """Area that a node's cell may take up in the panorama, in units of that at infinity; outside, it is stiffened."""
 
+    allowed_areas: tuple[float, float] = (0.1, 4.0)
+    """The same that is allowed in the end: what is left outside is smoothed."""
+
+    smoothing_steps: int = 60
+    """Steps of that at most."""
+
+    smoothing_nodes: float = 1.0
+    """Nodes, σ, of each."""
+
     stiffening: float = 4.0
     """Factor by which, each round."""
 
     max_stiffening: float = 256.0
     """The same in all."""
+
+
+@dataclass(frozen=True)
+class TakeoverOptions:
+    """Over how much the continuation takes over from the field beyond the reference's border (`continuation`)."""
+
+    shares: tuple[float, float] = (0.05, 0.15)
+    """Shares of the reference's longer side: the usual one, which hides errors at the border, and the most."""
+
+    px_per_px: float = 1.7
+    """px of it at least for each px by which the two differ at the border: a smooth transition has a slope of 1.5, and
+    the map folds where that takes up all there is."""
+
+    percentile: float = 98.0
+    """Percentile of these differences that counts."""
+
+    near_nodes: float = 2.0
+    """Nodes within which the target has to go on beyond a point of the border for it to count."""
 
 
 @dataclass(frozen=True)
@@ -256,4 +283,5 @@ GRID = GridOptions()
 PLANES = PlanesOptions()
 LABELS = LabelOptions()
 SYSTEM = SystemOptions()
+TAKEOVER = TakeoverOptions()
 LOOKUP = LookupOptions()

@@ -22,11 +22,13 @@ from .target_grid import TargetGrid
 
 @dataclass(frozen=True)
 class Samples:
-    """Inverse depth of the target in the overlap: points (N, 2) ideal px of it, δ (N,), trust (N,) from 0 to 1."""
+    """Inverse depth of the target in the overlap: points (N, 2) ideal px of it, δ (N,), trust (N,) from 0 to 1, and
+    which (N,) lie at the reference's border."""
 
     points: Array
     inverse_depth: Array
     trust: Array
+    at_border: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -68,11 +70,12 @@ def samples_of(field: Field, reference: View, target: View, refined: RefinedDept
     raw = np.stack(np.meshgrid(xs, ys), axis=-1)
     ray = homogeneous(undistort(raw, camera) if bent else raw) @ target.H_inf.T + d[..., None] * target.e_prime
     ahead = np.isfinite(ray[..., 2]) & (ray[..., 2] > 0)
-    ray, shift, d, trust = ray[ahead], shift[ahead], d[ahead], trust[ahead]
+    at_border = ((raw < every) | (raw > np.array([width, height]) - 1 - every)).any(axis=-1)
+    ray, shift, d, trust, at_border = (one[ahead] for one in (ray, shift, d, trust, at_border))
     points = ray[:, :2] / ray[:, 2:] + shift
     seen = distort(points, target.camera) if target.camera.distortion.any() else points
     inside = falls_inside(seen[:, 0], seen[:, 1], target.size)
-    return Samples(points[inside], (d / ray[:, 2])[inside], trust[inside])
+    return Samples(points[inside], (d / ray[:, 2])[inside], trust[inside], at_border[inside])
 
 
 def seen_at(grid: TargetGrid, samples: Samples) -> Seen:

@@ -42,8 +42,8 @@ class Surroundings:
 class Guides:
     """What the target's picture shows of how surfaces go on.
 
-    colours (rows, columns, 3): luma and chroma, 0 to 255, at the nodes; edges (M, 2, 3): rays to both ends of straight edges in the
-    target camera's frame; confirmed: whether such edges confirm which way is down.
+    colours (rows, columns, 3): luma and chroma, 0 to 255, at the nodes; edges (M, 2, 3): rays to both ends of straight
+    edges in the target camera's frame; confirmed: whether such edges confirm which way is down.
     """
 
     colours: Array
@@ -62,9 +62,9 @@ def surface(
     lines, uprights = _straight(grid, guides.edges)
     upright = SYSTEM.uprights if guides.confirmed else SYSTEM.doubtful_uprights
     slope = SYSTEM.membrane * (SYSTEM.carried_slope * GRID.nodes) ** 2
-    s2 = np.square(_flat(grid, grid.sensitivity))
-    pull = SYSTEM.attraction * s2 * _flat(grid, goes_on.attraction)
-    there = np.maximum(_flat(grid, goes_on.inverse_depth), 0)
+    s2 = np.square(grid.by_number(grid.sensitivity))
+    pull = SYSTEM.attraction * s2 * grid.by_number(goes_on.attraction)
+    there = np.maximum(grid.by_number(goes_on.inverse_depth), 0)
     problem = LeastSquares(count, (data, membrane, bends, lines, uprights))
     weights, stiffness, upright_weights = weight, stiff, np.ones(len(uprights.wanted))
     straight = np.full(len(lines.wanted), slope * SYSTEM.lines)
@@ -91,6 +91,18 @@ def surface(
     return result
 
 
+def without_folds(grid: TargetGrid, inverse_depth: Array, seen: Seen) -> Array:
+    """Inverse depth (rows, columns), smoothed where what only the target sees would turn over, or be enlarged beyond
+    use."""
+    low, high = SYSTEM.allowed_areas
+    for _ in range(SYSTEM.smoothing_steps):
+        near = _around(grid, inverse_depth, seen, low, high)
+        if not near.any():
+            break
+        inverse_depth = np.where(near, cv2.GaussianBlur(inverse_depth, (0, 0), SYSTEM.smoothing_nodes), inverse_depth)
+    return inverse_depth
+
+
 def nearest(samples: Samples) -> float:
     """The greatest inverse depth that a surface may have."""
     return float(SYSTEM.max_factor * np.percentile(samples.inverse_depth, 99.5))
@@ -111,13 +123,6 @@ def cell_areas(grid: TargetGrid, inverse_depth: Array) -> Array:
     return ratio
 
 
-def _flat(grid: TargetGrid, values: Array) -> Array:
-    """Values (rows, columns, …) of the nodes in the order of their numbers (N, …)."""
-    out = np.empty((grid.numbers.size, *values.shape[2:]), values.dtype)
-    out[grid.numbers] = values
-    return out
-
-
 def _data(grid: TargetGrid, samples: Samples, seen: Seen) -> tuple[Equations, Array]:
     """What the samples say (n,), in px, and what they count: each node's alike, more near the border."""
     nodes, weights = grid.taps(samples.points)
@@ -125,7 +130,7 @@ def _data(grid: TargetGrid, samples: Samples, seen: Seen) -> tuple[Equations, Ar
     count = np.bincount(nodes.ravel(), weights.ravel(), grid.numbers.size)
     usual = float(np.median(count[count > 0]))
     around = (weights * np.maximum(count, 0.3 * usual)[nodes]).sum(axis=1)
-    border = (weights * _flat(grid, seen.to_border)[nodes]).sum(axis=1) - 1
+    border = (weights * grid.by_number(seen.to_border)[nodes]).sum(axis=1) - 1
     near = 1 + SYSTEM.border_weight * np.exp(-np.maximum(border, 0) / SYSTEM.border_nodes)
     equations = Equations(nodes, weights * s[:, None], s * samples.inverse_depth)
     return equations, samples.trust / np.maximum(around, 1e-9) * near
@@ -227,9 +232,13 @@ def _straight(grid: TargetGrid, edges: Array) -> tuple[Equations, Equations]:
 def _stiffening(grid: TargetGrid, z: Array, seen: Seen) -> Array:
     """By what factor (n,) neighbours, in the order of `_membrane`, are to be tied more than before, because the
     surface (N,) folds or stretches what only the target sees."""
-    low, high = SYSTEM.areas
-    area = cell_areas(grid, z[grid.numbers])
-    bad = np.pad(((area < low) | (area > high)).astype(np.uint8), ((0, 1), (0, 1)), mode="edge")
-    near = (cv2.dilate(bad, np.ones((3, 3), np.uint8)) > 0) & ~seen.inside
-    factor = np.where(near, SYSTEM.stiffening, 1.0)
+    factor = np.where(_around(grid, z[grid.numbers], seen, *SYSTEM.areas), SYSTEM.stiffening, 1.0)
     return np.concatenate([factor[:-1].ravel(), factor[:, :-1].ravel()])
+
+
+def _around(grid: TargetGrid, inverse_depth: Array, seen: Seen, low: float, high: float) -> NDArray[np.bool_]:
+    """The nodes (rows, columns) that only the target sees around cells whose areas are not between two bounds."""
+    area = cell_areas(grid, inverse_depth)
+    bad = np.pad(((area < low) | (area > high)).astype(np.uint8), ((0, 1), (0, 1)), mode="edge")
+    near: NDArray[np.bool_] = (cv2.dilate(bad, np.ones((3, 3), np.uint8)) > 0) & ~seen.inside
+    return near

@@ -82,6 +82,12 @@ class TargetGrid:
         inside: NDArray[np.bool_] = ((points >= 0) & (points <= np.array(self.view.size) - 1.0)).all(axis=-1)
         return inside
 
+    def by_number(self, values: Array) -> Array:
+        """Values (rows, columns, …) of the nodes in the order of their numbers (N, …)."""
+        out = np.empty((self.numbers.size, *values.shape[2:]), values.dtype)
+        out[self.numbers] = values
+        return out
+
     def rays_of(self, points: Array) -> Array:
         """Rays (…, 3) of ideal pixels (…, 2), with r'_z = 1."""
         rays: Array = homogeneous(points) @ inverse_intrinsics(self.view.K).T

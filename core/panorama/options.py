@@ -41,10 +41,6 @@ class WarpOptions:
     """Longer sides of the reference beside it within which fields end in their plane, in round panoramas: the grid that
     is laid over the reference's plane has to end somewhere."""
 
-    takeover: float = 0.05
-    """Share of the reference's longer side, beyond its border, over which what continues beyond the overlap takes over
-    from the field."""
-
     max_node_factor: float = 4.0
     """Nodes of that grid at most, in units of those of any other grid: time and memory grow with it."""
 
@@ -181,11 +177,9 @@ class ChoiceOptions:
     seam_candidates: tuple[float, ...] = (0.0, 0.5, 1.0)
     """Slides at which a seam is cut and holes are counted, which takes longest; interpolated between."""
 
-    base_px_per_radian: float = 300.0
-    """Resolution of the coarse map: depth edges to about 3 px of a picture of 900."""
-
-    seam_px_per_radian: float = 150.0
-    """Resolution at which the seam is cut: finer costs more time and tells hardly more."""
+    base_px_per_radian: float = 150.0
+    """Resolution of the coarse map, and of the pictures through which a seam is cut: twice as fine it takes three times
+    as long, and hardly any choice changes."""
 
     px_per_radian: float = 900.0
     """Resolution in whose px bends and seams are given: about that of a picture that fills a screen."""
@@ -221,7 +215,7 @@ class ChoiceOptions:
     per_folded: float = 15.0
     """Price of all being folded."""
 
-    fold_steps: int = 17
+    fold_steps: int = 9
     """Viewpoints along the way from which it is looked whether a thing is seen more than once."""
 
     same_slide: float = 1e-6
@@ -285,7 +279,7 @@ class SlideOptions:
     nodes: int = 400
     """Nodes along the longer side of the base at which the overlap is looked at."""
 
-    rounds: int = 6
+    rounds: int = 4
     """Steps of false position for s: below a thousandth where the parallax is no more than the width of the slide."""
 
     least_range: float = 1e-9
@@ -314,9 +308,6 @@ class CarryOptions:
     halvings: int = 6
     """Times that the canvas is halved for gaps that are still there: up to 2 · 2⁶ px wide."""
 
-    refinements: int = 2
-    """Times that a pixel's depth is looked up where its point lies: it settles at once on smooth surfaces."""
-
     same_share: float = 0.06
     """Share of d, with `same_px` px of parallax, by which a surface may differ from what was carried over."""
 
@@ -329,11 +320,14 @@ class CarryOptions:
     behind_px: float = 2.0
     """See `behind_share`."""
 
-    least_shift_px: float = 1e-3
-    """px beside the epipolar line below which a map counts as on it: this is rounding."""
+    smaller_strips: int = 16
+    """Times that strips of rows are smaller than `PartOptions.strip_pixels`: they go through many hands."""
 
     reach_nodes: int = 200
     """Nodes along the longer side of the base at which the pictures' bounds are looked for."""
+
+    most_beyond: float = 0.01
+    """Share of what is shown that may lie beyond the projection's limits without a word: stray points do."""
 
 
 CANVAS = CanvasOptions()

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cameras.projective import homogeneous, inverse_intrinsics
 from ..raster.arrays import Array
@@ -96,20 +97,27 @@ class Projection:
 
         What a plane or Pannini's projection cannot show lies far beyond the limits, on the ray's side.
         """
-        x, y, z = np.moveaxis(rays @ self.rotation, -1, 0)
+        points: Array = np.stack(self.points_of(*np.moveaxis(rays @ self.rotation, -1, 0)), axis=-1)
+        return points
+
+    def points_of(self, x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """The same (u, v) for rays in the panorama's own axes, of their precision."""
         level = np.hypot(x, z)
         if self.kind == "equirectangular":
             out = np.arctan2(x, z), np.arctan2(y, level)
         else:
             with np.errstate(divide="ignore", invalid="ignore"):
-                rise, sine, cosine = y / level, x / level, z / level
+                rise = y / level
             if self.kind == "cylindrical":
                 out = np.arctan2(x, z), rise
             else:
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    sine, cosine = x / level, z / level
                 stretch = (self.distance + 1) / np.maximum(self.distance + cosine, PROJECTION.least_forward)
                 out = stretch * sine, stretch * rise
-        points: Array = np.stack(out, axis=-1) * self.focal + np.array(self.centre)
-        return points
+        kind = level.dtype.type
+        u, v = (part * kind(self.focal) + kind(middle) for part, middle in zip(out, self.centre, strict=True))
+        return u, v
 
     def of_reference(self, points: Array) -> Array:
         """Points (…, 2) of the plane that show ideal pixels (…, 2) of the reference."""

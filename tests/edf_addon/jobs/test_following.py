@@ -127,3 +127,14 @@ def leftover_folders():
     from ..conftest import leftovers
 
     return leftovers()
+
+
+def test_after_an_undo_the_editor_that_showed_it_shows_the_panorama_of_then(blender, monkeypatch):
+    """Blender forgets what an editor showed when the image goes; other editors are left alone."""
+    then = blender.settings.result = bpy.data.images.new("then", 8, 8)
+    mine, other, busy = (SimpleNamespace(image=image, as_pointer=lambda number=number: number) for number, image in
+                         enumerate((None, None, "something else")))  # fmt: skip
+    monkeypatch.setattr(editor, "all_spaces", lambda _: [(None, mine), (None, other), (None, busy)])
+    monkeypatch.setattr(following, "_shown_in", {0, 2})
+    following._show_again()
+    assert (mine.image, other.image, busy.image) == (then, None, "something else")
