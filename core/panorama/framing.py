@@ -18,6 +18,7 @@ from ..cameras.view import View
 from ..choices import Level
 from ..raster.arrays import Array
 from ..raster.rectangle import largest_rectangle
+from ..system.errors import BadRequest
 from .framing_options import FRAMING
 from .levelling import gravity, turned, upright
 from .projection import Projection, focal_of, round_projection
@@ -103,6 +104,11 @@ def frame_for(
     Returns
     -------
     Projection
+
+    Raises
+    ------
+    BadRequest
+        The frame that is asked for shows nothing.
     """
     return frame_of(asked, views, edges, down, coverage(warp_on(coarse_sphere(views))))
 
@@ -280,4 +286,7 @@ def _windowed(
     left, top, right, bottom = *(middle - half), *(middle + half)
     if fov is not None:
         left, right = (point(yaw + sign * np.radians(fov) / 2)[0] for sign in (-1, 1))
-    return replace(projection, window=(round(left), round(top), round(right) + 1, round(bottom) + 1))
+    window = (round(left), round(top), round(right) + 1, round(bottom) + 1)
+    if not ((points >= window[:2]) & (points < window[2:])).all(axis=1).any():
+        raise BadRequest("the frame lies beside all pictures: give a centre nearer to 0,0, or a larger field of view")
+    return replace(projection, window=window)
