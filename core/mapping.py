@@ -22,7 +22,7 @@ from .field.slack import SlackField
 from .field.strict import StrictField
 from .options import StitchOptions
 from .panorama.choosing_slide import SlideChoice, choose_slide
-from .panorama.framing import FrameRequest, frame_for
+from .panorama.framing import FrameRequest, coarse_sphere, frame_for
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
@@ -136,10 +136,12 @@ def map_pictures(
         return Mapped(warp_on(None), continuation, SlideChoice(0.0, (), "the reference's own plane has one viewpoint"))
     slide = SlideChoice(0.0, (), "as asked for")
     progress("warp", 0.2)
-    if options.slide and has_depth:
+    if options.slide == "auto" and field.two_view.model != "general":
+        slide = SlideChoice(0.0, (), "the pictures show one plane, or were taken from one place")
+    elif options.slide and has_depth:
         slide = _slide(warp_on, views, pictures, lines, options, lambda share: progress("warp", 0.2 + 0.2 * share))
     progress("warp", 0.4)
-    shown = _seen_from(slide.s1, warp_on, views, lines, CHOICE.base_px_per_radian)
+    shown = _seen_from(slide.s1, warp_on, views, lines, coarse_sphere(views).focal)
     kind, distance = options.surface
     asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
     edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
@@ -158,7 +160,7 @@ def _slide(
         if viewpoint_between(base, views) is None:
             return SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
         return SlideChoice(float(options.slide), (), "as asked for")
-    seam = RoughSeam.of(pictures, views, CHOICE.seam_px_per_radian)
+    seam = RoughSeam.of(pictures, views, CHOICE.base_px_per_radian)
     return choose_slide(base, views, lines.each, lines.down if lines.down_is_sure else None, seam, progress)
 
 
