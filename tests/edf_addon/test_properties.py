@@ -130,6 +130,8 @@ def test_the_frame_is_moved_and_sized_in_degrees_and_the_reference_keeps_its_own
     options = engine_options.options_of(settings)
     assert options["centre"] == pytest.approx([10, -4], abs=1e-5) and options["fov"] == pytest.approx(90, abs=1e-5)
     assert options["slide"] == 0.25
+    settings.projection = "EQUIRECTANGULAR"
+    assert engine_options.options_of(settings)["fov"] is None, "a sphere is whole"
     bpy.ops.edf.reference_frame()
     options = engine_options.options_of(settings)
     assert (options["projection"], options["slide"], options["crop"]) == ("reference", 0.0, "full")
