@@ -10,6 +10,8 @@ CHOICES = ("field", "fade", "seam", "blend", "holes")
 VALUES = ("dense", "exposure", "seed")
 # Projections whose frame is neither moved nor narrowed.
 WHOLE = ("REFERENCE", "EQUIRECTANGULAR")
+# Degrees below which no frame can be as narrow, and all is shown.
+LEAST_FOV = 1.0
 
 
 def options_of(settings: Any, scale: float | None = None) -> dict[str, Any]:
@@ -40,8 +42,11 @@ def frame_of(settings: Any, scale: float = 1.0) -> dict[str, Any]:
         frame["level"] = [math.degrees(angle) for angle in settings.level_angles]
     is_whole = settings.projection in WHOLE
     is_moved = not is_whole and any(settings.centre)
-    frame["centre"] = [math.degrees(angle) for angle in settings.centre] if is_moved else None
-    frame["fov"] = math.degrees(settings.fov) if settings.fov and not is_whole else None
+    # Blender's single floats reach a little beyond half a turn and a whole one
+    centre = [max(-180.0, min(180.0, math.degrees(angle))) for angle in settings.centre]
+    frame["centre"] = centre if is_moved else None
+    fov = min(360.0, math.degrees(settings.fov))
+    frame["fov"] = fov if fov >= LEAST_FOV and not is_whole else None
     return frame
 
 
