@@ -259,7 +259,7 @@ def _resized(projection: Projection, covered: Coverage) -> Projection:
     weights = (area * covered.solid_angle)[drawn]
     enlarged = np.sqrt(area[drawn] / covered.sharpness[drawn])
     median, most = _weighted_percentiles(enlarged, weights, (50.0, FRAMING.enlarged_percent))
-    focal = projection.focal / max(median, most / FRAMING.max_enlarged)
+    focal = projection.focal / (median * np.clip(most / (median * FRAMING.max_enlarged), 1, FRAMING.max_reduction))
     if projection.sphere is not None:
         return round_projection(projection.kind, projection.K, projection.rotation, focal)
     return replace(projection, focal=focal)

@@ -99,8 +99,7 @@ def _mapped(
         confidence[rows] = np.where(hidden, np.float32(0), more[..., 2])
 
     each(put, small_strips(shape))
-    # single pixels are rounding at the edges of near things
-    unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.speck_px,) * 2, np.uint8)) > 0
+    unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.least_behind_px,) * 2, np.uint8)) > 0
     return Warp(canvas, tuple(maps), depth, confidence, slide, unseen, viewpoint)
 
 
