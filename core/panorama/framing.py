@@ -290,8 +290,8 @@ def _windowed(
         ray = np.array([level * np.sin(heading), -np.sin(pitch), level * np.cos(heading)])
         return projection.points(projection.rotation @ ray)
 
-    middle, half = point(yaw), (high - low) / 2
-    left, top, right, bottom = *(middle - half), *(middle + half)
+    half = (high - low) / 2
+    (left, top), (right, bottom) = point(yaw) - half, point(yaw) + half
     if fov is not None:
         left, right = (point(yaw + sign * np.radians(fov) / 2)[0] for sign in (-1, 1))
     window = (round(left), round(top), round(right) + 1, round(bottom) + 1)
