@@ -52,7 +52,7 @@ class Mapped:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class AllEdges:
     """Straight edges (N) of each picture whose orientation is known, in the reference's frame, found when asked for."""
 
     pictures: Sequence[Picture]
@@ -116,7 +116,7 @@ def map_pictures(
     NoOverlap, OutputTooLarge, BadRequest
         There is no canvas for it (see `build_warp`).
     """
-    lines = Lines(pictures, views)
+    lines = AllEdges(pictures, views)
     progress("warp", 0.0)
     continuation = None
     has_depth = isinstance(field, (StrictField, SlackField)) and np.isfinite(views[1].R).all()
@@ -151,7 +151,7 @@ def map_pictures(
 
 
 def _slide(
-    warp_on: WarpOn, views: tuple[View, ...], pictures: Sequence[Picture], lines: Lines,
+    warp_on: WarpOn, views: tuple[View, ...], pictures: Sequence[Picture], lines: AllEdges,
     options: StitchOptions, progress: Callable[[float], None],
 ) -> SlideChoice:  # fmt: skip
     """How far the viewpoint slides: as asked for, or chosen."""
@@ -165,7 +165,7 @@ def _slide(
 
 
 def _seen_from(
-    s1: float, warp_on: WarpOn, views: tuple[View, ...], lines: Lines, px_per_radian: float
+    s1: float, warp_on: WarpOn, views: tuple[View, ...], lines: AllEdges, px_per_radian: float
 ) -> Callable[[Projection], Warp]:
     """Gives the maps on a projection as the viewpoint that slides by s1 sees them; depth is carried over from a map of
     some px per radian."""
@@ -179,7 +179,7 @@ def _seen_from(
     return lambda projection: slid_warp(base, views, sliding, projection)
 
 
-def _base(warp_on: WarpOn, views: Sequence[View], lines: Lines, px_per_radian: float) -> Warp:
+def _base(warp_on: WarpOn, views: Sequence[View], lines: AllEdges, px_per_radian: float) -> Warp:
     """The maps on a levelled cylinder, seen from the reference's place."""
     projection = round_projection("cylindrical", views[0].K, upright(lines.down))
     return warp_on(replace(projection, focal=px_per_radian), True)
