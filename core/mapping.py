@@ -22,7 +22,7 @@ from .field.slack import SlackField
 from .field.strict import StrictField
 from .options import StitchOptions
 from .panorama.choosing_slide import SlideChoice, choose_slide
-from .panorama.framing import FrameRequest, frame_for
+from .panorama.framing import FrameRequest, coarse_sphere, frame_for
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
@@ -36,6 +36,9 @@ from .system.progress import ReportProgress
 
 if TYPE_CHECKING:
     from .pictures.picture import Picture
+
+# The maps on a projection, and whether to keep its depth as an array.
+WarpOn = Callable[..., Warp]
 
 
 @dataclass(frozen=True)
@@ -126,17 +129,19 @@ def map_pictures(
             ),
         )  # fmt: skip
 
-    def warp_on(projection: Projection | None) -> Warp:
-        return build_warp(field, views, projection, refined, continuation)
+    def warp_on(projection: Projection | None, hold: bool = False) -> Warp:
+        return build_warp(field, views, projection, refined, continuation, hold)
 
     if options.surface[0] == "reference":
         return Mapped(warp_on(None), continuation, SlideChoice(0.0, (), "the reference's own plane has one viewpoint"))
     slide = SlideChoice(0.0, (), "as asked for")
     progress("warp", 0.2)
-    if options.slide and has_depth:
+    if options.slide == "auto" and field.two_view.model != "general":
+        slide = SlideChoice(0.0, (), "the pictures show one plane, or were taken from one place")
+    elif options.slide and has_depth:
         slide = _slide(warp_on, views, pictures, lines, options, lambda share: progress("warp", 0.2 + 0.2 * share))
     progress("warp", 0.4)
-    shown = _seen_from(slide.s1, warp_on, views, lines, CHOICE.base_px_per_radian)
+    shown = _seen_from(slide.s1, warp_on, views, lines, coarse_sphere(views).focal)
     kind, distance = options.surface
     asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
     edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
@@ -146,7 +151,7 @@ def map_pictures(
 
 
 def _slide(
-    warp_on: Callable[[Projection], Warp], views: tuple[View, ...], pictures: Sequence[Picture], lines: Lines,
+    warp_on: WarpOn, views: tuple[View, ...], pictures: Sequence[Picture], lines: Lines,
     options: StitchOptions, progress: Callable[[float], None],
 ) -> SlideChoice:  # fmt: skip
     """How far the viewpoint slides: as asked for, or chosen."""
@@ -155,12 +160,12 @@ def _slide(
         if viewpoint_between(base, views) is None:
             return SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
         return SlideChoice(float(options.slide), (), "as asked for")
-    seam = RoughSeam.of(pictures, views, CHOICE.seam_px_per_radian)
+    seam = RoughSeam.of(pictures, views, CHOICE.base_px_per_radian)
     return choose_slide(base, views, lines.each, lines.down if lines.down_is_sure else None, seam, progress)
 
 
 def _seen_from(
-    s1: float, warp_on: Callable[[Projection], Warp], views: tuple[View, ...], lines: Lines, px_per_radian: float
+    s1: float, warp_on: WarpOn, views: tuple[View, ...], lines: Lines, px_per_radian: float
 ) -> Callable[[Projection], Warp]:
     """Gives the maps on a projection as the viewpoint that slides by s1 sees them; depth is carried over from a map of
     some px per radian."""
@@ -174,9 +179,7 @@ def _seen_from(
     return lambda projection: slid_warp(base, views, sliding, projection)
 
 
-def _base(
-    warp_on: Callable[[Projection], Warp], views: Sequence[View], lines: Lines, px_per_radian: float
-) -> Warp:
+def _base(warp_on: WarpOn, views: Sequence[View], lines: Lines, px_per_radian: float) -> Warp:
     """The maps on a levelled cylinder, seen from the reference's place."""
     projection = round_projection("cylindrical", views[0].K, upright(lines.down))
-    return warp_on(replace(projection, focal=px_per_radian))
+    return warp_on(replace(projection, focal=px_per_radian), True)

@@ -39,8 +39,8 @@ class StitchOptions:
     ----------
     field : str, default "slack"
         The displacement field, one of FIELDS.
-    fade : str, default "plane"
-        What the field fades to outside the overlap, one of FADES.
+    fade : str, default "continue"
+        What becomes of depth outside the overlap, one of FADES.
     camera : CameraRequest
         What is known of the cameras. By default nothing: EXIF is asked, or the focal length estimated.
     matches : Path or ndarray (N, 4 or 5), optional
@@ -49,10 +49,10 @@ class StitchOptions:
     ignore : tuple of (Path, ndarray or None), default empty
         For each picture, the reference first, a mask of what is kept out of everything, white = ignored. None, and what
         is not named: nothing.
-    slide : float or "auto", default 0
+    slide : float or "auto", default "auto"
         How far the viewpoint slides from the reference's place to the target's across the overlap: 0 stays, 1 goes all
         the way, "auto" chooses (docs/method.md).
-    projection : str, default "reference"
+    projection : str, default "auto"
         The surface that the panorama lies on, one of PROJECTIONS, or "pannini:D" with a distance D from 0 to 1.
         "reference" keeps every pixel of the reference: it implies no slide and the full canvas.
     level : str or (yaw, pitch, roll), default "auto"
@@ -64,7 +64,7 @@ class StitchOptions:
         Horizontal field of view of the frame, degrees; all that is shown by default.
     scale : float, default 1
         Factor by which all pictures are resized first, from LEAST_SCALE to 1.
-    crop : str or (left, top, width, height), default "full"
+    crop : str or (left, top, width, height), default "auto"
         What is kept of the panorama: one of CROPS, or a box in px of it (see `crop_box`). "auto" keeps all on the
         reference's plane and of a sphere that is asked for.
     dense : bool, default True
@@ -78,7 +78,7 @@ class StitchOptions:
         seam decides.
     exposure : bool, default True
         Whether the target's exposure and white balance are matched to the reference's.
-    holes : str, default "transparent"
+    holes : str, default "auto"
         What becomes of pixels that no camera saw, one of HOLES: "auto" fills small closed holes, "inpaint" all that
         something near hid. `linear` blending has none of the latter.
     seed : int, default 0
@@ -92,23 +92,23 @@ class StitchOptions:
     """
 
     field: str = "slack"
-    fade: str = "plane"
+    fade: str = "continue"
     camera: CameraRequest = CameraRequest()
     matches: Path | NDArray[Any] | None = None
     ignore: tuple[Path | NDArray[Any] | None, ...] = ()
-    slide: Slide = 0.0
-    projection: str = "reference"
+    slide: Slide = "auto"
+    projection: str = "auto"
     level: Level = "auto"
     centre: tuple[float, float] | None = None
     fov: float | None = None
     scale: float = 1.0
-    crop: Crop = "full"
+    crop: Crop = "auto"
     dense: bool = True
     blend: str = "multiband"
     seam: str = "graphcut"
     mask: Path | NDArray[Any] | None = None
     exposure: bool = True
-    holes: str = "transparent"
+    holes: str = "auto"
     seed: int = 0
     measure: bool = True
     cache: Path | None = dataclasses.field(default=None, compare=False)

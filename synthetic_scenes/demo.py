@@ -1,12 +1,13 @@
-"""`edf demo`: render a pair, stitch it, measure the result against the truth, and say so in a few lines."""
+"""`edf demo`: render a pair, stitch it on the reference's plane, measure the result against the truth, and say so in a
+few lines."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from ..core.cameras.sources import CameraRequest
-from ..core.options import StitchOptions
 from ..core.output.outputs import OutputRequest, write
 from ..core.pictures.encoding import encode_picture
 from ..core.pipeline import stitch
@@ -14,6 +15,7 @@ from ..core.system.output_files import OutputFiles
 from .measures import figures, on_the_wide_canvas, truth_of, whole_picture
 from .recipes import RECIPES, Difficulty
 from .rendered import rendered_pair
+from .stitches import ON_REFERENCE
 
 SCENE, SIZE = "tabletop", (640, 480)
 MEASURES = (
@@ -41,7 +43,7 @@ def run_demo(folder: Path, overwrite: bool, progress: Callable[[str, float], Non
         pair = rendered_pair(RECIPES[SCENE], Difficulty(), SIZE, folder / "pictures")
         # a camera's EXIF would tell the focal length
         known = CameraRequest(focal_px=(float(pair.cameras["reference"].K[0, 0]),))
-        result = stitch((pair.reference, pair.target), StitchOptions(camera=known), progress)
+        result = stitch((pair.reference, pair.target), replace(ON_REFERENCE, camera=known), progress)
         truth = truth_of(pair)
         picture, shown = on_the_wide_canvas(result, truth)
         measured = figures(result, truth) | whole_picture(picture, shown, truth)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,13 +13,14 @@ from ..core.cameras.projective import distance_to_line
 from ..core.compose.blend import averaged
 from ..core.compose.composition import composed
 from ..core.measure.metrics import appearance, coverage_samples, overlap_quality, psnr, ssim
-from ..core.options import StitchOptions
 from ..core.panorama.layers import Layer
 from ..core.pipeline import StitchResult
 from ..core.raster.arrays import Array
 from ..core.raster.colour import encode
-from .ground_truth import TrueGeometry, pose_errors, seen_from, visible
+from ..core.raster.sampling import fetch
+from .ground_truth import SAME_DEPTH, TrueGeometry, pose_errors, seen_from, visible
 from .rendered import RenderedPair
+from .stitches import ON_REFERENCE
 
 # True matches that judge an estimated F.
 MATCHES = 5000
@@ -52,14 +54,14 @@ def truth_of(pair: RenderedPair) -> Truth:
 
 
 def figures(result: StitchResult, truth: Truth) -> dict[str, float]:
-    """All figures of a stitch; NaN where one has no meaning.
+    """All figures of a stitch on the reference's plane; NaN where one has no meaning.
 
     rotation_deg, focal_percent, epipole_deg (direction of the baseline), h_inf_px and h_inf_p95_px (transfer error,
     median and 95th percentile), f_px (mean distance of true matches from the estimated lines); projectivity_px and
     projectivity_p95_px (what the map shows outside the reference, from the true lines: mean, 95th percentile);
     alignment_px, alignment_p95_px (map against the true map where both cameras see the same: median, 95th percentile),
-    beyond_px (the same outside the reference: median); overlap_psnr_db, overlap_ssim; covered (share of what the target
-    alone shows that the panorama holds).
+    beyond_px, beyond_p90_px (the same outside the reference: median, 90th percentile); overlap_psnr_db, overlap_ssim;
+    covered (share of what the target alone shows that the panorama holds).
     """
     geometry, view = truth.geometry, result.edges[0].two_view
     width, height = result.cameras[1].size
@@ -92,10 +94,33 @@ def figures(result: StitchResult, truth: Truth) -> dict[str, float]:
         **known,
         "projectivity_px": float(off.mean()), "projectivity_p95_px": _percentile(off, 95),
         "alignment_px": _percentile(apart[both], 50), "alignment_p95_px": _percentile(apart[both], 95),
-        "beyond_px": _percentile(apart[alone], 50),
+        "beyond_px": _percentile(apart[alone], 50), "beyond_p90_px": _percentile(apart[alone], 90),
         "overlap_psnr_db": quality["overlap_psnr_db"], "overlap_ssim": quality["overlap_ssim"],
         "covered": float((only[there] & (result.alpha[here] > 0.5)).sum() / only.sum()) if only.any() else math.nan,
     }  # fmt: skip
+
+
+def meeting(result: StitchResult, pair: RenderedPair, truth: Truth) -> dict[str, float]:
+    """meeting_px, meeting_p95_px: how well both pictures' pixels at a canvas point show one point of the scene, on any
+    canvas and from any viewpoint (median, 95th percentile over the overlap; NaN without one).
+
+    The distance, in px of the target, of its pixel from where the target camera really sees what the reference's pixel
+    shows. Counted where both do show it: neither picture is said to be hidden there, and both cameras see it.
+    """
+    shown, found = (picture_map.arrays() for picture_map in result.warp.maps)
+    both = shown.inside() & found.inside() & ~result.occluded[0] & ~result.occluded[1]
+    points = np.stack([shown.x[both], shown.y[both]], axis=-1)
+    x, y = (points - np.array(truth.corner)).astype(np.float32).T[:, None]
+    with np.errstate(divide="ignore"):
+        inverse = (1.0 / pair.wide_depth).astype(np.float32)[..., None]
+    near, between = (fetch(inverse, x, y, how)[0, :, 0] for how in (cv2.INTER_NEAREST, cv2.INTER_LINEAR))
+    # inverse depth is affine on a plane; across the edge of an object it belongs to nothing
+    inverse = np.where(np.abs(between - near) <= SAME_DEPTH * near, between, near)
+    seen = fetch(truth.overlap.astype(np.float32)[..., None], x, y, cv2.INTER_NEAREST)[0, :, 0] > 0
+    with np.errstate(divide="ignore"):
+        true = truth.geometry.target_pixels(points, 1.0 / inverse.astype(np.float64))
+    apart = np.hypot(found.x[both] - true[:, 0], found.y[both] - true[:, 1])[seen]
+    return {"meeting_px": _percentile(apart, 50), "meeting_p95_px": _percentile(apart, 95)}
 
 
 def on_the_wide_canvas(result: StitchResult, truth: Truth) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
@@ -126,7 +151,7 @@ def composition(result: StitchResult, truth: Truth) -> dict[str, float]:
     seam_visibility (NaN without a seam): see `metrics.appearance`.
     """
     floats = [picture.bits == 32 for picture in result.pictures]
-    made = composed(result.layers, result.warp, result.views, StitchOptions(), floats, None, lambda *_: None)
+    made = composed(result.layers, result.warp, result.views, ON_REFERENCE, floats, None, lambda *_: None)
     panorama, (reference, target) = made.panorama, made.exposed
     average = averaged(reference, target, reference.alpha > 0)
     both = ((reference.alpha > 0.5) & (target.alpha > 0.5) & (panorama.alpha > 0.5)).astype(np.float32)

@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from ..core.output.page import STYLE, table
-from .thresholds import LEAD, SAYING_RUN, Check, Median, Result, Verdict
+from .thresholds import BEYOND_MEASURES, BEYOND_RUN, LEAD, SAYING_RUN, Check, Median, Result, Verdict
 
 # Figures of a run: what people call them, their unit, digits after the point.
 MEASURES = {
@@ -18,8 +18,9 @@ MEASURES = {
     "h_inf_p95_px": ("H∞ transfer, 95th", "px", 3), "f_px": ("F: true matches off their lines", "px", 3),
     "projectivity_px": ("projectivity, mean", "px", 3), "projectivity_p95_px": ("projectivity, 95th", "px", 3),
     "alignment_px": ("alignment, median", "px", 3), "alignment_p95_px": ("alignment, 95th", "px", 3),
-    "beyond_px": ("outside the overlap, median", "px", 3), "overlap_psnr_db": ("overlap PSNR", "dB", 2),
-    "overlap_ssim": ("overlap SSIM", "", 4), "covered": ("share of the target's own part shown", "", 3),
+    "beyond_px": ("outside the overlap, median", "px", 3), "beyond_p90_px": ("outside the overlap, 90th", "px", 3),
+    "overlap_psnr_db": ("overlap PSNR", "dB", 2), "overlap_ssim": ("overlap SSIM", "", 4),
+    "covered": ("share of the target's own part shown", "", 3),
     "whole_psnr_db": ("whole picture PSNR", "dB", 2), "whole_ssim": ("whole picture SSIM", "", 4),
     "composed_psnr_db": ("composed: whole picture PSNR", "dB", 2),
     "composed_ssim": ("composed: whole picture SSIM", "", 4),
@@ -29,6 +30,10 @@ MEASURES = {
     "source_fidelity_mean": ("source fidelity, mean", "", 4),
     "source_fidelity_p5": ("source fidelity, 5th percentile", "", 4),
     "seam_visibility": ("seam visibility", "levels", 2),
+    "slid_auto_px": ("viewpoint slides as chosen: both pictures meet, median", "px", 3),
+    "slid_auto_p95_px": ("viewpoint slides as chosen: both pictures meet, 95th", "px", 3),
+    "slid_half_px": ("viewpoint slides half-way: both pictures meet, median", "px", 3),
+    "slid_half_p95_px": ("viewpoint slides half-way: both pictures meet, 95th", "px", 3),
 }  # fmt: skip
 OTHER_NAMES = {
     "lead_db": "whole picture's lead over the best rival", "model": "model", "status": "status",
@@ -77,6 +82,7 @@ def page(results: Sequence[Result], suite: str, version: str, verdict: Verdict, 
         _bars(middles, verdict.complete), _failures(general),
         "<h2>Scenes</h2>", _overview(results, verdict),
         "<h2>Whole picture against the true panorama</h2>", _rivals(results),
+        "<h2>Outside the overlap</h2>", _beyond(results),
         *(_section(result, [c for c in verdict.checks if c.scene == result["scene"]]) for result in results),
         "</main>", "</body>", "</html>", "",
     ])  # fmt: skip
@@ -175,6 +181,21 @@ def _rivals(results: Sequence[Result]) -> str:
             cells += f"<td class=n>{f'<b>{text}</b>' if value is not None and value == best else text}</td>"
         rows.append(f'<tr><th><a href="#{_slug(result)}">{escape(result["scene"])}</a></th>{cells}</tr>')
     return table(head, rows) + '<p class="quiet">PSNR in dB over the pixels that all of them show; best: bold.</p>'
+
+
+def _beyond(results: Sequence[Result]) -> str:
+    """How far the map is off where the target alone sees: the default field beside one homography."""
+    titles = ("K known, slack", "K known, one homography")
+    groups = "".join(f'<th colspan="{len(BEYOND_MEASURES)}" class=first>{title}</th>' for title in titles)
+    columns = "<th class=n>median px</th><th class=n>90th px</th>" * len(titles)
+    rows = []
+    for result in results:
+        cells = ""
+        for way in (BEYOND_RUN, "known/homography"):
+            run = result["runs"].get(way) or {"figures": {}}
+            cells += "".join(_cell(run["figures"].get(name), name, None) for name in BEYOND_MEASURES)
+        rows.append(f'<tr><th><a href="#{_slug(result)}">{escape(result["scene"])}</a></th>{cells}</tr>')
+    return table(f"<tr><th rowspan=2>scene</th>{groups}</tr><tr>{columns}</tr>", rows)
 
 
 def _section(result: Result, checks: Sequence[Check]) -> str:

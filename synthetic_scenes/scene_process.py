@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,11 @@ from ..core.measure.report import plain
 from ..core.output.outputs import json_bytes
 from ..core.system.errors import StitchError
 from ..core.system.output_files import OutputFiles
-from .measures import composition, figures, on_the_wide_canvas, truth_of, whole_picture
+from .measures import Truth, composition, figures, meeting, on_the_wide_canvas, truth_of, whole_picture
 from .recipes import parse_scene
-from .rendered import rendered_pair
+from .rendered import RenderedPair, rendered_pair
 from .scene_pictures import scene_pictures
-from .stitches import WAYS, Shared, stitched
+from .stitches import SLIDES, WAYS, Shared, slid, stitched
 
 SCHEMA = 1
 # The stitch that the report shows, and that whose composition is judged: of the default field.
@@ -59,7 +60,7 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
         if common is not None:
             measured |= whole_picture(placed[way][0], common, truth)
         if way == COMPOSED:
-            measured |= composition(result, truth)
+            measured |= composition(result, truth) | _slid_figures(pair, truth, shared)
         said = any("not determined" in text for text in (view.focal_source, *result.warnings))
         # in a rival's hands the model is no decision
         model = None if way.endswith(RIVALS) else view.model
@@ -80,6 +81,17 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
         files.add_to_folder(folder / "scenes", f"{name}.timing.json", json_bytes(seconds))
         files.add_to_folder(folder / "scenes", f"{name}.json", json_bytes(plain(entry)))
     return seconds
+
+
+def _slid_figures(pair: RenderedPair, truth: Truth, shared: Shared) -> dict[str, float]:
+    """`measures.meeting` of the default field by how far the viewpoint slides, slid_auto_px and so on; a slide that is
+    refused has no figures."""
+    out: dict[str, float] = {}
+    for name, slide in SLIDES.items():
+        with suppress(StitchError):
+            found = meeting(slid(pair, COMPOSED, slide, shared), pair, truth)
+            out |= {key.replace("meeting", f"slid_{name}"): value for key, value in found.items()}
+    return out
 
 
 def _run(

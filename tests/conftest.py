@@ -12,7 +12,7 @@ import os
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -30,6 +30,8 @@ from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.synthetic_scenes.two_planes import Pair, make_pair
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
+
+from .pairs import ON_REFERENCE
 
 # The same examples on every machine, and no verdict by the clock: a busy one is slow, not wrong.
 settings.register_profile(
@@ -58,7 +60,7 @@ def small_pair() -> Pair:
 
 
 def true_focal(pair: Pair) -> StitchOptions:
-    return StitchOptions(camera=CameraRequest(focal_px=(pair.reference_camera.K[0, 0],)))
+    return replace(ON_REFERENCE, camera=CameraRequest(focal_px=(pair.reference_camera.K[0, 0],)))
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Warps and results of two pictures, made or changed by hand."""
+"""Options of a flat panorama; warps and results of two pictures, made or changed by hand."""
 
 from __future__ import annotations
 
@@ -10,11 +10,18 @@ from edf_stitch.core.alignment import Alignment
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.cameras.view import views_of
+from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
 from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.raster.picture_map import PictureMap
+
+# The reference's own plane, whole, where what holds for single pixels of the reference can be asked; in words as well.
+ON_REFERENCE = StitchOptions(projection="reference", slide=0.0, fade="plane", crop="full", holes="transparent")
+REFERENCE_WORDS = ("--projection", "reference", "--fade", "plane", "--crop", "full", "--holes", "transparent")
+# What the small pair's fixture `known` says, in words.
+KNOWN_WORDS = ("--focal-px", "228", *REFERENCE_WORDS)
 
 Aligned = TypeVar("Aligned", Alignment, StitchResult)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..choices import BLENDS, FADES, FIELDS, HOLES, SEAMS, Slide
+from ..choices import BLENDS, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS, Slide
 
 if TYPE_CHECKING:
     from ..options import StitchOptions
@@ -74,8 +74,8 @@ def _add_control(parser: argparse.ArgumentParser) -> None:
         "--scale", type=float, default=1.0, metavar="S", help="resize both pictures by S ≤ 1 first, for a fast preview"
     )
     control.add_argument(
-        "--crop", default="full", metavar="CROP",
-        help="full (default), auto (the largest full rectangle if that keeps most, else all that is shown), inscribed "
+        "--crop", default="auto", metavar="CROP",
+        help="auto (default: the largest full rectangle if that keeps most, else all that is shown), full, inscribed "
         "(that rectangle), reference (its frame), or X,Y,W,H in px",
     )  # fmt: skip
 
@@ -83,23 +83,23 @@ def _add_control(parser: argparse.ArgumentParser) -> None:
 def _add_alignment(how: argparse._ArgumentGroup) -> None:
     """How the pictures are brought onto the canvas, and what canvas that is."""
     how.add_argument(
-        "--fade", default="plane", type=_choice(FADES), metavar="FADE",
-        help="what it fades to outside the overlap: plane (default; the one that carries on beyond the border) or "
-        "infinity",
+        "--fade", default="continue", type=_choice(FADES), metavar="FADE",
+        help="what becomes of it outside the overlap: continue (default: what lies at the rim goes on as the picture "
+        "does), plane (it fades to the one that carries on beyond the border), or infinity",
     )  # fmt: skip
     how.add_argument(
         "--dense", action=argparse.BooleanOptionalAction, default=True,
         help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
     )  # fmt: skip
     how.add_argument(
-        "--slide", default=0.0, type=_slide, metavar="SLIDE",
-        help="how far the viewpoint slides from REF's place to TARGET's across the overlap: auto, or a share from 0 "
-        "(default: not at all) to 1",
+        "--slide", default="auto", type=_slide, metavar="SLIDE",
+        help="how far the viewpoint slides from REF's place to TARGET's across the overlap: auto (default), or a share "
+        "from 0 (not at all) to 1",
     )  # fmt: skip
     how.add_argument(
-        "--projection", default="reference", metavar="PROJECTION",
-        help="reference (default: the plane and place of REF, every pixel of it kept), auto (by the field of view, "
-        "levelled and centred), perspective (a plane), pannini[:D] (D from 0, a plane, to 1), cylindrical, or "
+        "--projection", default="auto", type=_projection, metavar="PROJECTION",
+        help="auto (default: by the field of view, levelled and centred), reference (the plane and place of REF, every "
+        "pixel of it kept), perspective (a plane), pannini[:D] (D from 0, a plane, to 1), cylindrical, or "
         "equirectangular (the whole sphere)",
     )  # fmt: skip
     how.add_argument(
@@ -135,8 +135,8 @@ def _add_composition(how: argparse._ArgumentGroup) -> None:
         help="match TARGET's exposure and white balance to REF's (default)",
     )  # fmt: skip
     how.add_argument(
-        "--holes", default="transparent", type=_choice(HOLES), metavar="HOLES",
-        help="what neither camera saw: transparent (default), auto (small closed holes are filled smoothly), or "
+        "--holes", default="auto", type=_choice(HOLES), metavar="HOLES",
+        help="what neither camera saw: auto (default: small closed holes are filled smoothly), transparent, or "
         "inpaint (all that something near hid)",
     )  # fmt: skip
 
@@ -190,6 +190,12 @@ def _numbers(text: str) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 1200 or 1200,1180") from None
+
+
+def _projection(text: str) -> str:
+    """A kind of projection, with whatever stands behind a colon, which StitchOptions checks."""
+    _choice(PROJECTIONS)(text.partition(":")[0])
+    return text
 
 
 def _slide(text: str) -> Slide:

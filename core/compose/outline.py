@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..cameras.view import View
 from ..choices import Crop
-from ..panorama.framing import FrameRequest, Shown, coarse_sphere, frame_of
-from ..panorama.options import FRAMING
+from ..panorama.framing import Coverage, FrameRequest, coarse_sphere, frame_of
+from ..panorama.framing_options import FRAMING
 from ..panorama.projection import Projection
 from ..raster.arrays import Array
 from ..system.errors import BadRequest
@@ -76,7 +76,7 @@ def border_of(frame: Projection, box: Array, count: int = 48) -> Array:
     return frame.rays(points)
 
 
-def _shown(sphere: Projection, views: Sequence[View], outlines: Sequence[Array]) -> Shown | None:
+def _shown(sphere: Projection, views: Sequence[View], outlines: Sequence[Array]) -> Coverage | None:
     """What lies inside the outlines, on a coarse sphere; None where one goes around the back of it."""
     left, top, width, height = sphere.sphere or (0, 0, 0, 0)
     mask: NDArray[np.uint8] = np.zeros((height, width), np.uint8)
@@ -92,4 +92,4 @@ def _shown(sphere: Projection, views: Sequence[View], outlines: Sequence[Array])
     solid_angle = np.cos((plane[:, 1] - sphere.centre[1]) / sphere.focal) / sphere.focal**2
     # as sharp as the middle of the reference
     sharpness = np.full(len(rays), float(views[0].K[0, 0] * views[0].K[1, 1]))
-    return Shown(sphere, (-left, -top), inside, rays, solid_angle, sharpness) if len(rays) else None
+    return Coverage(sphere, (-left, -top), inside, rays, solid_angle, sharpness) if len(rays) else None

@@ -218,6 +218,54 @@ class BeyondOptions:
 
 
 @dataclass(frozen=True)
+class RimOptions:
+    """What is doubted near the overlap's border (`rim`)."""
+
+    width: float = 0.05
+    """Share of the overlap's shorter side within which moves are doubted."""
+
+    beginning: float = 0.5
+    """Share of that width in which a doubtful patch has to begin."""
+
+    ignored_confidence: float = 0.4
+    """Confidence at and below which a move has no say: chance alone reaches as much."""
+
+    trusted_confidence: float = 0.7
+    """Confidence from which on the pictures bear a move out, and it has its full say."""
+
+    confidence_erosion: int = 9
+    """Nodes of the side of the window over which the lowest confidence counts."""
+
+    agreeing_px: float = 1.5
+    """px from the smooth field within which it bears a move out."""
+
+    large_px: float = 8.0
+    """px from it beyond which moves make a patch of their own: the matcher was led astray, it is no rough surface."""
+
+    usual_every: int = 8
+    """One node in so many rows and columns says which way the map turns."""
+
+    smoothness: float = 50.0
+    """λ of the edge-aware smoothing that carries sure moves to doubtful nodes of the same surface."""
+
+    field_confidence: float = 1e-3
+    """What the smooth field counts in that, relative to a sure node."""
+
+    coarse_step: int = 2
+    """Nodes along the side of a cell for that: four times less work."""
+
+    fold_tolerance: float = 1.0
+    """By how much of their squared difference the pictures may differ more in a patch afterwards, for each node of it
+    that folded before: a surface that folds is none."""
+
+    shown_share: float = 0.25
+    """Share of a patch that has to be shown afterwards, too, for the pictures to be compared."""
+
+    softness: int = 3
+    """Nodes of the side of the window over which what a patch gets and what lies around it pass into each other."""
+
+
+@dataclass(frozen=True)
 class PolishOptions:
     """The last fraction of a pixel (`polish`; Lucas and Kanade, IJCAI 1981). Gray levels are 0 to 255."""
 
@@ -283,3 +331,4 @@ SMOOTHING = SmoothingOptions()
 UNFOLDING = UnfoldingOptions()
 POLISH = PolishOptions()
 BEYOND = BeyondOptions()
+RIM = RimOptions()

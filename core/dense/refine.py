@@ -31,6 +31,7 @@ from .matching import ComparedPicture, search, search_base
 from .moved_depth import build_refinement
 from .options import BEYOND, REFINE
 from .polish import likeness, polish
+from .rim import Found, borne_out
 from .unfolding import unfolded
 
 
@@ -109,7 +110,8 @@ def refine(
     # smooth surfaces that look alike in both pictures are matched well without texture, noise is not
     similar = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
     plain = _plain(lines, sparse, views[0]) * (1 - similar)
-    weights = edge_weights(_guide(pictures[0].view, lines), REFINE.edge_levels)
+    guide = _guide(pictures[0].view, lines)
+    weights = edge_weights(guide, REFINE.edge_levels)
     weights = strengthen(cut_edges(weights, along, found > 0, REFINE.depth_edge_px), plain, REFINE.plain_strength)
     weight = np.maximum(found * (1 - np.float32(REFINE.plain_doubt) * plain), np.float32(REFINE.field_confidence))
     along = Smoother.of(weights, REFINE.smoothness).smoothed(along, weight)
@@ -119,7 +121,10 @@ def refine(
     overlap = _in_both(lines, polished.along, polished.across, pictures)
     if not overlap.any():
         return Dense(None, "the overlap is too small")
-    along = unfolded(lines, two_view, cameras[1].size, polished.along, polished.across) - field_at
+    both = overlap & _in_both(lines, field_at, np.zeros_like(field_at), pictures)
+    along = borne_out(lines, Found(polished.along, polished.across, field_at, confidence), both, guide, views)
+    overlap = _in_both(lines, along, polished.across, pictures)
+    along = unfolded(lines, two_view, cameras[1].size, along, polished.across) - field_at
     refinement = build_refinement(lines, base, along, polished.across, confidence, overlap)
     along_rms, across_rms = (float(np.sqrt(np.square(v[overlap]).mean())) for v in (along, polished.across))
     return Dense(refinement, "", reach, float((found[overlap] > 0).mean()), along_rms, across_rms)

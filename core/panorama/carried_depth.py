@@ -7,7 +7,7 @@ look up where a pixel comes from, again and again, would be simpler, but tears a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,56 +15,71 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cameras.projective import inverse_intrinsics
+from ..cameras.lens import distort
+from ..cameras.projective import ahead_of_camera, inverse_intrinsics
 from ..cameras.view import View
-from ..raster.arrays import Array, Plane, strips
+from ..raster.arrays import Array, Plane, beside, bounds, strips, with_margin
+from ..raster.options import PARTS
+from ..raster.picture_map import falls_inside
 from ..raster.pull_push import filled
 from ..raster.sampling import fetch
 from ..system.threads import each, in_order
 from .canvas import Canvas
-from .options import CARRY, SLIDE
+from .options import CARRY
 from .projection import Projection
 from .viewpoint import Viewpoint
 from .warp import Warp
 
 # three coordinates, each (…)
-Rays = Sequence[NDArray[np.float32]]
+Rays = Sequence[NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
     """The surface that both pictures show, from the reference's place, on a canvas.
 
-    depth (H, W): d, finite and not below 0; shown (H, W): where a picture shows it; to_ray (3, 3): K⁻¹ of the
-    reference.
+    depth (H, W): d, finite and not below 0; reference: its view; seen (H, W): where the target shows it.
     """
 
     canvas: Canvas
     projection: Projection
     depth: Plane
-    shown: NDArray[np.bool_]
-    to_ray: Array
+    reference: View
+    seen: NDArray[np.bool_]
 
     @staticmethod
     def of(base: Warp, views: Sequence[View]) -> Surface:
         """The surface of a warp on a cylinder or sphere that holds both pictures."""
-        if base.canvas.projection is None:
+        projection = base.canvas.projection
+        if projection is None:
             raise ValueError("the surface is carried over from a cylinder or sphere")
-        shown = np.logical_or.reduce([one.inside() for one in base.maps])
         depth = np.maximum(np.nan_to_num(base.inverse_depth), np.float32(0))
-        to_ray = inverse_intrinsics(views[0].K)
-        return Surface(base.canvas, base.canvas.projection, _sharpened(depth, base.canvas.projection), shown, to_ray)
+        return Surface(base.canvas, projection, _sharpened(depth, projection), views[0], base.maps[1].inside())
 
-    def places(self, rays: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Where rays (…, 3) of the reference's place meet the canvas, px x and y (…)."""
-        x, y = np.moveaxis(self.projection.points(rays), -1, 0)
-        return (x + self.canvas.offset[0]).astype(np.float32), (y + self.canvas.offset[1]).astype(np.float32)
+    def places(self, own: Rays) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Where rays (…) of the reference's place, in the projection's axes, meet the canvas, px x and y (…)."""
+        x, y = self.projection.points_of(*(part.astype(np.float32, copy=False) for part in own))
+        return x + np.float32(self.canvas.offset[0]), y + np.float32(self.canvas.offset[1])
 
-    def own_rays(self, viewpoint: Viewpoint, rows: slice, step: int) -> list[NDArray[np.float32]]:
-        """Unit rays (three arrays) in the viewpoint's axes of some rows, every `step`-th pixel of them."""
-        matrix = viewpoint.rotation.T @ self.to_ray
-        xs, ys = self.canvas.xs[::step], self.canvas.ys[rows]
-        return [part.astype(np.float32) for part in self.canvas.project_rows(matrix, xs, ys)]
+    def rays(self, canvas: Canvas, xs: Array, ys: Array) -> list[NDArray[np.float32]]:
+        """Unit rays (three arrays), in the projection's axes, of columns and lines of a canvas, px of its plane."""
+        matrix = self.projection.rotation.T @ inverse_intrinsics(self.reference.K)
+        return [part.astype(np.float32) for part in canvas.project_rows(matrix, xs, ys)]
+
+    def points(self, viewpoint: Viewpoint, rows: slice, every: int) -> tuple[list[NDArray[np.float32]], Plane]:
+        """Points q / d (three arrays (N,), in the projection's axes, and d (N,)) of some rows, every so many px, that
+        a picture shows and that the viewpoint does not see from the reference's place."""
+        own = self.rays(self.canvas, self.canvas.xs[::every], self.canvas.ys[rows])
+        slides = viewpoint.slide_of(*turned(viewpoint.rotation.T @ self.projection.rotation, own)) > 0
+        own = [part[slides] for part in own]
+        x, y, ahead = turned(self.reference.K @ self.projection.rotation, own)
+        camera = self.reference.camera
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ideal = np.stack([x / ahead, y / ahead], axis=-1)
+        raw = distort(ideal, camera) if camera.distortion.any() else ideal
+        shown = (ahead_of_camera(x, y, ahead) & falls_inside(raw[:, 0], raw[:, 1], camera.size))
+        shown |= self.seen[rows, ::every][slides]
+        return [part[shown] for part in own], self.depth[rows, ::every][slides][shown]
 
 
 @dataclass(frozen=True)
@@ -76,8 +91,29 @@ class Lattice:
     shape: tuple[int, int]
 
 
+def turned(matrix: Array, rays: Rays) -> list[NDArray[Any]]:
+    """A matrix (3, 3) times rays (three arrays), of their precision."""
+    kind = rays[0].dtype.type
+    x, y, z = rays
+    return [kind(a) * x + kind(b) * y + kind(c) * z for a, b, c in matrix]
+
+
+def looked_up(values: NDArray[np.float32], x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Values (H, W[, C]) at places x, y (h, w) px, bilinear; 0 outside."""
+    if max(values.shape[:2]) <= PARTS.max_remap_side:
+        found: NDArray[np.float32] = cv2.remap(values, x, y, cv2.INTER_LINEAR)
+        return found
+    found = fetch(values.reshape(*values.shape[:2], -1), x, y, cv2.INTER_LINEAR)
+    return found.reshape(*x.shape, *values.shape[2:])
+
+
+def small_strips(shape: tuple[int, ...]) -> Iterator[slice]:
+    """Rows of a picture (H, W), so few at a time that what is worked out of them stays in the processor's cache."""
+    return strips((shape[0], CARRY.smaller_strips * shape[1]))
+
+
 def carried_depth(surface: Surface, viewpoint: Viewpoint, projection: Projection, lattice: Lattice) -> Plane:
-    """The inverse depth that is seen from a sliding viewpoint.
+    """The inverse depth that is seen from a sliding viewpoint, where that is not the reference's place.
 
     Parameters
     ----------
@@ -94,13 +130,16 @@ def carried_depth(surface: Surface, viewpoint: Viewpoint, projection: Projection
     """
     every = max(1, int(lattice.step * surface.projection.focal / projection.focal))
     nearest = np.full(lattice.shape, -1, np.float32)
+    flat = nearest.ravel()
 
     def appear(rows: slice) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
         return _places_of(surface, viewpoint, projection, lattice, rows, every)
 
-    lines = range(0, surface.depth.shape[0], every)
-    parts = (slice(lines[part][0], lines[part][-1] + 1, every) for part in strips((len(lines), surface.depth.shape[1])))
-    flat = nearest.ravel()
+    height, width = surface.depth.shape
+    parts = (
+        slice(part.start * every, min(height, part.stop * every), every)
+        for part in small_strips((-(-height // every), -(-width // every)))
+    )
     for cells, d in in_order(appear, parts):
         # of equal indices NumPy keeps the last, so that what is nearer than that has another try
         nearer = np.flatnonzero(d > flat[cells])
@@ -114,30 +153,36 @@ def _places_of(
     surface: Surface, viewpoint: Viewpoint, projection: Projection, lattice: Lattice, rows: slice, every: int
 ) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     """The cells (N,) of the lattice on which points of some rows of a surface fall, and their inverse depth (N,)."""
-    own = surface.own_rays(viewpoint, rows, every)
-    depth, shown = (values[rows, ::every] for values in (surface.depth, surface.shown))
-    x, y, z = (part[shown] for part in own)
-    moved, length = viewpoint.shifted((x, y, z), depth[shown])
-    d = depth[shown] / length
-    points = projection.points(np.stack(moved, axis=-1) @ viewpoint.rotation.T.astype(np.float32))
+    (x, y, z), depth = surface.points(viewpoint, rows, every)
+    own = turned(viewpoint.rotation.T @ surface.projection.rotation, (x, y, z))
+    moved, length = viewpoint.shifted((own[0], own[1], own[2]), depth)
+    points = projection.points_of(*turned(projection.rotation.T @ viewpoint.rotation, moved))
     height, width = lattice.shape
-    column, row = (np.floor((points[:, k] - lattice.start[k]) / lattice.step) for k in (0, 1))
-    there = (column >= -1) & (row >= -1) & (column < width) & (row < height)
+    with np.errstate(invalid="ignore"):
+        column, row = (
+            np.floor((values - np.float32(start)) / np.float32(lattice.step))
+            for values, start in zip(points, lattice.start, strict=True)
+        )
+        there = (column >= -1) & (row >= -1) & (column < width) & (row < height)
     # a point covers the four cells around it: the one above and left of it stands for them (see `_filled`)
-    cells = np.maximum(row[there], 0).astype(np.intp) * width + np.maximum(column[there], 0).astype(np.intp)
-    return cells, d[there]
+    column, row = (np.maximum(values[there], 0).astype(np.intp) for values in (column, row))
+    return row * width + column, (depth / length)[there]
 
 
 def _filled(nearest: Plane) -> Plane:
     """Inverse depth (H, W) everywhere, from that of points by the cell above and left of each, -1 where none is.
 
-    Gaps in what is near are closed by it, though something farther shows through; other gaps go on from their farthest
-    neighbours, and what lies beyond all of them from a mean of what is around.
+    Gaps that are narrower than a point are closed by it; others go on from their farthest neighbours, and what lies
+    beyond all points from those at their bounds.
     """
-    square = np.ones((2, 2), np.uint8)
-    out: Plane = cv2.dilate(nearest, square, anchor=(1, 1))
-    out = cv2.medianBlur(out, CARRY.speck_px)
-    return _from_far(out, CARRY.halvings)
+    part = bounds(nearest >= 0)
+    if part is None:
+        return np.zeros(nearest.shape, np.float32)
+    part = with_margin(part, 1, nearest.shape)
+    here: Plane = cv2.dilate(nearest[part], np.ones((2, 2), np.uint8), anchor=(1, 1))
+    here = _from_far(cv2.medianBlur(here, CARRY.speck_px), CARRY.halvings)
+    beyond = [(one.start, side - one.stop) for one, side in zip(part, nearest.shape, strict=True)]
+    return np.pad(here, beyond, mode="edge")
 
 
 def _from_far(values: Plane, halvings: int) -> Plane:
@@ -167,60 +212,21 @@ def _from_far(values: Plane, halvings: int) -> Plane:
 
 def _sharpened(depth: Plane, projection: Projection) -> Plane:
     """Inverse depth (H, W) without what is in between at jumps: it belongs to neither surface, and would be seen
-    between them as specks."""
-    square = np.ones((3, 3), np.uint8)
-    for _ in range(CARRY.sharpenings):
-        near, far = cv2.dilate(depth, square), cv2.erode(depth, square)
-        jumps = near - far > np.float32(CARRY.jump_px / projection.focal) + np.float32(CARRY.jump_share) * near
-        depth = np.where(jumps, np.where(2 * depth > near + far, near, far), depth)
-    return depth
-
-
-def refined(
-    surface: Surface, viewpoint: Viewpoint, canvas: Canvas, depth: Plane
-) -> tuple[Plane, NDArray[np.bool_]]:
-    """What was carried to the pixels of a canvas, to a fraction of a pixel; and what of it the reference cannot see.
-
-    Where the surface holds about the same at a pixel's point, what it holds takes its place; and everywhere that the
-    viewpoint is the reference's place. Points of the surface are seen by the reference. What lies behind it there was
-    filled in.
-
-    Parameters
-    ----------
-    surface : Surface
-    viewpoint : Viewpoint
-    canvas : Canvas
-    depth : (H, W) float32
-        See `carried_depth`; written over.
-
-    Returns
-    -------
-    (H, W) float32
-        Inverse depth.
-    (H, W) bool
-        What lies behind the surface, as the reference sees it.
-    """
-    projection = surface.projection if canvas.projection is None else canvas.projection
-    height, width = surface.depth.shape
-    c = viewpoint.c.astype(np.float32)
-    behind = np.zeros(depth.shape, np.uint8)
+    between them as specks. Steep surfaces, which go on rising, stay."""
+    out, square, wider = np.empty_like(depth), np.ones((3, 3), np.uint8), np.ones((CARRY.jump_side,) * 2, np.uint8)
+    least, share = np.float32(CARRY.jump_px / projection.focal), np.float32(1 - CARRY.jump_share)
 
     def put(rows: slice) -> None:
-        rays = np.stack(canvas.project_rows(surface.to_ray, canvas.xs, canvas.ys[rows]), axis=-1).astype(np.float32)
-        slide = viewpoint.slide_at(rays)
-        d = depth[rows]
-        for _ in range(CARRY.refinements):
-            point = rays + (d * slide)[..., None] * c
-            x, y = surface.places(point)
-            here = fetch(surface.depth[..., None], x, y, cv2.INTER_LINEAR)[..., 0]
-            point /= np.linalg.norm(point, axis=-1, keepdims=True)
-            point -= (here * slide)[..., None] * c
-            new = here / np.maximum(np.linalg.norm(point, axis=-1), np.float32(SLIDE.least_range))
-            there = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
-            same = np.abs(new - d) < CARRY.same_share * d + np.float32(CARRY.same_px / projection.focal)
-            np.copyto(d, new, where=there & (same | (slide == 0)))
-            behind[rows] = there & (new > d + CARRY.behind_share * new + np.float32(CARRY.behind_px / projection.focal))
+        some, own = beside(rows, CARRY.sharpenings + CARRY.jump_side // 2, len(depth))
+        here = depth[some]
+        for _ in range(CARRY.sharpenings):
+            near, far = cv2.dilate(here, square), cv2.erode(here, square)
+            jumps = share * near - far > least
+            if not jumps.any():
+                break
+            jumps &= cv2.dilate(here, wider) - cv2.erode(here, wider) < CARRY.jump_growth * (near - far)
+            here = np.where(jumps, np.where(2 * here > near + far, near, far), here)
+        out[rows] = here[own]
 
-    each(put, strips(depth.shape))
-    # single pixels are rounding at the edges of near things
-    return depth, cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.speck_px,) * 2, np.uint8)) > 0
+    each(put, small_strips(depth.shape))
+    return out

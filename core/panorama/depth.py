@@ -32,6 +32,20 @@ class OnCanvas(LazyImage):
 
 
 @dataclass(frozen=True, eq=False)
+class Strip:
+    """Inverse depth (h, W) of whole rows of a canvas.
+
+    sideways (h, W, 2), confidence (h, W): px that dense refinement adds in its picture, and its confidence, None
+    without it; share (h, W): what the field counts, in depth and in px beside the epipolar lines, None if all of it.
+    """
+
+    depth: Array
+    sideways: NDArray[np.float32] | None
+    confidence: NDArray[np.float32] | None
+    share: Array | None
+
+
+@dataclass(frozen=True, eq=False)
 class Depth(OnCanvas):
     """The inverse depth (H, W) of a canvas, from a field's at the nodes of a grid, its dense refinement, and what
     continues both beyond the overlap."""
@@ -52,23 +66,24 @@ class Depth(OnCanvas):
                 out[low - rows.start : high - rows.start] = d[low - strip.start : high - strip.start, columns]
         return out
 
-    def strip(self, rows: slice) -> tuple[Array, NDArray[np.float32] | None, Array | None]:
-        """Whole rows of inverse depth; px (h, W, 2) that dense refinement adds in its picture, None without it; and
-        what the field counts there (h, W), in depth and in px beside the epipolar lines, None if all of it."""
-        canvas, d, sideways = self.canvas, self._of_field(rows), None
+    def strip(self, rows: slice) -> Strip:
+        """All that is known of whole rows."""
+        canvas, d, sideways, confidence = self.canvas, self._of_field(rows), None, None
         if self.refined is not None:
-            more, sideways, _ = _refined_at(self.refined, canvas, canvas.xs, canvas.ys[rows], self.camera)
+            more, sideways, confidence = _refined_at(
+                self.refined, canvas, canvas.xs, canvas.ys[rows], self.camera
+            )
             d = d + more
         if self.continued is None:
-            return d, sideways, None
+            return Strip(d, sideways, confidence, None)
         beyond, share = self.continued.strip(rows)
-        return _taken_over(d, beyond, share), sideways, share
+        return Strip(_taken_over(d, beyond, share), sideways, confidence, share)
 
     def _depth(self, rows: slice) -> Array:
         """Whole rows of inverse depth, without what dense refinement adds in its picture."""
         canvas, refined = self.canvas, self.refined
         if refined is None or canvas.projection is not None:
-            return self.strip(rows)[0]
+            return self.strip(rows).depth
         d = self._of_field(rows) + refined.part_over(refined.inverse_depth, canvas.xs, canvas.ys[rows])
         return d if self.continued is None else _taken_over(d, *self.continued.strip(rows))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,13 @@ from ..cameras.view import View
 from ..choices import Level
 from ..raster.arrays import Array
 from ..raster.rectangle import largest_rectangle
+from ..system.errors import BadRequest
 from .framing_options import FRAMING
 from .levelling import gravity, turned, upright
 from .projection import Projection, focal_of, round_projection
-from .warp import Warp
+
+if TYPE_CHECKING:
+    from .warp import Warp
 
 Edges = tuple[Array, Array]
 
@@ -56,7 +60,7 @@ class FrameRequest:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class Coverage:
     """What the pictures show, sampled on a sphere.
 
     projection: of that sphere; offset: see `Canvas`; mask (h, w): where its canvas shows something; and for each of
@@ -100,8 +104,13 @@ def frame_for(
     Returns
     -------
     Projection
+
+    Raises
+    ------
+    BadRequest
+        The frame that is asked for shows nothing.
     """
-    return frame_of(asked, views, edges, down, _shown(warp_on(coarse_sphere(views))))
+    return frame_of(asked, views, edges, down, coverage(warp_on(coarse_sphere(views))))
 
 
 def coarse_sphere(views: Sequence[View]) -> Projection:
@@ -112,22 +121,22 @@ def coarse_sphere(views: Sequence[View]) -> Projection:
 
 
 def frame_of(
-    asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None, shown: Shown
+    asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None, covered: Coverage
 ) -> Projection:
     """As `frame_for`, where it is known what the pictures show."""
     K = views[0].K
     if asked.level == "auto":
-        frame = _levelled(asked, views, edges, down, shown, K)
+        frame = _levelled(asked, views, edges, down, covered, K)
     else:
         angles = (0.0, 0.0, 0.0) if isinstance(asked.level, str) else asked.level
-        frame = _surface(asked, turned(*angles), edges, shown, K)
-    frame = _resized(frame, shown)
+        frame = _surface(asked, turned(*angles), edges, covered, K)
+    frame = _resized(frame, covered)
     if asked.centre is None and asked.fov is None:
         return frame
-    return _windowed(frame, shown, asked.centre or (0.0, 0.0), asked.fov)
+    return _windowed(frame, covered, asked.centre or (0.0, 0.0), asked.fov)
 
 
-def _shown(warp: Warp) -> Shown:
+def coverage(warp: Warp) -> Coverage:
     """What a coarse warp on a sphere shows."""
     canvas = warp.canvas
     projection = canvas.projection
@@ -143,33 +152,33 @@ def _shown(warp: Warp) -> Shown:
         px = np.maximum(px, np.where(here.inside(), area, 0))
     mask = px > 0
     rays = projection.rays(np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1)[mask])
-    return Shown(projection, canvas.offset, mask, rays, solid_angle[mask], px[mask] / solid_angle[mask])
+    return Coverage(projection, canvas.offset, mask, rays, solid_angle[mask], px[mask] / solid_angle[mask])
 
 
 def _levelled(
-    asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None, shown: Shown, K: Array
+    asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None, covered: Coverage, K: Array
 ) -> Projection:
     """The frame that is turned upright: by edges where they can be believed, else by how the cameras were held."""
     held = gravity([view.R for view in views if np.isfinite(view.R).all()])
-    frame = _surface(asked, _centred(held, shown), edges, shown, K)
+    frame = _surface(asked, _centred(held, covered), edges, covered, K)
     if down is None or np.allclose(down, held):
         return frame
     roll, pitch = np.degrees([np.arctan2(down[0], down[1]), np.arcsin(np.clip(down[2], -1, 1))])
     if abs(roll) > FRAMING.max_roll_deg or abs(pitch) > FRAMING.max_pitch_deg:
         return frame
-    by_edges = _surface(asked, _centred(down, shown), edges, shown, K)
-    room, room_by_edges = (_room(one, shown) for one in (frame, by_edges))
+    by_edges = _surface(asked, _centred(down, covered), edges, covered, K)
+    room, room_by_edges = (_room(one, covered) for one in (frame, by_edges))
     return by_edges if room_by_edges >= FRAMING.least_kept * room else frame
 
 
-def _centred(down: Array, shown: Shown) -> Array:
+def _centred(down: Array, covered: Coverage) -> Array:
     """The rotation (3, 3) of a panorama that looks at the middle of what is shown, `down` (3,) being down."""
     base = upright(down)
-    mean = shown.solid_angle @ shown.rays @ base
+    mean = covered.solid_angle @ covered.rays @ base
     ahead = np.arctan2(mean[0], mean[2])
-    left, right = _ends(shown.rays @ base @ turned(np.degrees(-ahead), 0, 0))
+    left, right = _ends(covered.rays @ base @ turned(np.degrees(-ahead), 0, 0))
     level = base @ turned(-np.degrees(ahead + (left + right) / 2), 0, 0)
-    mean = shown.solid_angle @ shown.rays @ level
+    mean = covered.solid_angle @ covered.rays @ level
     pitch = np.degrees(np.arctan2(-mean[1], np.hypot(mean[0], mean[2])))
     kept = np.sign(pitch) * max(0.0, abs(pitch) - FRAMING.full_pitch_deg)
     rotation: Array = level @ turned(0, -kept, 0)
@@ -183,9 +192,9 @@ def _ends(rays: Array) -> tuple[float, float]:
     return float(left), float(right)
 
 
-def _surface(asked: FrameRequest, rotation: Array, edges: Edges | None, shown: Shown, K: Array) -> Projection:
+def _surface(asked: FrameRequest, rotation: Array, edges: Edges | None, covered: Coverage, K: Array) -> Projection:
     """The projection that suits what is shown, or that is asked for, turned by a rotation (3, 3)."""
-    own = shown.rays @ rotation
+    own = covered.rays @ rotation
     fov = np.degrees(2 * max(abs(end) for end in _ends(own)))
     outer = FRAMING.outermost_percent
     steepest = np.degrees(np.abs(np.arcsin(np.percentile(own[:, 1], (outer, 100 - outer))))).max()
@@ -221,28 +230,28 @@ def _frontal_length(edges: Edges, rotation: Array) -> float:
     return float((weights @ (np.abs(normals @ along) < FRAMING.frontal_sine)).max()) if len(normals) else 0.0
 
 
-def _room(projection: Projection, shown: Shown) -> float:
+def _room(projection: Projection, covered: Coverage) -> float:
     """The largest rectangle that a frame has room for, as a share of what it shows."""
     limits = projection.limits
-    points = projection.points(shown.rays)
+    points = projection.points(covered.rays)
     left, top = np.maximum(points.min(axis=0), limits[:2])
     right, bottom = np.minimum(points.max(axis=0), limits[2:])
     step = max(right - left, bottom - top) / FRAMING.side_px
     grid = np.stack(np.meshgrid(np.arange(left, right, step), np.arange(top, bottom, step)), axis=-1)
-    mask = shown.at(projection.rays(grid))
+    mask = covered.at(projection.rays(grid))
     _, _, width, height = largest_rectangle(mask)
     return width * height / max(1, int(mask.sum()))
 
 
-def _resized(projection: Projection, shown: Shown) -> Projection:
+def _resized(projection: Projection, covered: Coverage) -> Projection:
     """The projection with as many px as the sharpest picture in each direction has, in the middle of all, and hardly
     more anywhere."""
-    area = projection.area(shown.rays)
+    area = projection.area(covered.rays)
     drawn = np.isfinite(area)
-    weights = (area * shown.solid_angle)[drawn]
-    enlarged = np.sqrt(area[drawn] / shown.sharpness[drawn])
+    weights = (area * covered.solid_angle)[drawn]
+    enlarged = np.sqrt(area[drawn] / covered.sharpness[drawn])
     median, most = _weighted_percentiles(enlarged, weights, (50.0, FRAMING.enlarged_percent))
-    focal = projection.focal / max(median, most / FRAMING.max_enlarged)
+    focal = projection.focal / (median * np.clip(most / (median * FRAMING.max_enlarged), 1, FRAMING.max_reduction))
     if projection.sphere is not None:
         return round_projection(projection.kind, projection.K, projection.rotation, focal)
     return replace(projection, focal=focal)
@@ -257,11 +266,11 @@ def _weighted_percentiles(values: Array, weights: Array, percents: Sequence[floa
 
 
 def _windowed(
-    projection: Projection, shown: Shown, centre: tuple[float, float], fov: float | None
+    projection: Projection, covered: Coverage, centre: tuple[float, float], fov: float | None
 ) -> Projection:
     """The projection with a window: as large as all that is shown, or fov degrees wide, with its middle moved by centre
     (yaw, pitch) in degrees."""
-    points = projection.points(shown.rays)
+    points = projection.points(covered.rays)
     limits = projection.limits
     low, high = np.maximum(points.min(axis=0), limits[:2]), np.minimum(points.max(axis=0), limits[2:])
     x, y, z = projection.rays((low + high) / 2) @ projection.rotation
@@ -277,4 +286,7 @@ def _windowed(
     left, top, right, bottom = *(middle - half), *(middle + half)
     if fov is not None:
         left, right = (point(yaw + sign * np.radians(fov) / 2)[0] for sign in (-1, 1))
-    return replace(projection, window=(round(left), round(top), round(right) + 1, round(bottom) + 1))
+    window = (round(left), round(top), round(right) + 1, round(bottom) + 1)
+    if not ((points >= window[:2]) & (points < window[2:])).all(axis=1).any():
+        raise BadRequest("the frame lies beside all pictures: give a centre nearer to 0,0, or a larger field of view")
+    return replace(projection, window=window)

@@ -1,4 +1,4 @@
-"""How a round panorama is levelled: by upright edges and by how the cameras were held, or by given angles.
+"""How a panorama is levelled: by upright edges and by how the cameras were held, or by given angles.
 
 Angles are those of Hugin and PTGui, in degrees: where the reference camera looks in the panorama. Yaw is to the right
 of its middle, pitch above its horizon, roll clockwise.
@@ -28,28 +28,6 @@ def parse_level(text: str) -> Level:
             f"the level {text!r} is not known; choose from: {', '.join(LEVELS)}, or give YAW,PITCH,ROLL in degrees"
         ) from None
     return yaw, pitch, roll
-
-
-def rotation_for(level: Level, rotations: Sequence[Array], edges: tuple[Array, Array] | None = None) -> Array:
-    """The rotation that levels a panorama.
-
-    Parameters
-    ----------
-    level : Level
-        "auto", "none" (the reference looks straight ahead), or (yaw, pitch, roll) in degrees.
-    rotations : sequence of (3, 3) arrays
-        From the reference camera to each camera that is known, itself (I) among them; for "auto".
-    edges : ((N, 3) array, (N,) array), optional
-        Normals and lengths of straight edges (see `gravity_by_edges`); for "auto".
-
-    Returns
-    -------
-    (3, 3) array
-        From the panorama's axes to the reference camera's.
-    """
-    if level == "auto":
-        return upright(gravity(rotations) if edges is None else gravity_by_edges(rotations, *edges))
-    return turned(*(0.0, 0.0, 0.0) if isinstance(level, str) else level)
 
 
 def gravity(rotations: Sequence[Array]) -> Array:

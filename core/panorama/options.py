@@ -177,11 +177,9 @@ class ChoiceOptions:
     seam_candidates: tuple[float, ...] = (0.0, 0.5, 1.0)
     """Slides at which a seam is cut and holes are counted, which takes longest; interpolated between."""
 
-    base_px_per_radian: float = 300.0
-    """Resolution of the coarse map: depth edges to about 3 px of a picture of 900."""
-
-    seam_px_per_radian: float = 150.0
-    """Resolution at which the seam is cut: finer costs more time and tells hardly more."""
+    base_px_per_radian: float = 150.0
+    """Resolution of the coarse map, and of the pictures through which a seam is cut: twice as fine it takes three times
+    as long, and hardly any choice changes."""
 
     px_per_radian: float = 900.0
     """Resolution in whose px bends and seams are given: about that of a picture that fills a screen."""
@@ -217,7 +215,7 @@ class ChoiceOptions:
     per_folded: float = 15.0
     """Price of all being folded."""
 
-    fold_steps: int = 17
+    fold_steps: int = 9
     """Viewpoints along the way from which it is looked whether a thing is seen more than once."""
 
     same_slide: float = 1e-6
@@ -225,6 +223,10 @@ class ChoiceOptions:
 
     max_folded: float = 0.01
     """Share of folded cells, more than without any slide, from which a slide is out of the question."""
+
+    max_stretched: float = 0.05
+    """Share of enlarged cells, more than without any slide, from which a slide is out of the question: the parallax is
+    too large for so short a way."""
 
     per_seam_px: float = 0.0044
     """Price of a px of seam that is seen."""
@@ -281,7 +283,7 @@ class SlideOptions:
     nodes: int = 400
     """Nodes along the longer side of the base at which the overlap is looked at."""
 
-    rounds: int = 6
+    rounds: int = 4
     """Steps of false position for s: below a thousandth where the parallax is no more than the width of the slide."""
 
     least_range: float = 1e-9
@@ -292,17 +294,26 @@ class SlideOptions:
 class CarryOptions:
     """Inverse depth carried to the sliding viewpoint (`carried_depth`, `slid_warp`)."""
 
-    jump_px: float = 2.5
+    jump_px: float = 6.0
     """px of parallax between neighbours, with `jump_share` of the nearer one's, from which they lie on two surfaces."""
 
     jump_share: float = 0.06
     """See `jump_px`: what is near has steeper slopes."""
 
+    jump_side: int = 7
+    """px, side of the square in which depth differs hardly more at a jump than between neighbours."""
+
+    jump_growth: float = 2.0
+    """Times that it differs more there: on a steep surface it is three times."""
+
     sharpenings: int = 2
     """Rounds in which pixels between two surfaces are given to the nearer in depth; a jump is 2 to 4 px wide."""
 
-    speck_px: int = 3
+    speck_px: int = 5
     """px, side of the median that takes single points out of the surface that they fall on."""
+
+    least_behind_px: int = 3
+    """px, side of the square below which what the reference cannot see is rounding."""
 
     rounds: int = 2
     """px by which gaps are filled from their far side at each size."""
@@ -310,13 +321,10 @@ class CarryOptions:
     halvings: int = 6
     """Times that the canvas is halved for gaps that are still there: up to 2 · 2⁶ px wide."""
 
-    refinements: int = 2
-    """Times that a pixel's depth is looked up where its point lies: it settles at once on smooth surfaces."""
-
     same_share: float = 0.06
     """Share of d, with `same_px` px of parallax, by which a surface may differ from what was carried over."""
 
-    same_px: float = 0.5
+    same_px: float = 1.5
     """See `same_share`."""
 
     behind_share: float = 0.1
@@ -325,11 +333,14 @@ class CarryOptions:
     behind_px: float = 2.0
     """See `behind_share`."""
 
-    least_shift_px: float = 1e-3
-    """px beside the epipolar line below which a map counts as on it: this is rounding."""
+    smaller_strips: int = 16
+    """Times that strips of rows are smaller than `PartOptions.strip_pixels`: they go through many hands."""
 
     reach_nodes: int = 200
     """Nodes along the longer side of the base at which the pictures' bounds are looked for."""
+
+    most_beyond: float = 0.01
+    """Share of what is shown that may lie beyond the projection's limits without a word: stray points do."""
 
 
 CANVAS = CanvasOptions()

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cameras.projective import homogeneous, inverse_intrinsics
 from ..raster.arrays import Array
@@ -70,6 +71,12 @@ class Projection:
         return (-half, -half // 2, 2 * half, half) if self.kind == "equirectangular" else None
 
     @property
+    def cuts(self) -> bool:
+        """Whether it leaves out what lies beyond its limits: a sphere has all, and what a window leaves out was asked
+        for."""
+        return self.sphere is None and self.window is None
+
+    @property
     def limits(self) -> Array:
         """left, top, right, bottom (exclusive) of what the plane may show, px."""
         if self.sphere is not None:
@@ -96,20 +103,27 @@ class Projection:
 
         What a plane or Pannini's projection cannot show lies far beyond the limits, on the ray's side.
         """
-        x, y, z = np.moveaxis(rays @ self.rotation, -1, 0)
+        points: Array = np.stack(self.points_of(*np.moveaxis(rays @ self.rotation, -1, 0)), axis=-1)
+        return points
+
+    def points_of(self, x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """The same (u, v) for rays in the panorama's own axes, of their precision."""
         level = np.hypot(x, z)
         if self.kind == "equirectangular":
             out = np.arctan2(x, z), np.arctan2(y, level)
         else:
             with np.errstate(divide="ignore", invalid="ignore"):
-                rise, sine, cosine = y / level, x / level, z / level
+                rise = y / level
             if self.kind == "cylindrical":
                 out = np.arctan2(x, z), rise
             else:
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    sine, cosine = x / level, z / level
                 stretch = (self.distance + 1) / np.maximum(self.distance + cosine, PROJECTION.least_forward)
                 out = stretch * sine, stretch * rise
-        points: Array = np.stack(out, axis=-1) * self.focal + np.array(self.centre)
-        return points
+        kind = level.dtype.type
+        u, v = (part * kind(self.focal) + kind(middle) for part, middle in zip(out, self.centre, strict=True))
+        return u, v
 
     def of_reference(self, points: Array) -> Array:
         """Points (…, 2) of the plane that show ideal pixels (…, 2) of the reference."""

@@ -10,6 +10,7 @@ is 0 the reference is only turned, whatever d is; where s is 1, so is the target
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -19,15 +20,14 @@ from ..cameras.lens import distort, undistort
 from ..cameras.projective import homogeneous, inverse_intrinsics
 from ..cameras.view import View
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Plane, strips
+from ..raster.arrays import Array, Plane
 from ..raster.grid import Grid
 from ..raster.picture_map import PictureMap
-from ..raster.sampling import fetch
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas
-from .carried_depth import Lattice, Surface, carried_depth, refined
-from .options import CANVAS, CARRY
-from .projection import Projection
+from .carried_depth import Lattice, Rays, Surface, carried_depth, looked_up, small_strips, turned
+from .options import CANVAS, CARRY, SLIDE
+from .projection import Projection, focal_of
 from .viewpoint import Viewpoint
 from .warp import Warp, trimmed
 
@@ -38,7 +38,8 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
     Parameters
     ----------
     base : Warp
-        Of both pictures, seen from the reference's place, on a cylinder or sphere.
+        Of both pictures, seen from the reference's place, on a cylinder or sphere. What lies beside the epipolar lines
+        counts if it holds it.
     views : sequence of View
         What is known of the pictures, the reference first.
     viewpoint : Viewpoint
@@ -58,86 +59,89 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
         The canvas would have too many pixels.
     """
     surface = Surface.of(base, views)
+    beside = np.zeros((*surface.depth.shape, 3), np.float32) if base.beside is None else base.beside
     canvas = _canvas(surface, views, viewpoint, projection)
     lattice = Lattice((float(canvas.xs[0]), float(canvas.ys[0])), 1.0, (canvas.height, canvas.width))
     depth = carried_depth(surface, viewpoint, projection, lattice)
-    depth, behind = refined(surface, viewpoint, canvas, depth)
-    return trimmed(_mapped(base, surface, views, viewpoint, canvas, depth, behind))
+    return trimmed(_mapped(beside, surface, views, viewpoint, canvas, depth))
 
 
 def _mapped(
-    base: Warp, surface: Surface, views: Sequence[View], viewpoint: Viewpoint, canvas: Canvas, depth: Plane,
-    behind: NDArray[np.bool_],
+    beside: NDArray[np.float32], surface: Surface, views: Sequence[View], viewpoint: Viewpoint, canvas: Canvas,
+    depth: Plane,
 ) -> Warp:  # fmt: skip
-    """The maps of all pictures on a canvas of known inverse depth (H, W); behind (H, W): what the reference cannot see.
+    """The maps of all pictures on a canvas, by what depth (H, W) was carried to its pixels; beside: see `Warp`.
+
+    Where the surface holds about the same at a pixel's point, what it holds takes its place, so that it is known to a
+    fraction of a pixel; and everywhere that the viewpoint is the reference's place. Points of the surface are seen by
+    the reference. What lies behind it there was filled in.
     """
-    extra = _beside_lines(base, views)
     shape = depth.shape
     maps = [PictureMap(np.empty(shape, np.float32), np.empty(shape, np.float32), view.size) for view in views]
-    slide, confidence = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    lattice = canvas.xs, canvas.ys
+    slide, confidence = np.empty(shape, np.float32), np.zeros(shape, np.float32)
+    behind = np.zeros(shape, np.uint8)
+    to_own, c = surface.projection.rotation.T, surface.projection.rotation.T @ viewpoint.c
 
     def put(rows: slice) -> None:
-        d = depth[rows].astype(np.float64)
-        xs, ys = lattice[0], lattice[1][rows]
-        s = viewpoint.slide_of(*canvas.project_rows(viewpoint.rotation.T @ surface.to_ray, xs, ys))
-        more = _carried(extra, surface, canvas, viewpoint, rows, d, s)
+        xs, ys = canvas.xs, canvas.ys[rows]
+        rays = surface.rays(canvas, xs, ys)
+        s = viewpoint.slide_of(*turned(viewpoint.rotation.T @ to_own.T, rays))
+        x, y, hidden = _refined(surface, rays, s, c, depth[rows])
+        more = looked_up(beside, x, y)
+        d, s64 = depth[rows].astype(np.float64), s.astype(np.float64)
         for number, (view, out) in enumerate(zip(views, maps, strict=True)):
-            x, y = _seen_at(view, views[0], viewpoint, canvas.project_rows(view.H_inf, xs, ys), d, s)
+            u, v = _seen_at(view, views[0], viewpoint, canvas.project_rows(view.H_inf, xs, ys), d, s64)
             if number == 1:
-                x, y = x + more[..., 0], y + more[..., 1]
-            out.x[rows], out.y[rows] = x, y
-        slide[rows], confidence[rows] = s, more[..., 2] * ~behind[rows]
+                u += more[..., 0]
+                v += more[..., 1]
+            out.x[rows], out.y[rows] = _raw(view, u, v)
+        slide[rows], behind[rows] = s, hidden
+        confidence[rows] = np.where(hidden, np.float32(0), more[..., 2])
 
-    each(put, strips(shape))
-    held = None if base.lazy_confidence is None else confidence
-    return Warp(canvas, tuple(maps), depth, held, slide, behind, viewpoint)
+    each(put, small_strips(shape))
+    unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.least_behind_px,) * 2, np.uint8)) > 0
+    return Warp(canvas, tuple(maps), depth, confidence, slide, unseen, viewpoint)
+
+
+def _refined(
+    surface: Surface, rays: Rays, s: NDArray[np.float32], c: Array, d: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+    """Where points at inverse depth d (…), written over, lie on the canvas of the surface, and whether they lie behind
+    it; rays: from their viewpoints; c (3,): the target's place, both in the surface's own axes."""
+    towards = [s * np.float32(part) for part in c]
+    x, y = surface.places([ray + d * step for ray, step in zip(rays, towards, strict=True)])
+    here = looked_up(surface.depth, x, y)
+    length = np.sqrt(sum((ray + d * step) ** 2 for ray, step in zip(rays, towards, strict=True)))
+    # what the surface holds there, measured from the pixel's viewpoint
+    away = np.sqrt(
+        sum(((ray + d * step) / length - here * step) ** 2 for ray, step in zip(rays, towards, strict=True))
+    )
+    new = here / np.maximum(away, np.float32(SLIDE.least_range))
+    height, width = surface.depth.shape
+    there = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
+    focal = surface.projection.focal
+    same = np.abs(new - d) < CARRY.same_share * d + np.float32(CARRY.same_px / focal)
+    hidden = there & (new > d + CARRY.behind_share * new + np.float32(CARRY.behind_px / focal)) & (s > 0)
+    np.copyto(d, new, where=there & (same | (s == 0)))
+    return x, y, hidden
 
 
 def _seen_at(
     view: View, reference: View, viewpoint: Viewpoint, infinite: list[Array], d: Array, s: Array
 ) -> tuple[Array, Array]:
-    """Raw pixels x, y (…) of a picture where points at inverse depth d (…) from a viewpoint with slide s (…) are seen;
-    infinite: see `transfer`."""
+    """Ideal pixels x, y (…) of a picture where points at inverse depth d (…) from a viewpoint with slide s (…) are
+    seen; infinite: see `transfer`."""
     step = view.H_inf @ reference.K @ viewpoint.c
-    x, y = transfer(view, [part + (d * s) * k for part, k in zip(infinite, step, strict=True)], d)
+    moved = d * s
+    return transfer(view, [part + moved * k for part, k in zip(infinite, step, strict=True)], d)
+
+
+def _raw(view: View, x: Array, y: Array) -> tuple[Array, Array]:
+    """Raw pixels x, y (…) of ideal ones."""
     if not view.camera.distortion.any():
         return x, y
     raw = distort(np.stack([x, y], axis=-1), view.camera)
     return raw[..., 0], raw[..., 1]
-
-
-def _beside_lines(base: Warp, views: Sequence[View]) -> NDArray[np.float32]:
-    """What the base has beside d (H, W, 3): px x and y that the target's map has beyond its epipolar lines, and
-    confidence."""
-    canvas, target = base.canvas, base.maps[1].arrays()
-    view = views[1]
-    out = np.zeros((canvas.height, canvas.width, 3), np.float32)
-
-    def put(rows: slice) -> None:
-        d = base.depth[rows, 0 : canvas.width].astype(np.float64)
-        infinite = canvas.project_rows(view.H_inf, canvas.xs, canvas.ys[rows])
-        x, y = transfer(view, infinite, d)
-        if view.camera.distortion.any():
-            x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
-        for k, (shown, strict) in enumerate(((target.x, x), (target.y, y))):
-            shift = np.nan_to_num(shown[rows] - strict)
-            out[rows, :, k] = np.where(np.abs(shift) > CARRY.least_shift_px, shift, 0)
-        if base.lazy_confidence is not None:
-            out[rows, :, 2] = base.lazy_confidence[rows, 0 : canvas.width]
-
-    each(put, strips(out.shape))
-    return out
-
-
-def _carried(
-    extra: NDArray[np.float32], surface: Surface, canvas: Canvas, viewpoint: Viewpoint, rows: slice, d: Array, s: Array
-) -> NDArray[np.float32]:
-    """What the base has beside d (see `_beside_lines`), at the points of some rows of the canvas."""
-    rays = np.stack(canvas.project_rows(surface.to_ray, canvas.xs, canvas.ys[rows]), axis=-1)
-    x, y = surface.places((rays + (d * s)[..., None] * viewpoint.c).astype(np.float32))
-    carried: NDArray[np.float32] = fetch(extra, x, y, cv2.INTER_LINEAR)
-    return carried
 
 
 def _canvas(surface: Surface, views: Sequence[View], viewpoint: Viewpoint, projection: Projection) -> Canvas:
@@ -147,33 +151,48 @@ def _canvas(surface: Surface, views: Sequence[View], viewpoint: Viewpoint, proje
     def pictures_at(grid: Grid) -> list[Array]:
         xs, ys = grid.xs, grid.ys
         lattice = Lattice((float(xs[0]), float(ys[0])), float(grid.step), (grid.rows, grid.columns))
-        d = carried_depth(surface, viewpoint, projection, lattice).astype(np.float64)
-        s = viewpoint.slide_of(*plane.project_rows(viewpoint.rotation.T @ surface.to_ray, xs, ys))
+        carried = carried_depth(surface, viewpoint, projection, lattice)
+        rays = surface.rays(plane, xs, ys)
+        s = viewpoint.slide_of(*turned(viewpoint.rotation.T @ surface.projection.rotation, rays))
+        c = surface.projection.rotation.T @ viewpoint.c
+        _refined(surface, rays, s, c, carried)
+        d, s64 = carried.astype(np.float64), s.astype(np.float64)
+        infinite = [plane.project_rows(view.H_inf, xs, ys) for view in views]
         return [
-            np.stack(_seen_at(view, views[0], viewpoint, plane.project_rows(view.H_inf, xs, ys), d, s), axis=-1)
-            for view in views
+            np.stack(_raw(view, *_seen_at(view, views[0], viewpoint, far, d, s64)), axis=-1)
+            for view, far in zip(views, infinite, strict=True)
         ]
 
-    reach = _reach(surface, views, viewpoint, projection)
+    reach, cropped = _reach(surface, views, viewpoint, projection)
     # what the reference shows is looked for like the rest: only its middle is sure to be seen
     middle = (np.array(views[0].size) - 1) / 2
     left, top = (int(v) for v in np.floor(projection.of_reference(undistort(middle, views[0].camera))))
-    return bounding_canvas(pictures_at, (left, top, 1, 1), [view.size for view in views], reach, projection)
+    canvas = bounding_canvas(pictures_at, (left, top, 1, 1), [view.size for view in views], reach, projection)
+    # nodes to both sides of an edge of depth look stretched, but are not
+    return replace(canvas, cropped=cropped)
 
 
-def _reach(surface: Surface, views: Sequence[View], viewpoint: Viewpoint, projection: Projection) -> Array:
-    """left, top, right, bottom, px of the plane, of a rectangle that holds all pictures, with a margin."""
-    every = max(1, max(surface.depth.shape) // CARRY.reach_nodes)
-    rows = slice(0, surface.depth.shape[0], every)
-    shown = surface.shown[rows, ::every]
-    x, y, z = (part[shown] for part in surface.own_rays(viewpoint, rows, every))
-    moved, _ = viewpoint.shifted((x, y, z), surface.depth[rows, ::every][shown])
-    # the target's own border counts too: at s = 1 the target is only turned
-    target = homogeneous(undistort(border(views[1].size), views[1].camera)) @ inverse_intrinsics(views[1].K).T
-    points = projection.points(np.vstack([np.stack(moved, axis=-1) @ viewpoint.rotation.T, target @ views[1].R]))
+def _reach(
+    surface: Surface, views: Sequence[View], viewpoint: Viewpoint, projection: Projection
+) -> tuple[Array, bool]:
+    """left, top, right, bottom, px of the plane, of a rectangle that holds all pictures, with a margin; and whether
+    more than some specks of them lie beyond the projection's limits."""
+    height, width = surface.depth.shape
+    every = max(1, max(height, width) // CARRY.reach_nodes)
+    (x, y, z), depth = surface.points(viewpoint, slice(0, height, every), every)
+    own = turned(viewpoint.rotation.T @ surface.projection.rotation, (x, y, z))
+    moved, _ = viewpoint.shifted((own[0], own[1], own[2]), depth)
+    # both borders count too: the reference is only turned where s is 0, and the target where it is 1
+    borders = [
+        homogeneous(undistort(border(view.size), view.camera)) @ inverse_intrinsics(view.K).T @ view.R
+        for view in views
+    ]
+    points = projection.points(np.vstack([np.stack(moved, axis=-1) @ viewpoint.rotation.T, *borders]))
     limits = projection.limits
-    points = np.clip(points[np.isfinite(points).all(axis=1)], limits[:2], limits[2:])
-    margin = CANVAS.margin * max(views[0].size)
+    points = points[np.isfinite(points).all(axis=1)]
+    beyond = (points < limits[:2] - 1) | (points > limits[2:] + 1)
+    points = np.clip(points, limits[:2], limits[2:])
+    margin = CANVAS.margin * max(views[0].size) * projection.focal / focal_of(projection.K)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     reach: Array = np.concatenate([np.maximum(low, limits[:2]), np.minimum(high, limits[2:])])
-    return reach
+    return reach, projection.cuts and float(beyond.any(axis=1).mean()) > CARRY.most_beyond

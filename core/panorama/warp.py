@@ -60,6 +60,9 @@ class Warp:
         What the reference cannot see though its map falls inside it, likewise: something nearer hides it.
     viewpoint : Viewpoint or None
         How far it slides in any direction.
+    beside : (H, W, 3) float32 array or None
+        px x and y (before the lens) by which picture 1 is seen beside its epipolar lines, and confidence; only where it
+        was asked for, with all of depth.
     """
 
     canvas: Canvas
@@ -69,6 +72,7 @@ class Warp:
     slide: AnyImage | None = None
     behind: NDArray[np.bool_] | None = None
     viewpoint: Viewpoint | None = None
+    beside: NDArray[np.float32] | None = None
 
     @property
     def inverse_depth(self) -> NDArray[np.float32]:
@@ -93,7 +97,8 @@ class Warp:
             for values in (self.lazy_confidence, self.slide)
         )
         behind = None if self.behind is None else cut(self.behind, box)
-        return Warp(self.canvas.within(box), maps, depth, confidence, slide, behind, self.viewpoint)
+        beside = None if self.beside is None else cut(self.beside, box)
+        return Warp(self.canvas.within(box), maps, depth, confidence, slide, behind, self.viewpoint, beside)
 
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
@@ -106,7 +111,7 @@ class Warp:
 
 def build_warp(
     field: Field, views: Sequence[View], projection: Projection | None = None, refined: RefinedDepth | None = None,
-    continuation: Continuation | None = None,
+    continuation: Continuation | None = None, hold: bool = False,
 ) -> Warp:  # fmt: skip
     """Lay out a canvas that holds all pictures, and map them onto it.
 
@@ -121,6 +126,8 @@ def build_warp(
         What dense refinement found.
     continuation : Continuation, optional
         What goes on where the reference shows nothing; by default the field does.
+    hold : bool
+        See `build_map`.
 
     Returns
     -------
@@ -154,7 +161,7 @@ def build_warp(
         return [_at_nodes(values, view, number, grid, plane, camera) for number, view in enumerate(further, 1)]
 
     canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
-    warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined, continuation)
+    warp = build_map(field, views, replace(canvas, cropped=canvas.cropped or cropped), refined, continuation, hold)
     return trimmed(warp)
 
 
@@ -169,7 +176,7 @@ def _at_nodes(values: FieldValues, view: View, number: int, grid: Grid, plane: C
 
 def build_map(
     field: Field, views: Sequence[View], canvas: Canvas, refined: RefinedDepth | None = None,
-    continuation: Continuation | None = None,
+    continuation: Continuation | None = None, hold: bool = False,
 ) -> Warp:  # fmt: skip
     """Map all pictures onto a given canvas, strip by strip.
 
@@ -183,6 +190,8 @@ def build_map(
         What dense refinement found.
     continuation : Continuation, optional
         What goes on where the reference shows nothing.
+    hold : bool
+        Keep inverse depth, and what lies beside the epipolar lines, as arrays: all of it will be read.
 
     Returns
     -------
@@ -202,28 +211,40 @@ def build_map(
     xs, ys = canvas.xs, canvas.ys
     continued = ContinuedDepth.over(continuation, canvas, camera, grid)
     depth = Depth(canvas, camera, grid, values.inverse_depth, refined, continued)
+    held = np.empty(shape if hold else (0, 0), np.float32)
+    held_beside = np.zeros((*held.shape, 3), np.float32)
 
     def put(part: slice) -> None:
         start, stop = part.start, part.stop
         strip = (left, top + start, canvas.width, stop - start)
-        d, sideways, share = depth.strip(part)
+        here = depth.strip(part)
+        if hold:
+            held[part] = here.depth
+            if here.confidence is not None:
+                held_beside[part, :, 2] = here.confidence
         for number, (view, out) in enumerate(zip(views[1:], maps, strict=True), 1):
-            x, y = transfer(view, canvas.project_rows(view.H_inf, xs, ys[start:stop], camera), d)
+            x, y = transfer(view, canvas.project_rows(view.H_inf, xs, ys[start:stop], camera), here.depth)
             beside = []
             if values.shift is not None and values.picture == number:
                 beside.append([grid.to_pixels(values.shift[..., k], *strip) for k in (0, 1)])
-            if refined is not None and sideways is not None and refined.picture == number:
-                beside.append([sideways[..., 0], sideways[..., 1]])
+            if refined is not None and here.sideways is not None and refined.picture == number:
+                beside.append([here.sideways[..., 0], here.sideways[..., 1]])
             for across, down in beside:
-                x += across if share is None else share * across
-                y += down if share is None else share * down
+                if here.share is not None:
+                    across, down = here.share * across, here.share * down
+                x += across
+                y += down
+                if hold:
+                    held_beside[part, :, 0] += across
+                    held_beside[part, :, 1] += down
             if view.camera.distortion.any():
                 x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
             out.x[part], out.y[part] = x, y
 
     each(put, strips(shape))
     confidence = None if refined is None else Confidence(canvas, camera, refined)
-    return Warp(canvas, (ReferenceMap(canvas, camera), *maps), depth, confidence)
+    warp = Warp(canvas, (ReferenceMap(canvas, camera), *maps), depth, confidence)
+    return replace(warp, depth=held, beside=held_beside) if hold else warp
 
 
 def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> FieldValues:
@@ -286,6 +307,4 @@ def trimmed(warp: Warp) -> Warp:
     if not shown.any() and not framed:
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
     shown |= warp.maps[0].inside()
-    if not shown.any():
-        raise BadRequest("the frame lies beside both pictures: give a centre nearer to 0,0, or a larger field of view")
     return warp.within(box_of(shown), in_place=True)

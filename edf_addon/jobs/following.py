@@ -17,6 +17,8 @@ from .. import editor, idnames, properties
 from ..bridge import compat, result
 from . import modal, stitching
 
+# Editors in which such a picture was shown, and px of the screen across all of it.
+_shown_in: dict[int, float] = {}
 # Seconds without another change before it begins, and before it looks again where other work is going on.
 REST, AGAIN = 0.25, 1.0
 # Pixels of the larger picture at most: so many are composed in about a second on two cores.
@@ -30,24 +32,61 @@ def changed(settings: Any) -> None:
     if bpy.app.timers.is_registered(_begin):
         bpy.app.timers.unregister(_begin)
     bpy.app.timers.register(_begin, first_interval=REST)
+    if editor.is_behind(settings, settings.result):
+        modal.start_ahead()
 
 
 def make_job(context: bpy.types.Context, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """As `stitching.make_job`, small and without what is only measured."""
+    """As `stitching.make_job`, small, without what is only measured, and without a seam that was painted over another
+    frame."""
     settings = properties.settings_of(context.scene)
     pixels = max(image.size[0] * image.size[1] for image in (settings.reference, settings.target))
     scale = min(settings.scale, math.sqrt(MOST_PIXELS / max(pixels, 1)))
     job, memory = stitching.make_job(context, folder, max(scale, 0.02), result.read(settings.result))
     job["options"]["measure"] = False
+    job["masks"].pop("seam", None)
     memory["shown"] = settings.result.session_uid
     return job, memory
 
 
 def take_over(context: bpy.types.Context, folder: Path, found: dict[str, Any], memory: dict[str, Any]) -> str:
-    """As `stitching.take_over`, shown only where the panorama was that it follows."""
+    """As `stitching.take_over`, shown only where the panorama was that it follows, as large as that."""
     before = compat.by_uid(bpy.data.images, memory["shown"])
-    spaces = [space for _, space in editor.all_spaces(context) if space.image is not None and space.image == before]
-    return stitching.take_over(context, folder, found, memory, "preview", spaces)
+    shown = [both for both in editor.all_spaces(context) if before is not None and both[1].image == before]
+    # px of the screen across the whole image; without a window nothing is drawn that wide
+    widths = [0.0 if bpy.app.background else space.zoom[0] * before.size[0] for _, space in shown]
+    words = stitching.take_over(context, folder, found, memory, "preview", [space for _, space in shown])
+    for (area, space), width in zip(shown, widths, strict=True):
+        _shown_in[space.as_pointer()] = width
+        _as_wide(context, area, space, width)
+    return words
+
+
+def _as_wide(context: bpy.types.Context, area: bpy.types.Area, space: bpy.types.SpaceImageEditor, width: float) -> None:
+    """Shows the image of an editor so many px of the screen wide."""
+    window = next((one for one in context.window_manager.windows if area in one.screen.areas[:]), None)
+    region = next(one for one in area.regions if one.type == "WINDOW")
+    if width and window is not None:
+        with context.temp_override(window=window, area=area, region=region):
+            bpy.ops.image.view_zoom_ratio(ratio=width / space.image.size[0])
+
+
+@bpy.app.handlers.persistent
+def _show_again(*_: Any) -> None:
+    """What Blender calls after an undo or a redo: where the picture is gone that was shown, the panorama of then is."""
+    last = properties.settings_of(bpy.context.scene).result
+    for _area, space in editor.all_spaces(bpy.context):
+        if space.as_pointer() in _shown_in and space.image is None and last is not None:
+            space.image = last
+            if not bpy.app.timers.is_registered(_as_wide_again):
+                bpy.app.timers.register(_as_wide_again)
+
+
+def _as_wide_again() -> None:
+    """Once the undo is over: the editors in question show all of their image as wide as before."""
+    for area, space in editor.all_spaces(bpy.context):
+        if space.image is not None and space.as_pointer() in _shown_in:
+            _as_wide(bpy.context, area, space, _shown_in[space.as_pointer()])
 
 
 def _begin() -> float | None:
@@ -60,18 +99,27 @@ def _begin() -> float | None:
             return AGAIN
         with bpy.context.temp_override(window=window):
             getattr(bpy.ops.edf, idnames.Operator.FOLLOW.partition(".")[2])("INVOKE_DEFAULT")
-        break
+        return None
+    modal.end_ahead()
     return None
+
+
+_HANDLERS = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
 
 
 def register() -> None:
     """Follow from now on."""
     properties.on_reframe.append(changed)
+    for handlers in _HANDLERS:
+        handlers.append(_show_again)
 
 
 def unregister() -> None:
     """Follow no longer."""
     if changed in properties.on_reframe:
         properties.on_reframe.remove(changed)
+    for handlers in _HANDLERS:
+        if _show_again in handlers:
+            handlers.remove(_show_again)
     if bpy.app.timers.is_registered(_begin):
         bpy.app.timers.unregister(_begin)

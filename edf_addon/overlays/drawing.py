@@ -216,12 +216,12 @@ def _draw_lines(view: _View) -> None:
 
 def _draw_frame(view: _View, settings: Any, panorama: bpy.types.Image | None, side: str) -> None:
     """The outline of the frame that is chosen now, where the panorama was made for another."""
-    from . import frame_geometry
-
-    known = result.read(panorama)
-    rays = _frame_rays(settings, panorama, known) if known is not None and editor.is_behind(settings, panorama) else None
+    known = result.read(panorama) if editor.is_behind(settings, panorama) else None
+    rays = None if known is None else _frame_rays(settings, panorama, known)
     if known is None or rays is None:
         return
+    from . import frame_geometry
+
     on_panorama = side == editor.PANORAMA
     points = frame_geometry.on_panorama(known, rays) if on_panorama else frame_geometry.on_picture(known, rays, side)
     ends = view.at(frame_geometry.closed_pieces(points, view.size[0] / 2 if on_panorama else 1e6))

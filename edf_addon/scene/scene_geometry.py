@@ -74,8 +74,9 @@ def viewpoint_of(known: dict[str, Any]) -> Viewpoint | None:
     told = known["geometry"].get("viewpoint")
     if told is None:
         return None
+    c, rotation, along = (matrix(told[name]) for name in ("c", "rotation", "along"))
     start, end = told["ends"]
-    return Viewpoint(float(told["s1"]), *(matrix(told[name]) for name in ("c", "rotation", "along")), (start, end))
+    return Viewpoint(float(told["s1"]), c, rotation, along, (float(start), float(end)))
 
 
 def axes(known: dict[str, Any]) -> Array:

@@ -121,7 +121,7 @@ def program(name: str, reference: Path, target: Path, folder: Path) -> list[str]
         "edf": [*edf, "--no-cache"],
         "sparse": [*edf, "--no-cache", *PLAIN, "--blend", "feather", "--field", "strict"],
         "preview": [*edf, "--no-cache", *PLAIN, "--blend", "linear", "--field", "strict"],
-        "rew": [*edf, "--no-cache", *PLAIN, "--blend", "feather", "--field", "rew"],
+        "rew": [*edf, "--no-cache", *PLAIN, "--blend", "feather", "--field", "rew", "--projection", "reference"],
     }[name]
 
 

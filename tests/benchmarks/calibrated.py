@@ -81,7 +81,7 @@ def measure(first: Path, second: Path, camera: dict, camera_prime: dict, way: st
             left, top = (width - w) // 2, (height - h) // 2
             views[index] = np.ascontiguousarray(views[index][top : top + h, left : left + w])
             matrix[:2, 2] -= (left, top)
-    view = stitch(views, StitchOptions(camera=request, measure=False)).edges[0].two_view
+    view = stitch(views, StitchOptions(camera=request, projection="reference", measure=False)).edges[0].two_view
     R = nearest_rotation(np.array(camera_prime["R"]) @ np.array(camera["R"]).T)
     height, width = views[1].shape[:2]
     grid = np.stack(np.meshgrid(np.linspace(0, width - 1, 20), np.linspace(0, height - 1, 20)), -1).reshape(-1, 2)

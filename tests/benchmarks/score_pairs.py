@@ -3,7 +3,8 @@
     score_pairs.py [--pairs DIR] [--score SCORE.py] [--field FIELD] [-o OUTDIR]
 
 Every folder of two pictures under --pairs ($EDF_DATA/pairs, else ../shared/data/pairs beside the checkout) is stitched
-with the defaults; --score (default ../shared/tools/score.py) gets the pictures and the warp, and nothing else of ours.
+on the reference's plane; --score (default ../shared/tools/score.py) gets the pictures and the warp, and nothing else of
+ours.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+# The score is of the reference's own pixels: on its own plane, whole.
+ON_REFERENCE = ("--projection", "reference", "--crop", "full")
 COLUMNS = ("ov_psnr_rgb", "ov_ssim_g11", "proj_mean", "proj_floor", "proj_reached", "overlap_ratio", "folds")
 
 
@@ -36,8 +39,8 @@ def main() -> None:
         pictures = [str(p) for p in sorted(folder.iterdir())[:2]]
         out = args.output / folder.name
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        edf = [sys.executable, "-m", "edf_stitch", "stitch", *pictures, "-o", f"{out}.png", "--field", args.field]
-        files = ["--warp", f"{out}.npz", "--report", f"{out}.json"]
+        edf = [sys.executable, "-m", "edf_stitch", "stitch", *pictures, "-o", f"{out}.png", *ON_REFERENCE]
+        files = ["--field", args.field, "--warp", f"{out}.npz", "--report", f"{out}.json"]
         subprocess.run([*edf, *files, "--overwrite", "--quiet"], check=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

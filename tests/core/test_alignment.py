@@ -19,6 +19,8 @@ from edf_stitch.core.system.progress import Progress
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at, make_pair
 
+from ..pairs import ON_REFERENCE
+
 HEIGHT, WIDTH = 180, 240
 
 
@@ -57,7 +59,7 @@ def pooled(clip: list[Pair], quick: StitchOptions) -> Alignment:
 
 def test_where_nothing_is_asked_the_pictures_stay_what_they_are(small_pair: Pair) -> None:
     pictures = picture_from_array(small_pair.reference), picture_from_array(small_pair.target)
-    frame = prepare(pictures, StitchOptions())
+    frame = prepare(pictures, ON_REFERENCE)
     assert frame.pictures[0] is pictures[0] and frame.pictures[1] is pictures[1]
     assert frame.full_sizes == ((WIDTH, HEIGHT), (WIDTH, HEIGHT)) and size_of(pictures[0]) == (WIDTH, HEIGHT)
 

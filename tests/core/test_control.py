@@ -22,6 +22,8 @@ from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at
 
+from ..pairs import ON_REFERENCE
+
 WIDTH, HEIGHT = 240, 180
 Mask = np.ndarray
 
@@ -312,7 +314,7 @@ def from_full(full: StitchResult, half: StitchResult) -> np.ndarray:
 def test_half_the_scale_is_the_same_panorama_at_half_the_size(pair: Pair, field: str) -> None:
     K = pair.reference_camera.K
     camera = CameraRequest(focal_px=(K[0, 0],), principal=(K[0, 2], K[1, 2]))
-    options = StitchOptions(field, camera=camera, measure=False)
+    options = replace(ON_REFERENCE, field=field, camera=camera, measure=False)
     full = stitch((pair.reference, pair.target), options)
     half = stitch((pair.reference, pair.target), replace(options, scale=0.5))
     for ours, theirs in zip((*half.alpha.shape, *half.warp.canvas.offset),
@@ -376,7 +378,7 @@ def test_a_mask_of_the_full_size_goes_with_a_scale(pair: Pair) -> None:
     mask = np.zeros((300, 400), bool)
     mask[:, 300:360] = True
     camera = CameraRequest(focal_px=(pair.reference_camera.K[0, 0],))
-    options = StitchOptions(camera=camera, scale=0.5, ignore=(mask,), measure=False)
+    options = replace(ON_REFERENCE, camera=camera, scale=0.5, ignore=(mask,), measure=False)
     result = stitch((pair.reference, pair.target), options)
     x, y = result.warp.canvas.offset
     alpha = result.layers[0].alpha[y : y + 150, x : x + 200]

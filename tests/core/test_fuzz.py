@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.batch.list import read_list
 from edf_stitch.core.cameras.sources import CameraRequest, read_camera_file
+from edf_stitch.core.choices import FADES
 from edf_stitch.core.commands.cli import main
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.masks import read_mask
@@ -27,6 +28,8 @@ from edf_stitch.synthetic_scenes.two_planes import Pair
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+
+from ..pairs import ON_REFERENCE
 
 SOAK = int(os.environ.get("EDF_SOAK_STITCHES", 300))
 PLACE = tempfile.TemporaryDirectory()
@@ -172,7 +175,7 @@ CHANGES: dict[str, st.SearchStrategy] = {
     "dtype": st.sampled_from((np.uint8, np.uint16, np.float32)), "channels": st.sampled_from((1, 3, 4)),
     "bright": st.sampled_from((1e-6, 0.1, 3.0, 1e6, 1e30)), "stretched": st.floats(0.3, 3),
     "focal": st.one_of(st.floats(0.01, 1e7), st.just(228.0)), "principal": st.tuples(*[st.floats(-1e4, 1e4)] * 2),
-    "field": st.sampled_from(("slack", "strict", "paper")), "fade": st.sampled_from(("plane", "infinity")),
+    "field": st.sampled_from(("slack", "strict", "paper")), "fade": st.sampled_from(FADES),
     "blend": st.sampled_from(("feather", "linear")), "scale": st.floats(0.02, 1), "seed": SEEDS,
     "crop": st.sampled_from(("full", "inscribed", "reference", (0, 0, 5, 5), (10, 10, 10**6, 3))),
     "matches": st.tuples(SEEDS, st.integers(1, 40)), "mask": SEEDS,
@@ -223,7 +226,7 @@ def changed(pair: Pair, how: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, St
         options["matches"] = np.random.default_rng(seed).random((count, 4)) * (np.array(size) - 1)
     if "mask" in how:
         options["ignore"] = (rng.random(pictures[0].shape[:2]) < rng.random(),)
-    return pictures[0], second, replace(StitchOptions(measure=False, **options), camera=CameraRequest(**camera))
+    return pictures[0], second, replace(ON_REFERENCE, measure=False, camera=CameraRequest(**camera), **options)
 
 
 def sound(result: StitchResult) -> None:

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError, fields
+from dataclasses import FrozenInstanceError, fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
-from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, SEAMS
+from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, HOLES, PROJECTIONS, ROUND_FIELDS, SEAMS
 from edf_stitch.core.options import LEAST_SCALE, StitchOptions
 from edf_stitch.core.system.errors import BadRequest
+
+from ..pairs import ON_REFERENCE
 
 
 def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
-        "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore": (),
-        "projection": "reference", "level": "auto", "scale": 1.0, "crop": "full",
-        "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True, "holes": "transparent",
-        "seed": 0,
-        "measure": True, "cache": None,
+        "field": "slack", "fade": "continue", "camera": CameraRequest(), "matches": None, "ignore": (),
+        "slide": "auto", "projection": "auto", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
+        "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True,
+        "holes": "auto", "seed": 0, "measure": True, "cache": None,
     }  # fmt: skip
 
 
@@ -38,14 +39,16 @@ def test_nothing_changes_them_afterwards() -> None:
 
 @pytest.mark.parametrize("asked", [
     *({"field": name} for name in FIELDS), *({"fade": name} for name in FADES), *({"blend": name} for name in BLENDS),
-    *({"seam": name} for name in SEAMS), {"mask": Path("m.png")}, {"exposure": False},
-    {"holes": "inpaint"},
+    *({"seam": name} for name in SEAMS), *({"holes": name} for name in HOLES), {"mask": Path("m.png")},
+    {"exposure": False}, *({"projection": name} for name in (*PROJECTIONS, "pannini:0.3")),
+    {"projection": "auto", "slide": "auto"}, {"projection": "auto", "slide": 1.0}, {"slide": "auto"},
+    {"projection": "auto", "field": "apap"}, {"projection": "auto", "centre": (-10.0, 3.0), "fov": 75.0},
     *({"crop": name} for name in CROPS), {"crop": (0, 0, 1, 1)}, {"crop": (3, 4, 500, 600)}, {"scale": 1},
     {"scale": LEAST_SCALE}, {"scale": 0.5}, {"seed": 0}, {"seed": 2**31 - 1}, {"matches": Path("m.csv")},
     {"matches": np.zeros((20, 4))}, {"ignore": (Path("a.png"),)}, {"ignore": (None, np.zeros((4, 4), bool))},
 ])  # fmt: skip
 def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
-    options = StitchOptions(**asked)
+    options = replace(ON_REFERENCE, **asked)
     for name, value in asked.items():
         assert getattr(options, name) is value
 
@@ -53,19 +56,29 @@ def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
 @pytest.mark.parametrize(("asked", "words"), [
     *(({"field": name}, ("field", repr(name), "choose from: slack, strict, paper"))
       for name in ("", "Slack", "slack ")),
-    *(({"fade": name}, ("fade", repr(name), "choose from: plane, infinity")) for name in ("none", "", "Plane")),
+    *(({"fade": name}, ("fade", repr(name), "choose from: continue, plane, infinity"))
+      for name in ("none", "", "Plane")),
     *(({"blend": name}, ("blend", repr(name), "choose from: multiband, feather, linear")) for name in ("", "Linear")),
     *(({"seam": name}, ("seam", repr(name), "choose from: graphcut, none")) for name in ("", "voronoi")),
-    *(({"holes": name}, ("holes", repr(name), "choose from: transparent, inpaint")) for name in ("", "fill")),
-    *(({"crop": name}, ("crop", repr(name), "choose from: full, inscribed, reference, or X, Y, W, H"))
+    *(({"holes": name}, ("holes", repr(name), "choose from: auto, transparent, inpaint")) for name in ("", "fill")),
+    *(({"crop": name}, ("crop", repr(name), "choose from: auto, full, inscribed, reference, or X, Y, W, H"))
       for name in ("tight", "", "1,2,3,4", "Full")),
     *(({"scale": scale}, ("scale", "between 0.02 and 1"))
       for scale in (0, 0.0199, 1.001, -1, 2, math.nan, math.inf, -math.inf)),
+    *(({"projection": name}, (repr(name), "choose from: auto, reference, perspective, pannini", "pannini:D"))
+      for name in ("", "flat", "Auto", "auto:1", "cylindrical:0.2")),
+    *(({"projection": name}, (repr(name), "from 0 (a plane) to 1"))
+      for name in ("pannini:x", "pannini:", "pannini:-1")),
+    *(({"slide": value, "projection": "auto"}, ("slide", "from 0", "to 1, or auto"))
+      for value in ("0", "", -0.1, 1.01, math.nan)),
+    *(({"centre": value, "projection": "auto"}, ("centre", "yaw, pitch"))
+      for value in ((1.0,), (1.0, 2.0, 3.0), (math.nan, 0.0), (181.0, 0.0))),
+    *(({"fov": value, "projection": "auto"}, ("field of view", "between 1 and 360")) for value in (0.5, 361, math.nan)),
     *(({"seed": seed}, ("seed", "from 0 to 2147483647")) for seed in (-1, 2**31, 2**63)),
 ])  # fmt: skip
 def test_what_is_not_offered_is_refused_with_what_is(asked: dict, words: tuple[str, ...]) -> None:
     with pytest.raises(BadRequest) as refused:
-        StitchOptions(**asked)
+        replace(ON_REFERENCE, **asked)
     assert refused.value.exit_code == 2
     for word in words:
         assert word in str(refused.value)
@@ -76,3 +89,42 @@ def test_a_crop_that_no_panorama_has_is_refused_before_the_work(crop: tuple) -> 
     """Whatever the panorama's size: nobody should wait for the end to hear of it."""
     with pytest.raises(BadRequest):
         StitchOptions(crop=crop)
+
+
+@pytest.mark.parametrize("asked", [
+    {"level": (1.0, 2.0, 3.0)}, {"centre": (1.0, 2.0)}, {"fov": 60.0}, {"slide": 0.5},
+], ids=str)  # fmt: skip
+def test_the_references_plane_has_one_frame_and_one_place(asked: dict) -> None:
+    """Whether it is asked for or what a field is bound to: the words say which, and what would help."""
+    (name,) = asked
+    with pytest.raises(BadRequest, match=f"projection reference .* leave the {name} out, or choose another projection"):
+        StitchOptions(projection="reference", **asked)
+    with pytest.raises(BadRequest, match=f"field 'apap' .* leave the {name} out, or choose another field"):
+        StitchOptions(projection="auto", field="apap", **asked)
+
+
+@pytest.mark.parametrize("asked", [{"centre": (1.0, 2.0)}, {"fov": 60.0}], ids=str)
+def test_a_sphere_is_a_whole_one(asked: dict) -> None:
+    with pytest.raises(BadRequest, match="whole sphere: leave centre and fov out, turn it by level, or cut"):
+        StitchOptions(projection="equirectangular", **asked)
+    assert StitchOptions(projection="equirectangular", level=(1.0, 2.0, 3.0)).surface == ("equirectangular", None)
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_a_field_that_knows_one_plane_is_drawn_on_it(field: str) -> None:
+    by_itself = "auto" if field in ROUND_FIELDS else "reference"
+    assert StitchOptions(projection="auto", field=field).surface[0] == by_itself
+    for name in PROJECTIONS[2:]:
+        if field in ROUND_FIELDS:
+            assert StitchOptions(projection=name, field=field).surface == (name, None)
+        else:
+            with pytest.raises(BadRequest, match="knows the reference's plane only"):
+                StitchOptions(projection=name, field=field)
+    assert StitchOptions(projection="pannini:0.25").surface == ("pannini", 0.25)
+
+
+def test_a_crop_is_chosen_only_where_something_may_be_lost() -> None:
+    for projection, kept in (("auto", "auto"), ("pannini", "auto"), ("reference", "full"), ("equirectangular", "full")):
+        assert StitchOptions(projection=projection, crop="auto").kept == kept
+        assert StitchOptions(projection=projection, crop="inscribed").kept == "inscribed"
+    assert StitchOptions(projection="auto", field="rew", crop="auto").kept == "full"

@@ -43,6 +43,8 @@ from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry, pose_errors
 from edf_stitch.synthetic_scenes.scene_camera import SceneCamera
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at, make_pair
 
+from ..pairs import ON_REFERENCE
+
 # --- against the truth ---------------------------------------------------------------------------------------------
 
 
@@ -131,7 +133,7 @@ def test_given_cameras_are_taken_as_they_are(pair: Pair) -> None:
         return {"K": camera.K.tolist(), "R": camera.R.tolist(), "t": camera.t.tolist()}
 
     cameras = {"cameras": {"reference": entry(pair.reference_camera), "target": entry(pair.target_camera)}}
-    options = StitchOptions("strict", camera=CameraRequest(cameras=cameras), measure=False)
+    options = replace(ON_REFERENCE, field="strict", camera=CameraRequest(cameras=cameras), measure=False)
     given = stitch((pair.reference, pair.target), options)
     truth, view = truth_of(pair), given.edges[0].two_view
     assert rotation_angle(view.R, truth.R) < 1e-6 and np.allclose(view.t, truth.t) and np.allclose(view.F, truth.F)
@@ -255,7 +257,7 @@ def test_pictures_of_two_sizes(pair: Pair, factor: float) -> None:
     target = cv2.resize(pair.target, size, interpolation=cv2.INTER_CUBIC if factor > 1 else cv2.INTER_AREA)
     focal = pair.reference_camera.K[0, 0]
     request = CameraRequest(focal_px=(focal, factor * focal))
-    result = stitch((pair.reference, target), StitchOptions(camera=request, measure=False))
+    result = stitch((pair.reference, target), replace(ON_REFERENCE, camera=request, measure=False))
     camera = pair.target_camera
     scaled = replace(camera, K=np.diag([factor, factor, 1]) @ camera.K, size=size)
     scaled.K[:2, 2] += (factor - 1) / 2
@@ -520,7 +522,7 @@ def test_a_pair_that_somebody_else_calibrated(data: Path) -> None:
         K[:2, 2] -= 0.25  # pixel centres are integers before and after
         cameras.append(SceneCamera(K, R, t, halves[0].shape[1::-1]))
     given = {"cameras": {role: {"K": c.K.tolist()} for role, c in zip(("reference", "target"), cameras, strict=True)}}
-    result = stitch(halves, StitchOptions(camera=CameraRequest(cameras=given), measure=False))
+    result = stitch(halves, replace(ON_REFERENCE, camera=CameraRequest(cameras=given), measure=False))
     errors = pose_errors(result.edges[0].two_view, TrueGeometry.of(*cameras), cameras[1].size)
     assert errors["h_inf_px"] < 0.79, "PoseLib's median over 14 such pairs (FIELD)"
     assert errors["rotation_deg"] < 0.1 and errors["baseline_deg"] < 1 and errors["f_px"] < 1
@@ -535,7 +537,7 @@ def test_a_pair_wider_than_opencv_can_hold() -> None:
     far, near = strip(1), strip(2)
     first = np.vstack([far[:60, 100:33_100], near[60:, 100:33_100]])
     second = np.vstack([far[:60, 110:33_110], near[60:, 130:33_130]])
-    result = stitch((first, second), StitchOptions(camera=CameraRequest(focal_px=(20_000.0,))))
+    result = stitch((first, second), replace(ON_REFERENCE, camera=CameraRequest(focal_px=(20_000.0,))))
     assert result.warp.canvas.width > 33_000 and result.report["measured"]["overlap_px"] > 3_000_000
 
 

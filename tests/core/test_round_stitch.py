@@ -14,12 +14,14 @@ from edf_stitch.core.measure.metrics import look_up
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.inspection import depth_grid, displacement_px, full_geometry, heat_map, match_rows
 from edf_stitch.core.output.outputs import OutputRequest, warp_bytes, write
-from edf_stitch.core.panorama.levelling import angles_of, rotation_for, turned
+from edf_stitch.core.panorama.levelling import angles_of, gravity, turned, upright
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.core.system.output_files import OutputFiles
 from edf_stitch.synthetic_scenes.two_planes import FLOOR_Y, WALL_Z, Pair, Textures
+
+from ..pairs import ON_REFERENCE
 
 ROUND = ("cylindrical", "equirectangular")
 
@@ -121,7 +123,9 @@ def test_a_flat_panorama_reports_its_plane(small_result: StitchResult) -> None:
 def test_the_sphere_is_whole_and_the_rest_of_it_empty(results: dict[str, StitchResult]) -> None:
     result = results["equirectangular"]
     height, width = result.alpha.shape
-    assert width == 2 * height and abs(width - 2 * np.pi * result.edges[0].two_view.K[0, 0]) < 4
+    focal = result.report["canvas"]["projection"]["focal_px"]
+    assert width == 2 * height and abs(width - 2 * np.pi * focal) < 1
+    assert 0.8 < focal / result.edges[0].two_view.K[0, 0] < 1.2, "the pictures keep their pixels"
     left, top, whole_width, whole_height = result.spread
     assert (whole_width, whole_height) == (width, height) and left < 0 and top < 0
     part = np.s_[-top : -top + result.warp.canvas.height, -left : -left + result.warp.canvas.width]
@@ -145,8 +149,11 @@ def test_the_horizon_is_that_of_upright_edges_and_of_the_poses_found(results: di
         projection = result.warp.canvas.projection
         assert projection is not None
         yaw, pitch, roll = angles_of(projection.rotation)
-        assert abs(yaw) < 1e-6 and 0 < abs(pitch) < 0.5 and abs(roll) < 0.5, "the scene's edges are upright"
-        level = rotation_for("auto", [view.R for view in result.views])
+        assert 0 < abs(pitch) < 0.5 and abs(roll) < 0.5, "the scene's edges are upright"
+        columns = np.flatnonzero((result.alpha > 0).any(axis=0))
+        middle = result.report["canvas"]["projection"]["centre"][0]
+        assert abs(yaw) > 3 and abs(columns.mean() - middle) < 3, "the frame is centred"
+        level = upright(gravity([view.R for view in result.views]))
         assert abs(angles_of(level)[1]) > 3, "which the poses alone do not tell"
 
 
@@ -240,11 +247,11 @@ def _margins(result: StitchResult) -> list[tuple[int, int]]:
     ({"projection": "equirectangular", "level": "straight"}, "level 'straight' is not known"),
     ({"projection": "cylindrical", "level": (1.0, 2.0)}, "yaw, pitch, roll"),
     ({"projection": "cylindrical", "level": (1.0, 2.0, float("nan"))}, "yaw, pitch, roll"),
-    ({"level": (1.0, 2.0, 3.0)}, "the projection reference keeps the reference's plane"),
+    ({"level": (1.0, 2.0, 3.0)}, "the projection reference keeps the reference's own plane"),
 ])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_words(options: dict, word: str) -> None:
     with pytest.raises(BadRequest, match=word) as caught:
-        StitchOptions(**options)
+        replace(ON_REFERENCE, **options)
     assert caught.value.exit_code == 2
 
 
@@ -257,7 +264,7 @@ def test_pictures_whose_pose_nobody_knows_are_shown_by_their_homography(small_pa
     y = homogeneous(x) @ H.T
     rows = np.column_stack([x, y[:, :2] / y[:, 2:]])
     rows = rows[((rows[:, 2:] > 1) & (rows[:, 2:] < (width - 2, height - 2))).all(axis=1)]
-    options = replace(StitchOptions(projection="cylindrical"), matches=rows, measure=False)
+    options = replace(ON_REFERENCE, projection="cylindrical", matches=rows, measure=False)
     result = stitch((small_pair.reference, small_pair.target), options)
     assert result.edges[0].two_view.model == "plane"
     assert np.nanmax(np.linalg.norm(look_up(result.warp, rows[:, :2]) - rows[:, 2:], axis=1)) < 0.5

@@ -71,6 +71,31 @@ def way() -> Iterator[float]:
     yield 3.0
     shoot("5_panorama")
 
+    open_only("EDF_PT_frame")
+    first = settings.result.name
+    settings.slide_auto, settings.slide = False, 0.1
+    settings.slide, settings.centre = 0.5, (0.1, 0.0)  # as one drags: each change begins anew
+    yield 0.1
+    area.tag_redraw()
+    shoot("5b_outline_of_the_frame")
+    for _ in range(120):
+        if settings.result.name != first:
+            break
+        yield 0.5
+    settings = bpy.context.scene.edf_stitch
+    walk["facts"]["followed"] = [settings.result.name, area.spaces.active.image.name]
+    yield 2.0
+    shoot("5c_followed")
+    with in_editor(area):
+        bpy.ops.ed.undo()
+    yield 2.0
+    settings = bpy.context.scene.edf_stitch
+    walk["facts"]["undone"] = [settings.result.name, getattr(area.spaces.active.image, "name", "")]
+    panorama = settings.result
+    settings.slide_auto, settings.centre = True, (0.0, 0.0)
+    show(area, panorama)
+    yield 2.0
+
     settings.show_matches = settings.show_epipolar = True
     open_only("EDF_PT_overlays")
     yield 1.0
@@ -86,7 +111,7 @@ def way() -> Iterator[float]:
     shoot("8_displacement")
     settings.overlay = "NONE"
 
-    open_only("EDF_PT_camera", "EDF_PT_field", "EDF_PT_output")
+    open_only("EDF_PT_camera", "EDF_PT_field", "EDF_PT_frame", "EDF_PT_output")
     yield 2.0
     shoot("9_settings")
     open_only("EDF_PT_matches", "EDF_PT_masks")

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.synthetic_scenes.compared import RenderedTruth, truth_beside
 from edf_stitch.synthetic_scenes.measures import figures, hidden_quality, truth_of
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
+
+from ..pairs import ON_REFERENCE
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +24,7 @@ def truth(rendered: RenderedPair) -> RenderedTruth:
 
 @pytest.fixture(scope="module")
 def stitched(rendered: RenderedPair, truth: RenderedTruth) -> StitchResult:
-    return stitch((rendered.reference, rendered.target), StitchOptions(camera=truth.camera, measure=False))
+    return stitch((rendered.reference, rendered.target), replace(ON_REFERENCE, camera=truth.camera, measure=False))
 
 
 def test_it_tells_the_true_focal_lengths(rendered: RenderedPair, truth: RenderedTruth) -> None:

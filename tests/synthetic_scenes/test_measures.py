@@ -15,15 +15,22 @@ from edf_stitch.synthetic_scenes.measures import (
     Truth,
     composition,
     figures,
+    meeting,
     on_the_wide_canvas,
     truth_of,
     whole_picture,
 )
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
 from edf_stitch.synthetic_scenes.scene_pictures import scene_pictures
-from edf_stitch.synthetic_scenes.stitches import WAYS, Shared, stitched
+from edf_stitch.synthetic_scenes.stitches import WAYS, Shared, slid, stitched
 
 from ..pairs import warp_of, with_map, with_two_view
+
+
+@pytest.fixture(scope="module")
+def shared() -> Shared:
+    """Features and geometry of the rendered pair, found once."""
+    return {}
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +64,7 @@ def test_the_truth_scores_nothing_off(perfect: StitchResult, truth: Truth) -> No
     for name in ("rotation_deg", "focal_percent", "h_inf_px", "h_inf_p95_px", "f_px"):
         assert abs(found[name]) < 1e-3, name
     assert found["epipole_deg"] < 1e-3
-    for name in ("projectivity_p95_px", "alignment_p95_px", "beyond_px"):
+    for name in ("projectivity_p95_px", "alignment_p95_px", "beyond_px", "beyond_p90_px"):
         assert found[name] < 1e-3, name
     assert found["covered"] == 1 and found["overlap_psnr_db"] > 30
 
@@ -72,8 +79,47 @@ def test_a_map_that_is_off_is_off_by_as_much(perfect: StitchResult, truth: Truth
     assert found["alignment_px"] == pytest.approx(5, abs=0.01)
     assert found["alignment_p95_px"] == pytest.approx(5, abs=0.01)
     assert found["beyond_px"] == pytest.approx(5, abs=0.01)
+    assert found["beyond_p90_px"] == pytest.approx(5, abs=0.01)
     assert found["projectivity_px"] > 1 and found["overlap_psnr_db"] < better["overlap_psnr_db"] - 5
     assert found["rotation_deg"] < 1e-3, "the cameras are as good as before"
+
+
+def test_a_tenth_that_is_off_beyond_the_overlap_is_the_90th_percentiles_business(
+    perfect: StitchResult, truth: Truth
+) -> None:
+    x = perfect.warp.maps[1].arrays().x.copy()
+    rows, columns = np.nonzero(truth.in_target & ~truth.in_reference)
+    x[rows[::8], columns[::8]] += 7
+    found = figures(replace(perfect, warp=with_map(perfect.warp, x)), truth)
+    assert found["beyond_px"] < 1e-3 and found["beyond_p90_px"] == pytest.approx(7, abs=0.01)
+
+
+@pytest.fixture(scope="module")
+def on_cylinder(rendered: RenderedPair, shared: Shared) -> StitchResult:
+    return slid(rendered, "known/strict", 0.0, shared)
+
+
+def test_pictures_meet_on_any_canvas(
+    rendered: RenderedPair, truth: Truth, result: StitchResult, on_cylinder: StitchResult
+) -> None:
+    flat, found = (meeting(one, rendered, truth) for one in (result, on_cylinder))
+    assert on_cylinder.warp.canvas.projection is not None and not result.warp.canvas.projection
+    assert flat["meeting_px"] == pytest.approx(figures(result, truth)["alignment_px"], abs=0.02)
+    assert found["meeting_px"] == pytest.approx(flat["meeting_px"], abs=0.02) and found["meeting_p95_px"] < 2
+
+
+def test_pictures_that_do_not_meet_are_as_far_apart_as_they_are(
+    rendered: RenderedPair, truth: Truth, on_cylinder: StitchResult
+) -> None:
+    off = meeting(moved(on_cylinder, 3, 4), rendered, truth)
+    assert off["meeting_px"] == pytest.approx(5, abs=0.2)
+    own, other = (picture_map.arrays() for picture_map in on_cylinder.warp.maps)
+    warp = replace(on_cylinder.warp, maps=(replace(own, y=own.y + np.float32(2)), other))
+    assert meeting(replace(on_cylinder, warp=warp), rendered, truth)["meeting_px"] == pytest.approx(2, abs=0.3)
+    nothing = np.ones_like(on_cylinder.occluded[0])
+    for occluded in ((nothing, on_cylinder.occluded[1]), (on_cylinder.occluded[0], nothing)):
+        hidden = replace(on_cylinder, occluded=occluded)
+        assert np.isnan(meeting(hidden, rendered, truth)["meeting_px"]), "what is hidden is not asked for"
 
 
 def test_cameras_that_are_off_are_told(perfect: StitchResult, truth: Truth) -> None:
@@ -122,12 +168,6 @@ def test_a_composition_is_held_against_the_plain_average(result: StitchResult, t
     there = found["composed_psnr_db"] - found["over_average_db"]
     assert there == pytest.approx(whole_picture(plain, shown, truth)["whole_psnr_db"], abs=0.1)
     assert found["source_fidelity_mean"] > 0.97 and found["seam_visibility"] < 2
-
-
-@pytest.fixture(scope="module")
-def shared() -> Shared:
-    """Features and geometry of the rendered pair, found once."""
-    return {}
 
 
 @pytest.mark.parametrize("way", WAYS)

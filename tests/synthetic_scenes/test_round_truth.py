@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,8 @@ from edf_stitch.core.pipeline import stitch
 from edf_stitch.core.raster.colour import encode
 from edf_stitch.synthetic_scenes.recipes import RECIPES
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
+
+from ..pairs import ON_REFERENCE
 
 pytestmark = pytest.mark.slow
 SCRIPT = Path(__file__).with_name("round_render.py")
@@ -41,7 +43,7 @@ def panorama_options(pair: RenderedPair, **options: Any) -> StitchOptions:
     K, K_prime = (pair.cameras[name].K for name in ("reference", "target"))
     middles = tuple(float(v) for v in (*K[:2, 2], *K_prime[:2, 2]))
     camera = CameraRequest(focal_px=(float(K[0, 0]), float(K_prime[0, 0])), principal=middles)
-    return StitchOptions(projection="equirectangular", camera=camera, measure=False, **options)
+    return replace(ON_REFERENCE, projection="equirectangular", camera=camera, measure=False, **options)
 
 
 def apart(a: np.ndarray, b: np.ndarray) -> float:

@@ -20,7 +20,8 @@ from edf_stitch.synthetic_scenes.validation import Validation, ValidationRequest
 
 FIGURES = {
     "rotation_deg": 0.01, "focal_percent": 0.5, "epipole_deg": 0.1, "h_inf_px": 0.2, "h_inf_p95_px": 0.3, "f_px": 0.1,
-    "projectivity_px": 0.05, "projectivity_p95_px": 0.1, "alignment_px": 0.2, "alignment_p95_px": 1.0, "beyond_px": 1.0,
+    "projectivity_px": 0.05, "projectivity_p95_px": 0.1, "alignment_px": 0.2, "alignment_p95_px": 1.0, "beyond_px": 0.3,
+    "beyond_p90_px": 1.5, "slid_auto_px": 0.1, "slid_auto_p95_px": 1.0, "slid_half_px": 0.1, "slid_half_p95_px": 1.0,
     "overlap_psnr_db": 30.0, "overlap_ssim": 0.9, "covered": 1.0, "whole_psnr_db": 30.0, "whole_ssim": 0.9,
     "over_average_db": 1.0, "over_average_ssim": 0.01, "overlap_over_average_db": 9.0, "source_fidelity_mean": 0.99,
     "source_fidelity_p5": 0.95, "seam_visibility": 0.5,

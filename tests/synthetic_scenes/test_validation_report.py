@@ -21,7 +21,9 @@ VOID = {"meta", "img", "br", "link", "hr", "input"}
 
 def scene(name: str, model: str = "general", **changed: Any) -> dict[str, Any]:
     figures = {"rotation_deg": 0.0123, "focal_percent": -0.5, "h_inf_px": 0.2, "projectivity_px": 0.05,
-               "alignment_px": 0.2, "beyond_px": None, "overlap_psnr_db": 31.0, "whole_psnr_db": 30.0,
+               "alignment_px": 0.2, "covered": None, "overlap_psnr_db": 31.0, "whole_psnr_db": 30.0,
+               "beyond_px": 0.3, "beyond_p90_px": 1.5, "slid_auto_px": 0.1, "slid_auto_p95_px": 1.0,
+               "slid_half_px": 0.1, "slid_half_p95_px": 1.0,
                "over_average_db": 1.0, "over_average_ssim": 0.01, "overlap_over_average_db": 9.0,
                "source_fidelity_mean": 0.99, "source_fidelity_p5": 0.95, "seam_visibility": 0.5,
                "new_figure": 7.0}  # fmt: skip
@@ -127,7 +129,7 @@ def test_the_csv_has_a_row_for_every_run_and_one_for_a_scene_without(results: li
     assert [row["run"] for row in table] == 3 * list(WAYS) + [""]
     first = table[0]
     assert (first["scene"], first["title"], first["model"]) == ("tabletop", "Façades & <poles>", "general")
-    assert (first["rotation_deg"], first["beyond_px"], first["new_figure"]) == ("0.0123", "", "7.0")
+    assert (first["rotation_deg"], first["covered"], first["new_figure"]) == ("0.0123", "", "7.0")
     assert [(row["scene"], row["run"]) for row in table if row["run_passed"] == "false"] == [
         ("street:noise=2", "unknown/slack"), ("foliage", ""),
     ]  # fmt: skip

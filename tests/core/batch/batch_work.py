@@ -17,7 +17,7 @@ from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchOptions, StitchResult
 
-FOCAL = ["--focal-px", "228"]
+from ...pairs import KNOWN_WORDS
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -98,4 +98,4 @@ def of_pairs(*names: str) -> set[str]:
 
 
 def run(work: Path, *arguments: str, items: str = "good.csv", out: str = "out") -> int:
-    return main(["batch", str(work / items), "-o", str(work / out), *FOCAL, *arguments])
+    return main(["batch", str(work / items), "-o", str(work / out), *KNOWN_WORDS, *arguments])

@@ -19,8 +19,9 @@ from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest, Cancelled, UnreadableImage, UnwritableOutput
 
+from ...pairs import KNOWN_WORDS, ON_REFERENCE
 from . import batch_work
-from .batch_work import FOCAL, files, lasting, of_pairs, run, summary
+from .batch_work import files, lasting, of_pairs, run, summary
 
 work, quick, said = batch_work.work, batch_work.quick, batch_work.said
 
@@ -155,7 +156,7 @@ def test_progress_of_everything_and_outcomes_as_they_come(work: Path, quick: lis
     told: list[tuple[str, float]] = []
     ended: list[tuple[str, int, int]] = []
     found = run_batch(
-        read_list(work / "good.csv"), StitchOptions(), BatchRequest(work / "out"),
+        read_list(work / "good.csv"), ON_REFERENCE, BatchRequest(work / "out"),
         lambda stage, share: told.append((stage, share)),
         finished=lambda outcome, number, count: ended.append((outcome.name, number, count)),
     )  # fmt: skip
@@ -168,7 +169,7 @@ def test_progress_of_everything_and_outcomes_as_they_come(work: Path, quick: lis
 def test_two_items_of_one_name_are_refused(tmp_path: Path) -> None:
     items = [BatchItem(name, Path("a.png"), Path("b.png")) for name in ("x", "X")]
     with pytest.raises(BadRequest, match="two items are named 'X'"):
-        run_batch(items, StitchOptions(), BatchRequest(tmp_path / "out"))
+        run_batch(items, ON_REFERENCE, BatchRequest(tmp_path / "out"))
     with pytest.raises(BadRequest, match="no name for outputs"):
         BatchItem("a/b", Path("a.png"), Path("b.png"))
 
@@ -226,7 +227,7 @@ def test_cancelled_from_outside(work: Path) -> None:
         return (work / "out" / "p1.png").exists()
 
     with pytest.raises(Cancelled):
-        run_batch(read_list(work / "good.csv"), StitchOptions(), BatchRequest(work / "out"), cancelled=cancelled)
+        run_batch(read_list(work / "good.csv"), ON_REFERENCE, BatchRequest(work / "out"), cancelled=cancelled)
     assert asked > 5 and set(files(work / "out")) == {"batch.json", *of_pairs("p1")}
 
 
@@ -244,7 +245,7 @@ sys.exit(cli.main())
 @pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 def test_a_signal_in_the_middle_keeps_what_is_finished(work: Path, number: signal.Signals) -> None:
-    line = [sys.executable, "-c", THINKING, "batch", str(work / "good.csv"), "-o", str(work / "out"), *FOCAL]
+    line = [sys.executable, "-c", THINKING, "batch", str(work / "good.csv"), "-o", str(work / "out"), *KNOWN_WORDS]
     with subprocess.Popen(line, cwd=work, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as job:
         assert job.stderr is not None
         assert job.stderr.readline().startswith("edf: [1/3] p1: ")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
-from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, HOLES, SEAMS
+from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS
 from edf_stitch.core.commands.arguments import add_options, options_from
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.system.errors import BadRequest
@@ -55,7 +55,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
 
 @pytest.mark.parametrize(("words", "expected"), [
     (["--field", "strict", "--fade", "plane", "--projection", "reference", "--seam", "none"],
-     {"field": "strict", "seam": "none"}),
+     {"field": "strict", "fade": "plane", "projection": "reference", "seam": "none"}),
     (["--field", "paper", "--fade", "infinity"], {"field": "paper", "fade": "infinity"}),
     (["--matches", "m.csv", "--ignore-ref", "a.png", "--ignore-target", "b.png"],
      {"matches": Path("m.csv"), "ignore": (Path("a.png"), Path("b.png"))}),
@@ -64,13 +64,20 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--crop", "3,4,50,60"], {"crop": (3, 4, 50, 60)}), (["--crop", "reference"], {"crop": "reference"}),
     (["--dense"], {}),
     (["--no-dense", "--no-exposure"], {"dense": False, "exposure": False}), (["--exposure", "--seam", "graphcut"], {}),
-    (["--holes", "inpaint"], {"holes": "inpaint"}), (["--holes", "transparent"], {}),
+    (["--holes", "inpaint"], {"holes": "inpaint"}), (["--holes", "transparent"], {"holes": "transparent"}),
     (["--mask", "m.png"], {"mask": Path("m.png")}),
     (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {"blend": "feather"}),
-    (["--projection", "reference"], {}), (["--projection", "cylindrical"], {"projection": "cylindrical"}),
+    (["--projection", "reference"], {"projection": "reference"}),
+    (["--projection", "cylindrical"], {"projection": "cylindrical"}),
     (["--projection", "equirectangular", "--level=-5,2.5,0"],
      {"projection": "equirectangular", "level": (-5.0, 2.5, 0.0)}),
     (["--level", "auto"], {}), (["--level", "none"], {"level": "none"}),
+    (["--projection", "auto", "--slide", "auto"], {"projection": "auto", "slide": "auto"}),
+    (["--projection", "pannini", "--slide", "0.5"], {"projection": "pannini", "slide": 0.5}),
+    (["--projection", "pannini:.25"], {"projection": "pannini:.25"}),
+    (["--projection", "perspective", "--centre=-5,2", "--fov", "80"],
+     {"projection": "perspective", "centre": (-5.0, 2.0), "fov": 80.0}),
+    (["--crop", "auto", "--holes", "auto"], {"crop": "auto", "holes": "auto"}),
     (["--seed", "7"], {"seed": 7}), (["--seed", "2147483647"], {"seed": 2147483647}),
 ])  # fmt: skip
 def test_how_it_is_done(words: list[str], expected: dict) -> None:
@@ -81,6 +88,7 @@ def test_how_it_is_done(words: list[str], expected: dict) -> None:
     ["--field", "nonsense"], ["--field", ""], ["--fade", "slowly"], ["--blend", ""], ["--seam", "x"], ["--seed", "x"],
     ["--seed", "1.5"], ["--scale", "x"], ["--focal-px", "abc"], ["--focal-px", ""], ["--focal-px", "1,,2"],
     ["--focal-px"], ["--projection", "flat"], ["--sensor-mm", "1;2"],
+    ["--slide", "x"], ["--slide", ""], ["--centre", "x"], ["--fov", "wide"],
 ], ids=" ".join)  # fmt: skip
 def test_what_makes_no_sense_is_refused_by_the_parser(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as leaving:
@@ -93,6 +101,11 @@ def test_what_makes_no_sense_is_refused_by_the_parser(words: list[str], capsys: 
     ["--sensor-mm", "0", "--focal-mm", "1"], ["--principal", "1"], ["--principal", "1,2,3"], ["--principal", "inf,1"],
     ["--focal-px", "9", "--focal35", "28"], ["--focal35", "28", "--cameras", "c.json"], ["--seed=-1"],
     ["--seed", "2147483648"], *(["--scale", text] for text in ("0", "1.5", "nan", "inf")), ["--scale=-0.5"],
+    *(["--projection", text] for text in ("pannini:x", "pannini:", "pannini:1.1", "pannini:nan", "perspective:0.5")),
+    *(["--slide", text, "--projection", "auto"] for text in ("1.1", "nan", "inf")), ["--slide", "2"],
+    *(["--projection", "auto", "--centre", text] for text in ("1", "1,2,3", "181,0", "nan,0")),
+    *(["--projection", "auto", "--fov", text] for text in ("0", "361", "nan")),
+    *(["--projection", "reference", *more] for more in (["--fov", "50"], ["--centre", "5,5"], ["--slide", "0.5"])),
     *(["--crop", text] for text in ("tight", "", "1,2,3", "1,2,3,4,5", "0,0,0,5", "0,0,5,0", "1.5,0,5,5", "Full")),
 ], ids=" ".join)  # fmt: skip
 def test_what_cannot_be_is_refused_before_the_work(words: list[str]) -> None:
@@ -108,8 +121,8 @@ def test_the_help_names_every_option_and_choice() -> None:
     for word in (*(f"--{name}" for name in (
         "focal-px", "focal-mm", "sensor-mm", "focal35", "principal", "cameras", "matches", "ignore-ref",
         "ignore-target", "scale", "crop", "field", "fade", "dense", "projection", "blend", "seam", "mask",
-        "exposure", "holes", "seed",
-    )), *FIELDS, *FADES, *BLENDS, *SEAMS, *HOLES, *CROPS):  # fmt: skip
+        "exposure", "holes", "seed", "slide", "level", "centre", "fov",
+    )), *PROJECTIONS, *FIELDS, *FADES, *BLENDS, *SEAMS, *HOLES, *CROPS):  # fmt: skip
         assert word in said, word
 
 

@@ -28,7 +28,7 @@ from edf_stitch.core.system.errors import Cancelled
 from edf_stitch.core.system.progress import STAGES
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
-FOCAL = ["--focal-px", "228"]
+from ...pairs import KNOWN_WORDS
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -75,7 +75,7 @@ def test_a_stitch_from_files_to_files(
 ) -> None:
     wanted = ["--report", "report.json", "--layers", "layers", "--warp", "warp.npz"]
     wanted = [str(tmp_path / one) if "." in one or one == "layers" else one for one in wanted]
-    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *FOCAL, *wanted]) == 0
+    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *KNOWN_WORDS, *wanted]) == 0
     out, err = said()
     assert out == ""
     height, width = small_result.alpha.shape
@@ -96,7 +96,7 @@ def test_a_stitch_from_files_to_files(
 def test_progress_is_plain_lines_where_there_is_no_terminal(
     pictures: list[str], tmp_path: Path, said: Callable
 ) -> None:
-    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *FOCAL]) == 0
+    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *KNOWN_WORDS]) == 0
     lines = said()[1].splitlines()
     assert [line.split()[1] for line in lines[:-1]] == list(STAGES), "one for each stage"
     shares = [int(line.split("(")[1].rstrip("%)")) for line in lines[:-1]]
@@ -178,7 +178,7 @@ def test_pictures_with_names_in_any_script(folder: Path, tmp_path: Path, said: C
     for name in ("reference", "target"):
         (there / f"{name}.png").rename(there / f"{name} ä.png")
     names = [str(there / f"{name} ä.png") for name in ("reference", "target")]
-    assert main(["stitch", *names, "-o", str(there / "ö.jpg"), *FOCAL, "--quiet"]) == 0
+    assert main(["stitch", *names, "-o", str(there / "ö.jpg"), *KNOWN_WORDS, "--quiet"]) == 0
     assert said() == ("", "") and load_picture(there / "ö.jpg").view.shape[1] > 300
 
 
@@ -214,7 +214,8 @@ WRONG = [
     ["--field", "nonsense"], ["--fade", "slowly"], ["--nonsense"], ["--seed", "x"], ["--seed", "-1"], ["--scale", "0"],
     ["--quiet", "--verbose"], ["--principal", "1"], ["--focal-px", "abc"], ["--focal-px", "0"], ["--focal-px"],
     ["--focal-mm", "35"], ["--crop", "tight"], ["--focal35", "28", "--cameras", "c.json"],
-    ["--projection", "fisheye"], ["--projection", "cylindrical", "--field", "paper"], ["--level=1,2,3"],
+    ["--projection", "fisheye"], ["--projection", "cylindrical", "--field", "paper"],
+    ["--projection", "reference", "--level=1,2,3"],
     ["--projection", "equirectangular", "--level", "north"],
 ]  # fmt: skip
 
@@ -451,7 +452,7 @@ def test_progress_never_goes_back(
         yield lambda _stage, total: totals.append(total)
 
     monkeypatch.setattr(cli, "progress_shown", shown)
-    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *FOCAL]) == 0
+    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *KNOWN_WORDS]) == 0
     assert totals == sorted(totals) and totals[0] == 0 and totals[-1] <= 1
 
 

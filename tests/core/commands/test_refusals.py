@@ -27,9 +27,10 @@ from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.core.system.output_files import OutputFiles
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
+from ...pairs import KNOWN_WORDS
+
 OpenEXR = pytest.importorskip("OpenEXR")
 
-FOCAL = ["--focal-px", "228"]
 NOISE = np.random.default_rng(5).integers(0, 256, (60, 80, 3), dtype=np.uint8)
 Refused = Callable[..., None]
 
@@ -175,7 +176,8 @@ def test_a_picture_under_the_suffix_of_another_kind_is_read(folder: Path, tmp_pa
     shutil.copy(folder / "reference.png", tmp_path / "first.jpg")
     (tmp_path / "second.heic").write_bytes(encoded(small_pair.target[..., ::-1]))
     out = tmp_path / "out.png"
-    assert main(["stitch", *(str(tmp_path / n) for n in ("first.jpg", "second.heic")), "-o", str(out), *FOCAL]) == 0
+    names = [str(tmp_path / name) for name in ("first.jpg", "second.heic")]
+    assert main(["stitch", *names, "-o", str(out), *KNOWN_WORDS]) == 0
     assert out.is_file()
 
 
@@ -187,7 +189,7 @@ def test_a_few_pixels_that_are_no_numbers_are_left_out_with_a_warning(
     light = [((a / 255.0) ** 2.2).astype(np.float32) for a in (small_pair.reference, small_pair.target)]
     Path(first).write_bytes(exr(with_bad_rows(light[0], 0.1, value)))
     Path(second).write_bytes(exr(light[1]))
-    assert main(["stitch", first, second, "-o", out, *FOCAL, "--quiet"]) == 0
+    assert main(["stitch", first, second, "-o", out, *KNOWN_WORDS, "--quiet"]) == 0
     said = capfd.readouterr().err
     assert "edf: warning: first.exr: 10.00% of the pixels are not finite numbers" in said and "transparent" in said
     panorama = load_picture(out)
@@ -251,7 +253,7 @@ def test_a_disk_that_is_full_in_the_end(folder: Path, tmp_path: Path, limit: int
         "sys.exit(main(sys.argv[1:]))"
     )
     wanted = ["-o", tmp_path / "out.jpg", "--layers", tmp_path / "new" / "layers", "--report", tmp_path / "report.json"]
-    arguments = ["stitch", folder / "reference.png", folder / "target.png", *wanted, *FOCAL, "--quiet"]
+    arguments = ["stitch", folder / "reference.png", folder / "target.png", *wanted, *KNOWN_WORDS, "--quiet"]
     done = subprocess.run(
         [sys.executable, "-c", program, *map(str, arguments)], capture_output=True, text=True, timeout=120,
         cwd=tmp_path, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},

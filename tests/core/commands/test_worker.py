@@ -13,6 +13,8 @@ from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
+from ...pairs import ON_REFERENCE
+
 
 def start(folder: Path, job: dict) -> subprocess.Popen:
     folder.mkdir(exist_ok=True)
@@ -33,6 +35,9 @@ def run(folder: Path, job: dict) -> tuple[int, list[dict], dict]:
     return worker.returncode, said, json.loads(index.read_text("utf-8")) if index.exists() else {}
 
 
+ON_PLANE = {name: getattr(ON_REFERENCE, name) for name in ("projection", "slide", "fade", "crop", "holes")}
+
+
 @pytest.fixture
 def job(small_pair: Pair, tmp_path: Path) -> dict:
     """The small pair as arrays, with its true focal length."""
@@ -41,7 +46,7 @@ def job(small_pair: Pair, tmp_path: Path) -> dict:
     focal = float(small_pair.reference_camera.K[0, 0])
     return {
         **{side: {"name": side, "array": str(tmp_path / f"{side}.npy")} for side in ("reference", "target")},
-        "options": {"camera": {"focal_px": [focal]}},
+        "options": {"camera": {"focal_px": [focal]}, **ON_PLANE},
     }
 
 

@@ -13,17 +13,19 @@ from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.commands.cli import main
 from edf_stitch.core.compare import run as run_module
 from edf_stitch.core.compare.pairs import PairFiles, find_pairs
-from edf_stitch.core.compare.run import FILES, ComparisonRequest, run_comparison
+from edf_stitch.core.compare.run import FILES, ComparisonRequest, comparable, run_comparison
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest, Cancelled, DegenerateGeometry, UnwritableOutput
+
+from ...pairs import ON_REFERENCE
 
 FIELDS = ("slack", "homography")
 
 
 def compared(folder: Path, out: Path, *more: PairFiles, fields: tuple[str, ...] = FIELDS, **given):
     request = ComparisonRequest(out, (*find_pairs([folder]), *more), fields)
-    return run_comparison(request, given.pop("options", StitchOptions()), "1.2.3", **given)
+    return run_comparison(request, given.pop("options", ON_REFERENCE), "1.2.3", **given)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +59,7 @@ def test_everything_is_there_and_agrees(done: tuple[dict, Path], folder: Path) -
 def test_it_is_what_a_stitch_of_its_own_measures(done: tuple[dict, Path], folder: Path) -> None:
     """Sharing features and geometry changes nothing."""
     figures = done[0]["pairs"][0]["fields"]["slack"]["figures"]
-    alone = stitch((folder / "reference.png", folder / "target.png")).report["measured"]
+    alone = stitch((folder / "reference.png", folder / "target.png"), ON_REFERENCE).report["measured"]
     for name in ("overlap_psnr_db", "overlap_ssim", "alignment_median_px", "held_out_rms_px", "off_line_mean_px"):
         assert figures[name] == pytest.approx(alone[name], abs=1e-9), name
     assert figures["projectivity_px"] == pytest.approx(alone["projectivity_own_px"], abs=1e-9)
@@ -147,7 +149,29 @@ def test_what_makes_no_sense_for_several_pairs_is_refused(
 ) -> None:
     again = PairFiles("again", folder / "reference.png", folder / "target.png")
     with pytest.raises(BadRequest, match=words):
-        compared(folder, tmp_path, again, options=replace(StitchOptions(), **change))
+        compared(folder, tmp_path, again, options=replace(ON_REFERENCE, **change))
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ({"projection": "pannini"}, "leave --projection"), ({"projection": "auto", "fov": 60.0}, "--fov out"),
+    ({"projection": "auto", "centre": (1.0, 2.0)}, "--centre"), ({"projection": "auto", "slide": 0.5}, "leave --slide"),
+    ({"projection": "auto", "crop": (0, 0, 9, 9)}, "--crop"),
+])  # fmt: skip
+def test_figures_are_compared_on_the_plane_where_all_fields_exist(change: dict, words: str) -> None:
+    with pytest.raises(BadRequest, match=words):
+        comparable(StitchOptions(**change), ())
+
+
+def test_what_would_be_chosen_by_itself_is_what_can_be_compared() -> None:
+    by_itself = StitchOptions(
+        projection="auto", slide="auto", crop="auto", holes="auto", fade="continue", seed=7, blend="feather"
+    )
+    plain = StitchOptions(
+        projection="reference", slide=0.0, crop="full", holes="transparent", fade="plane", seed=7, blend="feather"
+    )
+    assert comparable(by_itself, ()) == comparable(plain, ()) == plain
+    for asked in ({"fade": "infinity"}, {"holes": "inpaint"}):
+        assert comparable(replace(by_itself, **asked), ()) == replace(plain, **asked)
 
 
 @pytest.mark.parametrize("fields", [(), ("slack", "hugin"), ("slack", "slack")])

@@ -11,8 +11,8 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.compose.composition import Composition, Decided, composed, pooled_decision
-from edf_stitch.core.compose.options import OVERLAP
-from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.compose.inpaint import closed_holes
+from edf_stitch.core.compose.options import INPAINT, OVERLAP
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.reference_map import ReferenceMap
@@ -21,7 +21,7 @@ from edf_stitch.core.raster.arrays import without_specks
 from edf_stitch.core.raster.log_encoding import log_encode
 from edf_stitch.core.raster.picture_map import PictureMap
 
-from ...pairs import with_map
+from ...pairs import ON_REFERENCE, with_map
 from ..field.test_visibility import OFFSET, SHAPE, SIDEWAYS, TARGET, points
 
 FLOATS = (False, False)
@@ -47,7 +47,8 @@ def compose(first: Layer, second: Layer, warp: Warp, decided: Decided | None = N
     """The panorama, the second layer as it was exposed, and what was decided about it."""
     steps = (lambda *step: None) if said is None else (lambda stage, share: said.append(stage))
     both = None if decided is None else (decided, decided)  # about the reference there is nothing to decide
-    made = composed((first, second), warp, SIDEWAYS.views, StitchOptions(**options), FLOATS, painted, steps, both, keep)
+    wanted = replace(ON_REFERENCE, **options)
+    made = composed((first, second), warp, SIDEWAYS.views, wanted, FLOATS, painted, steps, both, keep)
     return made.panorama, made.exposed[1], made.decided[1]
 
 
@@ -79,6 +80,22 @@ def test_holes_are_filled_where_that_is_asked_for_and_nothing_else_changes() -> 
         assert np.array_equal(out.pixels[~holes], left.pixels[~holes]) and (out.pixels[holes] > 0).all()
     average, _, _ = compose(first, second, warp, blend="linear", holes="inpaint")
     assert np.array_equal(average.pixels, compose(first, second, warp, blend="linear")[0].pixels), "it has no holes"
+
+
+def test_small_closed_holes_are_filled_by_themselves_and_larger_ones_are_left() -> None:
+    first, second, warp = pictures()
+    most = int(first.alpha.size * INPAINT.small_share)
+    small, large = np.zeros((2, *SHAPE), bool)
+    small[60:63, 100:104] = True
+    large[100:120, 40 : 41 + most // 20] = True
+    for one in (first, second):
+        one.alpha[small | large] = 0
+    left, out = (compose(first, second, warp, holes=holes)[0] for holes in ("transparent", "auto"))
+    assert not left.alpha[small | large].any() and not out.alpha[large].any()
+    assert (out.alpha[small] == 1).all() and (out.pixels[small] > 0).all()
+    closed = closed_holes(left.alpha > 0, small=True)[0]
+    assert np.array_equal((out.alpha > 0) & (left.alpha == 0), closed) and closed[small].all()
+    assert np.array_equal(out.pixels[~closed], left.pixels[~closed])
 
 
 def test_an_average_hides_nothing() -> None:
@@ -191,7 +208,7 @@ def three(lights: Any, columns: tuple[slice, ...] = SIDE_BY_SIDE, **options: Any
     same = PictureMap(x, y, camera.size)
     warp = Warp(canvas, (ReferenceMap(canvas, camera), same, same), np.full((HEIGHT, WIDTH), np.nan, np.float32))
     view = View(camera, np.eye(3), np.eye(3), np.zeros(3), np.eye(3), np.zeros(3))
-    return composed(layers, warp, (view,) * 3, StitchOptions(**options), (True,) * 3, None, lambda *_: None)
+    return composed(layers, warp, (view,) * 3, replace(ON_REFERENCE, **options), (True,) * 3, None, lambda *_: None)
 
 
 def wall() -> np.ndarray:

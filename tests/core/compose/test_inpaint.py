@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.inpaint import inpainted
+from edf_stitch.core.compose.inpaint import closed_holes, inpainted
 from edf_stitch.core.panorama.layers import Layer
 
 SHAPE = 80, 120
@@ -69,3 +69,30 @@ def test_what_is_transparent_beside_a_hole_has_no_say() -> None:
     out = inpainted(Layer(whole.light, alpha), HOLES, np.zeros(SHAPE, np.float32))
     assert np.abs(out.pixels[HOLES] - 0.5).max() < 1e-3
     assert np.array_equal(out.alpha, alpha | HOLES)
+
+
+def test_small_closed_holes_are_told_from_large_and_open_ones() -> None:
+    shows = np.ones((100, 200), bool)
+    shows[40:44, 50:55] = False  # 20 px of 20 000: a thousandth
+    shows[70:73, 100:107] = False  # 21 px
+    shows[50, 0:5] = False  # at the left border
+    shows[99, 30:33] = shows[0, 30:33] = shows[20:24, 199] = False
+    shows[44, 55] = False  # touches the first by a corner only
+    small, boxes = closed_holes(shows, small=True)
+    assert boxes == [(50, 40, 5, 4), (55, 44, 1, 1)] and small.sum() == 21 and not (small & shows).any()
+    large, boxes = closed_holes(shows, small=False)
+    assert boxes == [(100, 70, 7, 3)] and large.sum() == 21 and large[70:73, 100:107].all()
+    for none in (np.ones((9, 9), bool), np.zeros((9, 9), bool)):
+        for of in (True, False):
+            found, boxes = closed_holes(none, of)
+            assert not found.any() and found.shape == none.shape and not boxes
+
+
+def test_holes_far_from_each_other_are_filled_each_from_its_surroundings() -> None:
+    holes = np.zeros((90, 300), bool)
+    holes[40:44, 20:26] = holes[40:44, 270:276] = True
+    light = np.where(np.arange(300) < 150, 0.2, 3.0)[None, :, None] * np.ones((90, 300, 3))
+    before = Layer(np.where(holes[..., None], 0, light).astype(np.float32), ~holes)
+    out = inpainted(before, holes, np.zeros((90, 300), np.float32))
+    assert np.allclose(out.pixels, light, rtol=1e-3) and (out.alpha == 1).all()
+    assert np.array_equal(out.light[38:50, 0:300], out.pixels[38:50])

@@ -11,13 +11,14 @@ from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.compose.composition import Composition, composed, pooled_decision
 from edf_stitch.core.compose.wraparound import WrappedImage, roll_for, rolled, rolled_map
-from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.projection import Projection
 from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
 from edf_stitch.core.raster.picture_map import PictureMap
+
+from ...pairs import ON_REFERENCE
 
 H, W = 180, 360
 FOCAL = H / np.pi
@@ -46,7 +47,7 @@ def world(turn: int) -> tuple[Layer, Layer, Warp]:
 
 def compose(turn: int, decided: Any = None, painted: np.ndarray | None = None, **options: Any) -> Composition:
     *layers, warp = world(turn)
-    return composed(layers, warp, VIEWS, StitchOptions(exposure=False, **options), (True, True), painted,
+    return composed(layers, warp, VIEWS, replace(ON_REFERENCE, exposure=False, **options), (True, True), painted,
                     lambda *_: None, decided, keep=True)  # fmt: skip
 
 

@@ -12,10 +12,10 @@ from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
 from edf_stitch.core.dense.matching import ComparedPicture
 from edf_stitch.core.dense.refine import _guide, _in_both, _overlap, _plain
 from edf_stitch.core.field.folding import folds, turning
-from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.picture import Picture, load_picture, picture_from_array
 from edf_stitch.core.pipeline import StitchResult, stitch
 
+from ...pairs import ON_REFERENCE
 from ..line_scenes import Field
 
 DATA = Path(pytest.importorskip("skimage").__file__).parent / "data"
@@ -25,7 +25,7 @@ DATA = Path(pytest.importorskip("skimage").__file__).parent / "data"
 def motorcycle() -> tuple[StitchResult, StitchResult]:
     """Scikit-image's pair (Middlebury 2014), without and with dense refinement; nothing told of the cameras."""
     pictures = [load_picture(DATA / f"motorcycle_{side}.png").view for side in ("left", "right")]
-    sparse, dense = (stitch(pictures, StitchOptions(dense=dense, measure=False)) for dense in (False, True))
+    sparse, dense = (stitch(pictures, replace(ON_REFERENCE, dense=dense, measure=False)) for dense in (False, True))
     return sparse, dense
 
 

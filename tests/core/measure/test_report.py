@@ -25,11 +25,12 @@ from edf_stitch.core.panorama.warp import build_warp
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
-from ...pairs import warp_of, with_map
+from ...pairs import ON_REFERENCE, warp_of, with_map
 
 
 def report_of(
-    result: StitchResult, measure: bool = True, holes: str = "transparent", **changed: Any
+    result: StitchResult, measure: bool = True, holes: str = "transparent", inpainted: int = 0,
+    shows: np.ndarray | None = None, projection: str = "reference", **changed: Any
 ) -> tuple[dict[str, Any], list[str]]:
     """The report of a result in whose alignment something is changed."""
     cameras = changed.get("cameras", result.cameras)
@@ -45,8 +46,10 @@ def report_of(
         hidden = np.zeros(alignment.warp.maps[1].x.shape, bool)
         further = replace(decided[1], hidden=hidden, folds=folds(turning(alignment.warp.maps[1].arrays())))
         decided = decided[0], further
+    options = replace(ON_REFERENCE, measure=measure, holes=holes, projection=projection)
     return make_report(
-        StitchOptions(measure=measure, holes=holes), result.pictures, alignment, alignment.warp.canvas, decided, {},
+        options, result.pictures, alignment, alignment.warp.canvas, decided, {},
+        result.alpha > 0 if shows is None else shows, inpainted,
     )
 
 
@@ -78,9 +81,29 @@ def test_holes_are_counted_and_said_where_they_matter(small_result: StitchResult
         assert report["composition"]["inpainted_px"] == 0
 
 
+def test_what_small_holes_are_filled_is_not_said_to_be_open(small_result: StitchResult) -> None:
+    most = int(2e-4 * small_result.warp.maps[1].x.size)
+    for filled, said in ((most, False), (most - 1, False), (0, True)):
+        report, spoken = report_of(with_holes(small_result, most + 1), holes="auto", inpainted=filled)
+        assert report["composition"]["inpainted_px"] == filled
+        assert any("pixels were seen by neither camera" in line for line in spoken) == said
+
+
+def test_closed_holes_are_listed_where_they_are_large(small_result: StitchResult) -> None:
+    shows = np.ones((100, 200), bool)
+    shows[40:50, 60:80] = shows[10:13, 5:15] = shows[70:72, 30:32] = shows[:5] = False
+    assert report_of(small_result, shows=shows)[0]["composition"]["holes"] == [[60, 40, 20, 10], [5, 10, 10, 3]]
+
+
+def test_a_field_that_is_drawn_on_the_references_plane_says_so(small_result: StitchResult) -> None:
+    for projection, said in (("auto", True), ("reference", False)):
+        spoken = report_of(small_result, projection=projection)[1]
+        assert any("knows the reference's plane only" in line for line in spoken) == said
+
+
 def test_filled_holes_are_counted_and_said(small_result: StitchResult) -> None:
     holes = int(2e-4 * small_result.warp.maps[1].x.size) + 1
-    report, spoken = report_of(with_holes(small_result, holes), holes="inpaint")
+    report, spoken = report_of(with_holes(small_result, holes), holes="inpaint", inpainted=holes)
     assert report["composition"]["inpainted_px"] == report["composition"]["hole_px"] == holes
     assert any("filled smoothly" in line for line in spoken)
 
@@ -119,7 +142,7 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
     assert report["options"] == {
         "field": "slack", "fade": "plane", "dense": True, "projection": "reference", "level": "auto", "scale": 1.0,
         "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": True,
-        "holes": "transparent", "seed": 0}
+        "holes": "transparent", "seed": 0, "slide": 0, "centre": None, "fov": None}
     assert report["composition"]["exposure_blocks"] > 100
     assert report["composition"]["exposure_gain"] == pytest.approx([1, 1, 1], abs=0.01)
     # nothing hides anything here: what dense refinement takes for an edge is next to nothing

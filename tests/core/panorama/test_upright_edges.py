@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
-from edf_stitch.core.panorama.levelling import gravity_by_edges, rotation_for, turned
+from edf_stitch.core.panorama.levelling import gravity, gravity_by_edges, turned
 from edf_stitch.core.panorama.upright_edges import straight_edges
 
 K = np.array([[500.0, 0, 319.5], [0, 500.0, 239.5], [0, 0, 1]])
@@ -48,8 +48,8 @@ def test_poles_tell_pitch_and_roll(pitch: float, roll: float) -> None:
     found = edges(street(pitch, roll), CAMERA, K)
     assert len(found[0]) > 10 and np.allclose(np.linalg.norm(found[0], axis=1), 1)
     alone = [np.eye(3)]
-    assert off(rotation_for("auto", alone, found)[:, 1], pitch, roll) < 0.3
-    assert off(rotation_for("auto", alone)[:, 1], pitch, roll) > abs(pitch) - 1e-6, "which the camera alone cannot tell"
+    assert off(gravity_by_edges(alone, *found), pitch, roll) < 0.3
+    assert off(gravity(alone), pitch, roll) > abs(pitch) - 1e-6, "which the camera alone cannot tell"
 
 
 def test_edges_of_the_target_count_in_the_references_frame() -> None:
@@ -62,7 +62,7 @@ def test_edges_of_the_target_count_in_the_references_frame() -> None:
 def test_edges_of_nothing_upright_and_none_at_all_leave_it_to_the_cameras() -> None:
     none = np.zeros((0, 3)), np.zeros(0)
     same = [np.eye(3)] * 2
-    assert np.array_equal(rotation_for("auto", same, none), rotation_for("auto", same))
+    assert np.array_equal(gravity_by_edges(same, *none), gravity(same))
     blank = SimpleNamespace(view=np.full((48, 64, 1), 9, np.uint8), alpha=None)
     assert len(edges(blank, CAMERA, K)[0]) == 0
     leaning = edges(street(0, 0, upright=False), CAMERA, K)

@@ -17,7 +17,8 @@ from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.system.errors import UnwritableOutput
 from edf_stitch.core.system.output_files import OutputFiles, undisturbed
 
-FOCAL = ["--focal-px", "228"]
+from ...pairs import KNOWN_WORDS
+
 INTERRUPTIONS = int(os.environ.get("EDF_SOAK_INTERRUPTIONS", 50))
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="file systems and signals as Linux has them")
@@ -27,7 +28,7 @@ def start(pair: Path, *arguments: str | Path, cwd: Path, **environment: str | No
     """`edf stitch` of a folder's pair, begun."""
     env = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **environment}
     pictures = [pair / "reference.png", pair / "target.png"]
-    line = [sys.executable, "-m", "edf_stitch", "stitch", *pictures, *arguments, *FOCAL]
+    line = [sys.executable, "-m", "edf_stitch", "stitch", *pictures, *arguments, *KNOWN_WORDS]
     return subprocess.Popen(
         list(map(str, line)), cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={name: value for name, value in env.items() if value is not None},

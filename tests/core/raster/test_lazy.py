@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.compose.blend import Cut, Evened, Mixed
 from edf_stitch.core.compose.exposure import Exposed
-from edf_stitch.core.compose.inpaint import Patched
+from edf_stitch.core.compose.inpaint import Patch, Patched
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.arrays import meet, with_margin, within
 from edf_stitch.core.raster.colour import decode, srgb_curve
@@ -42,7 +42,7 @@ def kinds(channels: int) -> dict[str, AnyImage]:
         "mixed": Mixed(layer(), layer(), np.clip(numbers(H, W), 0, 1)),
         "cut": Cut(light, other, numbers(H, W) > 0.5),
         "evened": Evened(light, (6, 8), change.any(axis=2), change),
-        "patched": Patched(light, (6, 8), numbers(9, 17) > 0.5, change),
+        "patched": Patched(light, (Patch((6, 8), numbers(9, 17) > 0.5, change),)),
     }  # fmt: skip
 
 
@@ -72,7 +72,8 @@ def test_what_each_kind_is() -> None:
     assert not (differs & ~changed).any() and differs[changed].mean() > 0.9
     patched = made["patched"]
     frame = patched.light.copy()
-    frame[6:15, 8:25][patched.touched] = patched.patch[patched.touched]
+    (patch,) = patched.patches
+    frame[6:15, 8:25][patch.touched] = patch.light[patch.touched]
     assert np.array_equal(whole(patched), frame)
     first, second = mixed.before, mixed.layer
     alone = (first.alpha > 0) & (second.alpha == 0)

@@ -60,6 +60,7 @@ def test_a_script_gets_the_panorama(chosen, pixels_of):
     """Opaque where the reference lies, whose every pixel is kept; and everything else that an artist may ask."""
     settings = chosen.settings
     settings.take_layers = settings.take_masks = settings.take_depth = True
+    bpy.ops.edf.reference_frame()
     settings.crop = "REFERENCE"
     settings.blend = "FEATHER"  # multi-band evens light out a little way into the part that only the reference shows
     assert bpy.ops.edf.stitch() == {"FINISHED"}
@@ -162,6 +163,7 @@ def test_a_pair_of_float_images_gives_a_float_panorama(chosen, folder, pixels_of
     for side in ("reference", "target"):
         light = picture_files.read(folder / f"{side}.png").pixels * 4
         setattr(settings, side, bpy.data.images.load(picture_files.write(tmp_path / f"{side}.exr", light)))
+    bpy.ops.edf.reference_frame()
     settings.crop, settings.blend, settings.take_masks = "REFERENCE", "FEATHER", True
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     panorama = settings.result
@@ -198,6 +200,7 @@ def test_colours_and_rows_survive_the_whole_way(blender, tmp_path, kind):
         match = settings.matches.add()
         match.x, match.y, match.x2, match.y2 = x, y, x2, y2
     settings.edited_matches = True
+    bpy.ops.edf.reference_frame()
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     for suffix in (".exr", ".png"):
         assert bpy.ops.edf.save(filepath=str(tmp_path / f"out{suffix}")) == {"FINISHED"}

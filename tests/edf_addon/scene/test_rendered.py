@@ -40,12 +40,13 @@ def apart(one: np.ndarray, other: np.ndarray, where: np.ndarray) -> float:
     return float(np.abs(one - other)[where].mean())
 
 
-@pytest.mark.parametrize("projection", ["PERSPECTIVE", "CYLINDRICAL", "EQUIRECTANGULAR"])
+@pytest.mark.parametrize("projection", ["REFERENCE", "PERSPECTIVE", "CYLINDRICAL", "EQUIRECTANGULAR"])
 def test_the_panoramas_camera_sees_the_panorama_on_its_mesh(chosen, render, pixels_of, projection):
     if projection == "CYLINDRICAL" and not compat.sees_cylinders():
         pytest.skip("this Blender has no cylindrical lens")
     settings = chosen.settings
-    settings.projection = projection
+    settings.projection, settings.crop = projection, "FULL"
+    settings.slide_auto = False  # a camera sees from one place
     bpy.ops.edf.stitch()
     bpy.ops.edf.create_cameras(baseline=0.5)
     bpy.ops.edf.depth_mesh()
@@ -60,7 +61,7 @@ def test_the_panoramas_camera_sees_the_panorama_on_its_mesh(chosen, render, pixe
 
 def test_the_reference_camera_sees_the_reference_in_the_world(chosen, render, pixels_of):
     settings = chosen.settings
-    settings.projection = "EQUIRECTANGULAR"
+    settings.projection, settings.crop, settings.slide_auto = "EQUIRECTANGULAR", "FULL", False
     bpy.ops.edf.stitch()
     bpy.ops.edf.create_cameras()
     bpy.ops.edf.use_as_world()
