@@ -217,7 +217,8 @@ def _straight(grid: TargetGrid, edges: Array) -> tuple[Equations, Equations]:
     step = (length / (points - 1))[edge]
     middle = np.flatnonzero(edge[:-2] == edge[2:]) + 1 if len(edge) > 2 else np.zeros(0, np.intp)
     three = np.stack([middle - 1, middle, middle + 1], axis=1)
-    factors = weights[three] * np.array([1.0, -2.0, 1.0])[:, None] * (s / step)[middle][:, None, None]
+    # second derivatives, whose squares sum up to the same however densely points lie
+    factors = weights[three] * np.array([1.0, -2.0, 1.0])[:, None] * (s / step**1.5)[middle][:, None, None]
     lines = Equations(nodes[three].reshape(-1, 12), factors.reshape(-1, 12), np.zeros(len(middle)))
     normals = np.cross(edges[:, 0], edges[:, 1])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
