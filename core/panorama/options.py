@@ -224,6 +224,10 @@ class ChoiceOptions:
     max_folded: float = 0.01
     """Share of folded cells, more than without any slide, from which a slide is out of the question."""
 
+    max_stretched: float = 0.05
+    """Share of enlarged cells, more than without any slide, from which a slide is out of the question: the parallax is
+    too large for so short a way."""
+
     per_seam_px: float = 0.0044
     """Price of a px of seam that is seen."""
 

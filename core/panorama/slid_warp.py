@@ -27,7 +27,7 @@ from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas
 from .carried_depth import Lattice, Rays, Surface, carried_depth, looked_up, small_strips, turned
 from .options import CANVAS, CARRY, SLIDE
-from .projection import Projection
+from .projection import Projection, focal_of
 from .viewpoint import Viewpoint
 from .warp import Warp, trimmed
 
@@ -193,7 +193,7 @@ def _reach(
     points = points[np.isfinite(points).all(axis=1)]
     beyond = (points < limits[:2] - 1) | (points > limits[2:] + 1)
     points = np.clip(points, limits[:2], limits[2:])
-    margin = CANVAS.margin * max(views[0].size)
+    margin = CANVAS.margin * max(views[0].size) * projection.focal / focal_of(projection.K)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     reach: Array = np.concatenate([np.maximum(low, limits[:2]), np.minimum(high, limits[2:])])
-    return reach, projection.sphere is None and float(beyond.any(axis=1).mean()) > CARRY.most_beyond
+    return reach, projection.cuts and float(beyond.any(axis=1).mean()) > CARRY.most_beyond
