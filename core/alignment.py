@@ -19,6 +19,7 @@ from .cameras.edge import Edge
 from .cameras.lens import undistort
 from .cameras.matches import Matches
 from .cameras.sources import cameras_for, role
+from .cameras.two_view import TwoView
 from .cameras.view import View, views_of
 from .continuation.continuation import Continuation
 from .dense.refine import Dense, refine
@@ -29,15 +30,17 @@ from .fields import fit_field
 from .mapping import map_pictures
 from .options import StitchOptions
 from .panorama.choosing_slide import SlideChoice
+from .panorama.upright_edges import straight_edges
 from .panorama.warp import Warp
 from .pictures.masks import read_mask, read_painted, without
 from .pictures.picture import Picture, resized
 from .pose import features
+from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
-from .pose.options import ESTIMATION, FEATURES
+from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
 from .system.cache import Cache
-from .system.errors import BadRequest, NoOverlap, TooFewMatches
+from .system.errors import BadRequest, NoOverlap, StitchError, TooFewMatches
 from .system.progress import ReportProgress
 from .system.threads import in_order
 
@@ -192,10 +195,31 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
 
     progress("geometry", 0.0)
     ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
+    looked_at = pictures if all(camera.assumed for camera in cameras) else ()
     two_view = cache.remember(
-        "two_view", (ideal, cameras, options.seed), lambda: estimate(ideal, cameras[0], cameras[1], seed=options.seed)
-    )
+        "two_view", (ideal, cameras, options.seed, tuple((picture.view, picture.alpha) for picture in looked_at)),
+        lambda: _estimated(ideal, cameras, options.seed, looked_at),
+    )  # fmt: skip
     return Geometry(cameras, (Edge(0, 1, matches, ideal, two_view),), (*warnings, *two_view.warnings))
+
+
+def _estimated(ideal: Matches, cameras: tuple[Camera, ...], seed: int, pictures: Sequence[Picture]) -> TwoView:
+    """The geometry by matches, ideal px; with a focal length that straight edges of the pictures ask for, if any are
+    given, where that explains as many matches."""
+    two_view = estimate(ideal, cameras[0], cameras[1], seed=seed)
+    if not pictures or two_view.model != "general":
+        return two_view
+    found = [straight_edges(one, camera, np.eye(3)) for one, camera in zip(pictures, cameras, strict=True)]
+    first, second = (Edges(edges.rays[..., :2] / edges.rays[..., 2:], edges.lengths) for edges in found)
+    known = focal_by_edges(ideal.subset(two_view.inliers), two_view, (cameras[0], cameras[1]), (first, second))
+    if known is None:
+        return two_view
+    try:
+        other = estimate(ideal, *known, seed=seed)
+    except StitchError:
+        return two_view
+    fewer = other.inliers.sum() < EDGE_FOCAL.inlier_share * two_view.inliers.sum()
+    return two_view if fewer or other.model != two_view.model else other
 
 
 def fit_and_warp(

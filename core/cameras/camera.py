@@ -16,6 +16,7 @@ class Knowledge(StrEnum):
 
     GIVEN = "given"  # by the user, a camera file or Blender: exact
     EXIF = "exif"  # from the picture's metadata: to some per cent
+    EDGES = "edges"  # by straight edges of both pictures: to ten per cent, where matches are further off
     ASSUMED = "assumed"  # not known at all: a usual focal length
 
 

@@ -70,6 +70,28 @@ class IndependentOptions:
 
 
 @dataclass(frozen=True)
+class FocalDoubtOptions:
+    """How sure a focal length is, and what that does to the picture (`focal_doubt`)."""
+
+    by_matches: float = 0.17
+    """Share that a focal length by matches alone is off by, at least: the median over photographs whose EXIF was
+    hidden. Their own estimate of it does not know of lenses and of scenes that hardly determine it."""
+
+    matches: int = 200
+    """Matches that follow when the focal length is moved: few suffice for a figure."""
+
+    columns: int = 9
+    rows: int = 7
+    """Places of the target at which the lean is looked at."""
+
+    step_px: float = 5.0
+    """px up and down from each, between which its lean is measured."""
+
+    percentile: float = 95.0
+    """% of the places that lean no more."""
+
+
+@dataclass(frozen=True)
 class WarningOptions:
     """From what on a figure becomes a warning of the report (`report`)."""
 
@@ -79,6 +101,9 @@ class WarningOptions:
     hole_share: float = 1e-4
     """Share of the canvas: larger holes can be seen in the panorama as a whole."""
 
+    lean_deg: float = 0.7
+    """Degrees by which uprights may lean for want of a focal length: what is seen at once beside straight ones."""
+
     fold_share: float = 0.005
     """Share of what is shown of the target: more folds show as doubled or torn things."""
 
@@ -86,4 +111,5 @@ class WarningOptions:
 HELD_OUT = HeldOutOptions()
 QUALITY = QualityOptions()
 INDEPENDENT = IndependentOptions()
+FOCAL_DOUBT = FocalDoubtOptions()
 WARNING = WarningOptions()

@@ -16,6 +16,7 @@ from ..panorama.canvas import Canvas
 from ..panorama.levelling import angles_of
 from ..panorama.warp import build_map
 from ..raster.arrays import Array
+from .focal_doubt import focal_doubt
 from .held_out import held_out
 from .metrics import coverage_samples, look_up, off_line_mean, overlap_quality
 from .options import WARNING
@@ -67,6 +68,7 @@ def make_report(
     matches, two_view, further = edge.matches, edge.two_view, decided[edge.j]
     holes = sum(one.holes for one in decided)
     measured = _measured(options, pictures, alignment) | {"folds": max(one.folds for one in decided)} | appearance
+    doubt = focal_doubt(alignment.cameras, edge, alignment.warp.canvas)
     report = {
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
@@ -80,7 +82,7 @@ def make_report(
         "two_view": {
             "model": two_view.model, "why": two_view.why, "focal_source": two_view.focal_source,
             "focal_px": [two_view.K[0, 0], two_view.K_prime[0, 0]], "focal_deviation": two_view.focal_deviation,
-            "h_inf_spread_px": two_view.h_inf_spread,
+            "h_inf_spread_px": two_view.h_inf_spread, "focal_off": doubt.off, "focal_lean_deg": doubt.lean_deg,
             "K": two_view.K, "K_prime": two_view.K_prime, "R": two_view.R, "t": two_view.t,
             "F": two_view.F, "H_inf": two_view.H_inf, "e_prime": two_view.e_prime,
         },
@@ -108,7 +110,7 @@ def make_report(
         },
         "measured": measured,
     }  # fmt: skip
-    warnings = _warnings(alignment, measured["folds"])
+    warnings = doubt.warnings(alignment.cameras, edge) + _warnings(alignment, measured["folds"])
     if options.projection == "auto" and canvas.projection is None:
         warnings.append(
             f"the field {field.name!r} knows the reference's plane only: the panorama is drawn on it, as by "

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import cv2
 import numpy as np
@@ -117,7 +118,12 @@ def choose_slide(
 
 def _least(costs: tuple[SlideCost, ...]) -> SlideChoice:
     """The choice by the costs of candidates, which slide further and further."""
-    possible = [one for one in costs if one.folded <= costs[0].folded + CHOICE.max_folded]
+    still = costs[0]
+    # what folds or stretches at some slide only does so the more at a longer one
+    possible = list(takewhile(
+        lambda one: one.folded <= still.folded + CHOICE.max_folded
+        and one.enlarged <= still.enlarged + CHOICE.max_stretched, costs,
+    ))  # fmt: skip
     least = min(one.cost for one in possible)
     tie = max(CHOICE.tie_px, CHOICE.tie_share * least)
     best = next(one for one in possible if one.cost <= least + tie)
@@ -125,7 +131,7 @@ def _least(costs: tuple[SlideCost, ...]) -> SlideChoice:
     if best.cost > least:
         why = f"costs {best.cost:.3f} px of bend, about as little as any"
     if len(possible) < len(costs):
-        why += f"; the map would fold at {', '.join(f'{one.s1:g}' for one in costs if one not in possible)}"
+        why += f"; from {costs[len(possible)].s1:g} on the map would fold or stretch"
     return SlideChoice(best.s1, costs, why)
 
 

@@ -18,6 +18,7 @@ from ..cameras.view import View
 from ..choices import Level
 from ..raster.arrays import Array
 from ..raster.rectangle import largest_rectangle
+from ..system.errors import BadRequest
 from .framing_options import FRAMING
 from .levelling import gravity, turned, upright
 from .projection import Projection, focal_of, round_projection
@@ -103,6 +104,11 @@ def frame_for(
     Returns
     -------
     Projection
+
+    Raises
+    ------
+    BadRequest
+        The frame that is asked for shows nothing.
     """
     return frame_of(asked, views, edges, down, coverage(warp_on(coarse_sphere(views))))
 
@@ -245,7 +251,7 @@ def _resized(projection: Projection, covered: Coverage) -> Projection:
     weights = (area * covered.solid_angle)[drawn]
     enlarged = np.sqrt(area[drawn] / covered.sharpness[drawn])
     median, most = _weighted_percentiles(enlarged, weights, (50.0, FRAMING.enlarged_percent))
-    focal = projection.focal / max(median, most / FRAMING.max_enlarged)
+    focal = projection.focal / (median * np.clip(most / (median * FRAMING.max_enlarged), 1, FRAMING.max_reduction))
     if projection.sphere is not None:
         return round_projection(projection.kind, projection.K, projection.rotation, focal)
     return replace(projection, focal=focal)
@@ -280,4 +286,7 @@ def _windowed(
     left, top, right, bottom = *(middle - half), *(middle + half)
     if fov is not None:
         left, right = (point(yaw + sign * np.radians(fov) / 2)[0] for sign in (-1, 1))
-    return replace(projection, window=(round(left), round(top), round(right) + 1, round(bottom) + 1))
+    window = (round(left), round(top), round(right) + 1, round(bottom) + 1)
+    if not ((points >= window[:2]) & (points < window[2:])).all(axis=1).any():
+        raise BadRequest("the frame lies beside all pictures: give a centre nearer to 0,0, or a larger field of view")
+    return replace(projection, window=window)

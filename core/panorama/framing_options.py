@@ -73,6 +73,9 @@ class FramingOptions:
     max_enlarged: float = 1.35
     """Canvas px per px of the sharper picture, in length, that all but the most enlarged percent stay below."""
 
+    max_reduction: float = 1.2
+    """How many times smaller that may make the panorama: where the map itself is torn, size mends nothing."""
+
     enlarged_percent: float = 99.0
     """Percent of the canvas for which that holds."""
 

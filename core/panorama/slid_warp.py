@@ -27,7 +27,7 @@ from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas
 from .carried_depth import Lattice, Rays, Surface, carried_depth, looked_up, small_strips, turned
 from .options import CANVAS, CARRY, SLIDE
-from .projection import Projection
+from .projection import Projection, focal_of
 from .viewpoint import Viewpoint
 from .warp import Warp, trimmed
 
@@ -99,8 +99,7 @@ def _mapped(
         confidence[rows] = np.where(hidden, np.float32(0), more[..., 2])
 
     each(put, small_strips(shape))
-    # single pixels are rounding at the edges of near things
-    unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.speck_px,) * 2, np.uint8)) > 0
+    unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.least_behind_px,) * 2, np.uint8)) > 0
     return Warp(canvas, tuple(maps), depth, confidence, slide, unseen, viewpoint)
 
 
@@ -193,7 +192,7 @@ def _reach(
     points = points[np.isfinite(points).all(axis=1)]
     beyond = (points < limits[:2] - 1) | (points > limits[2:] + 1)
     points = np.clip(points, limits[:2], limits[2:])
-    margin = CANVAS.margin * max(views[0].size)
+    margin = CANVAS.margin * max(views[0].size) * projection.focal / focal_of(projection.K)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     reach: Array = np.concatenate([np.maximum(low, limits[:2]), np.minimum(high, limits[2:])])
-    return reach, projection.sphere is None and float(beyond.any(axis=1).mean()) > CARRY.most_beyond
+    return reach, projection.cuts and float(beyond.any(axis=1).mean()) > CARRY.most_beyond

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cameras.camera import Camera
+from ..cameras.camera import Camera, Knowledge
 from ..cameras.matches import Matches
 from ..cameras.projective import infinite_homography, inverse_intrinsics, sampson_residuals
 from ..cameras.two_view import TwoView
@@ -85,9 +85,10 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
             return rotated
         if camera.assumed or camera_prime.assumed:
             return _plane_without_pose(matches, homography, camera, camera_prime)
-    # matches on a plane cannot tell its direction from the calibration: the calibration is not refined
+    # matches on a plane cannot tell its direction from the calibration, and those that edges contradict mislead
+    refined = parallax and camera.knowledge != Knowledge.EDGES
     first, second = (
-        c if parallax else replace(c.with_focal_held(), principal_sigma=0.0) for c in (camera, camera_prime)
+        c if refined else replace(c.with_focal_held(), principal_sigma=0.0) for c in (camera, camera_prime)
     )
     pose, inliers, sigma, zoom = _fit_pose(matches, candidates, homography, first, second, seed)
     if not parallax and inliers.sum() < ESTIMATION.plane_inlier_share * homography.inliers.sum():
@@ -107,7 +108,7 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
             "or check that neither picture is mirrored"
         )
     fit = matches.subset(inliers), pose, camera, camera_prime, sigma
-    known = known_focal(*fit, zoom) if parallax else held_focal(*fit)
+    known = known_focal(*fit, zoom) if refined else held_focal(*fit)
     warnings = [*focal_warnings(pose, camera, camera_prime), *known.warnings]
     if camera.fixed and camera_prime.fixed:
         warnings += _contradiction(matches, F, inliers, sigma)

@@ -17,6 +17,7 @@ from edf_stitch.core.panorama.levelling import angles_of, turned
 from edf_stitch.core.panorama.projection import Projection, focal_of
 from edf_stitch.core.panorama.warp import Warp
 from edf_stitch.core.raster.picture_map import PictureMap
+from edf_stitch.core.system.errors import BadRequest
 
 Angles = tuple[float, float, float]
 
@@ -186,6 +187,12 @@ def test_a_frame_is_moved_and_sized_without_turning_anything() -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     assert np.abs(np.array(moved[2:]) - moved[:2] - (high - low)).max() < 0.03 * np.ptp(points[:, 0]), "as large as all"
     assert abs((moved[1] + moved[3]) / 2 - (low + high)[1] / 2 + np.tan(np.radians(5)) * plain.focal) < 12, "up"
+
+
+@pytest.mark.parametrize("asked", [{"centre": (-170.0, 0.0)}, {"centre": (70.0, 0.0), "fov": 20.0}], ids=str)
+def test_a_frame_beside_all_pictures_is_refused(asked: dict) -> None:
+    with pytest.raises(BadRequest, match="beside all pictures"):
+        framed(rig((0, 0, 0), (30, 0, 0)), **asked)
 
 
 def test_without_a_pose_it_is_framed_by_what_is_shown() -> None:

@@ -1,0 +1,204 @@
+"""The focal length that straight edges of both pictures ask for, where matches alone may be led astray.
+
+On buildings upright edges meet in one vanishing point and level ones in two more, at right angles, and both pictures
+show the same three directions. That holds at one focal length only, since the rotation between the pictures, which the
+matches tell, goes with it: Caprile and Torre, Using vanishing points for camera calibration, IJCV 1990.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..cameras.camera import Camera, Knowledge, zoomed
+from ..cameras.matches import Matches
+from ..cameras.two_view import TwoView
+from ..raster.arrays import Array
+from .options import EDGE_FOCAL, REFINEMENT
+from .refinement import Pose, refine_pose
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Straight edges of a picture, longest first: ends (N, 2, 2) ideal px, lengths (N,), shares of the longer side."""
+
+    ends: Array
+    lengths: Array
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A pose with a focal length held, what it costs the matches, and what the edges say for it."""
+
+    pose: Pose
+    cost: float
+    evidence: float
+
+    def score(self, camera: Camera) -> float:
+        """Higher is better: edges, matches, and what is usual."""
+        z = np.log(self.pose.K[0, 0] / camera.focal) / camera.log_sigma
+        freedom = REFINEMENT.prior_freedom
+        usual = (freedom + 1) * np.log1p(z * z / freedom)
+        return float(EDGE_FOCAL.edge_weight * self.evidence - EDGE_FOCAL.match_weight * self.cost - usual)
+
+
+def focal_by_edges(
+    matches: Matches, two_view: TwoView, cameras: tuple[Camera, Camera], edges: tuple[Edges, Edges]
+) -> tuple[Camera, Camera] | None:
+    """Find the focal length of a pair of which nothing was known, by its edges beside its matches.
+
+    Parameters
+    ----------
+    matches : Matches
+        Those that the geometry explains, ideal px.
+    two_view : TwoView
+        The geometry by matches alone, of the general model.
+    cameras : (Camera, Camera)
+        As they were assumed.
+    edges : (Edges, Edges)
+        Of both pictures.
+
+    Returns
+    -------
+    (Camera, Camera) or None
+        Both with the focal length found; None unless the edges speak clearly for another one than the matches found.
+    """
+    few = matches.thinned(EDGE_FOCAL.matches)
+    start = Pose(two_view.K, two_view.K_prime, two_view.R, two_view.t)
+    def candidate(factor: float) -> _Candidate:
+        held = [
+            replace(camera.with_focal_held(), K=zoomed(K, factor), principal_sigma=0.0)
+            for camera, K in zip(cameras, (start.K, start.K_prime), strict=True)
+        ]
+        pose, cost = refine_pose(few, replace(start, K=held[0].K, K_prime=held[1].K), held[0], held[1], two_view.sigma)
+        evidence = _evidence([_Directions.of(edges[0], pose.K), _Directions.of(edges[1], pose.K_prime @ pose.R)])
+        return _Candidate(pose, cost, evidence)
+
+    by_matches = candidate(1.0)
+    side = max(cameras[0].size)
+    shortest, longest = np.log(EDGE_FOCAL.sides)
+    focals = side * np.exp(np.arange(shortest, longest, EDGE_FOCAL.log_step))
+    found = [candidate(float(focal / start.K[0, 0])) for focal in focals]
+    scores = np.array([one.score(cameras[0]) for one in found])
+    best = int(np.argmax(scores))
+    # matches and what is usual may speak for it, too, but edges alone have to suffice
+    by_edges = EDGE_FOCAL.edge_weight * (found[best].evidence - by_matches.evidence)
+    gain = min(by_edges, float(scores[best]) - by_matches.score(cameras[0]))
+    if gain < EDGE_FOCAL.min_gain or best in (0, len(found) - 1):
+        return None
+    factor = float(focals[best] * np.exp(EDGE_FOCAL.log_step * _peak(*scores[best - 1 : best + 2])) / start.K[0, 0])
+    first, second = (
+        replace(camera, K=zoomed(K, factor), source=EDGE_FOCAL.source, log_sigma=EDGE_FOCAL.log_sigma,
+                knowledge=Knowledge.EDGES)
+        for camera, K in zip(cameras, (start.K, start.K_prime), strict=True)
+    )  # fmt: skip
+    return first, second
+
+
+def _peak(before: float, at: float, after: float) -> float:
+    """Where, in steps from the middle one, the parabola through three values is highest; the middle one is."""
+    bend = before - 2 * at + after
+    return 0.0 if bend >= 0 else float(0.5 * (before - after) / bend)
+
+
+@dataclass(frozen=True)
+class _Directions:
+    """How near edges of a picture run to vanishing points of directions in the reference's frame.
+
+    P (3, 3): a direction's vanishing point, px; lines (N, 3): of the edges, with unit normals; middles (N, 4): 1, x, y,
+    x² + y² of their middles; lengths (N,).
+    """
+
+    P: Array
+    lines: Array
+    middles: Array
+    lengths: Array
+
+    @staticmethod
+    def of(edges: Edges, P: Array) -> _Directions:
+        middle, along = edges.ends.mean(axis=1), edges.ends[:, 1] - edges.ends[:, 0]
+        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+        normal = np.column_stack([along[:, 1], -along[:, 0]])
+        lines = np.column_stack([normal, -(normal * middle).sum(axis=1)])
+        middles = np.column_stack([np.ones(len(middle)), middle, np.square(middle).sum(axis=1)])
+        return _Directions(P, lines, middles, edges.lengths)
+
+    def longest(self, count: int) -> _Directions:
+        """Of the longest edges only."""
+        return replace(self, lines=self.lines[:count], middles=self.middles[:count], lengths=self.lengths[:count])
+
+    def agreeing(self, directions: Array) -> Array:
+        """exp(−½ (angle / σ)²) (M, N) of the angle in the picture between each edge and the way from its middle to the
+        vanishing point of each direction (M, 3)."""
+        points = directions @ self.P.T
+        u, v, w = points.T
+        squared = np.column_stack([u * u + v * v, -2 * u * w, -2 * v * w, w * w]) @ self.middles.T
+        sine = np.square(points @ self.lines.T) / np.maximum(squared, 1e-12)
+        sine *= -0.5 / np.radians(EDGE_FOCAL.edge_sigma_deg) ** 2
+        return np.asarray(np.exp(sine, out=sine))
+
+
+def _evidence(pictures: list[_Directions]) -> float:
+    """What the edges say for the best three directions at right angles, one of them upright."""
+    pitch, roll = (
+        angle.ravel() for angle in np.radians(np.meshgrid(
+            *(np.arange(-reach, reach + step / 2, step) for reach, step in EDGE_FOCAL.upright_grid_deg)
+        ))
+    )  # fmt: skip
+    longest = [picture.longest(EDGE_FOCAL.first_edges) for picture in pictures]
+    found = _total(longest, [_down(pitch, roll)])
+    best = 0.0
+    for start in _apart(_down(pitch, roll), found):
+        yaw = np.radians(np.arange(0.0, 90.0, EDGE_FOCAL.yaw_step_deg))
+        angles = np.column_stack([np.full(len(yaw), pitch[start]), np.full(len(yaw), roll[start]), yaw])
+        here = angles[np.argmax(_total(longest, _frame(angles)))]
+        value, step = float(_total(pictures, _frame(here[None]))[0]), np.radians(EDGE_FOCAL.yaw_step_deg) / 2
+        for _ in range(EDGE_FOCAL.steps):
+            around = here + step * _AROUND
+            values = _total(pictures, _frame(around))
+            if values.max() > value:
+                here, value = around[np.argmax(values)], float(values.max())
+            else:
+                step /= 2
+        best = max(best, value)
+    return best
+
+
+_AROUND = np.vstack([np.eye(3), -np.eye(3)])
+
+
+def _apart(down: Array, values: Array) -> list[int]:
+    """The best few directions (M, 3), by their values (M,), that lie apart from each other."""
+    out: list[int] = []
+    for number in np.argsort(-values, kind="stable"):
+        if all(down[number] @ down[other] < np.cos(np.radians(EDGE_FOCAL.apart_deg)) for other in out):
+            out.append(int(number))
+        if len(out) == EDGE_FOCAL.starts:
+            break
+    return out
+
+
+def _total(pictures: list[_Directions], directions: list[Array]) -> Array:
+    """Evidence (M,) of the edges of all pictures for frames, whose directions are (M, 3) each: the logarithm of how
+    much likelier each edge is if some edges run in these directions than if all run anywhere, weighted by length."""
+    density = EDGE_FOCAL.aligned_share / 3 * np.sqrt(np.pi / 2) / np.radians(EDGE_FOCAL.edge_sigma_deg)
+    total: Array = sum(
+        np.log1p(density * sum(picture.agreeing(one) for one in directions)) @ picture.lengths for picture in pictures
+    )
+    return total
+
+
+def _down(pitch: Array, roll: Array) -> Array:
+    """Unit vectors (M, 3) down in the reference's frame, of angles (M,) in radians."""
+    return np.column_stack([np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch), np.sin(pitch)])
+
+
+def _frame(angles: Array) -> list[Array]:
+    """The directions (M, 3) of frames with angles (M, 3), pitch, roll and yaw in radians: down and two level ones."""
+    down = _down(angles[:, 0], angles[:, 1])
+    level = np.cross(down, [0.0, 0.0, 1.0])
+    level /= np.linalg.norm(level, axis=1, keepdims=True)
+    other = np.cross(down, level)
+    sine, cosine = np.sin(angles[:, 2:]), np.cos(angles[:, 2:])
+    return [down, cosine * level + sine * other, cosine * other - sine * level]
