@@ -7,8 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from edf_stitch.core.cameras.camera import Camera
-from edf_stitch.core.cameras.projective import fundamental_from_pose, homogeneous, infinite_homography
-from edf_stitch.core.cameras.projective import rotation_from_vector
+from edf_stitch.core.cameras.projective import (
+    fundamental_from_pose,
+    homogeneous,
+    infinite_homography,
+    rotation_from_vector,
+)
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.cameras.view import View, views_of
 from edf_stitch.core.continuation.continuation import Continuation, continue_beyond
