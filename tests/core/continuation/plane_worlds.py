@@ -100,7 +100,9 @@ class World:
         return np.linalg.norm(found - true, axis=1)
 
 
-def world(planes: Sequence[tuple[float, float, float]], yaw: float = 18.0, t: tuple[float, ...] = (-1, 0.05, 0.1)) -> World:
+def world(
+    planes: Sequence[tuple[float, float, float]], yaw: float = 18.0, t: tuple[float, ...] = (-1, 0.05, 0.1)
+) -> World:
     """The world of planes, seen from the origin and by a target that is turned to the right by yaw degrees."""
     camera = Camera(np.array([[FOCAL, 0, 199.5], [0, FOCAL, 149.5], [0, 0, 1.0]]), SIZE, "test", 0.0, np.zeros(5))
     R = rotation_from_vector(np.radians([0.0, -yaw, 0.0]))
