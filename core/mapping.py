@@ -50,7 +50,7 @@ class Mapped:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class AllEdges:
     """Straight edges (N) of each picture whose orientation is known, in the reference's frame, found when asked for."""
 
     pictures: Sequence[Picture]
@@ -114,7 +114,7 @@ def map_pictures(
     NoOverlap, OutputTooLarge, BadRequest
         There is no canvas for it (see `build_warp`).
     """
-    lines = Lines(pictures, views)
+    lines = AllEdges(pictures, views)
     progress("warp", 0.0)
     continuation = None
     has_depth = isinstance(field, (StrictField, SlackField)) and np.isfinite(views[1].R).all()
@@ -180,7 +180,7 @@ class _Known:
 
 
 def _slide(
-    base: Warp, views: tuple[View, ...], pictures: Sequence[Picture], lines: Lines, slide: Slide,
+    base: Warp, views: tuple[View, ...], pictures: Sequence[Picture], lines: AllEdges, slide: Slide,
     progress: Callable[[float], None],
 ) -> SlideChoice:  # fmt: skip
     """How far the viewpoint slides: as asked for, or chosen; base: coarse, seen from the reference's place."""
