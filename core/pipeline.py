@@ -284,7 +284,8 @@ def compose(
     made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
     panorama, labels = made.panorama, made.labels
     looks = appearance(panorama, made.exposed, labels, any(floats)) if options.measure else {}
-    box = crop_box(options.kept, whole.canvas.whole, panorama.alpha > 0, box_of(whole.maps[0].inside()))
+    own = whole.maps[0].inside()
+    box = crop_box(options.kept, whole.canvas.whole, panorama.alpha > 0, box_of(own) if own.any() else None)
     panorama, canvas = panorama.within(box), whole.canvas.within(box)
     # of a whole sphere, layers and maps exist only where the pictures lie
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))

@@ -8,6 +8,10 @@ from typing import Any
 # The properties that are options of the engine under the same name: one word of several, or a plain value.
 CHOICES = ("field", "fade", "seam", "blend", "holes")
 VALUES = ("dense", "exposure", "seed")
+# Projections whose frame is neither moved nor narrowed.
+WHOLE = ("REFERENCE", "EQUIRECTANGULAR")
+# Degrees below which no frame can be as narrow, and all is shown.
+LEAST_FOV = 1.0
 
 
 def options_of(settings: Any, scale: float | None = None) -> dict[str, Any]:
@@ -36,9 +40,13 @@ def frame_of(settings: Any, scale: float = 1.0) -> dict[str, Any]:
     frame["level"] = "auto" if is_reference else settings.level.lower()
     if frame["level"] == "angles":
         frame["level"] = [math.degrees(angle) for angle in settings.level_angles]
-    is_moved = not is_reference and any(settings.centre)
-    frame["centre"] = [math.degrees(angle) for angle in settings.centre] if is_moved else None
-    frame["fov"] = math.degrees(settings.fov) if settings.fov and not is_reference else None
+    is_whole = settings.projection in WHOLE
+    is_moved = not is_whole and any(settings.centre)
+    # Blender's single floats reach a little beyond half a turn and a whole one
+    centre = [max(-180.0, min(180.0, math.degrees(angle))) for angle in settings.centre]
+    frame["centre"] = centre if is_moved else None
+    fov = min(360.0, math.degrees(settings.fov))
+    frame["fov"] = fov if fov >= LEAST_FOV and not is_whole else None
     return frame
 
 

@@ -1,9 +1,9 @@
 """One stitch for a program that watches, as a process of its own: `python -m edf_stitch.core.commands.worker FOLDER`.
 
-FOLDER/job.json says what to do; everything made lies in FOLDER afterwards, with result.json as its index. stdout
-carries one JSON object a line: {"stage", "share"} while working, at the end {"done": true} or {"error", "kind",
-"exit_code"}. The work ends on SIGINT (Windows: CTRL_BREAK) and when stdin closes, so that it never outlives whoever
-started it; FOLDER goes then too. Exit status as the command's.
+FOLDER/job.json says what to do; with a second argument `wait` it may come later. Everything made lies in FOLDER
+afterwards, with result.json as its index. stdout carries one JSON object a line: {"stage", "share"} while working, at
+the end {"done": true} or {"error", "kind", "exit_code"}. The work ends on SIGINT (Windows: CTRL_BREAK) and when stdin
+closes, so that it never outlives whoever started it; FOLDER goes then too. Exit status as the command's.
 
 job.json: `reference`, `target`: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as shown; "exif_of": a
 file whose EXIF (orientation included) belongs to the array. `options`: fields of StitchOptions, their `camera` those of
@@ -23,6 +23,7 @@ import shutil
 import signal
 import sys
 import threading
+import time
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -35,15 +36,15 @@ SIDES = ("reference", "target")
 LIBRARIES = ("numpy", "cv2", "scipy.linalg", "scipy.optimize", "poselib", "OpenEXR", "exifread")
 
 
-def main(folder: Path) -> int:
-    """Does the job in a folder; returns the exit status."""
+def main(folder: Path, waits: bool = False) -> int:
+    """Does the job in a folder, or loads what it takes and waits for it; returns the exit status."""
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before NumPy loads: the same bytes for any number of cores
     stop = _Stop()
     for name in ("SIGINT", "SIGTERM", "SIGBREAK"):  # whatever the parent had them set to
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), stop)
     try:
-        return _status(folder, stop)
+        return _status(folder, stop, waits)
     except BrokenPipeError:  # the parent has ended, and the thread has not seen stdin close yet
         stop.orphaned = True
         return 130
@@ -67,12 +68,12 @@ class _Stop:
             raise KeyboardInterrupt
 
 
-def _status(folder: Path, stop: _Stop) -> int:
+def _status(folder: Path, stop: _Stop, waits: bool) -> int:
     """Does the job and reports its end; returns the exit status."""
     try:
         threading.Thread(target=_end_with_parent, args=(stop,), daemon=True).start()
         try:
-            _work(folder, stop)
+            _work(folder, stop, waits)
         finally:
             stop.may_break_in = False
     except (KeyboardInterrupt, Exception) as error:
@@ -96,7 +97,7 @@ def _report_error(error: BaseException) -> int:
     return _fail(type(error).__name__, str(error), exit_code)
 
 
-def _work(folder: Path, stop: _Stop) -> None:
+def _work(folder: Path, stop: _Stop, waits: bool) -> None:
     """Reads the job, stitches, and writes everything asked for."""
     from ..system.output_files import undisturbed
 
@@ -109,6 +110,8 @@ def _work(folder: Path, stop: _Stop) -> None:
 
     use_again()
     _say({"stage": "read", "share": 0.0})
+    if waits:
+        _await(folder / "job.json", stop)
     job = json.loads((folder / "job.json").read_text("utf-8"))
     if job.get("try"):
         for name in LIBRARIES:
@@ -134,6 +137,16 @@ def _work(folder: Path, stop: _Stop) -> None:
         lambda: stop.asked,  # Python swallows a KeyboardInterrupt inside a finalizer
     )  # fmt: skip
     _write(folder, result.spread_out(), rows, job.get("take", []), turns)
+
+
+def _await(job: Path, stop: _Stop) -> None:
+    """Loads what a stitch loads sooner or later, and returns when the job is there."""
+    for name in (*LIBRARIES, f"{__package__.rpartition('.')[0]}.output.inspection"):
+        import_module(name)
+    while not job.exists():
+        if stop.asked:
+            raise KeyboardInterrupt
+        time.sleep(0.01)
 
 
 def cameras_of(entries: dict[str, Any], pictures: tuple[Any, ...]) -> dict[str, Any]:
@@ -292,4 +305,4 @@ def _end_with_parent(stop: _Stop) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    sys.exit(main(Path(sys.argv[1]), sys.argv[2:] == ["wait"]))

@@ -339,12 +339,12 @@ def _with_seam(
     cuts = options.seam != "none" and overlap is not None
     hidden = without_specks(so_far.hidden_by_depth) if cuts else so_far.hidden_by_depth
     known = known_labels(before, layer, hidden, painted)
+    if behind is not None:
+        known[without_specks(behind) & (known == FREE)] = SECOND
     if overlap is None:
         return replace(so_far, chosen=known == SECOND)
     if options.seam == "none":
         nearest = distance_labels(before, layer)
-        if behind is not None:
-            nearest |= behind
         return replace(so_far, chosen=np.where(known == FREE, nearest, known == SECOND))
     picture_map, confidence = rolled_map(added.picture_map, so_far.roll), added.warp.lazy_confidence
     if confidence is not None and so_far.roll:

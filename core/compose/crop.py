@@ -30,7 +30,7 @@ def parse_crop(text: str) -> Crop:
     return left, top, width, height
 
 
-def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Box) -> Box:
+def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Box | None) -> Box:
     """The part of the panorama that is kept.
 
     Parameters
@@ -41,8 +41,8 @@ def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Bo
         The whole panorama in canvas px (see `Canvas.whole`).
     shows : (H, W) bool array
         Where the canvas shows something.
-    reference_box : Box
-        Where the reference lies, canvas px.
+    reference_box : Box or None
+        Where the reference lies, canvas px; None if it lies beside the canvas.
 
     Returns
     -------
@@ -58,6 +58,8 @@ def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Bo
     if kind == "full":
         return whole
     if kind == "reference":
+        if reference_box is None:
+            raise BadRequest("the reference lies outside the frame: leave centre and fov out, or choose another crop")
         return reference_box
     if kind in ("auto", "inscribed"):
         if not shows.any():

@@ -17,7 +17,7 @@ from ..field.visibility import occluded
 from ..panorama.layers import layer_of
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture, picture_from_array
-from ..raster.arrays import dilated, without_specks
+from ..raster.arrays import dilated
 from ..raster.picture_map import PictureMap
 from ..raster.resizing import resized_points
 from .options import ROUGH_SEAM
@@ -43,23 +43,20 @@ class RoughSeam:
         """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out."""
         maps = [_resized(one.arrays(), picture) for one, picture in zip(warp.maps, self.pictures, strict=True)]
         before, layer = (layer_of(picture, one) for picture, one in zip(self.pictures, maps, strict=True))
-        hidden_before, hidden = (
-            without_specks(occluded(one, warp.nearness(self.views, number))) for number, one in enumerate(maps)
-        )
+        hidden = occluded(maps[1], warp.nearness(self.views, 1))
         overlap = overlap_of(before, layer, hidden)
         if overlap is None:
             return 0.0
         difference = overlap.difference
         # as if exposure were matched already
         difference[overlap.both] -= np.median(difference[overlap.both], axis=0)
-        cost, price = (
-            seam_cost(overlap, maps[1], None),
-            added_price(overlap, hidden, hidden_before[overlap.box].astype(np.int8)),
-        )
-        chosen = find_seam(known_labels(before, layer, hidden), cost, price, overlap.box)[overlap.box]
-        seam = overlap.both & dilated(chosen & overlap.both, 1) & dilated(~chosen & overlap.both, 1)
+        cost, price = seam_cost(overlap, maps[1], None), added_price(overlap, hidden, behind=warp.behind)
+        chosen = find_seam(known_labels(before, layer, hidden), cost, price, overlap.box)
+        # also where the overlap ends: what the border of one picture cuts off does not go on in the other
+        others = ((before.alpha > 0) | (layer.alpha > 0)) & ~chosen
+        seam = (dilated(chosen, 1) & dilated(others, 1))[overlap.box] & overlap.both
         apart = np.abs(difference).mean(axis=2) > ROUGH_SEAM.visible_tone
-        return float((seam & dilated(apart, 1)).sum()) / 2  # a pixel on either side of the seam
+        return float((seam & apart).sum()) / 2  # a pixel on either side of the seam
 
 
 def _small(picture: Picture, scale: float) -> Picture:

@@ -117,7 +117,7 @@ def continue_beyond(
     field: Field, views: Sequence[View], refined: RefinedDepth | None, picture: NDArray[np.uint8], edges: Array,
     down: Array, confirmed: bool,
 ) -> Continuation | None:  # fmt: skip
-    """Continues a field's inverse depth to what the target alone shows (docs/method.md, 8).
+    """Continues a field's inverse depth to what the target alone shows (docs/method.md, 5).
 
     Parameters
     ----------

@@ -159,10 +159,10 @@ class SystemOptions:
     carried_slope: float = 0.2
     """Share of the longer side over which slopes carry on."""
 
-    lines: float = 0.8
+    lines: float = 2.0
     """Weight of straight lines, in units of the membrane's times the square of that length."""
 
-    uprights: float = 200.0
+    uprights: float = 600.0
     """Weight of upright edges where gravity is confirmed, in units of the membrane's."""
 
     doubtful_uprights: float = 10.0

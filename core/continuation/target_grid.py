@@ -1,4 +1,4 @@
-"""The nodes over the target picture at which its inverse depth δ = 1 / Z' is solved for (docs/method.md, 8)."""
+"""The nodes over the target picture at which its inverse depth δ = 1 / Z' is solved for (docs/method.md, 5)."""
 
 from __future__ import annotations
 
@@ -127,7 +127,9 @@ class TargetGrid:
         """Sums (rows, columns, …) over points (N, 2) of values (N[, k]), shared out to the four nodes around each."""
         nodes, weights = self.taps(points)
         flat = values.reshape(len(points), -1)
-        sums = [np.bincount(nodes.ravel(), (weights * column[:, None]).ravel(), self.numbers.size) for column in flat.T]
+        sums: list[Array] = [
+            np.bincount(nodes.ravel(), (weights * column[:, None]).ravel(), self.numbers.size) for column in flat.T
+        ]
         at_nodes: Array = np.stack(sums, axis=-1)[self.numbers].reshape(*self.shape, *values.shape[1:])
         return at_nodes
 

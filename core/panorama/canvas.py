@@ -253,9 +253,7 @@ def round_reach(
     limits = projection.limits
     margin = CANVAS.margin * max(cameras[0].size) * projection.focal / focal_of(projection.K)
     low, high = np.min(extents, axis=0)[:2], np.max(extents, axis=0)[2:]
-    # a sphere leaves out nothing, and what a window leaves out was asked for
-    bounded = projection.sphere is None and projection.window is None
-    cut = bounded and bool((low < limits[:2]).any() or (high > limits[2:]).any())
+    cut = projection.cuts and bool((low < limits[:2]).any() or (high > limits[2:]).any())
     reach = np.clip(np.concatenate([low - margin, high + margin]), np.tile(limits[:2], 2), np.tile(limits[2:], 2))
     left, top = np.floor(np.clip(extents[0][:2], limits[:2], limits[2:] - 1)).astype(int)
     right, bottom = np.ceil(np.clip(extents[0][2:], limits[:2], limits[2:] - 1)).astype(int) + 1

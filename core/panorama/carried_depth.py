@@ -212,18 +212,19 @@ def _from_far(values: Plane, halvings: int) -> Plane:
 
 def _sharpened(depth: Plane, projection: Projection) -> Plane:
     """Inverse depth (H, W) without what is in between at jumps: it belongs to neither surface, and would be seen
-    between them as specks."""
-    out, square = np.empty_like(depth), np.ones((3, 3), np.uint8)
+    between them as specks. Steep surfaces, which go on rising, stay."""
+    out, square, wider = np.empty_like(depth), np.ones((3, 3), np.uint8), np.ones((CARRY.jump_side,) * 2, np.uint8)
     least, share = np.float32(CARRY.jump_px / projection.focal), np.float32(1 - CARRY.jump_share)
 
     def put(rows: slice) -> None:
-        some, own = beside(rows, CARRY.sharpenings, len(depth))
+        some, own = beside(rows, CARRY.sharpenings + CARRY.jump_side // 2, len(depth))
         here = depth[some]
         for _ in range(CARRY.sharpenings):
             near, far = cv2.dilate(here, square), cv2.erode(here, square)
             jumps = share * near - far > least
             if not jumps.any():
                 break
+            jumps &= cv2.dilate(here, wider) - cv2.erode(here, wider) < CARRY.jump_growth * (near - far)
             here = np.where(jumps, np.where(2 * here > near + far, near, far), here)
         out[rows] = here[own]
 

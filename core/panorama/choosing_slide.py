@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import cv2
 import numpy as np
@@ -99,8 +100,9 @@ def choose_slide(
     viewpoint = viewpoint_between(base, views)
     if viewpoint is None:
         return SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
-    shown = [
-        _shown(OwnDepth.of(base, view, number), one, down)
+    base = replace(base, depth=base.inverse_depth, lazy_confidence=None)  # read more than once
+    samples = [
+        _samples(OwnDepth.of(base, view, number), one, down)
         for number, (view, one) in enumerate(zip(views, edges, strict=True))
     ]
     seams: dict[float, tuple[float, float]] = {}
@@ -110,13 +112,18 @@ def choose_slide(
     costs = []
     for s1 in CHOICE.candidates:
         seam_px, holes = (float(np.interp(s1, list(seams), values)) for values in zip(*seams.values(), strict=True))
-        costs.append(_cost(s1, _geometry(shown, viewpoint.sliding(s1), down), seam_px, holes))
+        costs.append(_cost(s1, _geometry(samples, viewpoint.sliding(s1), down), seam_px, holes))
     return _least(tuple(costs))
 
 
 def _least(costs: tuple[SlideCost, ...]) -> SlideChoice:
     """The choice by the costs of candidates, which slide further and further."""
-    possible = [one for one in costs if one.folded <= costs[0].folded + CHOICE.max_folded]
+    still = costs[0]
+    # what folds or stretches at some slide only does so the more at a longer one
+    possible = list(takewhile(
+        lambda one: one.folded <= still.folded + CHOICE.max_folded
+        and one.enlarged <= still.enlarged + CHOICE.max_stretched, costs,
+    ))  # fmt: skip
     least = min(one.cost for one in possible)
     tie = max(CHOICE.tie_px, CHOICE.tie_share * least)
     best = next(one for one in possible if one.cost <= least + tie)
@@ -124,7 +131,7 @@ def _least(costs: tuple[SlideCost, ...]) -> SlideChoice:
     if best.cost > least:
         why = f"costs {best.cost:.3f} px of bend, about as little as any"
     if len(possible) < len(costs):
-        why += f"; the map would fold at {', '.join(f'{one.s1:g}' for one in costs if one not in possible)}"
+        why += f"; from {costs[len(possible)].s1:g} on the map would fold or stretch"
     return SlideChoice(best.s1, costs, why)
 
 
@@ -139,7 +146,7 @@ def _cost(s1: float, geometry: tuple[float, float, float, float], seam_px: float
 
 
 @dataclass(frozen=True)
-class _Shown:
+class _Samples:
     """What one picture shows: places along its straight edges (N, points), and a coarse grid of it (rows, columns).
 
     lengths (N,): of the edges, weights; upright (N,): which of them are upright; areas (rows − 1, columns − 1): solid
@@ -153,7 +160,7 @@ class _Shown:
     areas: Array
 
 
-def _shown(depth: OwnDepth, edges: StraightEdges, down: Array | None) -> _Shown:
+def _samples(depth: OwnDepth, edges: StraightEdges, down: Array | None) -> _Samples:
     """What a picture shows, with its depth; edges: in the reference's frame."""
     view = depth.view
     long = edges.lengths >= CHOICE.least_length
@@ -173,7 +180,7 @@ def _shown(depth: OwnDepth, edges: StraightEdges, down: Array | None) -> _Shown:
     nearest, farthest = parallax.max(axis=0), parallax.min(axis=0)
     surface = nearest - farthest < CHOICE.least_jump_px + CHOICE.jump_share * nearest
     areas = np.where(surface, _areas(grid), np.nan)
-    return _Shown(places, edges.lengths, upright, smooth, areas)
+    return _Samples(places, edges.lengths, upright, smooth, areas)
 
 
 def _level(rays: Array, d: Array, down: Array) -> NDArray[np.bool_]:
@@ -191,10 +198,12 @@ def _level(rays: Array, d: Array, down: Array) -> NDArray[np.bool_]:
     return level
 
 
-def _geometry(shown: Sequence[_Shown], viewpoint: Viewpoint, down: Array | None) -> tuple[float, float, float, float]:
+def _geometry(
+    samples: Sequence[_Samples], viewpoint: Viewpoint, down: Array | None
+) -> tuple[float, float, float, float]:
     """Bend (px) and lean (degrees) of the edges of all pictures, and shares of their cells enlarged and folded."""
     bends, weights, lean, upright_weights, enlarged, folded = ([] for _ in range(6))
-    for one in shown:
+    for one in samples:
         normals, off = planes_through(viewpoint.seen_from(one.edges.q, one.edges.d)[0])
         bends.append(np.minimum(CHOICE.px_per_radian * off, CHOICE.max_bend_px))
         weights.append(one.lengths)
@@ -241,11 +250,11 @@ def _seam_and_holes(
 ) -> tuple[float, float]:
     """px (at `ChoiceOptions.px_per_radian`) of a rough seam that is seen, and the share of holes in what is shown."""
     projection = base.canvas.projection
-    coarse = replace(projection, focal=CHOICE.seam_px_per_radian)
-    warp = slid_warp(base, views, viewpoint, coarse)
+    assert projection is not None
+    warp = slid_warp(base, views, viewpoint, projection) if viewpoint.s1 else base
     shown = np.logical_or.reduce([one.inside() for one in warp.maps])
-    side = 2 * max(1, round(CHOICE.hole_radius * coarse.focal)) + 1
+    side = 2 * max(1, round(CHOICE.hole_radius * projection.focal)) + 1
     within = cv2.morphologyEx(np.pad(shown, side).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((side, side), np.uint8))
     holes = int(within[side:-side, side:-side].sum()) - int(shown.sum())
-    seam_px = rough_seam(warp) * CHOICE.px_per_radian / coarse.focal
+    seam_px = rough_seam(warp) * CHOICE.px_per_radian / projection.focal
     return seam_px, holes / max(1, int(shown.sum()))

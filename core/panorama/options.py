@@ -177,11 +177,9 @@ class ChoiceOptions:
     seam_candidates: tuple[float, ...] = (0.0, 0.5, 1.0)
     """Slides at which a seam is cut and holes are counted, which takes longest; interpolated between."""
 
-    base_px_per_radian: float = 300.0
-    """Resolution of the coarse map: depth edges to about 3 px of a picture of 900."""
-
-    seam_px_per_radian: float = 150.0
-    """Resolution at which the seam is cut: finer costs more time and tells hardly more."""
+    base_px_per_radian: float = 150.0
+    """Resolution of the coarse map, and of the pictures through which a seam is cut: twice as fine it takes three times
+    as long, and hardly any choice changes."""
 
     px_per_radian: float = 900.0
     """Resolution in whose px bends and seams are given: about that of a picture that fills a screen."""
@@ -217,7 +215,7 @@ class ChoiceOptions:
     per_folded: float = 15.0
     """Price of all being folded."""
 
-    fold_steps: int = 17
+    fold_steps: int = 9
     """Viewpoints along the way from which it is looked whether a thing is seen more than once."""
 
     same_slide: float = 1e-6
@@ -225,6 +223,10 @@ class ChoiceOptions:
 
     max_folded: float = 0.01
     """Share of folded cells, more than without any slide, from which a slide is out of the question."""
+
+    max_stretched: float = 0.05
+    """Share of enlarged cells, more than without any slide, from which a slide is out of the question: the parallax is
+    too large for so short a way."""
 
     per_seam_px: float = 0.0044
     """Price of a px of seam that is seen."""
@@ -292,17 +294,26 @@ class SlideOptions:
 class CarryOptions:
     """Inverse depth carried to the sliding viewpoint (`carried_depth`, `slid_warp`)."""
 
-    jump_px: float = 2.5
+    jump_px: float = 6.0
     """px of parallax between neighbours, with `jump_share` of the nearer one's, from which they lie on two surfaces."""
 
     jump_share: float = 0.06
     """See `jump_px`: what is near has steeper slopes."""
 
+    jump_side: int = 7
+    """px, side of the square in which depth differs hardly more at a jump than between neighbours."""
+
+    jump_growth: float = 2.0
+    """Times that it differs more there: on a steep surface it is three times."""
+
     sharpenings: int = 2
     """Rounds in which pixels between two surfaces are given to the nearer in depth; a jump is 2 to 4 px wide."""
 
-    speck_px: int = 3
+    speck_px: int = 5
     """px, side of the median that takes single points out of the surface that they fall on."""
+
+    least_behind_px: int = 3
+    """px, side of the square below which what the reference cannot see is rounding."""
 
     rounds: int = 2
     """px by which gaps are filled from their far side at each size."""
@@ -313,7 +324,7 @@ class CarryOptions:
     same_share: float = 0.06
     """Share of d, with `same_px` px of parallax, by which a surface may differ from what was carried over."""
 
-    same_px: float = 0.5
+    same_px: float = 1.5
     """See `same_share`."""
 
     behind_share: float = 0.1

@@ -119,4 +119,5 @@ def _looked_up(image: NDArray[np.float32], places: Array) -> Array:
     if not places.size:
         return np.zeros(places.shape[:-1])
     x, y = (np.ascontiguousarray(places[..., k], np.float32) for k in (0, 1))
-    return cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
+    values: Array = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
+    return values

@@ -71,6 +71,12 @@ class Projection:
         return (-half, -half // 2, 2 * half, half) if self.kind == "equirectangular" else None
 
     @property
+    def cuts(self) -> bool:
+        """Whether it leaves out what lies beyond its limits: a sphere has all, and what a window leaves out was asked
+        for."""
+        return self.sphere is None and self.window is None
+
+    @property
     def limits(self) -> Array:
         """left, top, right, bottom (exclusive) of what the plane may show, px."""
         if self.sphere is not None:

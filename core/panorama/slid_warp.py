@@ -27,7 +27,7 @@ from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas
 from .carried_depth import Lattice, Rays, Surface, carried_depth, looked_up, small_strips, turned
 from .options import CANVAS, CARRY, SLIDE
-from .projection import Projection
+from .projection import Projection, focal_of
 from .viewpoint import Viewpoint
 from .warp import Warp, trimmed
 
@@ -38,7 +38,8 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
     Parameters
     ----------
     base : Warp
-        Of both pictures, seen from the reference's place, on a cylinder or sphere.
+        Of both pictures, seen from the reference's place, on a cylinder or sphere. What lies beside the epipolar lines
+        counts if it holds it.
     views : sequence of View
         What is known of the pictures, the reference first.
     viewpoint : Viewpoint
@@ -57,13 +58,12 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
     OutputTooLarge
         The canvas would have too many pixels.
     """
-    if base.beside is None:
-        raise ValueError("the base's depth, and what lies beside its epipolar lines, are to be held")
     surface = Surface.of(base, views)
+    beside = np.zeros((*surface.depth.shape, 3), np.float32) if base.beside is None else base.beside
     canvas = _canvas(surface, views, viewpoint, projection)
     lattice = Lattice((float(canvas.xs[0]), float(canvas.ys[0])), 1.0, (canvas.height, canvas.width))
     depth = carried_depth(surface, viewpoint, projection, lattice)
-    return trimmed(_mapped(base.beside, surface, views, viewpoint, canvas, depth))
+    return trimmed(_mapped(beside, surface, views, viewpoint, canvas, depth))
 
 
 def _mapped(
@@ -99,8 +99,7 @@ def _mapped(
         confidence[rows] = np.where(hidden, np.float32(0), more[..., 2])
 
     each(put, small_strips(shape))
-    # single pixels are rounding at the edges of near things
-    unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.speck_px,) * 2, np.uint8)) > 0
+    unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.least_behind_px,) * 2, np.uint8)) > 0
     return Warp(canvas, tuple(maps), depth, confidence, slide, unseen, viewpoint)
 
 
@@ -110,7 +109,10 @@ def _refined(
     """Where points at inverse depth d (…), written over, lie on the canvas of the surface, and whether they lie behind
     it; rays: from their viewpoints; c (3,): the target's place, both in the surface's own axes."""
     towards = [s * np.float32(part) for part in c]
+    height, width = surface.depth.shape
     x, y = surface.places([ray + d * step for ray, step in zip(rays, towards, strict=True)])
+    there = (x > -1) & (y > -1) & (x < width) & (y < height)
+    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
     here = looked_up(surface.depth, x, y)
     length = np.sqrt(sum((ray + d * step) ** 2 for ray, step in zip(rays, towards, strict=True)))
     # what the surface holds there, measured from the pixel's viewpoint
@@ -118,12 +120,10 @@ def _refined(
         sum(((ray + d * step) / length - here * step) ** 2 for ray, step in zip(rays, towards, strict=True))
     )
     new = here / np.maximum(away, np.float32(SLIDE.least_range))
-    height, width = surface.depth.shape
-    there = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
     focal = surface.projection.focal
     same = np.abs(new - d) < CARRY.same_share * d + np.float32(CARRY.same_px / focal)
     hidden = there & (new > d + CARRY.behind_share * new + np.float32(CARRY.behind_px / focal)) & (s > 0)
-    np.copyto(d, new, where=there & (same | (s == 0)))
+    np.copyto(d, new, where=(there & same) | (s == 0))
     return x, y, hidden
 
 
@@ -176,8 +176,8 @@ def _canvas(surface: Surface, views: Sequence[View], viewpoint: Viewpoint, proje
 def _reach(
     surface: Surface, views: Sequence[View], viewpoint: Viewpoint, projection: Projection
 ) -> tuple[Array, bool]:
-    """left, top, right, bottom, px of the plane, of a rectangle that holds all pictures, with a margin; and whether more
-    than some specks of them lie beyond the projection's limits."""
+    """left, top, right, bottom, px of the plane, of a rectangle that holds all pictures, with a margin; and whether
+    more than some specks of them lie beyond the projection's limits."""
     height, width = surface.depth.shape
     every = max(1, max(height, width) // CARRY.reach_nodes)
     (x, y, z), depth = surface.points(viewpoint, slice(0, height, every), every)
@@ -193,7 +193,7 @@ def _reach(
     points = points[np.isfinite(points).all(axis=1)]
     beyond = (points < limits[:2] - 1) | (points > limits[2:] + 1)
     points = np.clip(points, limits[:2], limits[2:])
-    margin = CANVAS.margin * max(views[0].size)
+    margin = CANVAS.margin * max(views[0].size) * projection.focal / focal_of(projection.K)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     reach: Array = np.concatenate([np.maximum(low, limits[:2]), np.minimum(high, limits[2:])])
-    return reach, projection.sphere is None and float(beyond.any(axis=1).mean()) > CARRY.most_beyond
+    return reach, projection.cuts and float(beyond.any(axis=1).mean()) > CARRY.most_beyond

@@ -225,7 +225,9 @@ def _sees_baseline(reference: View, target: View, c: Array) -> bool:
 
     def sees(view: View, direction: Array) -> bool:
         point = view.K @ view.R @ direction
+        if not ahead_of_camera(*point):
+            return False
         x, y = project(point)
-        return bool(ahead_of_camera(*point) and falls_inside(x, y, view.size))
+        return bool(falls_inside(x, y, view.size))
 
     return any(sees(reference, direction) and sees(target, direction) for direction in (c, -c))

@@ -17,8 +17,8 @@ from .. import editor, idnames, properties
 from ..bridge import compat, result
 from . import modal, stitching
 
-# Editors in which such a picture was shown.
-_shown_in: set[int] = set()
+# Editors in which such a picture was shown, and px of the screen across all of it.
+_shown_in: dict[int, float] = {}
 # Seconds without another change before it begins, and before it looks again where other work is going on.
 REST, AGAIN = 0.25, 1.0
 # Pixels of the larger picture at most: so many are composed in about a second on two cores.
@@ -32,6 +32,8 @@ def changed(settings: Any) -> None:
     if bpy.app.timers.is_registered(_begin):
         bpy.app.timers.unregister(_begin)
     bpy.app.timers.register(_begin, first_interval=REST)
+    if editor.is_behind(settings, settings.result):
+        modal.start_ahead()
 
 
 def make_job(context: bpy.types.Context, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -55,7 +57,7 @@ def take_over(context: bpy.types.Context, folder: Path, found: dict[str, Any], m
     widths = [0.0 if bpy.app.background else space.zoom[0] * before.size[0] for _, space in shown]
     words = stitching.take_over(context, folder, found, memory, "preview", [space for _, space in shown])
     for (area, space), width in zip(shown, widths, strict=True):
-        _shown_in.add(space.as_pointer())
+        _shown_in[space.as_pointer()] = width
         _as_wide(context, area, space, width)
     return words
 
@@ -76,6 +78,15 @@ def _show_again(*_: Any) -> None:
     for _area, space in editor.all_spaces(bpy.context):
         if space.as_pointer() in _shown_in and space.image is None and last is not None:
             space.image = last
+            if not bpy.app.timers.is_registered(_as_wide_again):
+                bpy.app.timers.register(_as_wide_again)
+
+
+def _as_wide_again() -> None:
+    """Once the undo is over: the editors in question show all of their image as wide as before."""
+    for area, space in editor.all_spaces(bpy.context):
+        if space.image is not None and space.as_pointer() in _shown_in:
+            _as_wide(bpy.context, area, space, _shown_in[space.as_pointer()])
 
 
 def _begin() -> float | None:
@@ -88,7 +99,8 @@ def _begin() -> float | None:
             return AGAIN
         with bpy.context.temp_override(window=window):
             getattr(bpy.ops.edf, idnames.Operator.FOLLOW.partition(".")[2])("INVOKE_DEFAULT")
-        break
+        return None
+    modal.end_ahead()
     return None
 
 

@@ -141,8 +141,20 @@ class Job:
 
 def start(job: dict[str, Any], folder: Path) -> Job:
     """A worker on a folder (see `new_folder`) that holds the job's pictures."""
-    (folder / "job.json").write_text(json.dumps(job), "utf-8")
+    hand_over(job, folder)
     return Job(folder, *command.worker_command([str(folder)], WORKER))
+
+
+def start_ahead(folder: Path) -> Job:
+    """A worker that loads what it takes, and waits for a job in a folder (see `hand_over`)."""
+    return Job(folder, *command.worker_command([str(folder), "wait"], WORKER))
+
+
+def hand_over(job: dict[str, Any], folder: Path) -> None:
+    """Leave a job in its folder, whole at once."""
+    beside = folder / "job.json.part"
+    beside.write_text(json.dumps(job), "utf-8")
+    os.replace(beside, folder / "job.json")
 
 
 def new_folder(parent: str | None = None) -> Path:

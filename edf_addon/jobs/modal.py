@@ -19,11 +19,37 @@ TICK = 0.1
 _current: job.Job | None = None
 # Whether that is a picture which follows the frame: nobody waits for it, and it makes way for any other work.
 _is_following = False
+# A worker that was started before there was something to do, so that this takes less time then.
+_ahead: job.Job | None = None
 
 
 def is_working() -> bool:
     """Whether a worker is at what an artist asked for; there is one at a time."""
     return _current is not None and not _is_following
+
+
+def start_ahead() -> None:
+    """Have a worker ready for the picture that follows the frame, if none is."""
+    global _ahead
+    if _ahead is None:
+        _ahead = job.start_ahead(job.new_folder(bpy.app.tempdir))
+
+
+def end_ahead() -> None:
+    """End the worker that waits, if one does."""
+    global _ahead
+    if _ahead is not None:
+        _ahead.close()
+        _ahead = None
+
+
+def _take_ahead() -> job.Job | None:
+    """The worker that waits, if it still does: whoever takes it ends it."""
+    global _ahead
+    if _ahead is not None and _ahead.poll() is not None:
+        end_ahead()
+    taken, _ahead = _ahead, None
+    return taken
 
 
 def make_way() -> None:
@@ -44,6 +70,7 @@ def stop(words: str) -> None:
     if is_working():
         status.end(words)
     _end()
+    end_ahead()
 
 
 def _end() -> None:
@@ -129,13 +156,19 @@ class LongWork:
             self.report({"ERROR"}, "EDF Stitch is still at work: wait for it, or cancel it.")  # type: ignore[attr-defined]
             return False
         make_way()
-        folder = None
+        ahead, folder = _take_ahead() if self.follows else None, None
         try:
-            folder = job.new_folder(bpy.app.tempdir)
+            folder = job.new_folder(bpy.app.tempdir) if ahead is None else ahead.folder
             request = self.prepare(context, folder)
-            self._job = _current = job.start(request, folder)
+            if ahead is None:
+                self._job = _current = job.start(request, folder)
+            else:
+                job.hand_over(request, folder)
+                self._job = _current = ahead
         except Exception as error:
-            if folder is not None:
+            if ahead is not None:
+                ahead.close()
+            elif folder is not None:
                 job.remove(folder)
             return self._refuse(_in_words(error))
         _is_following = self.follows

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from .. import editor, explain, idnames, offered
+from .. import editor, engine_options, explain, idnames, offered
 from ..bridge import photo
 from ..idnames import Operator
 from .rows import NOTE, Row, SubPanel, rows, words
@@ -30,8 +30,8 @@ def _is_framed(settings: Any) -> bool:
 
 
 def _projection_why_not(settings: Any) -> str:
-    if _is_framed(settings) and settings.field not in offered.ROUND_FIELDS:
-        return "This needs a field that knows depth everywhere, Slack or Strict; or choose Reference"
+    if settings.projection not in ("AUTO", "REFERENCE") and settings.field not in offered.ROUND_FIELDS:
+        return "This needs a field that knows depth everywhere: Slack or Strict"
     return ""
 
 
@@ -57,8 +57,8 @@ FRAME = (
     Row("slide", shown=lambda settings: _is_framed(settings) and not settings.slide_auto),
     Row("level", shown=_is_framed),
     Row("level_angles", shown=lambda settings: _is_framed(settings) and settings.level == "ANGLES"),
-    Row("centre", shown=_is_framed),
-    Row("fov", shown=_is_framed),
+    Row("centre", shown=lambda settings: settings.projection not in engine_options.WHOLE),
+    Row("fov", shown=lambda settings: settings.projection not in engine_options.WHOLE),
     Row("crop"),
     Row("crop_box", shown=lambda settings: settings.crop == "BOX"),
 )

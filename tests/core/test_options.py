@@ -19,10 +19,10 @@ from ..pairs import ON_REFERENCE
 def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
-        "field": "slack", "fade": "plane", "camera": CameraRequest(), "matches": None, "ignore": (),
-        "slide": 0.0, "projection": "reference", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
-        "crop": "full", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True,
-        "holes": "transparent", "seed": 0, "measure": True, "cache": None,
+        "field": "slack", "fade": "continue", "camera": CameraRequest(), "matches": None, "ignore": (),
+        "slide": "auto", "projection": "auto", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
+        "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True,
+        "holes": "auto", "seed": 0, "measure": True, "cache": None,
     }  # fmt: skip
 
 

@@ -21,7 +21,8 @@ def options_in_words(settings) -> StitchOptions:
     """As the worker makes them of what it reads."""
     options = engine_options.options_of(settings)
     camera = CameraRequest(**options.pop("camera"))
-    return StitchOptions(**options, camera=camera)
+    tuples = {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
+    return StitchOptions(**tuples, camera=camera)
 
 
 def test_by_default_everything_is_chosen_for_the_artist(blender):
@@ -34,7 +35,7 @@ def test_every_choice_is_one_that_the_engine_offers(blender, name):
         blender.settings.projection = "REFERENCE"  # which every field knows
         setattr(blender.settings, name, item.identifier)
         chosen = getattr(options_in_words(blender.settings), name)
-        special = {"BOX": [0, 0, 1000, 1000], "PANNINI": "pannini:0.5", "AUTO": "full" if name == "crop" else "auto"}
+        special = {"BOX": (0, 0, 1000, 1000), "PANNINI": "pannini:0.5", "AUTO": "full" if name == "crop" else "auto"}
         assert chosen == special.get(item.identifier, item.identifier.lower())
 
 
@@ -130,6 +131,10 @@ def test_the_frame_is_moved_and_sized_in_degrees_and_the_reference_keeps_its_own
     options = engine_options.options_of(settings)
     assert options["centre"] == pytest.approx([10, -4], abs=1e-5) and options["fov"] == pytest.approx(90, abs=1e-5)
     assert options["slide"] == 0.25
+    settings.centre, settings.fov = (math.pi, -math.pi), 2 * math.pi
+    assert options_in_words(settings).centre == (180, -180) and options_in_words(settings).fov == 360
+    settings.projection = "EQUIRECTANGULAR"
+    assert engine_options.options_of(settings)["fov"] is None, "a sphere is whole"
     bpy.ops.edf.reference_frame()
     options = engine_options.options_of(settings)
     assert (options["projection"], options["slide"], options["crop"]) == ("reference", 0.0, "full")

@@ -127,6 +127,7 @@ import bpy
 from pathlib import Path
 left, right, folder = map(Path, {paths!r})
 bpy.ops.edf.open_pair(directory=str(left.parent), files=[{{"name": left.name}}, {{"name": right.name}}])
+bpy.ops.edf.reference_frame()
 assert bpy.ops.edf.stitch() == {{"FINISHED"}}
 for kind in ("exr", "png"):
     assert bpy.ops.edf.save(filepath=str(folder / f"panorama.{{kind}}")) == {{"FINISHED"}}

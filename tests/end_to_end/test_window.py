@@ -77,8 +77,15 @@ def test_the_panorama_and_what_goes_with_it(walked):
     assert facts["exr_bytes"] > 100_000
 
 
+def test_a_picture_follows_the_frame_and_an_undo_brings_the_panorama_back(walked):
+    facts = json.loads((walked / "walk.json").read_text("utf-8"))["facts"]
+    assert facts["followed"] == ["reference preview"] * 2, "it was made, and is shown"
+    assert facts["undone"] == ["reference panorama"] * 2, "the panorama of before is there, and shown"
+
+
 @pytest.mark.parametrize(("one", "other", "changed"), [
     ("2_nothing_chosen", "3_pair_opened", 0.1), ("5_panorama", "6_matches_and_lines", 0.01),
+    ("5_panorama", "5b_outline_of_the_frame", 0.002), ("5_panorama", "5c_followed", 0.05),
     ("5_panorama", "7_difference", 0.1), ("7_difference", "8_displacement", 0.1),
     ("8_displacement", "11_painted_out", 0.1),
 ])  # fmt: skip

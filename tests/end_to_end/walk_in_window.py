@@ -90,7 +90,7 @@ def way() -> Iterator[float]:
         bpy.ops.ed.undo()
     yield 2.0
     settings = bpy.context.scene.edf_stitch
-    walk["facts"]["undone"] = settings.result.name
+    walk["facts"]["undone"] = [settings.result.name, getattr(area.spaces.active.image, "name", "")]
     panorama = settings.result
     settings.slide_auto, settings.centre = True, (0.0, 0.0)
     show(area, panorama)

@@ -102,9 +102,10 @@ def test_what_makes_no_sense_is_refused_by_the_parser(words: list[str], capsys: 
     ["--focal-px", "9", "--focal35", "28"], ["--focal35", "28", "--cameras", "c.json"], ["--seed=-1"],
     ["--seed", "2147483648"], *(["--scale", text] for text in ("0", "1.5", "nan", "inf")), ["--scale=-0.5"],
     *(["--projection", text] for text in ("pannini:x", "pannini:", "pannini:1.1", "pannini:nan", "perspective:0.5")),
-    *(["--slide", text, "--projection", "auto"] for text in ("1.1", "nan", "inf")), ["--slide", "0.5"],
+    *(["--slide", text, "--projection", "auto"] for text in ("1.1", "nan", "inf")), ["--slide", "2"],
     *(["--projection", "auto", "--centre", text] for text in ("1", "1,2,3", "181,0", "nan,0")),
-    *(["--projection", "auto", "--fov", text] for text in ("0", "361", "nan")), ["--fov", "50"], ["--centre", "5,5"],
+    *(["--projection", "auto", "--fov", text] for text in ("0", "361", "nan")),
+    *(["--projection", "reference", *more] for more in (["--fov", "50"], ["--centre", "5,5"], ["--slide", "0.5"])),
     *(["--crop", text] for text in ("tight", "", "1,2,3", "1,2,3,4,5", "0,0,0,5", "0,0,5,0", "1.5,0,5,5", "Full")),
 ], ids=" ".join)  # fmt: skip
 def test_what_cannot_be_is_refused_before_the_work(words: list[str]) -> None:

@@ -53,6 +53,11 @@ def test_by_itself_it_keeps_what_is_full_where_that_is_most_of_what_is_shown(
     assert crop_box("inscribed", (0, 0, 60, 60), shows, REFERENCE) == (5, 10, 40, 20)
 
 
+def test_a_reference_that_is_not_shown_is_no_crop() -> None:
+    with pytest.raises(BadRequest, match="outside the frame"):
+        crop_box("reference", (0, 0, 50, 30), SHOWS, None)
+
+
 def test_nothing_shown_leaves_nothing_to_keep() -> None:
     for kind in ("auto", "inscribed"):
         with pytest.raises(BadRequest, match="shows nothing"):

@@ -1,5 +1,6 @@
 """What a window shows of a stitch, against the stitch itself."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.projective import homogeneous, project
 from edf_stitch.core.output import inspection
+from edf_stitch.core.output.outputs import json_bytes
+from edf_stitch.core.panorama.viewpoint import Viewpoint
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
@@ -36,6 +39,17 @@ def test_geometry_is_that_of_the_full_pictures(half: StitchResult, pair: Pair):
     lines = homogeneous(x) @ found["F"].T
     distance = np.abs((lines * homogeneous(y)).sum(axis=1)) / np.linalg.norm(lines[:, :2], axis=1)
     assert np.median(distance) < 0.5
+
+
+def test_a_sliding_viewpoint_is_kept_as_it_is(half: StitchResult):
+    """From it, whoever reads result.json knows from where each direction is seen."""
+    assert inspection.full_geometry(half)["viewpoint"] is None, "all is seen from the reference's place"
+    viewpoint = Viewpoint(0.5, np.array([0.6, 0, 0.8]), np.eye(3), np.array([1.0, 0]), (-0.1, 0.2))
+    slid = replace(half, warp=replace(half.warp, viewpoint=viewpoint))
+    told = json.loads(json_bytes(inspection.full_geometry(slid)))["viewpoint"]
+    back = Viewpoint(told["s1"], *(np.array(told[name]) for name in ("c", "rotation", "along")), tuple(told["ends"]))
+    ray = np.array([0.05, -0.1, 1.0])
+    assert 0 < viewpoint.slide_at(ray) < 0.5 and np.array_equal(back.place(ray), viewpoint.place(ray))
 
 
 def test_every_match_has_its_place_its_fate_and_its_error(half: StitchResult):

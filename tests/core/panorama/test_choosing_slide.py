@@ -40,8 +40,8 @@ def slid(warp: Warp) -> float:
 
 
 def rig(by_hand: SimpleNamespace, depth: Callable, turn: float = 28.0) -> tuple[Warp, tuple[View, ...]]:
-    """Two cameras side by side, the target on the right, turned to the right, and the panorama of depth(heading, rise), d along rays
-    of that heading and tan of elevation."""
+    """Two cameras side by side, the target on the right, turned to the right, and the panorama of depth(heading, rise):
+    d along rays of that heading and tan of elevation."""
     camera = by_hand.camera(SIZE, FOCAL)
     first, second = views_of(by_hand.view(camera, camera, (0, -turn, 0), (-1.0, 0, 0)), (camera, camera))
     t = -second.R @ PLACE
@@ -173,3 +173,33 @@ def test_it_can_be_stopped_between_candidates(by_hand: SimpleNamespace) -> None:
     with pytest.raises(Cancelled):
         choose_slide(base, views, NONE, DOWN, steady, stop)
     assert said == sorted(said) and said[0] == 0
+
+
+def test_holes_between_the_pictures_count(by_hand: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    base, views = rig(by_hand, lambda heading, rise: np.full_like(heading, 0.05))
+    torn = base.maps[1].arrays()
+    # what only the target shows, with a hole that a slide closes
+    left = base.canvas.offset[0] + round(0.7 * CHOICE.base_px_per_radian)
+    torn.x[195:203, left : left + 6] = np.nan
+
+    def choose() -> SlideChoice:
+        return choose_slide(base, views, NONE, DOWN, steady)
+
+    choice = choose()
+    assert choice.s1 > 0 and choice.costs[0].holes > 1e-3 and choice.costs[-1].holes < 6e-4
+    assert chosen_without(monkeypatch, "per_hole", choose) == 0
+
+
+def test_what_runs_straight_away_on_the_floor_is_no_upright(
+    by_hand: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the picture a rail below the camera looks upright; from elsewhere it does not, and should not."""
+    base, views = rig(by_hand, lambda heading, rise: np.maximum(rise, 0) / np.hypot(1, rise) / 1.5)
+    ahead = views[1].R.T @ np.array([0, 0, 1.0])
+    rails = lines(*(
+        (tuple(place + DOWN * 1.5 + 4.0 * ahead), tuple(place + DOWN * 1.5 + 9.0 * ahead)) for place in [PLACE] * 4
+    ))  # fmt: skip
+    edges = [NONE[0], rails[1]]
+    assert all(one.lean_deg == 0 for one in choose_slide(base, views, edges, DOWN, steady).costs)
+    monkeypatch.setattr(choosing_slide, "_level", lambda rays, d, down: np.zeros(len(rays), bool))
+    assert choose_slide(base, views, edges, DOWN, steady).costs[0].lean_deg > 1, "as they are seen from the reference"

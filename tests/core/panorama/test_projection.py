@@ -136,6 +136,7 @@ def test_the_middle_looks_ahead_and_has_the_references_pixels(surface: tuple[str
 def test_a_window_is_all_that_is_shown_and_no_more_than_there_is() -> None:
     whole = made("pannini", distance=0.5)
     assert np.array_equal(replace(whole, window=(-50, -20, 101, 31)).limits, (-50, -20, 101, 31))
+    assert whole.cuts and not replace(whole, window=(-50, -20, 101, 31)).cuts and not made("equirectangular").cuts
     left, _, _, bottom = whole.limits
     assert np.array_equal(replace(whole, window=(-9e9, -20, 101, 9e9)).limits, (left, -20, 101, bottom))
 

@@ -68,9 +68,11 @@ def test_it_begins_once_when_the_frame_rests(stitched, monkeypatch):
     """Each change begins the waiting anew."""
     settings, begun = stitched.settings, []
     monkeypatch.setattr(following.bpy, "app", SimpleNamespace(background=False, timers=Timers(begun)))
+    ahead = []
+    monkeypatch.setattr(modal, "start_ahead", lambda: ahead.append("started"))
     settings.slide, settings.slide = 0.2, 0.4
     settings.fov = 1.2
-    assert begun == ["register", "unregister", "register", "unregister", "register"]
+    assert begun == ["register", "unregister", "register", "unregister", "register"] and ahead
     settings.result = None
     settings.slide = 0.6
     assert len(begun) == 5, "there is nothing to follow"
@@ -114,6 +116,35 @@ def test_it_makes_way_for_other_work_and_other_work_never_for_it(chosen, working
     modal.stop("Stopped.")
 
 
+def test_a_worker_that_waits_does_the_next_job_that_follows(stitched, monkeypatch):
+    """It is started once, loads its libraries meanwhile, and its folder goes with it."""
+    monkeypatch.setattr(job, "start", lambda *_: pytest.fail("there was one already"))
+    modal.start_ahead()
+    waiting = modal._ahead
+    modal.start_ahead()
+    assert modal._ahead is waiting and waiting.poll() is None
+    stitched.settings.level_angles[0] = math.radians(5)
+    assert bpy.ops.edf.follow() == {"FINISHED"} and modal._ahead is None
+    assert not editor.is_behind(stitched.settings, stitched.settings.result)
+    assert not waiting.folder.exists()
+
+
+def test_a_worker_that_waits_in_vain_is_ended(blender):
+    modal.start_ahead()
+    waiting = modal._ahead
+    assert following._begin() is None and modal._ahead is None, "there is nothing to follow"
+    assert waiting._process.poll() is not None and not waiting.folder.exists()
+    modal.start_ahead()
+    modal._ahead._process.kill()
+    modal._ahead._process.wait()
+    while modal._ahead.poll() is None:
+        pass
+    assert modal._take_ahead() is None, "it has died meanwhile"
+    modal.start_ahead()
+    modal.stop("Another file is opened.")
+    assert modal._ahead is None
+
+
 def test_a_frame_is_followed_only_while_it_is_switched_on(blender):
     assert following.changed in properties.on_reframe
     import edf_stitch
@@ -135,6 +166,6 @@ def test_after_an_undo_the_editor_that_showed_it_shows_the_panorama_of_then(blen
     mine, other, busy = (SimpleNamespace(image=image, as_pointer=lambda number=number: number) for number, image in
                          enumerate((None, None, "something else")))  # fmt: skip
     monkeypatch.setattr(editor, "all_spaces", lambda _: [(None, mine), (None, other), (None, busy)])
-    monkeypatch.setattr(following, "_shown_in", {0, 2})
+    monkeypatch.setattr(following, "_shown_in", {0: 0.0, 2: 0.0})
     following._show_again()
     assert (mine.image, other.image, busy.image) == (then, None, "something else")
