@@ -32,6 +32,7 @@ def facts(report: dict[str, Any]) -> list[tuple[str, str]]:
     out = [("Model", MODELS.get(view["model"], view["model"]))]
     out += [("Size", f"{report['canvas']['width']} × {report['canvas']['height']} px")]
     out += [("Matches", f"{found}"), ("Inliers", f"{inliers} ({_share(inliers, found)})")]
+    out += viewpoint_facts(report.get("slide") or {})
     out += focal_facts(view)
     out += [("Dense", _dense(report["field"].get("dense") or {}))] if report["options"].get("dense") else []
     out += [("Alignment", _pixels(measured.get("alignment_median_px"), measured.get("alignment_p95_px")))]
@@ -53,6 +54,14 @@ def focal_facts(view: dict[str, Any]) -> list[tuple[str, str]]:
     if deviation and "matches" in view["focal_source"]:
         lengths += f" ± {deviation:.1%}"
     return [("Focal", lengths), ("Source", view["focal_source"])]
+
+
+def viewpoint_facts(slide: dict[str, Any]) -> list[tuple[str, str]]:
+    """From where a panorama is seen, of its report's `slide`."""
+    s1 = slide.get("s1")
+    if s1 is None:
+        return []
+    return [("Viewpoint", f"slides by {s1:.2f}" if s1 else "the reference's place")]
 
 
 def viewpoint(report: dict[str, Any] | None) -> str:

@@ -228,7 +228,8 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         "each point comes from (which can be painted on, as the seam), as images",
     )
     take_depth: BoolProperty(
-        name="Inverse Depth", description="The panorama's inverse depth, in units of the distance between the cameras"
+        name="Inverse Depth", description="The panorama's inverse depth, from where each of its points is seen, in "
+        "units of the distance between the cameras"
     )
     fake_user: BoolProperty(
         name="Fake User", description="Keep the images in the file even where nothing uses them", default=True

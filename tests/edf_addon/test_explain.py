@@ -50,6 +50,14 @@ def test_what_a_plane_lacks_is_left_out(small_result):
     assert facts["Model"].startswith("Plane")
 
 
+def test_the_viewpoint_is_told_and_how_it_was_chosen():
+    assert explain.viewpoint_facts({"s1": 0.5}) == [("Viewpoint", "slides by 0.50")]
+    assert explain.viewpoint_facts({"s1": 0.0}) == [("Viewpoint", "the reference's place")]
+    assert explain.viewpoint_facts({}) == []
+    assert explain.viewpoint({"slide": {"s1": 0.5, "why": "least bends"}}) == "Chosen: 0.50 (least bends)"
+    assert "next stitch" in explain.viewpoint(None)
+
+
 def test_two_focal_lengths_are_both_said_and_an_estimate_says_how_sure():
     view = {"focal_px": [500.0, 900.0], "focal_source": "the matches, from EXIF", "focal_deviation": 0.02}
     assert dict(explain.focal_facts(view))["Focal"] == "500 px and 900 px ± 2.0%"
