@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .cameras.view import View
-from .choices import Slide
 from .compose.rough_seam import RoughSeam
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
@@ -180,7 +179,7 @@ class _Known:
 
 
 def _slide(
-    base: Warp, views: tuple[View, ...], pictures: Sequence[Picture], lines: AllEdges, slide: Slide,
+    base: Warp, views: tuple[View, ...], pictures: Sequence[Picture], lines: AllEdges, slide: str | float,
     progress: Callable[[float], None],
 ) -> SlideChoice:  # fmt: skip
     """How far the viewpoint slides: as asked for, or chosen; base: coarse, seen from the reference's place."""
