@@ -96,7 +96,7 @@ def without_folds(grid: TargetGrid, inverse_depth: Array, seen: Seen) -> Array:
     use."""
     low, high = SYSTEM.allowed_areas
     for _ in range(SYSTEM.smoothing_steps):
-        near = _surrounding(grid, inverse_depth, seen, low, high)
+        near = _misshapen(grid, inverse_depth, seen, low, high)
         if not near.any():
             break
         inverse_depth = np.where(near, cv2.GaussianBlur(inverse_depth, (0, 0), SYSTEM.smoothing_nodes), inverse_depth)
@@ -233,11 +233,11 @@ def _straight(grid: TargetGrid, edges: Array) -> tuple[Equations, Equations]:
 def _stiffening(grid: TargetGrid, z: Array, seen: Seen) -> Array:
     """By what factor (n,) neighbours, in the order of `_membrane`, are to be tied more than before, because the
     surface (N,) folds or stretches what only the target sees."""
-    factor = np.where(_surrounding(grid, z[grid.numbers], seen, *SYSTEM.areas), SYSTEM.stiffening, 1.0)
+    factor = np.where(_misshapen(grid, z[grid.numbers], seen, *SYSTEM.areas), SYSTEM.stiffening, 1.0)
     return np.concatenate([factor[:-1].ravel(), factor[:, :-1].ravel()])
 
 
-def _surrounding(grid: TargetGrid, inverse_depth: Array, seen: Seen, low: float, high: float) -> NDArray[np.bool_]:
+def _misshapen(grid: TargetGrid, inverse_depth: Array, seen: Seen, low: float, high: float) -> NDArray[np.bool_]:
     """The nodes (rows, columns) that only the target sees around cells whose areas are not between two bounds."""
     area = cell_areas(grid, inverse_depth)
     bad = np.pad(((area < low) | (area > high)).astype(np.uint8), ((0, 1), (0, 1)), mode="edge")

@@ -127,10 +127,10 @@ class TargetGrid:
         """Sums (rows, columns, …) over points (N, 2) of values (N[, k]), shared out to the four nodes around each."""
         nodes, weights = self.taps(points)
         flat = values.reshape(len(points), -1)
-        sums: list[Array] = [
-            np.bincount(nodes.ravel(), (weights * column[:, None]).ravel(), self.numbers.size) for column in flat.T
-        ]
-        at_nodes: Array = np.stack(sums, axis=-1)[self.numbers].reshape(*self.shape, *values.shape[1:])
+        sums = np.zeros((self.numbers.size, flat.shape[1]))
+        for k, column in enumerate(flat.T):
+            sums[:, k] = np.bincount(nodes.ravel(), (weights * column[:, None]).ravel(), self.numbers.size)
+        at_nodes: Array = sums[self.numbers].reshape(*self.shape, *values.shape[1:])
         return at_nodes
 
     def panorama_rays(self, inverse_depth: Array) -> Array:
