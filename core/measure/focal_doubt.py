@@ -57,7 +57,8 @@ def focal_doubt(cameras: Sequence[Camera], edge: Edge, canvas: Canvas) -> FocalD
     FocalDoubt
     """
     view, pair = edge.two_view, edge.pair(cameras)
-    if view.model != "general" or not np.isfinite(view.focal_deviation):
+    # a rival knows the pair's lines, but no pose
+    if view.model != "general" or not np.isfinite(view.focal_deviation) or not np.isfinite(view.R).all():
         return FocalDoubt(math.nan, math.nan)
     by_matches = pair[0].assumed and view.focal_source != EDGE_FOCAL.source
     off = max(view.focal_deviation, FOCAL_DOUBT.by_matches) if by_matches else view.focal_deviation
