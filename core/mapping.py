@@ -7,13 +7,14 @@ by what is shown from there (docs/method.md, 6).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .cameras.view import View
+from .choices import Slide
 from .compose.rough_seam import RoughSeam
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
@@ -22,7 +23,7 @@ from .field.slack import SlackField
 from .field.strict import StrictField
 from .options import StitchOptions
 from .panorama.choosing_slide import SlideChoice, choose_slide
-from .panorama.framing import FrameRequest, coarse_sphere, frame_for
+from .panorama.framing import FrameRequest, frame_for
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
@@ -37,9 +38,6 @@ from .system.progress import ReportProgress
 if TYPE_CHECKING:
     from .pictures.picture import Picture
 
-# The maps on a projection, and whether to keep its depth as an array.
-WarpOn = Callable[..., Warp]
-
 
 @dataclass(frozen=True)
 class Mapped:
@@ -52,7 +50,7 @@ class Mapped:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class AllEdges:
     """Straight edges (N) of each picture whose orientation is known, in the reference's frame, found when asked for."""
 
     pictures: Sequence[Picture]
@@ -116,7 +114,7 @@ def map_pictures(
     NoOverlap, OutputTooLarge, BadRequest
         There is no canvas for it (see `build_warp`).
     """
-    lines = Lines(pictures, views)
+    lines = AllEdges(pictures, views)
     progress("warp", 0.0)
     continuation = None
     has_depth = isinstance(field, (StrictField, SlackField)) and np.isfinite(views[1].R).all()
@@ -128,58 +126,67 @@ def map_pictures(
                 lines.down_is_sure,
             ),
         )  # fmt: skip
-
-    def warp_on(projection: Projection | None, hold: bool = False) -> Warp:
-        return build_warp(field, views, projection, refined, continuation, hold)
-
+    known = _Known(field, views, refined, continuation)
     if options.surface[0] == "reference":
-        return Mapped(warp_on(None), continuation, SlideChoice(0.0, (), "the reference's own plane has one viewpoint"))
-    slide = SlideChoice(0.0, (), "as asked for")
+        return Mapped(
+            known.on(None), continuation, SlideChoice(0.0, (), "the reference's own plane has one viewpoint")
+        )
     progress("warp", 0.2)
+    coarse, slide = None, SlideChoice(0.0, (), "as asked for")
     if options.slide == "auto" and field.two_view.model != "general":
         slide = SlideChoice(0.0, (), "the pictures show one plane, or were taken from one place")
     elif options.slide and has_depth:
-        slide = _slide(warp_on, views, pictures, lines, options, lambda share: progress("warp", 0.2 + 0.2 * share))
+        coarse = known.base(lines.down, CHOICE.base_px_per_radian)
+        slide = _slide(coarse, views, pictures, lines, options.slide, lambda share: progress("warp", 0.2 + 0.2 * share))
+    viewpoint = viewpoint_between(coarse, views) if coarse is not None and slide.s1 else None
+
+    def seen_on(projection: Projection, base: Warp | None = coarse) -> Warp:
+        if base is None or viewpoint is None:
+            return known.on(projection)
+        return slid_warp(base, views, viewpoint.sliding(slide.s1), projection)
+
     progress("warp", 0.4)
-    shown = _seen_from(slide.s1, warp_on, views, lines, coarse_sphere(views).focal)
     kind, distance = options.surface
     asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
     edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
-    frame = frame_for(asked, views, edges, down, shown)
+    frame = frame_for(asked, views, edges, down, seen_on)
     progress("warp", 0.5)
-    return Mapped(_seen_from(slide.s1, warp_on, views, lines, focal_of(views[0].K))(frame), continuation, slide)
+    base = None
+    if viewpoint is not None:
+        # who sets the slide by hand tries others
+        cache = Cache(options.cache if options.slide != "auto" else None)
+        base = known.base(lines.down, focal_of(views[0].K), cache)
+    return Mapped(seen_on(frame, base), continuation, slide)
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What all maps are made from (see `build_warp`)."""
+
+    field: Field
+    views: tuple[View, ...]
+    refined: RefinedDepth | None
+    continuation: Continuation | None
+
+    def on(self, projection: Projection | None, hold: bool = False) -> Warp:
+        """The maps on a projection, or on the reference's plane, seen from the reference's place."""
+        return build_warp(self.field, self.views, projection, self.refined, self.continuation, hold)
+
+    def base(self, down: Array, px_per_radian: float, cache: Cache | None = None) -> Warp:
+        """The maps on a levelled cylinder, with what a sliding viewpoint needs of them."""
+        projection = round_projection("cylindrical", self.views[0].K, upright(down), px_per_radian)
+        cache = cache or Cache(None)
+        return cache.remember("base", (self, projection), lambda: self.on(projection, True))
 
 
 def _slide(
-    warp_on: WarpOn, views: tuple[View, ...], pictures: Sequence[Picture], lines: Lines,
-    options: StitchOptions, progress: Callable[[float], None],
+    base: Warp, views: tuple[View, ...], pictures: Sequence[Picture], lines: AllEdges, slide: Slide,
+    progress: Callable[[float], None],
 ) -> SlideChoice:  # fmt: skip
-    """How far the viewpoint slides: as asked for, or chosen."""
-    base = _base(warp_on, views, lines, CHOICE.base_px_per_radian)
-    if options.slide != "auto":
+    """How far the viewpoint slides: as asked for, or chosen; base: coarse, seen from the reference's place."""
+    if slide != "auto":
         if viewpoint_between(base, views) is None:
             return SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
-        return SlideChoice(float(options.slide), (), "as asked for")
+        return SlideChoice(float(slide), (), "as asked for")
     seam = RoughSeam.of(pictures, views, CHOICE.base_px_per_radian)
     return choose_slide(base, views, lines.each, lines.down if lines.down_is_sure else None, seam, progress)
-
-
-def _seen_from(
-    s1: float, warp_on: WarpOn, views: tuple[View, ...], lines: Lines, px_per_radian: float
-) -> Callable[[Projection], Warp]:
-    """Gives the maps on a projection as the viewpoint that slides by s1 sees them; depth is carried over from a map of
-    some px per radian."""
-    if not s1:
-        return warp_on
-    base = _base(warp_on, views, lines, px_per_radian)
-    viewpoint = viewpoint_between(base, views)
-    if viewpoint is None:
-        return warp_on
-    sliding = viewpoint.sliding(s1)
-    return lambda projection: slid_warp(base, views, sliding, projection)
-
-
-def _base(warp_on: WarpOn, views: Sequence[View], lines: Lines, px_per_radian: float) -> Warp:
-    """The maps on a levelled cylinder, seen from the reference's place."""
-    projection = round_projection("cylindrical", views[0].K, upright(lines.down))
-    return warp_on(replace(projection, focal=px_per_radian), True)

@@ -13,10 +13,10 @@ from ..field.fade import fading
 from ..field.field import FieldValues
 from ..raster.arrays import Array
 from ..raster.grid import Grid
-from .canvas import Canvas
 
 if TYPE_CHECKING:
     from ..continuation.continuation import Continuation
+    from .canvas import Canvas
 
 
 @dataclass(frozen=True, eq=False)

@@ -159,20 +159,28 @@ def _levelled(
     asked: FrameRequest, views: Sequence[View], edges: Edges | None, down: Array | None, covered: Coverage, K: Array
 ) -> Projection:
     """The frame that is turned upright: by edges where they can be believed, else by how the cameras were held."""
-    held = gravity([view.R for view in views if np.isfinite(view.R).all()])
-    frame = _surface(asked, _centred(held, covered), edges, covered, K)
-    if down is None or np.allclose(down, held):
-        return frame
+    best = gravity([view.R for view in views if np.isfinite(view.R).all()])
+
+    def frame(down: Array, more: float = 0.0) -> Projection:
+        return _surface(asked, _centred(down, covered, more), edges, covered, K)
+
+    if down is not None and _believed(down) and not np.allclose(down, best):
+        room, room_by_edges = (_room(frame(one), covered)[0] for one in (best, down))
+        best = down if room_by_edges >= FRAMING.least_kept * room else best
+    frames = [frame(best, more) for more in FRAMING.more_kept_deg]
+    rooms = [_room(one, covered)[1] for one in frames]
+    return next(one for one, room in zip(frames, rooms, strict=True) if room >= FRAMING.least_room * max(rooms))
+
+
+def _believed(down: Array) -> bool:
+    """Whether somebody may have held the reference so, `down` (3,) being down in its frame."""
     roll, pitch = np.degrees([np.arctan2(down[0], down[1]), np.arcsin(np.clip(down[2], -1, 1))])
-    if abs(roll) > FRAMING.max_roll_deg or abs(pitch) > FRAMING.max_pitch_deg:
-        return frame
-    by_edges = _surface(asked, _centred(down, covered), edges, covered, K)
-    room, room_by_edges = (_room(one, covered) for one in (frame, by_edges))
-    return by_edges if room_by_edges >= FRAMING.least_kept * room else frame
+    return abs(roll) <= FRAMING.max_roll_deg and abs(pitch) <= FRAMING.max_pitch_deg
 
 
-def _centred(down: Array, covered: Coverage) -> Array:
-    """The rotation (3, 3) of a panorama that looks at the middle of what is shown, `down` (3,) being down."""
+def _centred(down: Array, covered: Coverage, more: float) -> Array:
+    """The rotation (3, 3) of a panorama that looks at the middle of what is shown, `down` (3,) being down; more:
+    degrees of tilt that are kept beside what is always kept."""
     base = upright(down)
     mean = covered.solid_angle @ covered.rays @ base
     ahead = np.arctan2(mean[0], mean[2])
@@ -180,7 +188,7 @@ def _centred(down: Array, covered: Coverage) -> Array:
     level = base @ turned(-np.degrees(ahead + (left + right) / 2), 0, 0)
     mean = covered.solid_angle @ covered.rays @ level
     pitch = np.degrees(np.arctan2(-mean[1], np.hypot(mean[0], mean[2])))
-    kept = np.sign(pitch) * max(0.0, abs(pitch) - FRAMING.full_pitch_deg)
+    kept = np.sign(pitch) * min(abs(pitch), max(0.0, abs(pitch) - FRAMING.full_pitch_deg) + more)
     rotation: Array = level @ turned(0, -kept, 0)
     return rotation
 
@@ -230,8 +238,8 @@ def _frontal_length(edges: Edges, rotation: Array) -> float:
     return float((weights @ (np.abs(normals @ along) < FRAMING.frontal_sine)).max()) if len(normals) else 0.0
 
 
-def _room(projection: Projection, covered: Coverage) -> float:
-    """The largest rectangle that a frame has room for, as a share of what it shows."""
+def _room(projection: Projection, covered: Coverage) -> tuple[float, float]:
+    """The largest rectangle that a frame has room for, as a share of what it shows and of its canvas."""
     limits = projection.limits
     points = projection.points(covered.rays)
     left, top = np.maximum(points.min(axis=0), limits[:2])
@@ -240,7 +248,7 @@ def _room(projection: Projection, covered: Coverage) -> float:
     grid = np.stack(np.meshgrid(np.arange(left, right, step), np.arange(top, bottom, step)), axis=-1)
     mask = covered.at(projection.rays(grid))
     _, _, width, height = largest_rectangle(mask)
-    return width * height / max(1, int(mask.sum()))
+    return width * height / max(1, int(mask.sum())), width * height / mask.size
 
 
 def _resized(projection: Projection, covered: Coverage) -> Projection:
@@ -282,8 +290,8 @@ def _windowed(
         ray = np.array([level * np.sin(heading), -np.sin(pitch), level * np.cos(heading)])
         return projection.points(projection.rotation @ ray)
 
-    middle, half = point(yaw), (high - low) / 2
-    left, top, right, bottom = *(middle - half), *(middle + half)
+    half = (high - low) / 2
+    (left, top), (right, bottom) = point(yaw) - half, point(yaw) + half
     if fov is not None:
         left, right = (point(yaw + sign * np.radians(fov) / 2)[0] for sign in (-1, 1))
     window = (round(left), round(top), round(right) + 1, round(bottom) + 1)

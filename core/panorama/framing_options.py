@@ -33,6 +33,13 @@ class FramingOptions:
     """Degrees up or down that are levelled fully. What is beyond is kept: uprights that converge a little look better
     than a picture that is stretched at one end."""
 
+    more_kept_deg: tuple[float, ...] = (0.0, 1.5, 3.0, 4.5)
+    """Degrees of tilt that may be kept beside that, for a larger rectangle: at the sides uprights then lean by half of
+    it."""
+
+    least_room: float = 0.96
+    """Share of the largest rectangle so found that a frame leaves room for; of those the one that keeps least tilt."""
+
     flat_fov_deg: float = 60.0
     """Degrees from left to right up to which a plane looks natural."""
 

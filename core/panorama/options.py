@@ -280,6 +280,10 @@ class SlideOptions:
     least_alone: float = 0.03
     """Share of each picture that it alone shows: with less the other one surrounds it."""
 
+    inner: float = 0.5
+    """Share of each side of the pictures, about their middle, in which a direction along the baseline lies well inside:
+    nearer to their borders there is still room to slide past it."""
+
     nodes: int = 400
     """Nodes along the longer side of the base at which the overlap is looked at."""
 

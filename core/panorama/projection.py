@@ -87,8 +87,8 @@ class Projection:
         limits = np.array([-across, -up, across + 1, up + 1])
         if self.window is None:
             return limits
-        left, top, right, bottom = self.window
-        inner: Array = np.concatenate([np.maximum(limits[:2], [left, top]), np.minimum(limits[2:], [right, bottom])])
+        window = np.array(self.window)
+        inner: Array = np.concatenate([np.maximum(limits[:2], window[:2]), np.minimum(limits[2:], window[2:])])
         return inner
 
     def rays(self, points: Array) -> Array:

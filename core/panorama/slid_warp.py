@@ -109,7 +109,10 @@ def _refined(
     """Where points at inverse depth d (…), written over, lie on the canvas of the surface, and whether they lie behind
     it; rays: from their viewpoints; c (3,): the target's place, both in the surface's own axes."""
     towards = [s * np.float32(part) for part in c]
+    height, width = surface.depth.shape
     x, y = surface.places([ray + d * step for ray, step in zip(rays, towards, strict=True)])
+    there = (x > -1) & (y > -1) & (x < width) & (y < height)
+    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
     here = looked_up(surface.depth, x, y)
     length = np.sqrt(sum((ray + d * step) ** 2 for ray, step in zip(rays, towards, strict=True)))
     # what the surface holds there, measured from the pixel's viewpoint
@@ -117,12 +120,10 @@ def _refined(
         sum(((ray + d * step) / length - here * step) ** 2 for ray, step in zip(rays, towards, strict=True))
     )
     new = here / np.maximum(away, np.float32(SLIDE.least_range))
-    height, width = surface.depth.shape
-    there = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
     focal = surface.projection.focal
     same = np.abs(new - d) < CARRY.same_share * d + np.float32(CARRY.same_px / focal)
     hidden = there & (new > d + CARRY.behind_share * new + np.float32(CARRY.behind_px / focal)) & (s > 0)
-    np.copyto(d, new, where=there & (same | (s == 0)))
+    np.copyto(d, new, where=(there & same) | (s == 0))
     return x, y, hidden
 
 

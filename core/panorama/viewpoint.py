@@ -221,11 +221,13 @@ def _centre(view: View) -> Array:
 
 
 def _sees_baseline(reference: View, target: View, c: Array) -> bool:
-    """Whether some direction along the baseline lies in both pictures: around it no viewpoint can slide."""
+    """Whether some direction along the baseline lies well inside both pictures: around it no viewpoint can slide."""
 
     def sees(view: View, direction: Array) -> bool:
         point = view.K @ view.R @ direction
-        x, y = project(point)
-        return bool(ahead_of_camera(*point) and falls_inside(x, y, view.size))
+        if not ahead_of_camera(*point):
+            return False
+        place, size = project(point), np.array(view.size)
+        return bool((np.abs(place - (size - 1) / 2) < SLIDE.inner * size / 2).all())
 
     return any(sees(reference, direction) and sees(target, direction) for direction in (c, -c))

@@ -7,6 +7,7 @@ matches tell, goes with it: Caprile and Torre, Using vanishing points for camera
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,11 +30,19 @@ class Edges:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A pose with a focal length held, what it costs the matches, and what the edges say for it."""
+    """A pose with a focal length held, what it costs the matches, both pictures' edges with it, the angles (3,) of the
+    best frame (see `_frame`), and what the edges say for that."""
 
     pose: Pose
     cost: float
+    pictures: tuple[_Directions, _Directions]
+    angles: Array
     evidence: float
+
+    def with_frame_of(self, other: _Candidate) -> _Candidate:
+        """With the frame that another one leads to, where that is better."""
+        angles, evidence = _followed(self.pictures, other.angles)
+        return replace(self, angles=angles, evidence=evidence) if evidence > self.evidence else self
 
     def score(self, camera: Camera) -> float:
         """Higher is better: edges, matches, and what is usual."""
@@ -72,14 +81,19 @@ def focal_by_edges(
             for camera, K in zip(cameras, (start.K, start.K_prime), strict=True)
         ]
         pose, cost = refine_pose(few, replace(start, K=held[0].K, K_prime=held[1].K), held[0], held[1], two_view.sigma)
-        evidence = _evidence([_Directions.of(edges[0], pose.K), _Directions.of(edges[1], pose.K_prime @ pose.R)])
-        return _Candidate(pose, cost, evidence)
+        pictures = _Directions.of(edges[0], pose.K), _Directions.of(edges[1], pose.K_prime @ pose.R)
+        return _Candidate(pose, cost, pictures, *_best_frame(pictures))
 
-    by_matches = candidate(1.0)
     side = max(cameras[0].size)
     shortest, longest = np.log(EDGE_FOCAL.sides)
     focals = side * np.exp(np.arange(shortest, longest, EDGE_FOCAL.log_step))
     found = [candidate(float(focal / start.K[0, 0])) for focal in focals]
+    # a search may miss the best frame: that of the next focal length leads to it
+    for order in (range(1, len(found)), range(len(found) - 2, -1, -1)):
+        for number in order:
+            found[number] = found[number].with_frame_of(found[number - order.step])
+    nearest = found[int(np.argmin(np.abs(np.log(focals / start.K[0, 0]))))]
+    by_matches = candidate(1.0).with_frame_of(nearest)
     scores = np.array([one.score(cameras[0]) for one in found])
     best = int(np.argmax(scores))
     # matches and what is usual may speak for it, too, but edges alone have to suffice
@@ -139,8 +153,9 @@ class _Directions:
         return np.asarray(np.exp(sine, out=sine))
 
 
-def _evidence(pictures: list[_Directions]) -> float:
-    """What the edges say for the best three directions at right angles, one of them upright."""
+def _best_frame(pictures: tuple[_Directions, _Directions]) -> tuple[Array, float]:
+    """The angles (3,) of the best three directions at right angles, one of them upright (see `_frame`), and what the
+    edges say for them."""
     pitch, roll = (
         angle.ravel() for angle in np.radians(np.meshgrid(
             *(np.arange(-reach, reach + step / 2, step) for reach, step in EDGE_FOCAL.upright_grid_deg)
@@ -148,21 +163,27 @@ def _evidence(pictures: list[_Directions]) -> float:
     )  # fmt: skip
     longest = [picture.longest(EDGE_FOCAL.first_edges) for picture in pictures]
     found = _total(longest, [_down(pitch, roll)])
-    best = 0.0
+    best, value = np.zeros(3), -1.0
     for start in _apart(_down(pitch, roll), found):
         yaw = np.radians(np.arange(0.0, 90.0, EDGE_FOCAL.yaw_step_deg))
         angles = np.column_stack([np.full(len(yaw), pitch[start]), np.full(len(yaw), roll[start]), yaw])
-        here = angles[np.argmax(_total(longest, _frame(angles)))]
-        value, step = float(_total(pictures, _frame(here[None]))[0]), np.radians(EDGE_FOCAL.yaw_step_deg) / 2
-        for _ in range(EDGE_FOCAL.steps):
-            around = here + step * _AROUND
-            values = _total(pictures, _frame(around))
-            if values.max() > value:
-                here, value = around[np.argmax(values)], float(values.max())
-            else:
-                step /= 2
-        best = max(best, value)
-    return best
+        there, there_value = _followed(pictures, angles[np.argmax(_total(longest, _frame(angles)))])
+        if there_value > value:
+            best, value = there, there_value
+    return best, value
+
+
+def _followed(pictures: Sequence[_Directions], angles: Array) -> tuple[Array, float]:
+    """The best frame near the one of angles (3,), and what the edges say for it."""
+    value, step = float(_total(pictures, _frame(angles[None]))[0]), np.radians(EDGE_FOCAL.yaw_step_deg) / 2
+    for _ in range(EDGE_FOCAL.steps):
+        around = angles + step * _AROUND
+        values = _total(pictures, _frame(around))
+        if values.max() > value:
+            angles, value = around[np.argmax(values)], float(values.max())
+        else:
+            step /= 2
+    return angles, value
 
 
 _AROUND = np.vstack([np.eye(3), -np.eye(3)])
@@ -179,7 +200,7 @@ def _apart(down: Array, values: Array) -> list[int]:
     return out
 
 
-def _total(pictures: list[_Directions], directions: list[Array]) -> Array:
+def _total(pictures: Sequence[_Directions], directions: list[Array]) -> Array:
     """Evidence (M,) of the edges of all pictures for frames, whose directions are (M, 3) each: the logarithm of how
     much likelier each edge is if some edges run in these directions than if all run anywhere, weighted by length."""
     density = EDGE_FOCAL.aligned_share / 3 * np.sqrt(np.pi / 2) / np.radians(EDGE_FOCAL.edge_sigma_deg)

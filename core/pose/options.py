@@ -182,7 +182,7 @@ class EdgeFocalOptions:
     # Degrees of pitch and roll, reach and step, at which down is sought first, and steps of yaw after it.
     upright_grid_deg: tuple[tuple[float, float], tuple[float, float]] = ((40.0, 2.5), (12.0, 1.5))
     yaw_step_deg: float = 1.5
-    # Directions down, so many degrees apart, that are followed, and steps of following, each to one side or half as wide.
+    # Directions down, so many degrees apart, that are followed; steps of following are to one side, or half as wide.
     starts: int = 2
     apart_deg: float = 5.0
     steps: int = 16

@@ -223,20 +223,6 @@ def test_a_pair_is_refined_and_a_clip_says_why_not(clip: list[Pair], quick: Stit
     assert plain.dense is None and np.array_equal(several.warp.maps[1].x, plain.warp.maps[1].x, equal_nan=True)
 
 
-def test_a_camera_whose_rotation_is_unknown_has_no_say_in_the_level(small_pair: Pair, quick: StitchOptions) -> None:
-    options = replace(quick, projection="equirectangular")
-    frame = frame_of(small_pair, options)
-    views = align([frame], options, silent).views
-    unknown = replace(views[1], R=np.full((3, 3), np.nan))
-    alone = Frame(frame.pictures[:1], frame.full_sizes[:1])
-    both, one, neither = (
-        alignment._projection(options, some, of)
-        for some, of in ((views, frame), ((views[0], unknown), frame), (views[:1], alone))
-    )
-    assert both is not None and one is not None and neither is not None
-    assert np.array_equal(one.rotation, neither.rotation) and not np.array_equal(both.rotation, one.rotation)
-
-
 def test_each_stage_is_told_and_features_climb(clip: list[Pair], quick: StitchOptions) -> None:
     said: list[tuple[str, float]] = []
     align([frame_of(pair, quick) for pair in clip[:2]], quick, lambda stage, share: said.append((stage, share)))

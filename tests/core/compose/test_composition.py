@@ -268,3 +268,21 @@ def test_pictures_that_do_not_meet_are_shown_side_by_side(options: dict) -> None
     assert np.array_equal(out.alpha > 0, shown | (first.alpha > 0))
     assert np.array_equal(out.pixels[shown], second.pixels[shown])
     assert np.array_equal(out.pixels[first.alpha > 0], first.pixels[first.alpha > 0])
+
+
+@pytest.mark.parametrize("options", [{}, {"blend": "feather"}, {"blend": "feather", "seam": "none"}, {"seam": "none"}])
+def test_what_a_sliding_viewpoint_sees_behind_the_references_things_comes_from_the_target(options: dict) -> None:
+    """What neither sees is a hole, even where the reference's map falls inside it."""
+    first, second, warp = pictures()
+    behind = np.zeros(SHAPE, bool)
+    behind[60:90, 150:180] = True
+    ghost = first.pixels.copy()
+    ghost[behind] = [0.9, 0.1, 0.9]
+    slides = replace(warp, behind=behind)
+    out, _, found = compose(Layer(ghost, first.alpha), second, slides, **options)
+    seen = behind & ~found.hidden & (second.alpha > 0) & (first.alpha > 0)
+    assert seen.sum() > 400
+    away = np.abs(log_encode(out.pixels) - log_encode(second.pixels))[seen]
+    assert np.percentile(away, 95) < 0.05, "the ghost is nowhere to be seen"
+    nobody = behind & (first.alpha > 0) & (found.hidden | (second.alpha == 0))
+    assert not out.alpha[nobody].any()

@@ -129,12 +129,23 @@ def test_what_would_be_enlarged_beyond_the_overlap_is_shown_as_it_was_taken(
     assert chosen_without(monkeypatch, "per_enlarged", choose) == 0
 
 
-def test_a_slide_that_folds_is_out_of_the_question(by_hand: SimpleNamespace) -> None:
+def test_a_slide_that_folds_or_stretches_is_out_of_the_question(
+    by_hand: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # from the right the target looks far to the left: the way goes against the parallax
     base, views = rig(by_hand, lambda heading, rise: np.full_like(heading, 0.3), turn=-52.0)
-    choice = choose_slide(base, views, NONE, DOWN, better_far(25))
+
+    def choose(**options: float) -> SlideChoice:
+        with monkeypatch.context() as patch:
+            patch.setattr(choosing_slide, "CHOICE", replace(CHOICE, per_enlarged=0.0, **options))
+            return choose_slide(base, views, NONE, DOWN, better_far(25))
+
+    choice = choose(max_stretched=1.0)
     assert 0 < choice.s1 < 1 and choice.costs[-1].folded > 0.02 and "fold" in choice.why
     assert next(one for one in choice.costs if one.s1 == choice.s1).folded < 0.01
+    stretched = choose()
+    assert stretched.s1 < choice.s1 and "stretch" in stretched.why
+    assert choose(max_stretched=1.0, max_folded=1.0, per_folded=0.0).s1 == 1, "nothing else holds it"
 
 
 def test_a_seam_that_runs_unseen_is_worth_it(by_hand: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,13 +6,16 @@ The scenes are pictures of what is infinitely far, turned from each other: what 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
+from edf_stitch.core.panorama import framing
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.framing import FrameRequest, frame_for
+from edf_stitch.core.panorama.framing_options import FRAMING
 from edf_stitch.core.panorama.levelling import angles_of, turned
 from edf_stitch.core.panorama.projection import Projection, focal_of
 from edf_stitch.core.panorama.warp import Warp
@@ -94,14 +97,29 @@ def test_what_reaches_far_up_is_drawn_on_a_sphere() -> None:
     assert framed(rig((0, 0, 0), (0, 45, 0), (0, -45, 0))).kind == "equirectangular"
 
 
-@pytest.mark.parametrize(("pitch", "kept"), [(8.0, 0.0), (-11.0, 0.0), (20.0, 8.0), (-20.0, -8.0)])
-def test_a_tilt_is_levelled_fully_up_to_a_point(pitch: float, kept: float) -> None:
-    """What is beyond stays in the middle of the picture, so that the far end is not stretched."""
-    views = rig((-15, pitch, 0), (15, pitch, 0))
-    down = turned(*(-15, pitch, 0))[:, 1]
-    ahead = framed(views, down).rotation[:, 2]
-    level = turned(-15, pitch, 0).T  # from the reference's frame to the world's
-    assert abs(np.degrees(np.arcsin(-(level @ ahead)[1])) - kept) < 1.5
+def kept_tilt(pitch: float, yaw: float) -> tuple[float, float]:
+    """Degrees above the horizon that the panorama of two pictures with this pitch looks, and its rectangle's share."""
+    views = rig((-yaw, pitch, 0), (yaw, pitch, 0))
+    projection = framed(views, turned(-yaw, pitch, 0)[:, 1])
+    ahead = turned(-yaw, pitch, 0).T @ projection.rotation[:, 2]
+    covered = framing.coverage(warps(views)(framing.coarse_sphere(views)))
+    return float(np.degrees(np.arcsin(-ahead[1]))), framing._room(projection, covered)[1]
+
+
+@pytest.mark.parametrize(("pitch", "kept"), [(8.0, 0.0), (-11.0, 0.0), (20.0, 9.0), (-20.0, -9.0)])
+def test_a_tilt_is_levelled_up_to_a_point(pitch: float, kept: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is beyond stays in the middle of the picture, so that the far end is not stretched; and a little more where
+    the rectangle would become small."""
+    tilt, room = kept_tilt(pitch, 15)
+    assert -0.2 < (tilt - kept) * np.sign(pitch) < 4.7
+    monkeypatch.setattr(framing, "FRAMING", replace(FRAMING, more_kept_deg=(0.0,)))
+    levelled, less_room = kept_tilt(pitch, 15)
+    assert abs(levelled - kept) < 0.2 and room >= less_room
+    assert (abs(tilt - levelled) > 1) == (room > less_room), "only for a larger one"
+
+
+def test_a_tilt_that_costs_nothing_is_not_kept() -> None:
+    assert abs(kept_tilt(3.0, 15)[0]) < 0.2
 
 
 def test_edges_that_would_leave_no_room_are_not_believed() -> None:

@@ -1,0 +1,72 @@
+"""From a field to maps: who tells which way is down, when a viewpoint slides, and what a slide set by hand reuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from edf_stitch.core import mapping
+from edf_stitch.core.alignment import Frame, align, estimate_geometry, fit_and_warp, prepare
+from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.pictures.picture import picture_from_array
+from edf_stitch.synthetic_scenes.two_planes import Pair
+
+QUICK = StitchOptions(dense=False, measure=False, projection="cylindrical")
+
+
+def silent(stage: str, share: float) -> None:
+    pass
+
+
+@pytest.fixture(scope="module")
+def frame(small_pair: Pair) -> Frame:
+    return prepare([picture_from_array(small_pair.reference), picture_from_array(small_pair.target)], QUICK)
+
+
+def test_a_camera_whose_rotation_is_unknown_has_no_say_in_the_level(frame: Frame) -> None:
+    views = align([frame], QUICK, silent).views
+    unknown = replace(views[1], R=np.full((3, 3), np.nan))
+    both, one, alone = (
+        mapping.AllEdges(pictures, some).down
+        for pictures, some in (
+            (frame.pictures, views), (frame.pictures, (views[0], unknown)), (frame.pictures[:1], views[:1]),
+        )
+    )  # fmt: skip
+    assert np.array_equal(one, alone) and not np.array_equal(both, one)
+
+
+def test_nothing_slides_where_the_model_is_a_plane(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr(mapping, "choose_slide", lambda *given: asked.append(given) or mapping.SlideChoice(0, (), "no"))
+    options = replace(QUICK, slide="auto")
+    geometry = estimate_geometry([frame], options, silent)
+    assert fit_and_warp(geometry, [frame], options, silent).slide.why == "no" and len(asked) == 1
+    plane = replace(geometry.edges[0], two_view=replace(geometry.edges[0].two_view, model="plane"))
+    found = fit_and_warp(replace(geometry, edges=(plane,)), [frame], options, silent)
+    assert found.slide.s1 == 0 and "plane" in found.slide.why and len(asked) == 1
+
+
+def test_another_slide_set_by_hand_starts_from_what_is_kept(
+    frame: Frame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built = []
+    build = mapping.build_warp
+
+    def counted(*given: Any) -> Any:
+        built.append(given)
+        return build(*given)
+
+    monkeypatch.setattr(mapping, "build_warp", counted)
+    kept = replace(QUICK, cache=tmp_path)
+    align([frame], replace(kept, slide=0.25), silent)
+    first = len(built)
+    again = align([frame], replace(kept, slide=0.5), silent).warp
+    assert len(built) - first == first - 1, "all but the full map, which is the dearest"
+    anew = align([frame], replace(QUICK, slide=0.5), silent).warp
+    assert again.viewpoint is not None and again.viewpoint.s1 == 0.5
+    for one, other in zip(again.maps, anew.maps, strict=True):
+        assert np.array_equal(one.arrays().x, other.arrays().x, equal_nan=True)
+    assert np.array_equal(again.inverse_depth, anew.inverse_depth, equal_nan=True)
