@@ -272,7 +272,7 @@ class LookupOptions:
     oversampling: int = 4
     """Values between nodes, per node, that rays are looked up in."""
 
-    scan: int = 16
+    scan: int = 24
     """Inverse depths at which a ray is held against the surface before the nearest crossing is narrowed down."""
 
     narrowing: int = 10
