@@ -26,7 +26,7 @@ class GridOptions:
     """Share of the greatest px per unit of inverse depth that a node has at least: near the epipole depth is invisible,
     and the surface has to stay whole."""
 
-    samples: int = 60_000
+    samples: int = 40_000
     """Pixels of the whole reference whose inverse depth is looked at: some ten for each node."""
 
     field_nodes: int = 4_000
@@ -142,7 +142,7 @@ class LabelOptions:
     agreeing_factor: float = 2.0
     """Tolerances at which a sample that lies off these planes counts a quarter."""
 
-    sweeps: int = 6
+    sweeps: int = 5
     """Rounds of messages through the grid, in four directions each."""
 
     coarsening: int = 2
@@ -225,7 +225,7 @@ class SystemOptions:
     rounds: int = 6
     """Reweighted solutions."""
 
-    first_rounds: int = 3
+    first_rounds: int = 2
     """The same of the smooth surface that is there before any plane."""
 
     areas: tuple[float, float] = (0.35, 2.2)
