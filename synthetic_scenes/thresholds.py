@@ -103,6 +103,7 @@ BEYOND: dict[str, tuple[float, float]] = {
     "exposure_step": (0.4, 2.0), "layered_cards": (math.inf, 20.2), "street": (math.inf, 15.2),
     "foliage": (2.7, 15.4), "relief": (math.inf, 5.9), "tabletop": (math.inf, 7.6), "zoom_pair": (math.inf, 21.2),
     "forward": (math.inf, 11.8), "toe_in": (math.inf, 5.6), "hdr_interior": (3.0, 54.7), "low_texture": (3.0, 85.9),
+    "wide": (math.inf, 21.3), "occluder": (math.inf, 19.6),
 }  # fmt: skip
 # The whole suite: medians over its scenes with parallax.
 SUITE = (

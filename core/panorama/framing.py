@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..cameras.view import View
 from ..choices import Level
-from ..raster.arrays import Array
+from ..raster.arrays import Array, angle_of
 from ..raster.rectangle import largest_rectangle
 from ..system.errors import BadRequest
 from .framing_options import FRAMING
@@ -196,7 +196,7 @@ def _centred(down: Array, covered: Coverage, more: float) -> Array:
 def _ends(rays: Array) -> tuple[float, float]:
     """The headings of the outermost rays (N, 3) in a panorama's axes, left and right, in radians."""
     outer = FRAMING.outermost_percent
-    left, right = np.percentile(np.arctan2(rays[:, 0], rays[:, 2]), (outer, 100 - outer))
+    left, right = np.percentile(angle_of(rays[:, 0], rays[:, 2]), (outer, 100 - outer))
     return float(left), float(right)
 
 

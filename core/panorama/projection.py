@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.projective import homogeneous, inverse_intrinsics
-from ..raster.arrays import Array
+from ..raster.arrays import Array, angle_of
 from .options import PROJECTION
 
 
@@ -110,12 +110,12 @@ class Projection:
         """The same (u, v) for rays in the panorama's own axes, of their precision."""
         level = np.hypot(x, z)
         if self.kind == "equirectangular":
-            out = np.arctan2(x, z), np.arctan2(y, level)
+            out = angle_of(x, z), angle_of(y, level)
         else:
             with np.errstate(divide="ignore", invalid="ignore"):
                 rise = y / level
             if self.kind == "cylindrical":
-                out = np.arctan2(x, z), rise
+                out = angle_of(x, z), rise
             else:
                 with np.errstate(divide="ignore", invalid="ignore"):
                     sine, cosine = x / level, z / level

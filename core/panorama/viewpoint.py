@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..cameras.projective import ahead_of_camera, homogeneous, inverse_intrinsics, project, rotation_from_vector
 from ..cameras.view import View
-from ..raster.arrays import Array
+from ..raster.arrays import Array, angle_of
 from ..raster.picture_map import falls_inside
 from .options import SLIDE
 
@@ -66,9 +66,9 @@ class Viewpoint:
         kind = np.result_type(x, y, z).type
         heading, elevation = (kind(part) for part in self.along)
         if not elevation:
-            return np.asarray(heading * np.arctan2(x, z))
-        rise = elevation * np.arctan2(y, np.hypot(x, z))
-        return np.asarray(rise + heading * np.arctan2(x, z) if heading else rise)
+            return np.asarray(heading * angle_of(x, z))
+        rise = elevation * angle_of(y, np.hypot(x, z))
+        return np.asarray(rise + heading * angle_of(x, z) if heading else rise)
 
     def slide_of(self, x: NDArray[Any], y: NDArray[Any], z: NDArray[Any]) -> NDArray[Any]:
         """s (…) of rays of any length in the viewpoint's own axes."""

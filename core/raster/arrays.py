@@ -19,6 +19,15 @@ Part: TypeAlias = tuple[slice, slice]
 Box = tuple[int, int, int, int]
 
 
+def angle_of(y: NDArray[Any], x: NDArray[Any]) -> NDArray[Any]:
+    """The angle (…) of (x, y), −π to π, of their precision.
+
+    NumPy's arctan2 has other last bits now and then, from call to call, for values with gaps between them in memory.
+    """
+    angles: NDArray[Any] = np.arctan2(np.asarray(y, order="C"), np.asarray(x, order="C"))
+    return angles
+
+
 def common(box: Box, other: Box) -> Box:
     """What two boxes that meet have in common."""
     left, top = max(box[0], other[0]), max(box[1], other[1])

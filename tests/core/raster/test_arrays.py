@@ -1,0 +1,26 @@
+"""What arrays are asked for, whatever their memory looks like."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from edf_stitch.core.raster.arrays import angle_of
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_an_angle_has_the_same_bytes_from_call_to_call(kind: type) -> None:
+    random = np.random.default_rng(0)
+    rays = random.normal(size=(40_000, 3)).astype(kind)
+    between: list[np.ndarray] = []  # so that memory is another one from call to call
+    found = set()
+    for _ in range(200):
+        between = [*between[-20:], np.empty(random.integers(1, 60_000))]
+        x, _, z = rays.copy().T
+        found.add(angle_of(x, z).tobytes())
+    assert len(found) == 1
+    (angles,) = (np.frombuffer(one, kind) for one in found)
+    np.testing.assert_allclose(np.tan(angles), rays[:, 0] / rays[:, 2], rtol=1e-2 if kind is np.float32 else 1e-6)
+
+
+def test_an_angle_of_single_numbers_is_one() -> None:
+    assert angle_of(np.float64(1), np.float64(-1)) == pytest.approx(0.75 * np.pi)
