@@ -38,7 +38,7 @@ MAY_IMPORT = {
     "choices": (),
     "options": ("system", "cameras", "choices"),
     "fields": ("cameras", "field", "rivals"),
-    "mapping": (*BELOW_MEASURE, "options"),
+    "mapping": (*BELOW_MEASURE, "choices", "options"),
     "alignment": (*BELOW_MEASURE, "options", "fields", "mapping"),
     "pipeline": (*BELOW_MEASURE, "measure", "options", "alignment"),
 }

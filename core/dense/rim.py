@@ -101,7 +101,8 @@ def _touching(mask: NDArray[np.bool_], places: NDArray[np.bool_]) -> NDArray[np.
     touching = np.zeros(count, bool)
     touching[numbers[places]] = True
     touching[0] = False
-    return touching[numbers]
+    parts: NDArray[np.bool_] = touching[numbers]
+    return parts
 
 
 def _from_surface(moves: Plane, known: Plane, guide: NDArray[np.float32]) -> Plane:

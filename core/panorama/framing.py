@@ -80,7 +80,8 @@ class Coverage:
         column, row = np.moveaxis(np.rint(self.projection.points(rays) + np.array(self.offset)).astype(int), -1, 0)
         height, width = self.mask.shape
         known = (column >= 0) & (row >= 0) & (column < width) & (row < height)
-        return known & self.mask[np.where(known, row, 0), np.where(known, column, 0)]
+        shown: NDArray[np.bool_] = known & self.mask[np.where(known, row, 0), np.where(known, column, 0)]
+        return shown
 
 
 def frame_for(
@@ -175,7 +176,7 @@ def _levelled(
 def _believed(down: Array) -> bool:
     """Whether somebody may have held the reference so, `down` (3,) being down in its frame."""
     roll, pitch = np.degrees([np.arctan2(down[0], down[1]), np.arcsin(np.clip(down[2], -1, 1))])
-    return abs(roll) <= FRAMING.max_roll_deg and abs(pitch) <= FRAMING.max_pitch_deg
+    return bool(abs(roll) <= FRAMING.max_roll_deg and abs(pitch) <= FRAMING.max_pitch_deg)
 
 
 def _centred(down: Array, covered: Coverage, more: float) -> Array:

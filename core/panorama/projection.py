@@ -152,7 +152,8 @@ class Projection:
             with np.errstate(divide="ignore", invalid="ignore"):
                 density = (D + 1) ** 2 * (1 + D * cosine) / (ahead * level) ** 3
             density = np.where(ahead > PROJECTION.least_forward, density, np.inf)
-        return self.focal**2 * density
+        per_steradian: Array = self.focal**2 * density
+        return per_steradian
 
     def _angles(self, x: Array, y: Array) -> tuple[Array, Array, Any, Any]:
         """sin θ and cos θ, as x is shaped, and cos φ and sin φ at x and y, which broadcast against each other."""
