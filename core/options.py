@@ -74,8 +74,8 @@ class StitchOptions:
     seam : str, default "graphcut"
         How the seam between them is found, one of SEAMS; `linear` blending has none.
     mask : Path or ndarray, optional
-        Painted over the whole panorama: black = from the reference, white = from the target, gray or transparent = the
-        seam decides.
+        Painted over the panorama, whole or as it is cropped: black = from the reference, white = from the target, gray
+        or transparent = the seam decides.
     exposure : bool, default True
         Whether the target's exposure and white balance are matched to the reference's.
     holes : str, default "auto"

@@ -21,7 +21,7 @@ from .cameras.camera import Camera
 from .cameras.edge import Edge
 from .cameras.matches import Matches
 from .cameras.view import View
-from .compose.composition import Decided, composed
+from .compose.composition import Composition, Decided, composed
 from .compose.crop import crop_box
 from .field.field import Field
 from .measure.metrics import appearance
@@ -30,7 +30,7 @@ from .options import StitchOptions
 from .panorama.canvas import Canvas
 from .panorama.layers import Layer, layer_of
 from .panorama.warp import Warp
-from .pictures.masks import painted_over
+from .pictures.masks import has_shape, painted_over
 from .pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
 from .raster.arrays import Box, box_of, common, cut
 from .raster.resizing import resized_points
@@ -279,13 +279,25 @@ def compose(
     progress("warp", 0.5)
     layers = tuple(layer_of(picture, one) for picture, one in zip(pictures, whole.maps, strict=True))
 
-    painted = None if frame.painted is None else _on_canvas(frame.painted, whole.canvas)
     floats = [picture.bits == 32 for picture in pictures]
-    made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
+
+    def composed_with(painted: NDArray[np.int8] | None) -> tuple[Composition, Box]:
+        made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
+        own = whole.maps[0].inside()
+        shown = made.panorama.alpha > 0
+        return made, crop_box(options.kept, whole.canvas.whole, shown, box_of(own) if own.any() else None)
+
+    painted = frame.painted
+    if painted is not None:
+        place = whole.canvas.whole
+        if options.kept != "full" and painted.shape[::-1] != place[2:]:
+            # it may have been painted over the panorama as it is cropped
+            cropped = composed_with(None)[1]
+            place = cropped if has_shape(painted, cropped[2:]) else place
+        painted = _on_canvas(painted, whole.canvas, place)
+    made, box = composed_with(painted)
     panorama, labels = made.panorama, made.labels
     looks = appearance(panorama, made.exposed, labels, any(floats)) if options.measure else {}
-    own = whole.maps[0].inside()
-    box = crop_box(options.kept, whole.canvas.whole, panorama.alpha > 0, box_of(own) if own.any() else None)
     panorama, canvas = panorama.within(box), whole.canvas.within(box)
     # of a whole sphere, layers and maps exist only where the pictures lie
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))
@@ -330,9 +342,9 @@ def _picture(source: Source) -> Picture:
     return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
 
 
-def _on_canvas(painted: NDArray[np.int8], canvas: Canvas) -> NDArray[np.int8]:
-    """What was painted over the whole panorama, on the canvas: of a sphere the part that the pictures cover."""
-    left, top, width, height = canvas.whole
+def _on_canvas(painted: NDArray[np.int8], canvas: Canvas, place: Box) -> NDArray[np.int8]:
+    """What was painted over a box of the canvas, on the canvas: of a sphere the part that the pictures cover."""
+    left, top, width, height = place
     return cut(painted_over(painted, (width, height)), (-left, -top, canvas.width, canvas.height))
 
 

@@ -128,7 +128,8 @@ def _add_composition(how: argparse._ArgumentGroup) -> None:
     )  # fmt: skip
     how.add_argument(
         "--mask", type=Path, metavar="MASK",
-        help="painted over the whole panorama: black from REF, white from TARGET, gray or transparent: the seam's",
+        help="painted over the panorama, whole or cropped: black from REF, white from TARGET, gray or transparent: the "
+        "seam's",
     )  # fmt: skip
     how.add_argument(
         "--exposure", action=argparse.BooleanOptionalAction, default=True,

@@ -91,6 +91,14 @@ def painted_over(painted: NDArray[np.int8], size: tuple[int, int]) -> NDArray[np
     return _stretched(painted, size, "the mask of the seam", "the whole panorama")
 
 
+def has_shape(mask: NDArray[Any], size: tuple[int, int]) -> bool:
+    """Whether a mask (H, W) has the shape of `size` (W, H), to within a pixel of the smaller of the two."""
+    own = mask.shape[1], mask.shape[0]
+    (w, h), (small_w, small_h) = sorted([own, size], reverse=True, key=lambda s: s[0] * s[1])
+    # some scale brings both sides together
+    return max((small_w - 1) / w, (small_h - 1) / h) <= min((small_w + 1) / w, (small_h + 1) / h)
+
+
 def without(picture: Picture, mask: NDArray[np.bool_]) -> Picture:
     """The picture with alpha 0 where the mask (H, W) is True; the same picture where it is True nowhere."""
     if not mask.any():
@@ -136,9 +144,7 @@ def _stretched(mask: NDArray[Any], size: tuple[int, int], label: str, what: str 
     own_height, own_width = mask.shape
     if (own_width, own_height) == size:
         return mask
-    # some scale brings both sides to within a pixel, of the smaller of the two
-    (w, h), (small_w, small_h) = sorted([(own_width, own_height), size], reverse=True, key=lambda s: s[0] * s[1])
-    if max((small_w - 1) / w, (small_h - 1) / h) > min((small_w + 1) / w, (small_h + 1) / h):
+    if not has_shape(mask, size):
         raise BadRequest(
             f"{label} has {own_width}×{own_height} pixels, {what} has {width}×{height}: a mask needs "
             f"{what}'s size, or its shape at another size, upright"

@@ -88,8 +88,6 @@ def why_not(context: Any, side: str) -> str:
         return "" if picture is not None else f"There is no {side} to paint out anything of"
     if picture is None:
         return "Stitch once: a seam is painted over the panorama"
-    if editor.known(picture)["report"]["options"]["crop"] != "full":
-        return "A seam is painted over a whole panorama: stitch once with Crop: Full"
     return ""
 
 

@@ -385,3 +385,21 @@ def test_a_mask_of_the_full_size_goes_with_a_scale(pair: Pair) -> None:
     assert not alpha[:, 150:180].any() and (alpha[:, :150] == 1).all() and (alpha[:, 180:] == 1).all()
     within = (result.edges[0].matches.x[:, 0] > 149.5) & (result.edges[0].matches.x[:, 0] < 179.5)
     assert len(within) > 40 and not within.any()
+
+
+def test_a_seam_may_be_painted_over_the_panorama_as_it_is_cropped(small_pair: Pair, quick: StitchOptions) -> None:
+    """Halves of the cropped panorama, painted over it alone or over the whole, decide the same."""
+    pictures, cropped = [small_pair.reference, small_pair.target], replace(quick, crop="inscribed")
+    whole, part = stitch(pictures, quick), stitch(pictures, cropped)
+    height, width = part.alpha.shape
+    assert part.alpha.shape != whole.alpha.shape
+    over_part = np.zeros((height, width), np.uint8)
+    over_part[:, width // 2 :] = 255
+    (x, y), (left, top) = part.canvas.offset, whole.canvas.offset
+    over_whole = np.full(whole.alpha.shape, 128, np.uint8)
+    over_whole[top - y : top - y + height, left - x : left - x + width] = over_part
+    painted, padded = (stitch(pictures, replace(cropped, mask=mask)) for mask in (over_part, over_whole))
+    assert painted.labels is not None and padded.labels is not None
+    both = (painted.layers[0].alpha > 0) & (painted.layers[1].alpha > 0)
+    assert (painted.labels[both] == (over_part[both] > 0)).mean() > 0.9
+    np.testing.assert_array_equal(painted.labels, padded.labels)

@@ -40,8 +40,8 @@ def test_without_a_picture_there_is_a_reason(blender):
 
 @pytest.fixture
 def panorama(blender, monkeypatch):
-    """A panorama of 60 × 40 px, which says that it is whole."""
-    known = {"report": {"options": {"crop": "full"}}}
+    """A panorama of 60 × 40 px."""
+    known = {"report": {}}
     settings = blender.settings
     settings.reference, settings.target = (bpy.data.images.new(name, 40, 30) for name in ("a", "b"))
     settings.result = bpy.data.images.new("p", 60, 40)
@@ -59,10 +59,7 @@ def test_a_seams_mask_decides_nothing_until_it_is_painted(blender, panorama):
     assert images.read(mask).shape == (40, 60, 4)
 
 
-def test_a_seam_is_painted_over_a_whole_panorama_only(blender, panorama):
-    panorama["report"]["options"]["crop"] = "inscribed"
-    with pytest.raises(RuntimeError, match="Crop: Full"):
-        bpy.ops.edf.mask_paint(side="seam")
+def test_a_seam_is_painted_over_a_panorama_only(blender, panorama):
     blender.settings.result = None
     with pytest.raises(RuntimeError, match="Stitch once"):
         bpy.ops.edf.mask_paint(side="seam")
