@@ -41,30 +41,33 @@ class ContinuedDepth:
         nodes = continuation.at(rays / length[..., None]) * length
         return ContinuedDepth(canvas, camera, grid, nodes, continuation.takeover_px)
 
-    def strip(self, rows: slice) -> tuple[Array, Array]:
-        """Whole rows of continued inverse depth, and of the field's share (see `field_share`)."""
+    def strip(self, rows: slice, places: Array | None) -> tuple[Array, Array]:
+        """Whole rows of continued inverse depth, and of the field's share (see `field_share`); places (h, W, 2): raw px
+        of the reference there, None on its own plane."""
         canvas = self.canvas
         left, top = -canvas.offset[0], rows.start - canvas.offset[1]
         values = self.grid.to_pixels(self.nodes, left, top, canvas.width, rows.stop - rows.start)
-        share = field_share(canvas, self.camera, canvas.xs, canvas.ys[rows], self.takeover_px)
+        if places is None:  # canvas pixels are the reference's
+            share = field_share(canvas.xs[None, :], canvas.ys[rows][:, None], self.camera.size, self.takeover_px)
+        else:
+            share = field_share(places[..., 0], places[..., 1], self.camera.size, self.takeover_px)
         return values.astype(np.float64), share
 
     def blended(self, values: FieldValues) -> FieldValues:
         """The field's values at the nodes, where it has its share, and the continuation's beyond."""
-        share = field_share(self.canvas, self.camera, self.grid.xs, self.grid.ys, self.takeover_px)
+        x, y = self.grid.xs[None, :], self.grid.ys[:, None]
+        if self.canvas.projection is not None:
+            x, y = np.moveaxis(self.canvas.on_reference(self.grid.xs, self.grid.ys, self.camera)[0], -1, 0)
+        share = field_share(x, y, self.camera.size, self.takeover_px)
         depth = self.nodes + share * (values.inverse_depth - self.nodes)
         shift = None if values.shift is None else values.shift * share[..., None]
         return replace(values, inverse_depth=depth, shift=shift)
 
 
-def field_share(canvas: Canvas, camera: Camera, xs: Array, ys: Array, width_px: float) -> Array:
-    """What the field counts (len(ys), len(xs)) at columns xs and lines ys, px of the plane: 1 where the reference lies,
-    falling smoothly to 0 over width_px around it; camera: the reference's."""
-    if canvas.projection is None:  # canvas pixels are the reference's
-        x, y = xs[None, :], ys[:, None]
-    else:
-        x, y = np.moveaxis(canvas.on_reference(xs, ys, camera)[0], -1, 0)
-    width, height = camera.size
+def field_share(x: Array, y: Array, size: tuple[int, int], width_px: float) -> Array:
+    """What the field counts (…) at raw px x, y (…) of a reference of (W, H) px: 1 within it, falling smoothly to 0 over
+    width_px around it; NaN, behind its camera, lies beyond."""
+    width, height = size
     across, down = np.maximum(np.maximum(-x, x - (width - 1)), 0), np.maximum(np.maximum(-y, y - (height - 1)), 0)
-    distance = np.nan_to_num(np.hypot(across, down), nan=np.inf)  # behind the camera
+    distance = np.nan_to_num(np.hypot(across, down), nan=np.inf)
     return fading(distance, width_px)

@@ -36,13 +36,15 @@ class Strip:
     """Inverse depth (h, W) of whole rows of a canvas.
 
     sideways (h, W, 2), confidence (h, W): px that dense refinement adds in its picture, and its confidence, None
-    without it; share (h, W): what the field counts, in depth and in px beside the epipolar lines, None if all of it.
+    without it; share (h, W): what the field counts, in depth and in px beside the epipolar lines, None if all of it;
+    places (h, W, 2): raw px of the reference, None on its own plane.
     """
 
     depth: Array
     sideways: NDArray[np.float32] | None
     confidence: NDArray[np.float32] | None
     share: Array | None
+    places: Array | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +71,18 @@ class Depth(OnCanvas):
     def strip(self, rows: slice) -> Strip:
         """All that is known of whole rows."""
         canvas, d, sideways, confidence = self.canvas, self._of_field(rows), None, None
+        xs, ys = canvas.xs, canvas.ys[rows]
+        places, ahead = (None, None) if canvas.projection is None else canvas.on_reference(xs, ys, self.camera)
         if self.refined is not None:
-            more, sideways, confidence = _refined_at(
-                self.refined, canvas, canvas.xs, canvas.ys[rows], self.camera
-            )
+            if places is None or ahead is None:  # canvas pixels are the reference's
+                more, sideways, confidence = self.refined.over(xs, ys)
+            else:
+                more, sideways, confidence = _refined_at(self.refined, places, ahead)
             d = d + more
         if self.continued is None:
-            return Strip(d, sideways, confidence, None)
-        beyond, share = self.continued.strip(rows)
-        return Strip(_taken_over(d, beyond, share), sideways, confidence, share)
+            return Strip(d, sideways, confidence, None, places)
+        beyond, share = self.continued.strip(rows, places)
+        return Strip(_taken_over(d, beyond, share), sideways, confidence, share, places)
 
     def _depth(self, rows: slice) -> Array:
         """Whole rows of inverse depth, without what dense refinement adds in its picture."""
@@ -85,7 +90,7 @@ class Depth(OnCanvas):
         if refined is None or canvas.projection is not None:
             return self.strip(rows).depth
         d = self._of_field(rows) + refined.part_over(refined.inverse_depth, canvas.xs, canvas.ys[rows])
-        return d if self.continued is None else _taken_over(d, *self.continued.strip(rows))
+        return d if self.continued is None else _taken_over(d, *self.continued.strip(rows, None))
 
     def _of_field(self, rows: slice) -> Array:
         """Whole rows of the field's inverse depth."""
@@ -106,7 +111,7 @@ class Confidence(OnCanvas):
         xs, ys = self.canvas.xs[columns], self.canvas.ys[rows]
         if self.canvas.projection is None:
             return self.refined.part_over(self.refined.confidence, xs, ys)
-        return _refined_at(self.refined, self.canvas, xs, ys, self.camera)[2]
+        return _refined_at(self.refined, *self.canvas.on_reference(xs, ys, self.camera))[2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,12 +145,9 @@ def _taken_over(d: Array, beyond: Array, share: Array) -> Array:
 
 
 def _refined_at(
-    refined: RefinedDepth, canvas: Canvas, xs: Array, ys: Array, camera: Camera
+    refined: RefinedDepth, places: Array, ahead: Array
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """What dense refinement adds to inverse depth and to its picture's pixels at canvas columns xs and lines ys, and
-    its confidence."""
-    if canvas.projection is None:  # canvas pixels are the reference's
-        return refined.over(xs, ys)
-    places, ahead = canvas.on_reference(xs, ys, camera)
+    """What dense refinement adds to inverse depth and to its picture's pixels at raw px (…, 2) of the reference with
+    p_3 = ahead (…), and its confidence."""
     more, sideways, confidence = refined.at(places[..., 0], places[..., 1])
     return more * np.nan_to_num(ahead).astype(np.float32), sideways, confidence

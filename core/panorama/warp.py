@@ -211,17 +211,24 @@ def build_map(
     xs, ys = canvas.xs, canvas.ys
     continued = ContinuedDepth.over(continuation, canvas, camera, grid)
     depth = Depth(canvas, camera, grid, values.inverse_depth, refined, continued)
-    held = np.empty(shape if hold else (0, 0), np.float32)
-    held_beside = np.zeros((*held.shape, 3), np.float32)
+    # on another plane than the reference's, depth and the reference's map take long to work out, and are read again
+    projected = canvas.projection is not None
+    held = np.empty(shape if projected or hold else (0, 0), np.float32)
+    held_beside = np.zeros((*shape, 3) if hold else (0, 0, 3), np.float32)
+    own: CanvasMap = ReferenceMap(canvas, camera)
+    if projected:
+        own = PictureMap(np.empty(shape, np.float32), np.empty(shape, np.float32), camera.size)
 
     def put(part: slice) -> None:
         start, stop = part.start, part.stop
         strip = (left, top + start, canvas.width, stop - start)
         here = depth.strip(part)
-        if hold:
+        if held.size:
             held[part] = here.depth
-            if here.confidence is not None:
-                held_beside[part, :, 2] = here.confidence
+        if hold and here.confidence is not None:
+            held_beside[part, :, 2] = here.confidence
+        if isinstance(own, PictureMap) and here.places is not None:
+            own.x[part], own.y[part] = here.places[..., 0], here.places[..., 1]
         for number, (view, out) in enumerate(zip(views[1:], maps, strict=True), 1):
             x, y = transfer(view, canvas.project_rows(view.H_inf, xs, ys[start:stop], camera), here.depth)
             beside = []
@@ -243,8 +250,9 @@ def build_map(
 
     each(put, strips(shape))
     confidence = None if refined is None else Confidence(canvas, camera, refined)
-    warp = Warp(canvas, (ReferenceMap(canvas, camera), *maps), depth, confidence)
-    return replace(warp, depth=held, beside=held_beside) if hold else warp
+    return Warp(
+        canvas, (own, *maps), held if held.size else depth, confidence, beside=held_beside if hold else None
+    )
 
 
 def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> FieldValues:
