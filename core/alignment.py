@@ -234,7 +234,7 @@ def fit_and_warp(
     frames : sequence of Frame
         Only a single one is refined: a clip keeps one smooth field.
     options : StitchOptions
-        Field, fade, dense, projection and level; seed and cache.
+        Field, fade, dense, slide, projection, level, centre and fov; seed and cache.
     progress : callable
         As for `align`.
 

@@ -119,7 +119,8 @@ def map_pictures(
     has_depth = isinstance(field, (StrictField, SlackField)) and np.isfinite(views[1].R).all()
     if options.fade == "continue" and has_depth:
         continuation = Cache(options.cache).remember(
-            "continuation", (field, refined, views, pictures[1].view),
+            # edges of both pictures tell which way is down
+            "continuation", (field, refined, views, tuple((picture.view, picture.alpha) for picture in pictures)),
             lambda: continue_beyond(
                 field, views, refined, pictures[1].view, lines.each[1].rays @ views[1].R.T, lines.down,
                 lines.down_is_sure,
@@ -132,9 +133,9 @@ def map_pictures(
         )
     progress("warp", 0.2)
     coarse, slide = None, SlideChoice(0.0, (), "as asked for")
-    if options.slide == "auto" and field.two_view.model != "general":
+    if options.slide and (not has_depth or (options.slide == "auto" and field.two_view.model != "general")):
         slide = SlideChoice(0.0, (), "the pictures show one plane, or were taken from one place")
-    elif options.slide and has_depth:
+    elif options.slide:
         coarse = known.base(lines.down, CHOICE.base_px_per_radian)
         slide = _slide(coarse, views, pictures, lines, options.slide, lambda share: progress("warp", 0.2 + 0.2 * share))
     viewpoint = viewpoint_between(coarse, views) if coarse is not None and slide.s1 else None

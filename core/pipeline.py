@@ -174,7 +174,7 @@ def stitch(
     progress: Callable[[str, float], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> StitchResult:
-    """Stitches pictures into one panorama, seen from where the first of them was taken.
+    """Stitches pictures into one panorama, seen from where the first of them was taken, or from there on (see `slide`).
 
     Parameters
     ----------

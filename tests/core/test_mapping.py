@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from edf_stitch.core import mapping
 from edf_stitch.core.alignment import Frame, align, estimate_geometry, fit_and_warp, prepare
+from edf_stitch.core.continuation.continuation import continue_beyond
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.synthetic_scenes.two_planes import Pair
@@ -47,6 +48,31 @@ def test_nothing_slides_where_the_model_is_a_plane(frame: Frame, monkeypatch: py
     plane = replace(geometry.edges[0], two_view=replace(geometry.edges[0].two_view, model="plane"))
     found = fit_and_warp(replace(geometry, edges=(plane,)), [frame], options, silent)
     assert found.slide.s1 == 0 and "plane" in found.slide.why and len(asked) == 1
+
+
+def test_a_slide_that_is_asked_for_in_vain_is_not_said_to_be_taken(frame: Frame) -> None:
+    aligned = align([frame], QUICK, silent)
+    unknown = replace(aligned.views[1], R=np.full((3, 3), np.nan))
+    options = replace(QUICK, slide=0.5)
+    found = mapping.map_pictures(aligned.field, (aligned.views[0], unknown), None, frame.pictures, options, silent)
+    assert found.slide.s1 == 0 and "plane" in found.slide.why
+
+
+def test_what_goes_on_beyond_the_overlap_is_kept_for_the_same_pictures_only(
+    frame: Frame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+    monkeypatch.setattr(mapping, "continue_beyond", lambda *given: asked.append(given) or continue_beyond(*given))
+    aligned = align([frame], replace(QUICK, fade="plane"), silent)
+    options = replace(QUICK, slide=0.0, fade="continue", cache=tmp_path)
+    reference, target = frame.pictures
+    turned = replace(reference, view=np.ascontiguousarray(reference.view[::-1]))
+    masked = replace(target, alpha=np.ones(target.view.shape[:2], np.float32))
+    for pictures, count in (
+        ((reference, target), 1), ((reference, target), 1), ((turned, target), 2), ((reference, masked), 3),
+    ):  # fmt: skip
+        mapping.map_pictures(aligned.field, aligned.views, None, pictures, options, silent)
+        assert len(asked) == count
 
 
 def test_another_slide_set_by_hand_starts_from_what_is_kept(
