@@ -63,7 +63,8 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
     canvas = _canvas(surface, views, viewpoint, projection)
     lattice = Lattice((float(canvas.xs[0]), float(canvas.ys[0])), 1.0, (canvas.height, canvas.width))
     depth = carried_depth(surface, viewpoint, projection, lattice)
-    return trimmed(_mapped(beside, surface, views, viewpoint, canvas, depth))
+    warp = _mapped(beside, surface, views, viewpoint, canvas, depth)
+    return trimmed(warp if base.lazy_confidence is not None else replace(warp, lazy_confidence=None))
 
 
 def _mapped(

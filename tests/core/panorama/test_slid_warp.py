@@ -107,6 +107,15 @@ def test_a_slide_of_nothing_gives_the_same_maps(by_hand: SimpleNamespace, seed: 
     assert not whole(warp.slide).any() and not warp.behind.any()
 
 
+def test_without_dense_refinement_there_is_no_confidence(by_hand: SimpleNamespace) -> None:
+    base, views, viewpoint = rig(by_hand, 1)
+    sure = np.ones((base.canvas.height, base.canvas.width), np.float32)
+    refined = replace(base, lazy_confidence=sure, beside=np.dstack([0 * sure, 0 * sure, sure]))
+    found = [slid_warp(one, views, viewpoint.sliding(0.5), base.canvas.projection) for one in (base, refined)]
+    assert found[0].confidence is None, "where it is 0, visibility takes it that the pictures do not agree"
+    assert found[1].confidence is not None and found[1].confidence.max() == 1
+
+
 WALL, CARD = 6.0, 2.5
 LEFT, RIGHT, TOP, BOTTOM = -0.35, 0.25, -0.6, 0.5
 
