@@ -37,12 +37,15 @@ def frame_outline(
     -------
     (Projection, (4,) array) or None
         The frame, and left, top, right, bottom in px of its plane; None where they cannot be told: a picture reaches
-        around the back, or the crop is none.
+        around the back, or the frame lies beside both, or the crop is none.
     """
     shown = _shown(coarse_sphere(views), views, outlines)
     if shown is None:
         return None
-    frame = frame_of(asked, views, None, None, shown)
+    try:
+        frame = frame_of(asked, views, None, None, shown)
+    except BadRequest:
+        return None
     limits, points = frame.limits, frame.points(shown.rays)
     low, high = np.maximum(points.min(axis=0), limits[:2]), np.minimum(points.max(axis=0), limits[2:])
     if frame.window is not None:

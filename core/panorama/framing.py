@@ -256,7 +256,14 @@ def _resized(projection: Projection, covered: Coverage) -> Projection:
     """The projection with as many px as the sharpest picture in each direction has, in the middle of all, and hardly
     more anywhere."""
     area = projection.area(covered.rays)
-    drawn = np.isfinite(area)
+    limits, points = projection.limits, projection.points(covered.rays)
+    # a pixel beyond the limits is rounding: a sphere's are whole numbers
+    drawn = np.isfinite(area) & ((points >= limits[:2] - 1) & (points <= limits[2:] + 1)).all(axis=1)
+    if not drawn.any():
+        raise BadRequest(
+            f"the pictures lie behind a {projection.kind} panorama that is turned so: choose another level, or the "
+            "projection cylindrical or equirectangular"
+        )
     weights = (area * covered.solid_angle)[drawn]
     enlarged = np.sqrt(area[drawn] / covered.sharpness[drawn])
     median, most = _weighted_percentiles(enlarged, weights, (50.0, FRAMING.enlarged_percent))
@@ -294,7 +301,9 @@ def _windowed(
     half = (high - low) / 2
     (left, top), (right, bottom) = point(yaw) - half, point(yaw) + half
     if fov is not None:
-        left, right = (point(yaw + sign * np.radians(fov) / 2)[0] for sign in (-1, 1))
+        # half a turn to either side at most; all others than a cylinder have ended long before
+        most = np.pi - 1e-9 if projection.kind == "cylindrical" else 0.8 * np.pi
+        left, right = (point(np.clip(yaw + sign * np.radians(fov) / 2, -most, most))[0] for sign in (-1, 1))
     window = (round(left), round(top), round(right) + 1, round(bottom) + 1)
     if not ((points >= window[:2]) & (points < window[2:])).all(axis=1).any():
         raise BadRequest("the frame lies beside all pictures: give a centre nearer to 0,0, or a larger field of view")

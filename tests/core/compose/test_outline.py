@@ -69,3 +69,7 @@ def test_the_border_runs_along_the_box_and_comes_back(views, outlines):
     points = frame.points(border_of(frame, box))
     np.testing.assert_allclose(points[0], points[-1], atol=1e-9)
     np.testing.assert_allclose(np.concatenate([points.min(axis=0), points.max(axis=0)]), box, atol=1e-6)
+
+
+def test_a_frame_beside_all_pictures_has_no_outline(views, outlines):
+    assert frame_outline(FrameRequest("cylindrical", centre=(170.0, 0.0)), "auto", views, outlines) is None

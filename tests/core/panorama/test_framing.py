@@ -230,3 +230,21 @@ def test_it_needs_edges_where_they_have_a_say() -> None:
 def test_px_per_radian_are_those_of_the_middle() -> None:
     views = rig((0, 0, 0), (1, 0, 0))
     assert abs(framed(views).focal / focal_of(views[0].K) - 1) < 0.1
+
+
+@pytest.mark.parametrize("kind", ["perspective", "pannini"])
+def test_a_plane_that_is_turned_away_from_all_pictures_is_refused(kind: str) -> None:
+    with pytest.raises(BadRequest, match="another level"):
+        framed(rig((0, 0, 0), (35, 0, 0)), kind=kind, level=(180.0, 0.0, 0.0))
+
+
+def test_what_lies_beyond_the_limits_of_a_plane_does_not_shrink_it() -> None:
+    views = rig((0, 0, 0), (35, 0, 0))
+    assert framed(views, kind="perspective", level=(80.0, 0.0, 0.0)).focal > 100
+
+
+@pytest.mark.parametrize(("kind", "fov"), [("cylindrical", 360.0), ("cylindrical", 340.0), ("perspective", 360.0)])
+def test_a_field_of_view_beyond_the_surface_ends_where_that_does(kind: str, fov: float) -> None:
+    frame = framed(rig((0, 0, 0), (35, 0, 0)), kind=kind, centre=(20.0, 0.0), fov=fov)
+    whole = replace(frame, window=None).limits
+    assert frame.limits[2] == whole[2] and (kind == "cylindrical" or frame.limits[0] == whole[0])
