@@ -103,6 +103,12 @@ def test_the_references_plane_has_one_frame_and_one_place(asked: dict) -> None:
         StitchOptions(projection="auto", field="apap", **asked)
 
 
+def test_a_viewpoint_slides_only_where_depth_is_known_beyond_the_references_plane() -> None:
+    assert StitchOptions().may_slide and StitchOptions(slide=0.5).may_slide
+    for stays in ({"slide": 0.0}, {"projection": "reference"}, {"field": "apap"}):
+        assert not StitchOptions(**stays).may_slide
+
+
 @pytest.mark.parametrize("asked", [{"centre": (1.0, 2.0)}, {"fov": 60.0}], ids=str)
 def test_a_sphere_is_a_whole_one(asked: dict) -> None:
     with pytest.raises(BadRequest, match="whole sphere: leave centre and fov out, turn it by level, or cut"):
