@@ -57,6 +57,8 @@ def slid_warp(base: Warp, views: Sequence[View], viewpoint: Viewpoint, projectio
         The target comes to lie nowhere near the reference.
     OutputTooLarge
         The canvas would have too many pixels.
+    BadRequest
+        The projection has a window that shows nothing.
     """
     surface = Surface.of(base, views)
     beside = np.zeros((*surface.depth.shape, 3), np.float32) if base.beside is None else base.beside

@@ -306,7 +306,8 @@ def _in_plane(points: Array) -> Array:
 
 
 def trimmed(warp: Warp) -> Warp:
-    """The warp without the outer rows and columns that no picture reaches."""
+    """The warp without the outer rows and columns that no picture reaches. Raises NoOverlap, or BadRequest where a
+    window shows nothing."""
     shown = np.zeros((warp.canvas.height, warp.canvas.width), bool)
     for one in warp.maps[1:]:
         shown |= one.inside()
@@ -315,4 +316,6 @@ def trimmed(warp: Warp) -> Warp:
     if not shown.any() and not framed:
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
     shown |= warp.maps[0].inside()
+    if not shown.any():
+        raise BadRequest("the frame shows nothing of any picture: give a centre nearer to 0,0, or a larger field of view")
     return warp.within(box_of(shown), in_place=True)

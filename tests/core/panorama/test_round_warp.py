@@ -22,10 +22,11 @@ from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.panorama.levelling import turned
 from edf_stitch.core.panorama.projection import Projection, round_projection
 from edf_stitch.core.panorama.reference_map import ReferenceMap
-from edf_stitch.core.panorama.warp import Warp, build_map, build_warp
+from edf_stitch.core.panorama.warp import Warp, build_map, build_warp, trimmed
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.raster.arrays import box_of
 from edf_stitch.core.raster.lazy import whole
+from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.core.system.errors import BadRequest
 
 from ...pairs import with_map
@@ -246,6 +247,14 @@ def test_a_field_of_the_plane_alone_is_refused(by_hand: SimpleNamespace) -> None
     field = fit_field("paper", "plane", view, matches_of(view), SIZE, TARGET)
     with pytest.raises(BadRequest, match="'paper' knows the reference's plane only: use slack or strict"):
         build_warp(field, views_of(view, cameras), projection_of(view, "cylindrical"))
+
+
+def test_a_window_that_shows_nothing_is_refused(by_hand: SimpleNamespace) -> None:
+    projection = Projection("cylindrical", 100.0, (0.0, 0.0), np.eye(3), by_hand.camera(SIZE, 300.0).K)
+    nothing = PictureMap(np.full((4, 5), np.nan, np.float32), np.full((4, 5), np.nan, np.float32), SIZE)
+    canvas = Canvas(5, 4, (-200, 0), projection=replace(projection, window=(200, 0, 205, 4)))
+    with pytest.raises(BadRequest, match="shows nothing .* centre"):
+        trimmed(Warp(canvas, (nothing, nothing), np.zeros((4, 5), np.float32)))
 
 
 def test_a_rotation_needs_no_depth(by_hand: SimpleNamespace) -> None:
