@@ -317,5 +317,5 @@ def trimmed(warp: Warp) -> Warp:
         raise NoOverlap("the warp brings the target nowhere near the reference: the matches may be chance look-alikes")
     shown |= warp.maps[0].inside()
     if not shown.any():
-        raise BadRequest("the frame shows nothing of any picture: give a centre nearer to 0,0, or a larger field of view")
+        raise BadRequest("the frame shows nothing at all: give a centre nearer to 0,0, or a larger field of view")
     return warp.within(box_of(shown), in_place=True)
