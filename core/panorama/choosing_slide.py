@@ -190,7 +190,8 @@ def _level(rays: Array, d: Array, down: Array) -> NDArray[np.bool_]:
     Along a level edge the height below the camera stays the same, along an upright one the distance.
     """
     sine = rays @ down
-    height, distance = (np.log(np.maximum(v, 1e-6)) for v in (np.abs(sine), np.sqrt(1 - np.square(sine))))
+    cosine = np.sqrt(np.maximum(1 - np.square(sine), 0))  # straight down, rounding may exceed 1
+    height, distance = (np.log(np.maximum(v, 1e-6)) for v in (np.abs(sine), cosine))
     inverse_range = np.log(np.maximum(d, 1e-6))
     spread = [np.abs(np.diff(inverse_range - part, axis=1).sum(axis=1)) for part in (height, distance)]
     crosses = sine.min(axis=1) * sine.max(axis=1) < 0

@@ -214,3 +214,16 @@ def test_what_runs_straight_away_on_the_floor_is_no_upright(
     assert all(one.lean_deg == 0 for one in choose_slide(base, views, edges, DOWN, steady).costs)
     monkeypatch.setattr(choosing_slide, "_level", lambda rays, d, down: np.zeros(len(rays), bool))
     assert choose_slide(base, views, edges, DOWN, steady).costs[0].lean_deg > 1, "as they are seen from the reference"
+
+
+def test_an_upright_edge_that_ends_straight_below_the_camera_is_upright() -> None:
+    """Warnings are errors: the sine of such a ray may be rounded to more than 1."""
+    down = np.array([0.21, 0.97, 0.1])
+    down /= np.linalg.norm(down) * (1 - 1e-15)
+    ahead = np.cross([1.0, 0, 0], down) / np.linalg.norm(np.cross([1.0, 0, 0], down))
+    # places on a pole that stands one baseline ahead
+    places = ahead + np.array([[0.5], [2.0], [1e12]]) * down
+    ranges = np.linalg.norm(places, axis=1)
+    rays = places / ranges[:, None]
+    assert (rays @ down).max() > 1
+    assert not choosing_slide._level(rays[None], 1 / ranges[None], down)[0]
