@@ -303,9 +303,11 @@ def compose(
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))
 
     progress("write", 0.0)
+    hidden = np.logical_or.reduce([one.hidden for one in made.decided])
     report, more = make_report(
-        options, pictures, alignment, canvas, made.decided, looks, panorama.alpha > 0, int(made.filled.sum())
-    )
+        options, pictures, alignment, canvas, made.decided, looks, panorama.alpha > 0, int(made.filled.sum()),
+        int((hidden & (made.panorama.alpha == 0)).sum()),
+    )  # fmt: skip
     warnings = (*(line for picture in pictures for line in _named(picture)), *alignment.warnings, *more)
     report["warnings"] = list(warnings)
     progress("write", 0.5)

@@ -37,6 +37,7 @@ SCHEMA = 1
 def make_report(
     options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment, canvas: Canvas,
     decided: Sequence[Decided], appearance: dict[str, float], shows: NDArray[np.bool_], inpainted: int,
+    open_px: int,
 ) -> tuple[dict[str, Any], list[str]]:
     """The report of a stitch. It holds no times and no dates: the same input gives the same report.
 
@@ -56,6 +57,8 @@ def make_report(
         Where the panorama shows something.
     inpainted : int
         Pixels that were filled, before cropping.
+    open_px : int
+        Pixels that no camera saw and that were not filled, before cropping.
 
     Returns
     -------
@@ -116,7 +119,7 @@ def make_report(
             f"the field {field.name!r} knows the reference's plane only: the panorama is drawn on it, as by "
             "--projection reference"
         )
-    open_holes = holes - inpainted if options.holes == "auto" else holes
+    open_holes = open_px if options.holes == "auto" else holes
     if open_holes > WARNING.hole_share * further.hidden.size:
         shown = (
             "filled smoothly from around there" if options.holes == "inpaint" else

@@ -29,7 +29,7 @@ from ...pairs import ON_REFERENCE, warp_of, with_map
 
 
 def report_of(
-    result: StitchResult, measure: bool = True, holes: str = "transparent", inpainted: int = 0,
+    result: StitchResult, measure: bool = True, holes: str = "transparent", inpainted: int = 0, open_px: int = 0,
     shows: np.ndarray | None = None, projection: str = "reference", **changed: Any
 ) -> tuple[dict[str, Any], list[str]]:
     """The report of a result in whose alignment something is changed."""
@@ -49,7 +49,7 @@ def report_of(
     options = replace(ON_REFERENCE, measure=measure, holes=holes, projection=projection)
     return make_report(
         options, result.pictures, alignment, alignment.warp.canvas, decided, {},
-        result.alpha > 0 if shows is None else shows, inpainted,
+        result.alpha > 0 if shows is None else shows, inpainted, open_px,
     )
 
 
@@ -83,8 +83,9 @@ def test_holes_are_counted_and_said_where_they_matter(small_result: StitchResult
 
 def test_what_small_holes_are_filled_is_not_said_to_be_open(small_result: StitchResult) -> None:
     most = int(2e-4 * small_result.warp.maps[1].x.size)
-    for filled, said in ((most, False), (most - 1, False), (0, True)):
-        report, spoken = report_of(with_holes(small_result, most + 1), holes="auto", inpainted=filled)
+    for left, said in ((0, False), (1, False), (most + 1, True)):
+        holed, filled = with_holes(small_result, most + 1), 3 * most  # not only what something near hid
+        report, spoken = report_of(holed, holes="auto", inpainted=filled, open_px=left)
         assert report["composition"]["inpainted_px"] == filled
         assert any("pixels were seen by neither camera" in line for line in spoken) == said
 
