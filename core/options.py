@@ -145,7 +145,7 @@ class StitchOptions:
     @property
     def may_slide(self) -> bool:
         """On the reference's own plane the viewpoint stays."""
-        return self.projection != "reference" and self.slide != 0
+        return self.surface[0] != "reference" and self.slide != 0
 
     @property
     def preview(self) -> bool:
