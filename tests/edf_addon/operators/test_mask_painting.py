@@ -68,7 +68,7 @@ def test_a_seam_is_painted_over_a_panorama_only(blender, panorama):
 def test_a_painted_seam_is_obeyed(chosen, pixels_of):
     """All black: the reference's own pixels wherever it shows any. All white: the target's, bent, where both do."""
     settings = chosen.settings
-    settings.exposure = False
+    settings.exposure, settings.projection = False, "REFERENCE"
     bpy.ops.edf.stitch()
     whole = settings.result
     left, top = result.read(whole)["report"]["canvas"]["offset"]
