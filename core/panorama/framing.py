@@ -255,6 +255,11 @@ def _room(projection: Projection, covered: Coverage) -> tuple[float, float]:
 def _resized(projection: Projection, covered: Coverage) -> Projection:
     """The projection with as many px as the sharpest picture in each direction has, in the middle of all, and hardly
     more anywhere."""
+    if not _within(projection.points(covered.rays), projection.limits).any():
+        raise BadRequest(
+            f"turned like that, a {projection.kind} panorama shows nothing of the pictures: give level other angles, "
+            "or choose the projection equirectangular"
+        )
     area = projection.area(covered.rays)
     drawn = np.isfinite(area)
     weights = (area * covered.solid_angle)[drawn]
@@ -272,6 +277,12 @@ def _weighted_percentiles(values: Array, weights: Array, percents: Sequence[floa
     below = np.cumsum(weights[order])
     found: Array = values[order][np.searchsorted(below, np.array(percents) / 100 * below[-1]).clip(0, len(values) - 1)]
     return found
+
+
+def _within(points: Array, box: Array) -> NDArray[np.bool_]:
+    """Which points (N, 2) lie in a box: left, top, right, bottom."""
+    within: NDArray[np.bool_] = ((points >= box[:2]) & (points < box[2:])).all(axis=1)
+    return within
 
 
 def _windowed(
@@ -294,8 +305,11 @@ def _windowed(
     half = (high - low) / 2
     (left, top), (right, bottom) = point(yaw) - half, point(yaw) + half
     if fov is not None:
-        left, right = (point(yaw + sign * np.radians(fov) / 2)[0] for sign in (-1, 1))
+        most = np.pi - FRAMING.behind
+        # what goes on beyond straight behind would come back in at the other end
+        ends = (np.clip(yaw + sign * np.radians(fov) / 2, -most, most) for sign in (-1, 1))
+        left, right = (point(end)[0] for end in ends)
     window = (round(left), round(top), round(right) + 1, round(bottom) + 1)
-    if not ((points >= window[:2]) & (points < window[2:])).all(axis=1).any():
+    if not _within(points, np.array(window)).any():
         raise BadRequest("the frame lies beside all pictures: give a centre nearer to 0,0, or a larger field of view")
     return replace(projection, window=window)
