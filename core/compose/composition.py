@@ -18,7 +18,7 @@ from ..field.visibility import by_agreement, occluded
 from ..options import StitchOptions
 from ..panorama.layers import Layer
 from ..panorama.warp import Warp
-from ..raster.arrays import bounds, with_margin, without_specks
+from ..raster.arrays import bounds, larger_parts, with_margin, without_specks
 from ..raster.lazy import AnyImage, Weighed, whole
 from ..raster.picture_map import PictureMap
 from ..system.progress import ReportProgress
@@ -340,7 +340,7 @@ def _with_seam(
     hidden = without_specks(so_far.hidden_by_depth) if cuts else so_far.hidden_by_depth
     known = known_labels(before, layer, hidden, painted)
     if behind is not None:
-        known[without_specks(behind) & (known == FREE)] = SECOND
+        known[larger_parts(behind) & (known == FREE)] = SECOND
     if overlap is None:
         return replace(so_far, chosen=known == SECOND)
     if options.seam == "none":

@@ -32,9 +32,11 @@ class FocalDoubt:
         camera, focal = cameras[edge.i], edge.two_view.K[0, 0]
         if not camera.assumed or not self.lean_deg >= WARNING.lean_deg:
             return []
+        source = edge.two_view.focal_source.partition(", ")[0]
+        known = source if source.startswith("not ") else f"from {source}"
         on_film = focal * math.hypot(36, 24) / math.hypot(*camera.size)
         return [
-            f"the focal length ({focal:.0f} px, {on_film:.0f} mm on 35 mm film, from {edge.two_view.focal_source}) may "
+            f"the focal length ({focal:.0f} px, {on_film:.0f} mm on 35 mm film, {known}) may "
             f"be off by {self.off:.0%}: uprights may lean by {self.lean_deg:.1f}° beside the reference; give it "
             "(--focal35, --focal-px) if you know it"
         ]

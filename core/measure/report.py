@@ -125,9 +125,10 @@ def make_report(
             "filled smoothly from around there" if options.holes == "inpaint" else
             "transparent there (black in a JPEG); --holes inpaint fills them"
         )  # fmt: skip
+        without = "--crop reference" if canvas.projection is None else "--projection reference --crop reference"
         warnings.append(
             f"{open_holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
-            f"{shown}; --crop reference shows none of them"
+            f"{shown}; {without} shows none of them"
         )
     return plain(report), warnings
 

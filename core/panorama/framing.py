@@ -281,6 +281,12 @@ def _weighted_percentiles(values: Array, weights: Array, percents: Sequence[floa
     return found
 
 
+def _within(points: Array, box: Array) -> NDArray[np.bool_]:
+    """Which points (N, 2) lie in a box: left, top, right, bottom."""
+    within: NDArray[np.bool_] = ((points >= box[:2]) & (points < box[2:])).all(axis=1)
+    return within
+
+
 def _windowed(
     projection: Projection, covered: Coverage, centre: tuple[float, float], fov: float | None
 ) -> Projection:
@@ -301,10 +307,12 @@ def _windowed(
     half = (high - low) / 2
     (left, top), (right, bottom) = point(yaw) - half, point(yaw) + half
     if fov is not None:
-        # half a turn to either side at most; all others than a cylinder have ended long before
-        most = np.pi - 1e-9 if projection.kind == "cylindrical" else 0.8 * np.pi
-        left, right = (point(np.clip(yaw + sign * np.radians(fov) / 2, -most, most))[0] for sign in (-1, 1))
+        # all others than a cylinder have ended long before
+        most = np.pi - FRAMING.behind if projection.kind == "cylindrical" else 0.8 * np.pi
+        # what goes on beyond straight behind would come back in at the other end
+        ends = (np.clip(yaw + sign * np.radians(fov) / 2, -most, most) for sign in (-1, 1))
+        left, right = (point(end)[0] for end in ends)
     window = (round(left), round(top), round(right) + 1, round(bottom) + 1)
-    if not ((points >= window[:2]) & (points < window[2:])).all(axis=1).any():
+    if not _within(points, np.array(window)).any():
         raise BadRequest("the frame lies beside all pictures: give a centre nearer to 0,0, or a larger field of view")
     return replace(projection, window=window)

@@ -86,5 +86,8 @@ class FramingOptions:
     enlarged_percent: float = 99.0
     """Percent of the canvas for which that holds."""
 
+    behind: float = 1e-4
+    """Radians from straight behind at which a frame ends: less than a pixel, and to the side of it that is meant."""
+
 
 FRAMING = FramingOptions()

@@ -42,7 +42,7 @@ def known_focal(
         f"not determined by the matches, {camera.source}", with_prior, spread,
         (
             f"the focal length is not determined by the matches ({pose.K[0, 0]:.0f} px ± {with_prior:.0%} is taken): "
-            f"what is at infinity may lie {spread:.0f} px off; the panorama hardly depends on it, depth does; give "
+            f"what is at infinity may lie {spread:.0f} px off; the overlap hardly depends on it, depth does; give "
             "the focal length (--focal35, --focal-px) if you know it",
         ),
     )  # fmt: skip

@@ -120,6 +120,7 @@ def test_a_sphere_is_a_whole_one(asked: dict) -> None:
 def test_a_field_that_knows_one_plane_is_drawn_on_it(field: str) -> None:
     by_itself = "auto" if field in ROUND_FIELDS else "reference"
     assert StitchOptions(projection="auto", field=field).surface[0] == by_itself
+    assert StitchOptions(projection="auto", field=field).may_slide == (field in ROUND_FIELDS)
     for name in PROJECTIONS[2:]:
         if field in ROUND_FIELDS:
             assert StitchOptions(projection=name, field=field).surface == (name, None)

@@ -17,7 +17,7 @@ from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
-from edf_stitch.core.raster.arrays import without_specks
+from edf_stitch.core.raster.arrays import larger_parts, without_specks
 from edf_stitch.core.raster.log_encoding import log_encode
 from edf_stitch.core.raster.picture_map import PictureMap
 
@@ -286,3 +286,14 @@ def test_what_a_sliding_viewpoint_sees_behind_the_references_things_comes_from_t
     assert np.percentile(away, 95) < 0.05, "the ghost is nowhere to be seen"
     nobody = behind & (first.alpha > 0) & (found.hidden | (second.alpha == 0))
     assert not out.alpha[nobody].any()
+
+
+def test_narrow_strips_that_the_reference_cannot_see_come_from_the_target() -> None:
+    """A pole's rim that would show twice is a strip of a few px; what is smaller than that may be rounding."""
+    first, second, warp = pictures()
+    behind = np.zeros(SHAPE, bool)
+    behind[50:90, 158:162] = True
+    found = compose(first, second, replace(warp, behind=behind))[2]
+    seen = behind & ~found.hidden & (second.alpha > 0) & (first.alpha > 0)
+    assert seen.sum() > 100 and found.chosen is not None and found.chosen[seen].all()
+    assert not larger_parts(behind & (np.arange(SHAPE[0]) < 60)[:, None]).any()

@@ -61,7 +61,9 @@ def test_matches_alone_are_doubted_more_than_they_doubt_themselves() -> None:
     (warning,) = doubt.warnings((assumed(), assumed()), pair)
     focal = pair.two_view.K[0, 0]
     assert f"{focal:.0f} px" in warning and f"{doubt.lean_deg:.1f}°" in warning and "--focal35" in warning
-    assert f"{focal * np.hypot(36, 24) / np.hypot(*SIZE):.0f} mm on 35 mm film" in warning
+    assert f"{focal * np.hypot(36, 24) / np.hypot(*SIZE):.0f} mm on 35 mm film, from the matches) may" in warning
+    unknown = replace(pair, two_view=replace(pair.two_view, focal_source="not determined by the matches, assumed"))
+    assert "35 mm film, not determined by the matches) may" in doubt.warnings((assumed(), assumed()), unknown)[0]
 
 
 def test_the_lean_is_what_another_focal_length_makes() -> None:

@@ -21,6 +21,7 @@ from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.fields import fit_field
 from edf_stitch.core.measure.report import make_report, plain
 from edf_stitch.core.panorama.canvas import Canvas
+from edf_stitch.core.panorama.projection import round_projection
 from edf_stitch.core.panorama.warp import build_warp
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
@@ -78,7 +79,17 @@ def test_holes_are_counted_and_said_where_they_matter(small_result: StitchResult
         report, spoken = report_of(with_holes(small_result, holes))
         assert report["composition"]["hole_px"] == holes
         assert any(f"{holes} pixels were seen by neither camera" in line for line in spoken) == said
+        assert any("; --crop reference shows none of them" in line for line in spoken) == said
         assert report["composition"]["inpainted_px"] == 0
+
+
+def test_on_another_surface_the_references_crop_is_not_said_to_show_no_holes(small_result: StitchResult) -> None:
+    """The reference's box holds more than the reference there, and holes of a viewpoint that slides."""
+    views = small_result.views
+    warp = build_warp(small_result.field, views, round_projection("cylindrical", views[0].K, np.eye(3)))
+    spoken = report_of(with_holes(small_result, 10**6), measure=False, warp=warp, projection="cylindrical")[1]
+    assert not any("; --crop reference" in line for line in spoken)
+    assert any("; --projection reference --crop reference shows none of them" in line for line in spoken)
 
 
 def test_what_small_holes_are_filled_is_not_said_to_be_open(small_result: StitchResult) -> None:

@@ -213,6 +213,22 @@ def test_a_frame_beside_all_pictures_is_refused(asked: dict) -> None:
         framed(rig((0, 0, 0), (30, 0, 0)), **asked)
 
 
+@pytest.mark.parametrize("fov", [200.0, 360.0])
+@pytest.mark.parametrize("kind", ["perspective", "pannini", "cylindrical"])
+@pytest.mark.parametrize("heading", [0.0, 5.0])
+def test_a_frame_that_reaches_straight_behind_shows_all(kind: str, fov: float, heading: float) -> None:
+    views = rig((0, 0, 0), (30, 0, 0))
+    found = framed(views, kind=kind, fov=fov, centre=(heading, 0.0))
+    points, (left, _, right, _) = shown(found, views), found.limits
+    assert left <= points[:, 0].min() and points[:, 0].max() < right
+
+
+@pytest.mark.parametrize("kind", ["perspective", "pannini"])
+def test_a_panorama_that_looks_away_from_all_pictures_is_refused(kind: str) -> None:
+    with pytest.raises(BadRequest, match="lie behind a"):
+        framed(rig((0, 0, 0), (30, 0, 0)), kind=kind, distance=0.3, level=(180.0, 0.0, 0.0))
+
+
 def test_without_a_pose_it_is_framed_by_what_is_shown() -> None:
     first, second = rig((0, 0, 0), (30, 0, 0))
     unknown = View(second.camera, second.K, np.full((3, 3), np.nan), np.full(3, np.nan), second.H_inf, second.e_prime)

@@ -95,6 +95,7 @@ def test_what_they_do_not_determine_is_said_with_its_spread(layout: tuple[np.nda
     assert about.deviation > 0.2
     (warning,) = about.warnings
     assert "not determined by the matches" in warning and "--focal35" in warning
+    assert "the overlap hardly depends on it" in warning, "what lies beside it leans"
     assert f"{found.K[0, 0]:.0f} px ± {about.deviation:.0%}" in warning
     assert f"{about.h_inf_spread:.0f} px off" in warning
 
