@@ -134,6 +134,8 @@ def map_pictures(
     coarse, slide = None, SlideChoice(0.0, (), "as asked for")
     if options.slide == "auto" and field.two_view.model != "general":
         slide = SlideChoice(0.0, (), "the pictures show one plane, or were taken from one place")
+    elif options.slide == "auto" and has_depth and refined is None:
+        slide = SlideChoice(0.0, (), "the smooth field knows no edges of near things, which a slide would bend")
     elif options.slide and has_depth:
         coarse = known.base(lines.down, CHOICE.base_px_per_radian)
         slide = _slide(coarse, views, pictures, lines, options.slide, lambda share: progress("warp", 0.2 + 0.2 * share))
