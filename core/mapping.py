@@ -135,6 +135,8 @@ def map_pictures(
     coarse, slide = None, SlideChoice(0.0, (), "as asked for")
     if options.slide and (not has_depth or (options.slide == "auto" and field.two_view.model != "general")):
         slide = SlideChoice(0.0, (), "the pictures show one plane, or were taken from one place")
+    elif options.slide == "auto" and refined is None:
+        slide = SlideChoice(0.0, (), "the smooth field knows no edges of near things, which a slide would bend")
     elif options.slide:
         coarse = known.base(lines.down, CHOICE.base_px_per_radian)
         slide = _slide(coarse, views, pictures, lines, options.slide, lambda share: progress("warp", 0.2 + 0.2 * share))

@@ -42,7 +42,7 @@ def test_a_camera_whose_rotation_is_unknown_has_no_say_in_the_level(frame: Frame
 def test_nothing_slides_where_the_model_is_a_plane(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
     monkeypatch.setattr(mapping, "choose_slide", lambda *given: asked.append(given) or mapping.SlideChoice(0, (), "no"))
-    options = replace(QUICK, slide="auto")
+    options = replace(QUICK, slide="auto", dense=True)
     geometry = estimate_geometry([frame], options, silent)
     assert fit_and_warp(geometry, [frame], options, silent).slide.why == "no" and len(asked) == 1
     plane = replace(geometry.edges[0], two_view=replace(geometry.edges[0].two_view, model="plane"))
@@ -73,6 +73,16 @@ def test_what_goes_on_beyond_the_overlap_is_kept_for_the_same_pictures_only(
     ):  # fmt: skip
         mapping.map_pictures(aligned.field, aligned.views, None, pictures, options, silent)
         assert len(asked) == count
+
+
+@pytest.mark.parametrize(("frames", "dense"), [(1, False), (2, True)])
+def test_nothing_slides_by_itself_where_depth_is_not_known_to_the_pixel(
+    frame: Frame, monkeypatch: pytest.MonkeyPatch, frames: int, dense: bool
+) -> None:
+    """Near things would bend by the smooth field, a clip's too."""
+    monkeypatch.setattr(mapping, "choose_slide", lambda *given: mapping.SlideChoice(1.0, (), "chosen"))
+    found = align([frame] * frames, replace(QUICK, slide="auto", dense=dense), silent)
+    assert found.slide.s1 == 0 and "smooth" in found.slide.why and found.warp.viewpoint is None
 
 
 def test_another_slide_set_by_hand_starts_from_what_is_kept(
