@@ -35,7 +35,7 @@ class Home:
 
     def run(self, *arguments: str | Path) -> subprocess.CompletedProcess:
         command = [*BLENDER, "-b", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=self.environment, timeout=600)
+        return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=self.environment, timeout=1200)
 
     def edf(self, *arguments: str | Path) -> subprocess.CompletedProcess:
         return self.run("--command", "edf", *arguments)
