@@ -75,8 +75,8 @@ def way() -> Iterator[float]:
     first = settings.result.name
     settings.slide_auto, settings.slide = False, 0.1
     settings.slide, settings.centre = 0.5, (0.1, 0.0)  # as one drags: each change begins anew
-    yield 0.1
     area.tag_redraw()
+    yield 0.5  # until the window is drawn anew
     shoot("5b_outline_of_the_frame")
     for _ in range(120):
         if settings.result.name != first:
