@@ -237,7 +237,7 @@ def test_blenders_worker_stitches_as_the_checkout_does(home, pair, tmp_path):
     for name in ("blender", "checkout"):
         call = ["stitch", *map(str, pair), "-o", str(tmp_path / f"{name}.png"), "--warp", str(tmp_path / f"{name}.npz")]
         # at the board's rim last digits decide which of two places a dense search takes
-        call += ["--focal-px", "500", "--field", "strict", "--no-dense"]
+        call += ["--focal-px", "500", "--field", "strict", "--no-dense", "--projection", "reference"]
         if name == "blender":
             done = home.edf(*call)
         else:
