@@ -44,6 +44,9 @@ class GridOptions:
     min_samples: int = 200
     """Fewer samples than this say nothing, and nothing is continued."""
 
+    far_nodes: float = 1e4
+    """Nodes to the nearest of a kind that there is none of: further than any."""
+
 
 @dataclass(frozen=True)
 class PlanesOptions:

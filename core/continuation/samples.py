@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +13,7 @@ from ..cameras.view import View
 from ..field.field import Field
 from ..field.refined_depth import RefinedDepth
 from ..raster.arrays import Array
+from ..raster.distance import distance_to
 from ..raster.grid import Grid
 from ..raster.picture_map import falls_inside
 from .options import GRID
@@ -89,13 +89,6 @@ def seen_at(grid: TargetGrid, samples: Samples) -> Seen:
     alone = grid.in_picture & ~inside
     return Seen(
         inside, np.where(inside, depth / np.maximum(trust, 1e-12), 0.0),
-        np.where(inside, trust / np.maximum(count, 1e-12), 0.0), _distance_to(alone), _distance_to(inside),
+        np.where(inside, trust / np.maximum(count, 1e-12), 0.0),
+        *(np.minimum(distance_to(one), GRID.far_nodes) for one in (alone, inside)),
     )  # fmt: skip
-
-
-def _distance_to(mask: NDArray[np.bool_]) -> Array:
-    """Nodes (rows, columns) to the nearest of a mask; very far where it is empty."""
-    cells = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    # OpenCV's root has other last bits from call to call; squared distances are whole numbers
-    distance: Array = np.sqrt(np.rint(np.square(np.minimum(cells, 1e4), dtype=np.float64)))
-    return distance

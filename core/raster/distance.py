@@ -16,11 +16,16 @@ def outside(inside: NDArray[np.bool_], step: int = 1) -> Array:
     """
     if not inside.any():
         return np.full(inside.shape, np.inf)
-    cells = cv2.distanceTransform((~inside).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    # OpenCV's root has other last bits from call to call; squared distances are whole numbers
-    cells = np.sqrt(np.rint(np.square(cells, dtype=np.float64)))
-    distance: Array = np.maximum(cells - 1, 0.0) * step
+    distance: Array = np.maximum(distance_to(inside) - 1.0, 0.0) * float(step)
     return distance
+
+
+def distance_to(mask: NDArray[np.bool_]) -> Array:
+    """Distance in px (h, w) to the nearest pixel of a mask, 0 in it; very large if it is empty."""
+    distance = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    # OpenCV's root has other last bits from call to call; squared distances are whole numbers
+    exact: Array = np.sqrt(np.rint(np.square(distance, dtype=np.float64)))
+    return exact
 
 
 def distance_to_border(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
