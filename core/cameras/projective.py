@@ -51,6 +51,11 @@ def skew(v: Array) -> Array:
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
+def down_at(pitch: Array, roll: Array) -> Array:
+    """Unit vectors (M, 3) down, in a camera's axes, where it is pitched and rolled by so much (M,), rad."""
+    return np.column_stack([np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch), np.sin(pitch)])
+
+
 def rotation_from_vector(omega: Array) -> Array:
     """Rodrigues' formula: rotation vector in radians (3,) to a rotation matrix (3, 3)."""
     angle = float(np.linalg.norm(omega))

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..cameras.camera import Camera, zoomed
+from ..cameras.camera import Camera
 from ..cameras.edge import Edge
 from ..cameras.projective import homogeneous
 from ..panorama.canvas import Canvas
 from ..panorama.levelling import gravity
 from ..pose.options import EDGE_FOCAL
-from ..pose.refinement import Pose, refine_pose
+from ..pose.refinement import Pose, pose_at_focal
 from ..raster.arrays import Array
 from .options import FOCAL_DOUBT, WARNING
 
@@ -72,11 +72,7 @@ def focal_doubt(cameras: Sequence[Camera], edge: Edge, canvas: Canvas) -> FocalD
     upright = _turns(found, down, pair[1].size)
     leans = []
     for factor in (math.exp(-off), math.exp(off)):
-        held = [
-            replace(camera.with_focal_held(), K=zoomed(K, factor), principal_sigma=0.0)
-            for camera, K in zip(pair, (view.K, view.K_prime), strict=True)
-        ]
-        other, _ = refine_pose(few, replace(found, K=held[0].K, K_prime=held[1].K), held[0], held[1], view.sigma)
+        other, _ = pose_at_focal(few, found, pair, factor, view.sigma)
         # the reference's uprights meet in the same pixel as before
         still_down = np.linalg.inv(other.K) @ view.K @ down
         lean = np.abs(_turns(other, still_down / np.linalg.norm(still_down), pair[1].size) - upright)

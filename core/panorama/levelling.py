@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..cameras.projective import down_at
 from ..choices import LEVELS, Level
 from ..raster.arrays import Array
 from ..system.errors import BadRequest
@@ -99,7 +100,7 @@ def gravity_by_edges(rotations: Sequence[Array], normals: Array, lengths: Array)
                 middle[1] + np.arange(-roll_reach, roll_reach + step / 2, step),
             ))
         )  # fmt: skip
-        down = np.column_stack([np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch), np.sin(pitch)]) @ base.T
+        down = down_at(pitch, roll) @ base.T
         pose_cost = sum(
             np.log1p(np.square(down @ a[0]) / roll_sigma**2) + np.square(down @ a[2]) / pitch_sigma**2
             for a in rotations

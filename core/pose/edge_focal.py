@@ -14,10 +14,11 @@ import numpy as np
 
 from ..cameras.camera import Camera, Knowledge, zoomed
 from ..cameras.matches import Matches
+from ..cameras.projective import down_at
 from ..cameras.two_view import TwoView
 from ..raster.arrays import Array
 from .options import EDGE_FOCAL, REFINEMENT
-from .refinement import Pose, refine_pose
+from .refinement import Pose, pose_at_focal
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +76,9 @@ def focal_by_edges(
     """
     few = matches.thinned(EDGE_FOCAL.matches)
     start = Pose(two_view.K, two_view.K_prime, two_view.R, two_view.t)
+
     def candidate(factor: float) -> _Candidate:
-        held = [
-            replace(camera.with_focal_held(), K=zoomed(K, factor), principal_sigma=0.0)
-            for camera, K in zip(cameras, (start.K, start.K_prime), strict=True)
-        ]
-        pose, cost = refine_pose(few, replace(start, K=held[0].K, K_prime=held[1].K), held[0], held[1], two_view.sigma)
+        pose, cost = pose_at_focal(few, start, cameras, factor, two_view.sigma)
         pictures = _Directions.of(edges[0], pose.K), _Directions.of(edges[1], pose.K_prime @ pose.R)
         return _Candidate(pose, cost, pictures, *_best_frame(pictures))
 
@@ -162,9 +160,9 @@ def _best_frame(pictures: tuple[_Directions, _Directions]) -> tuple[Array, float
         ))
     )  # fmt: skip
     longest = [picture.longest(EDGE_FOCAL.first_edges) for picture in pictures]
-    found = _total(longest, [_down(pitch, roll)])
+    found = _total(longest, [down_at(pitch, roll)])
     best, value = np.zeros(3), -1.0
-    for start in _apart(_down(pitch, roll), found):
+    for start in _apart(down_at(pitch, roll), found):
         yaw = np.radians(np.arange(0.0, 90.0, EDGE_FOCAL.yaw_step_deg))
         angles = np.column_stack([np.full(len(yaw), pitch[start]), np.full(len(yaw), roll[start]), yaw])
         there, there_value = _followed(pictures, angles[np.argmax(_total(longest, _frame(angles)))])
@@ -210,14 +208,9 @@ def _total(pictures: Sequence[_Directions], directions: list[Array]) -> Array:
     return total
 
 
-def _down(pitch: Array, roll: Array) -> Array:
-    """Unit vectors (M, 3) down in the reference's frame, of angles (M,) in radians."""
-    return np.column_stack([np.sin(roll) * np.cos(pitch), np.cos(roll) * np.cos(pitch), np.sin(pitch)])
-
-
 def _frame(angles: Array) -> list[Array]:
     """The directions (M, 3) of frames with angles (M, 3), pitch, roll and yaw in radians: down and two level ones."""
-    down = _down(angles[:, 0], angles[:, 1])
+    down = down_at(angles[:, 0], angles[:, 1])
     level = np.cross(down, [0.0, 0.0, 1.0])
     level /= np.linalg.norm(level, axis=1, keepdims=True)
     other = np.cross(down, level)

@@ -7,7 +7,8 @@ scipy.optimize takes longer to load than this takes to run, and a stitch is a sh
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +92,17 @@ def refine_pose(
         if gain < 1e-5 * cost + 1e-12:
             break
     return pose, cost
+
+
+def pose_at_focal(
+    matches: Matches, pose: Pose, cameras: Sequence[Camera], factor: float, sigma: float
+) -> tuple[Pose, float]:
+    """The pose that fits matches best with both its focal lengths times a factor, and its cost (see `refine_pose`)."""
+    first, second = (
+        replace(camera.with_focal_held(), K=zoomed(K, factor), principal_sigma=0.0)
+        for camera, K in zip(cameras, (pose.K, pose.K_prime), strict=True)
+    )
+    return refine_pose(matches, replace(pose, K=first.K, K_prime=second.K), first, second, sigma)
 
 
 def focal_deviations(
