@@ -21,14 +21,14 @@ from .field.refined_depth import RefinedDepth
 from .field.slack import SlackField
 from .field.strict import StrictField
 from .options import StitchOptions
-from .panorama.choosing_slide import SlideChoice, choose_slide
+from .panorama.choosing_slide import NO_WAY, SlideChoice, choose_slide
 from .panorama.framing import FrameRequest, frame_for
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
 from .panorama.slid_warp import slid_warp
 from .panorama.upright_edges import StraightEdges, straight_edges
-from .panorama.viewpoint import viewpoint_between
+from .panorama.viewpoint import Viewpoint, viewpoint_between
 from .panorama.warp import Warp, build_warp
 from .raster.arrays import Array
 from .system.cache import Cache
@@ -55,11 +55,6 @@ class AllEdges:
     pictures: Sequence[Picture]
     views: Sequence[View]
 
-    @property
-    def known(self) -> list[View]:
-        """The views whose orientation is known."""
-        return [view for view in self.views if np.isfinite(view.R).all()]
-
     @cached_property
     def each(self) -> list[StraightEdges]:
         """The edges of each such picture."""
@@ -69,7 +64,7 @@ class AllEdges:
             if np.isfinite(view.R).all()
         ]
 
-    @property
+    @cached_property
     def together(self) -> tuple[Array, Array]:
         """Normals (N, 3) and lengths (N,) of all of them."""
         return np.vstack([one.normals for one in self.each]), np.concatenate([one.lengths for one in self.each])
@@ -77,7 +72,7 @@ class AllEdges:
     @cached_property
     def down(self) -> Array:
         """The unit vector (3,) along gravity."""
-        return gravity_by_edges([view.R for view in self.known], *self.together)
+        return gravity_by_edges([view.R for view in self.views if np.isfinite(view.R).all()], *self.together)
 
     @cached_property
     def down_is_sure(self) -> bool:
@@ -116,8 +111,7 @@ def map_pictures(
     lines = AllEdges(pictures, views)
     progress("warp", 0.0)
     continuation = None
-    has_depth = isinstance(field, (StrictField, SlackField)) and np.isfinite(views[1].R).all()
-    if options.fade == "continue" and has_depth:
+    if options.fade == "continue" and has_depth(field, views):
         continuation = Cache(options.cache).remember(
             # edges of both pictures tell which way is down
             "continuation", (field, refined, views, tuple((picture.view, picture.alpha) for picture in pictures)),
@@ -132,33 +126,30 @@ def map_pictures(
             known.on(None), continuation, SlideChoice(0.0, (), "the reference's own plane has one viewpoint")
         )
     progress("warp", 0.2)
-    coarse, slide = None, SlideChoice(0.0, (), "as asked for")
-    if options.slide and (not has_depth or (options.slide == "auto" and field.two_view.model != "general")):
-        slide = SlideChoice(0.0, (), "the pictures show one plane, or were taken from one place")
-    elif options.slide == "auto" and refined is None:
-        slide = SlideChoice(0.0, (), "the smooth field knows no edges of near things, which a slide would bend")
-    elif options.slide:
-        coarse = known.base(lines.down, CHOICE.base_px_per_radian)
-        slide = _slide(coarse, views, pictures, lines, options.slide, lambda share: progress("warp", 0.2 + 0.2 * share))
-    viewpoint = viewpoint_between(coarse, views) if coarse is not None and slide.s1 else None
+    slide, sliding = _slide(known, pictures, lines, options, lambda share: progress("warp", 0.2 + 0.2 * share))
 
-    def seen_on(projection: Projection, base: Warp | None = coarse) -> Warp:
-        if base is None or viewpoint is None:
+    def coarsely(projection: Projection) -> Warp:
+        if sliding is None:
             return known.on(projection)
-        return slid_warp(base, views, viewpoint.sliding(slide.s1), projection)
+        return slid_warp(sliding.base, views, sliding.viewpoint, projection)
 
     progress("warp", 0.4)
     kind, distance = options.surface
     asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
     edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
-    frame = frame_for(asked, views, edges, down, seen_on)
+    frame = frame_for(asked, views, edges, down, coarsely)
     progress("warp", 0.5)
-    base = None
-    if viewpoint is not None:
-        # who sets the slide by hand tries others
-        cache = Cache(options.cache if options.slide != "auto" else None)
-        base = known.base(lines.down, focal_of(views[0].K), cache)
-    return Mapped(seen_on(frame, base), continuation, slide)
+    if sliding is None:
+        return Mapped(known.on(frame), continuation, slide)
+    # who sets the slide by hand tries others
+    cache = Cache(options.cache if options.slide != "auto" else None)
+    base = known.base(lines.down, focal_of(views[0].K), cache)
+    return Mapped(slid_warp(base, views, sliding.viewpoint, frame), continuation, slide)
+
+
+def has_depth(field: Field, views: Sequence[View]) -> bool:
+    """Whether a field knows depth, and the pose that goes with it."""
+    return isinstance(field, (StrictField, SlackField)) and bool(np.isfinite(views[1].R).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,14 +172,32 @@ class _Known:
         return cache.remember("base", (self, projection), lambda: self.on(projection, True))
 
 
+@dataclass(frozen=True)
+class _Sliding:
+    """A viewpoint that slides, and a coarse map of both pictures from the reference's place."""
+
+    base: Warp
+    viewpoint: Viewpoint
+
+
 def _slide(
-    base: Warp, views: tuple[View, ...], pictures: Sequence[Picture], lines: AllEdges, slide: str | float,
+    known: _Known, pictures: Sequence[Picture], lines: AllEdges, options: StitchOptions,
     progress: Callable[[float], None],
-) -> SlideChoice:  # fmt: skip
-    """How far the viewpoint slides: as asked for, or chosen; base: coarse, seen from the reference's place."""
-    if slide != "auto":
-        if viewpoint_between(base, views) is None:
-            return SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
-        return SlideChoice(float(slide), (), "as asked for")
-    seam = RoughSeam.of(pictures, views, CHOICE.base_px_per_radian)
-    return choose_slide(base, views, lines.each, lines.down if lines.down_is_sure else None, seam, progress)
+) -> tuple[SlideChoice, _Sliding | None]:  # fmt: skip
+    """How far the viewpoint slides, as asked for or chosen; None where it stays."""
+    asked, views, field = options.slide, known.views, known.field
+    if not asked:
+        return SlideChoice(0.0, (), "as asked for"), None
+    if not has_depth(field, views) or (asked == "auto" and field.two_view.model != "general"):
+        return SlideChoice(0.0, (), "the pictures show one plane, or were taken from one place"), None
+    if asked == "auto" and known.refined is None:
+        return SlideChoice(0.0, (), "the smooth field knows no edges of near things, which a slide would bend"), None
+    base = known.base(lines.down, CHOICE.base_px_per_radian)
+    viewpoint = viewpoint_between(base, views)
+    if viewpoint is None:
+        return NO_WAY, None
+    choice = SlideChoice(float(asked), (), "as asked for") if asked != "auto" else choose_slide(
+        base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None,
+        RoughSeam.of(pictures, views, CHOICE.base_px_per_radian), progress,
+    )  # fmt: skip
+    return choice, _Sliding(base, viewpoint.sliding(choice.s1)) if choice.s1 else None

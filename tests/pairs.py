@@ -26,6 +26,12 @@ KNOWN_WORDS = ("--focal-px", "228", *REFERENCE_WORDS)
 Aligned = TypeVar("Aligned", Alignment, StitchResult)
 
 
+def own_map(canvas: Canvas, camera: Camera) -> PictureMap:
+    """Where the reference is seen on a canvas that is not its own plane, from its own place."""
+    places = canvas.on_reference(canvas.xs, canvas.ys, camera)[0].astype(np.float32)
+    return PictureMap(places[..., 0], places[..., 1], camera.size)
+
+
 def warp_of(
     canvas: Canvas, x: np.ndarray, y: np.ndarray, depth: np.ndarray | None = None, *,
     size: tuple[int, int] | None = None, reference: tuple[int, int] | None = None,

@@ -24,7 +24,7 @@ from .own_depth import OwnDepth, Things
 from .slid_warp import slid_warp
 from .straightness import along, leans, planes_through
 from .upright_edges import StraightEdges
-from .viewpoint import Viewpoint, viewpoint_between
+from .viewpoint import Viewpoint
 from .warp import Warp
 
 # The upper left corner of each cell of a grid (rows, columns, …), that to its right, and that below it.
@@ -71,8 +71,12 @@ class SlideChoice:
     why: str
 
 
+# Where there is nothing to slide along.
+NO_WAY = SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
+
+
 def choose_slide(
-    base: Warp, views: Sequence[View], edges: Sequence[StraightEdges], down: Array | None,
+    base: Warp, views: Sequence[View], viewpoint: Viewpoint, edges: Sequence[StraightEdges], down: Array | None,
     rough_seam: Callable[[Warp], float], progress: Callable[[float], None] = lambda share: None,
 ) -> SlideChoice:  # fmt: skip
     """Choose how far the viewpoint slides.
@@ -83,6 +87,8 @@ def choose_slide(
         Of both pictures, seen from the reference's place, on a cylinder or sphere that is coarse and holds both.
     views : sequence of View
         What is known of the pictures, the reference first.
+    viewpoint : Viewpoint
+        How it slides from the one to the other (see `viewpoint_between`).
     edges : sequence of StraightEdges
         Of each picture, in the reference's frame.
     down : (3,) array or None
@@ -95,11 +101,8 @@ def choose_slide(
     Returns
     -------
     SlideChoice
-        0 where there is nothing to slide along. Of candidates that cost about as much, the one that slides least.
+        Of candidates that cost about as much, the one that slides least.
     """
-    viewpoint = viewpoint_between(base, views)
-    if viewpoint is None:
-        return SlideChoice(0.0, (), "the pictures do not lie side by side, or were taken from one place")
     base = replace(base, depth=base.inverse_depth, lazy_confidence=None)  # read more than once
     samples = [
         _samples(OwnDepth.of(base, view, number), one, down)

@@ -58,6 +58,21 @@ def test_a_slide_that_is_asked_for_in_vain_is_not_said_to_be_taken(frame: Frame)
     assert found.slide.s1 == 0 and "plane" in found.slide.why
 
 
+@pytest.mark.parametrize("slide", ["auto", 0.5])
+def test_nothing_is_tried_where_there_is_nothing_to_slide_along(
+    frame: Frame, monkeypatch: pytest.MonkeyPatch, slide: str | float
+) -> None:
+    asked = []
+    monkeypatch.setattr(mapping, "choose_slide", lambda *given: asked.append(given) or mapping.SlideChoice(1, (), "no"))
+    aligned = align([frame], replace(QUICK, dense=True, slide=0.0), silent)
+    assert aligned.dense is not None
+    still = aligned.views[0], replace(aligned.views[1], t=np.zeros(3), e_prime=np.zeros(3))
+    options = replace(QUICK, slide=slide)
+    found = mapping.map_pictures(aligned.field, still, aligned.dense.refined, frame.pictures, options, silent)
+    choice = found.slide
+    assert choice.s1 == 0 and choice.costs == () and choice.why and not asked, "nothing is tried"
+
+
 def test_what_goes_on_beyond_the_overlap_is_kept_for_the_same_pictures_only(
     frame: Frame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
