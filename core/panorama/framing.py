@@ -307,8 +307,7 @@ def _windowed(
     half = (high - low) / 2
     (left, top), (right, bottom) = point(yaw) - half, point(yaw) + half
     if fov is not None:
-        # all others than a cylinder have ended long before
-        most = np.pi - FRAMING.behind if projection.kind == "cylindrical" else 0.8 * np.pi
+        most = np.pi - FRAMING.behind if projection.kind == "cylindrical" else np.radians(FRAMING.widest_flat_deg)
         # what goes on beyond straight behind would come back in at the other end
         ends = (np.clip(yaw + sign * np.radians(fov) / 2, -most, most) for sign in (-1, 1))
         left, right = (point(end)[0] for end in ends)

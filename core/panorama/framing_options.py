@@ -86,6 +86,9 @@ class FramingOptions:
     enlarged_percent: float = 99.0
     """Percent of the canvas for which that holds."""
 
+    widest_flat_deg: float = 144.0
+    """Degrees to either side at which a frame on a plane, or by Pannini, ends at most: these have ended long before."""
+
     behind: float = 1e-4
     """Radians from straight behind at which a frame ends: less than a pixel, and to the side of it that is meant."""
 

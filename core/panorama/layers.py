@@ -65,7 +65,7 @@ def layer_of(picture: Picture, picture_map: CanvasMap) -> Layer:
     Layer
         Pasted pixel for pixel where the canvas is the picture's own plane, else resampled; alpha 0 outside it.
     """
-    if isinstance(picture_map, ReferenceMap) and picture_map.pasted:
+    if isinstance(picture_map, ReferenceMap):
         return _pasted_layer(picture, picture_map)
     return _fetched_layer(picture, picture_map.arrays())
 

@@ -12,10 +12,11 @@ from edf_stitch.core.cameras.view import View, views_of
 from edf_stitch.core.compose.rough_seam import RoughSeam
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.projection import round_projection
-from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.raster.picture_map import PictureMap
+
+from ...pairs import own_map
 
 SIZE, FOCAL = (480, 360), 450.0
 COARSE = 150.0
@@ -39,7 +40,7 @@ def far_away(views: tuple[View, ...], focal: float, shift: float = 0.0) -> Warp:
     a, b, c = canvas.project_rows(views[1].H_inf, canvas.xs, canvas.ys)
     x, y = (np.where(c > 1e-6, v / np.maximum(c, 1e-6), np.nan).astype(np.float32) for v in (a, b))
     return Warp(
-        canvas, (ReferenceMap(canvas, views[0].camera), PictureMap(x, y + np.float32(shift), SIZE)),
+        canvas, (own_map(canvas, views[0].camera), PictureMap(x, y + np.float32(shift), SIZE)),
         np.zeros(x.shape, np.float32),
     )  # fmt: skip
 

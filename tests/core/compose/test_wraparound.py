@@ -14,11 +14,10 @@ from edf_stitch.core.compose.wraparound import WrappedImage, roll_for, rolled, r
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.projection import Projection
-from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
 from edf_stitch.core.raster.picture_map import PictureMap
 
-from ...pairs import ON_REFERENCE
+from ...pairs import ON_REFERENCE, own_map
 
 H, W = 180, 360
 FOCAL = H / np.pi
@@ -40,7 +39,7 @@ def world(turn: int) -> tuple[Layer, Layer, Warp]:
         layers.append(Layer(rolled(light, turn), rolled(alpha, turn)))
     x, y = np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32))
     flat = np.full((H, W), np.nan, np.float32)
-    maps = ReferenceMap(CANVAS, VIEWS[0].camera), PictureMap(rolled(x, turn), rolled(y, turn), (W, H))
+    maps = own_map(CANVAS, VIEWS[0].camera), PictureMap(rolled(x, turn), rolled(y, turn), (W, H))
     warp = Warp(CANVAS, maps, flat, rolled(layers[1].alpha, 0))
     return layers[0], layers[1], warp
 

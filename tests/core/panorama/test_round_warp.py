@@ -21,7 +21,6 @@ from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.panorama.levelling import turned
 from edf_stitch.core.panorama.projection import Projection, round_projection
-from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp, build_map, build_warp, trimmed
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.raster.arrays import box_of
@@ -220,11 +219,12 @@ def test_the_reference_is_fetched_where_its_rays_are(
     by_hand: SimpleNamespace, kind: str, lens: tuple[float, ...]
 ) -> None:
     """A picture that holds its own coordinates says where each canvas pixel was fetched."""
-    view, camera, _ = scene(by_hand, "sideways", lens)
+    view, camera, target = scene(by_hand, "sideways", lens)
     x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
     picture = picture_from_array(np.stack([x, y, 0 * x], axis=-1).astype(np.float32))
     canvas = Canvas(420, 330, (210, 165), projection=projection_of(view, kind))
-    layer = layer_of(picture, ReferenceMap(canvas, camera))
+    field, views = fit_strict(view, matches_of(view), SIZE, TARGET), views_of(view, (camera, target))
+    layer = layer_of(picture, build_map(field, views, canvas).maps[0])
     shown = layer.alpha == 1
     assert 40_000 < shown.sum() < canvas.width * canvas.height and not layer.pixels[layer.alpha == 0].any()
     places = canvas.of_reference(layer.pixels[shown][:, :2].astype(float), camera)

@@ -16,7 +16,6 @@ from edf_stitch.core.field.strict import fit_strict
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.projection import Projection, round_projection
-from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.slid_warp import slid_warp
 from edf_stitch.core.panorama.viewpoint import Viewpoint, viewpoint_between
 from edf_stitch.core.panorama.warp import Warp, build_warp
@@ -24,6 +23,8 @@ from edf_stitch.core.raster.lazy import whole
 from edf_stitch.core.raster.picture_map import PictureMap
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from ...pairs import own_map
 
 SIZE, TARGET, FOCAL = (320, 240), (300, 260), 300.0
 FIT_SEEDS = st.integers(0, 2**16)
@@ -136,7 +137,7 @@ def card_before_wall(by_hand: SimpleNamespace) -> tuple[Warp, tuple[View, ...], 
     p = (rays @ views[1].R.T + d[..., None] * t) @ views[1].K.T
     with np.errstate(divide="ignore", invalid="ignore"):
         x, y = (np.where(p[..., 2] > 1e-6, p[..., k] / p[..., 2], np.nan).astype(np.float32) for k in (0, 1))
-    base = Warp(canvas, (ReferenceMap(canvas, camera), PictureMap(x, y, SIZE)), d.astype(np.float32))
+    base = Warp(canvas, (own_map(canvas, camera), PictureMap(x, y, SIZE)), d.astype(np.float32))
     viewpoint = viewpoint_between(base, views)
     assert viewpoint is not None
     return base, views, viewpoint
