@@ -39,10 +39,12 @@ def changed(settings: Any) -> None:
 def make_job(context: bpy.types.Context, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """As `stitching.make_job`, small, without what is only measured, and without a seam that was painted over another
     frame."""
+    from ...core.options import LEAST_SCALE
+
     settings = properties.settings_of(context.scene)
     pixels = max(image.size[0] * image.size[1] for image in (settings.reference, settings.target))
     scale = min(settings.scale, math.sqrt(MOST_PIXELS / max(pixels, 1)))
-    job, memory = stitching.make_job(context, folder, max(scale, 0.02), result.read(settings.result))
+    job, memory = stitching.make_job(context, folder, max(scale, LEAST_SCALE), result.read(settings.result))
     job["options"]["measure"] = False
     job["masks"].pop("seam", None)
     memory["shown"] = settings.result.session_uid
