@@ -133,6 +133,12 @@ class RoughSeamOptions:
     visible_tone: float = 0.1
     """Tones by which the pictures differ at a seam that is seen: blending evens out less."""
 
+    contrast_px: int = 7
+    """px, side of the square in which the pictures' contrast is looked at."""
+
+    hidden_by_contrast: float = 2.0
+    """Times this contrast, of the picture that has less of it, by which they may differ more."""
+
 
 @dataclass(frozen=True)
 class BandOptions:
