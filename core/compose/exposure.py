@@ -184,7 +184,7 @@ def pooled(exposures: Sequence[Exposure]) -> Exposure:
     gain, spread = (_median([getattr(one, name) for one in known]) for name in ("gain", "spread"))
     halfway, corner = np.median([astuple(one.vignetting) for one in known], axis=0).tolist()
     curves = [astuple(one.curve) for one in known if one.curve is not None]
-    curve = ToneCurve(*np.median(curves, axis=0).astype(np.float32)) if curved else None
+    curve = ToneCurve(*np.median(curves, axis=0).tolist()) if curved else None
     overexposed = float(np.median([one.overexposed for one in known]))
     blocks, keeps_white = sum(one.blocks for one in known), known[0].keeps_white
     return Exposure(gain, spread, blocks, Vignetting(halfway, corner), curve, keeps_white, overexposed)

@@ -7,6 +7,7 @@ clipped stays as white as it is. Each step rises with the light, so that no orde
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import reduce
 
@@ -47,31 +48,31 @@ class Vignetting:
 
 @dataclass(frozen=True)
 class ToneCurve:
-    """A gain that changes with the tone, for each channel: linear in the logarithm of light, constant beyond its ends.
+    """A gain that changes with the tone, the same in all channels: linear in the logarithm of light, constant beyond.
 
     Attributes
     ----------
-    slope : (C,) float32 array
+    slope : float
         Of the gain's logarithm, above −1: so the curve always rises.
-    dark, bright : (C,) float32 arrays
+    dark, bright : float
         Logarithms of light between which the gain changes. Halfway between them the curve changes nothing.
     """
 
-    slope: Channels
-    dark: Channels
-    bright: Channels
+    slope: float
+    dark: float
+    bright: float
 
     def at(self, log_light: Plane) -> Plane:
-        """The logarithm (…, C) of the gain at logarithms of light (…, C)."""
-        within_ends = np.clip(log_light, self.dark, self.bright)
-        within_ends -= (self.dark + self.bright) / 2
-        within_ends *= self.slope
-        return within_ends
+        """The logarithm (…) of the gain at logarithms of light (…)."""
+        change = np.clip(log_light, np.float32(self.dark), np.float32(self.bright))
+        change -= np.float32((self.dark + self.bright) / 2)
+        change *= np.float32(self.slope)
+        return change
 
     @property
-    def darkest(self) -> Channels:
-        """Light (C,) below which the gain stays the same."""
-        return np.exp(self.dark)
+    def of_white(self) -> float:
+        """The gain from the bright end on."""
+        return math.exp(self.slope * (self.bright - self.dark) / 2)
 
 
 NO_VIGNETTING = Vignetting()
@@ -114,17 +115,18 @@ class Toned(LazyImage):
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         own = self.light[part]
-        out, given_back = times(own, self.gain), None
+        gain: NDArray[np.float32] = self.gain
         if self.vignetting:
-            given_back = self._given_back(part)
-            out *= for_each_channel(given_back, out.shape[2])
+            gain = times(for_each_channel(self._given_back(part), self.shape[2]), gain)
+        out = own * gain
         if self.curve is not None:
-            light = own if given_back is None else own * for_each_channel(given_back, out.shape[2])
-            out *= np.exp(self.curve.at(np.log(np.maximum(light, self.curve.darkest))))
+            # the gain of a channel does not count: the curve was fitted on light before it
+            light = np.maximum(out / self.gain, np.float32(math.exp(self.curve.dark)))
+            out *= np.exp(self.curve.at(np.log(light, out=light)))
         if self.keeps_white:
-            brightest = self._brightest_gain()
-            rolled_off(out, brightest if given_back is None else brightest * given_back)
-            white_kept(own, out, self._gain_of_white())
+            of_white = 1.0 if self.curve is None else self.curve.of_white
+            rolled_off(out, gain * np.float32(of_white))
+            white_kept(own, out, self.gain * np.float32(of_white))
         return out
 
     def _given_back(self, part: Part) -> Plane:
@@ -136,16 +138,6 @@ class Toned(LazyImage):
         given_back: Plane = np.exp(-lost).astype(np.float32, copy=False)
         return given_back
 
-    def _gain_of_white(self) -> Channels:
-        """What white (C,) is multiplied by in the middle of the picture."""
-        if self.curve is None:
-            return self.gain
-        gain: Channels = self.gain * np.exp(self.curve.at(np.zeros_like(self.gain)))
-        return gain
-
-    def _brightest_gain(self) -> np.float32:
-        return np.float32(self._gain_of_white().max())
-
 
 def times(light: NDArray[np.float32], gain: Channels) -> NDArray[np.float32]:
     """Light (h, w, C) times a gain (C,)."""
@@ -154,28 +146,24 @@ def times(light: NDArray[np.float32], gain: Channels) -> NDArray[np.float32]:
     return (light.reshape(height, width * channels) * np.tile(gain, width)).reshape(light.shape)
 
 
-def rolled_off(light: NDArray[np.float32], brightest: np.float32 | Plane) -> None:
-    """Compresses highlights (h, w, C) in place, all channels of a pixel by one factor.
+def rolled_off(light: NDArray[np.float32], gain: NDArray[np.float32]) -> None:
+    """Compresses highlights (h, w, C) in place, channel by channel, so that what is just not clipped stays neutral.
 
-    Below the knee nothing changes; from there the largest channel follows a hyperbola that leaves the knee with slope 1
-    and arrives just below white at what is just not clipped. brightest: what white was multiplied by, one number or
-    (h, w).
+    Below the knee nothing changes; from there light follows a hyperbola that leaves the knee with slope 1 and arrives
+    just below white at what is just not clipped. gain (C,) or (h, w, C): what white was multiplied by.
     """
-    knee = np.float32(TONE.knee)
-    largest = reduce(np.maximum, (light[..., k] for k in range(light.shape[2])))
-    above = largest - knee
+    above = light - np.float32(TONE.knee)
     if above.max(initial=0) <= 0:
         return
     np.maximum(above, 0, out=above)
-    reach = np.maximum(np.float32(EXPOSURE.clipped_light) * brightest - knee, np.float32(TONE.below_white - TONE.knee))
-    bend = np.float32(1 / (TONE.below_white - TONE.knee)) - 1 / reach
-    # above / (1 + bend · above) is what is left of it
-    factor = above * bend
-    factor *= above
-    factor /= 1 + above * bend
-    factor /= np.maximum(largest, knee)
-    np.subtract(1, factor, out=factor)
-    light *= for_each_channel(factor, light.shape[2])
+    room = np.float32(TONE.below_white - TONE.knee)
+    reach = np.maximum(np.float32(EXPOSURE.clipped_light) * gain - np.float32(TONE.knee), room)
+    # above / (1 + bend · above) is what is left of it: so much less
+    less = above * (1 / room - 1 / reach)
+    above *= less
+    less += 1
+    above /= less
+    light -= above
 
 
 def white_kept(own: NDArray[np.float32], light: NDArray[np.float32], gain: Channels) -> None:

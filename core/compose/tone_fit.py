@@ -2,14 +2,15 @@
 
     ln before − ln added = V(r before) − V(r added) + g + p (s − s0)
 
-per block and channel. V: one vignetting for both lenses, the same in all channels; g: the gain; p: the slope of a curve
-against s, the mean of both logarithms without vignetting, which noise in either does not bend. Robust least squares, by
+per block and channel. V: one vignetting for both lenses, the same in all channels; g: the gain of a channel; p: the
+slope of a curve against s, the mean of both logarithms without vignetting, which noise in either does not bend; it is
+the same in all channels, so that gray stays gray. Robust least squares, by
 reweighting. Vignetting and curve are kept only if they earn it on blocks that they were not fitted on.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,17 +64,17 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _Model:
-    """Parameters: gains g, slopes p and middles s0 (C,) of a curve."""
+    """Parameters: gains g (C,), slope p and middle s0 of a curve."""
 
     vignetting: Vignetting
     gains: Array
-    slopes: Array
-    middles: Array
+    slope: float
+    middle: float
 
     def residuals(self, seen: _Seen) -> Array:
         """What is left (N, C) of the difference of log light."""
         before, added = seen.without(self.vignetting)
-        left: Array = before - added - self.gains - self.slopes * ((before + added) / 2 - self.middles)
+        left: Array = before - added - self.gains - self.slope * ((before + added) / 2 - self.middle)
         return left
 
 
@@ -97,7 +98,7 @@ def fit_tone(blocks: Blocks, radii: tuple[Array, Array], with_curve: bool) -> To
     seen = _Seen((before, added), radii, block_weights(blocks))
     model = _chosen(seen, blocks.at, with_curve) if len(blocks) >= TONE.min_blocks else _fitted(seen, False, False)
     spread = np.median(np.abs(model.residuals(seen)), axis=0)
-    if not model.slopes.any():
+    if not model.slope:
         return ToneFit(np.exp(model.gains), spread, model.vignetting, None)
     curve, gains = _curve_of(model, seen)
     return ToneFit(np.exp(gains), spread, model.vignetting, curve)
@@ -141,32 +142,25 @@ def _left_over(seen: _Seen, black: NDArray[np.bool_], parts: tuple[bool, bool]) 
 
 def _fitted(seen: _Seen, vignetting: bool, curve: bool) -> _Model:
     """The model with or without vignetting and curve."""
-    found = _vignetting(seen, curve) if vignetting else NO_VIGNETTING
-    before, added = seen.without(found)
-    middle = (before + added) / 2
-    middles = np.median(middle, axis=0)
-    if not curve:
-        gains = [weighted_median(column, seen.weights) for column in (before - added).T]
-        return _Model(found, np.array(gains), np.zeros(len(gains)), middles)
-    ones = np.ones(len(seen.weights))
-    fits = [
-        _robust(np.column_stack([ones, s]), difference, seen.weights)
-        for s, difference in zip((middle - middles).T, (before - added).T, strict=True)
-    ]
-    gains, slopes = np.array(fits).T
-    return _Model(found, gains, np.clip(slopes, -TONE.max_slope, TONE.max_slope), middles)
+    parts = _parts(seen, vignetting, curve)
+    before, added = seen.without(parts.vignetting)
+    differences = before - added - parts.slope * ((before + added) / 2 - parts.middle)
+    gains = [weighted_median(column, seen.weights) for column in differences.T]
+    return replace(parts, gains=np.array(gains))
 
 
-def _vignetting(seen: _Seen, curve: bool) -> Vignetting:
-    """The vignetting that fits the mean of all channels best, beside a gain and perhaps a curve."""
+def _parts(seen: _Seen, vignetting: bool, curve: bool) -> _Model:
+    """Vignetting and curve that fit the mean of all channels best, beside a gain."""
     (before, added), (near, far) = seen.logs, seen.radii
-    columns = [np.ones(len(near)), near - far, near**2 - far**2]
-    if curve:
-        middle = (before + added) / 2
-        columns.append((middle - np.median(middle, axis=0)).mean(axis=1))
-    found = _robust(np.column_stack(columns), (before - added).mean(axis=1), seen.weights)
-    linear, square = found[1:3].tolist()
-    return Vignetting(linear / 2 + square / 4, linear + square)
+    light = ((before + added) / 2).mean(axis=1)
+    middle = float(np.median(light))
+    columns = [np.ones(len(light))]
+    columns += [near - far, near**2 - far**2] if vignetting else []
+    columns += [light - middle] if curve else []
+    _, *found = _robust(np.column_stack(columns), (before - added).mean(axis=1), seen.weights).tolist()
+    slope = float(np.clip(found.pop(), -TONE.max_slope, TONE.max_slope)) if curve else 0.0
+    lens = Vignetting(found[0] / 2 + found[1] / 4, found[0] + found[1]) if vignetting else NO_VIGNETTING
+    return _Model(lens, np.zeros(before.shape[1]), slope, middle)
 
 
 def _robust(columns: Array, values: Array, weights: Array) -> Array:
@@ -192,10 +186,8 @@ def _curve_of(model: _Model, seen: _Seen) -> tuple[ToneCurve, Array]:
 
     ln before = ln added + g + p (s − s0) with s their mean, solved for ln before.
     """
-    added = seen.without(model.vignetting)[1]
-    dark, bright = np.percentile(added, TONE.curve_ends, axis=0)
-    slope = model.slopes / (1 - model.slopes / 2)
-    constant = (model.gains - model.slopes * model.middles) / (1 - model.slopes / 2)
-    gains = constant + slope * (dark + bright) / 2
-    as_floats = [values.astype(np.float32) for values in (slope, dark, bright)]
-    return ToneCurve(*as_floats), gains
+    added = seen.without(model.vignetting)[1].mean(axis=1)
+    dark, bright = np.percentile(added, TONE.curve_ends).tolist()
+    slope = model.slope / (1 - model.slope / 2)
+    gains = (model.gains - model.slope * model.middle) / (1 - model.slope / 2) + slope * (dark + bright) / 2
+    return ToneCurve(slope, dark, bright), gains
