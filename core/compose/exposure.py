@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from ..choices import Exposing
 from ..panorama.layers import Layer
 from ..raster.picture_map import CanvasMap
-from .options import EXPOSURE, TONE
+from .clipped import ClippedColours, clipped_colours
+from .options import CLIPPED, EXPOSURE, OVERLAP, TONE
 from .tone import NO_VIGNETTING, Exposed, ToneCurve, Toned, Vignetting
 from .tone_blocks import block_weights, bright_blocks, log_ratios, shared_blocks, weighted_median
 from .tone_fit import fit_tone
@@ -42,6 +43,8 @@ class Exposure:
         Whether highlights are rolled off below white, and white stays white.
     overexposed : float
         Share of what both pictures show that is clipped in this one alone.
+    clipped : ClippedColours or None
+        What is known of its clipped channels.
     """
 
     gain: NDArray[np.float32]
@@ -51,6 +54,7 @@ class Exposure:
     curve: ToneCurve | None = None
     keeps_white: bool = False
     overexposed: float = 0.0
+    clipped: ClippedColours | None = None
 
     def applied(self, layer: Layer, picture_map: CanvasMap) -> Layer:
         """A picture's layer with its light changed; picture_map: where the canvas shows the picture."""
@@ -59,7 +63,7 @@ class Exposure:
             return layer
         if is_gain and not self.keeps_white:
             return Layer(Exposed(layer.light, self.gain), layer.alpha)
-        toned = Toned(layer.light, self.gain, self.vignetting, self.curve, self.keeps_white, picture_map)
+        toned = Toned(layer.light, self.gain, self.vignetting, self.curve, self.keeps_white, picture_map, self.clipped)
         return Layer(toned, layer.alpha)
 
 
@@ -171,6 +175,25 @@ def match_tones(
             (np.ones(channels), fit.gain), (None, fit.curve), shared.overexposed, strict=True
         )
     )
+    if radiance:
+        return first, second
+    return _with_clipped((first, second), layers, maps, hidden)
+
+
+def _with_clipped(
+    exposures: tuple[Exposure, Exposure], layers: tuple[Layer, Layer], maps: tuple[CanvasMap, CanvasMap],
+    hidden: NDArray[np.bool_],
+) -> tuple[Exposure, Exposure]:  # fmt: skip
+    """The same with what each picture tells of the other's clipped channels, where that is over-exposed."""
+    if max(one.overexposed for one in exposures) < CLIPPED.least_share:
+        return exposures
+    shown = (layers[0].alpha > OVERLAP.opaque_alpha) & (layers[1].alpha > OVERLAP.opaque_alpha) & ~hidden
+    toned = [one.applied(layer, at).light for one, layer, at in zip(exposures, layers, maps, strict=True)]
+    first, second = (
+        replace(one, clipped=clipped_colours(layer.light, toned[k], toned[1 - k], shown))
+        if one.overexposed >= CLIPPED.least_share else one
+        for k, (one, layer) in enumerate(zip(exposures, layers, strict=True))
+    )  # fmt: skip
     return first, second
 
 

@@ -100,6 +100,32 @@ class ToneOptions:
 
 
 @dataclass(frozen=True)
+class ClippedOptions:
+    """What clipped channels were (`clipped`)."""
+
+    least_share: float = 0.005
+    """Share of what both pictures show that is clipped in one alone, from which that is asked."""
+
+    begins: float = 0.88
+    """Light from which a channel may be clipped in parts, as where a picture was made smaller: level 241."""
+
+    most: float = 0.947
+    """Light that a channel is raised to at most, that of `ToneOptions.below_white`: another channel may be unclipped."""
+
+    cells: int = 16
+    """Cells of a side of the table."""
+
+    fineness: int = 8
+    """Cells of a side into which a cell is divided, so that none is seen."""
+
+    min_pixels: int = 200
+    """Clipped pixels of a channel that both pictures show, below which nothing is learnt."""
+
+    sure_pixels: float = 20.0
+    """Pixels of a cell from which it counts for more than its neighbours."""
+
+
+@dataclass(frozen=True)
 class OverlapOptions:
     """Where two layers show the same (`overlap`)."""
 
@@ -252,6 +278,7 @@ class CropOptions:
 
 EXPOSURE = ExposureOptions()
 TONE = ToneOptions()
+CLIPPED = ClippedOptions()
 OVERLAP = OverlapOptions()
 MOVING_THINGS = MovingThingsOptions()
 MIN_CUT = MinCutOptions()

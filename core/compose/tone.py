@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..raster.arrays import Part, Plane, for_each_channel, within
 from ..raster.lazy import AnyImage, LazyImage
 from ..raster.picture_map import CanvasMap
+from .clipped import ClippedColours
 from .options import EXPOSURE, TONE
 from .tone_blocks import radius_squared
 
@@ -98,7 +99,8 @@ class Exposed(LazyImage):
 class Toned(LazyImage):
     """Light with vignetting, curve and gain (C,) applied; picture_map: where the canvas shows the picture.
 
-    keeps_white: whether highlights roll off below white and white stays white.
+    keeps_white: whether highlights roll off below white and white stays white; clipped: what is known of clipped
+    channels.
     """
 
     light: AnyImage
@@ -107,6 +109,7 @@ class Toned(LazyImage):
     curve: ToneCurve | None
     keeps_white: bool
     picture_map: CanvasMap
+    clipped: ClippedColours | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -126,6 +129,8 @@ class Toned(LazyImage):
         if self.keeps_white:
             of_white = 1.0 if self.curve is None else self.curve.of_white
             rolled_off(out, gain * np.float32(of_white))
+            if self.clipped is not None:
+                self.clipped.restore(own, out)
             white_kept(own, out, self.gain * np.float32(of_white))
         return out
 
