@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import Array, bounds, strips
+from ..raster.arrays import Array, bounds
 from ..raster.lazy import AnyImage
 from ..raster.pull_push import filled
 from .options import CLIPPED, EXPOSURE
@@ -43,8 +43,9 @@ class ClippedColours:
             channel, colours, told = own[..., k][clipped], own[clipped], light[..., k][clipped]
             weight = np.clip((channel - CLIPPED.begins) / np.float32(EXPOSURE.clipped_light - CLIPPED.begins), 0, 1)
             weight *= weight * (3 - 2 * weight)
-            more = np.minimum(told * factors[_places(colours, k, len(factors))], np.float32(CLIPPED.most)) - told
-            light[..., k][clipped] = told + weight * np.maximum(more, 0)
+            raised = told * factors.reshape(-1)[_cells(colours, k, len(factors))]
+            np.minimum(raised, np.float32(CLIPPED.most), out=raised)
+            light[..., k][clipped] = told + weight * np.maximum(raised - told, 0)
 
 
 def clipped_colours(
@@ -72,34 +73,36 @@ def clipped_colours(
     if box is None or channels != 3:
         return None
     size = CLIPPED.cells
-    sums, counts = np.zeros((2, channels, size, size))
-    for rows in strips((box[0].stop - box[0].start, box[1].stop - box[1].start)):
-        part = slice(box[0].start + rows.start, box[0].start + rows.stop), box[1]
+    sums, counts = np.zeros((2, channels, size * size))
+    rows, columns = box
+    for top in range(rows.start, rows.stop, CLIPPED.bands_apart):
+        part = slice(top, min(rows.stop, top + CLIPPED.band_rows)), columns
         before, after, told, both = own[part], light[part], other[part], shown[part]
         for k in range(channels):
             clipped = both & (before[..., k] >= EXPOSURE.clipped_light)
-            if clipped.any():
-                cells = _places(before[clipped], k, size)
-                ratio = np.log(np.maximum(told[..., k][clipped], 1e-3) / after[..., k][clipped])
-                np.add.at(sums[k], cells, ratio)
-                np.add.at(counts[k], cells, 1)
+            cells = _cells(before[clipped], k, size)
+            ratio = np.log(np.maximum(told[..., k][clipped], CLIPPED.least_light) / after[..., k][clipped])
+            sums[k] += np.bincount(cells, ratio, size * size)
+            counts[k] += np.bincount(cells, minlength=size * size)
     factors = tuple(_factors(*one) for one in zip(sums, counts, strict=True))
     return ClippedColours(factors) if any(one is not None for one in factors) else None
 
 
-def _places(colours: NDArray[np.float32], channel: int, size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Row and column (N,) in a channel's table of `size` a side, for colours (N, 3)."""
+def _cells(colours: NDArray[np.float32], channel: int, size: int) -> NDArray[np.intp]:
+    """Cells (N,) of a channel's table of `size` a side, row by row, for colours (N, 3)."""
     row, column = (
         np.minimum(np.sqrt(np.maximum(colours[:, (channel + k) % 3], 0)) * size, size - 1).astype(np.intp)
         for k in (1, 2)
     )
-    return row, column
+    cells: NDArray[np.intp] = row * size + column
+    return cells
 
 
 def _factors(sums: Array, counts: Array) -> NDArray[np.float32] | None:
-    """A fine table of factors by the sums of logarithms (n, n) and counts in a coarse one; None with too few."""
+    """A fine table of factors (m, m) by the sums of logarithms (n²,) and counts in a coarse one; None with too few."""
     if counts.sum() < CLIPPED.min_pixels:
         return None
+    sums, counts = (one.reshape(CLIPPED.cells, CLIPPED.cells) for one in (sums, counts))
     means, known = sums / np.maximum(counts, 1), counts / (counts + CLIPPED.sure_pixels)
     logs = filled(means.astype(np.float32)[..., None], known.astype(np.float32))[..., 0]
     fine = cv2.resize(logs, None, fx=CLIPPED.fineness, fy=CLIPPED.fineness, interpolation=cv2.INTER_LINEAR)

@@ -98,6 +98,9 @@ class ToneOptions:
     most_near_white: float = 0.84
     """The same at most, level 235: so that no edge is seen."""
 
+    pixels_at_once: int = 1 << 14
+    """Pixels whose tones are worked out at once: more leave the processor's cache, fewer cost calls."""
+
 
 @dataclass(frozen=True)
 class ClippedOptions:
@@ -110,7 +113,7 @@ class ClippedOptions:
     """Light from which a channel may be clipped in parts, as where a picture was made smaller: level 241."""
 
     most: float = 0.947
-    """Light that a channel is raised to at most, that of `ToneOptions.below_white`: another channel may be unclipped."""
+    """Light that a channel is raised to at most, that of `ToneOptions.below_white`: another may be unclipped."""
 
     cells: int = 16
     """Cells of a side of the table."""
@@ -118,8 +121,17 @@ class ClippedOptions:
     fineness: int = 8
     """Cells of a side into which a cell is divided, so that none is seen."""
 
-    min_pixels: int = 200
-    """Clipped pixels of a channel that both pictures show, below which nothing is learnt."""
+    min_pixels: int = 50
+    """Clipped pixels of a channel in these bands, below which nothing is learnt."""
+
+    band_rows: int = 8
+    """Rows that are looked at together."""
+
+    bands_apart: int = 64
+    """Rows from one such band to the next: all of them take eight times as long and tell the same."""
+
+    least_light: float = 1e-3
+    """Light that counts as black where logarithms are taken."""
 
     sure_pixels: float = 20.0
     """Pixels of a cell from which it counts for more than its neighbours."""

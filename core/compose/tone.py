@@ -117,26 +117,37 @@ class Toned(LazyImage):
         return self.light.shape
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
-        own = self.light[part]
-        gain: NDArray[np.float32] = self.gain
+        rows, columns = within(part, self.shape)
+        own = self.light[rows, columns]
+        out = np.empty_like(own)
+        # few rows at a time, which stay in the processor's cache from one step to the next
+        at_once = max(1, TONE.pixels_at_once // max(1, columns.stop - columns.start))
+        for top in range(0, len(own), at_once):
+            some = slice(top, min(len(own), top + at_once))
+            out[some] = self._toned(own[some], (slice(rows.start + some.start, rows.start + some.stop), columns))
+        return out
+
+    def _toned(self, own: NDArray[np.float32], part: Part) -> NDArray[np.float32]:
+        """Own light (h, w, C) of rows and columns as it is shown."""
+        gain: NDArray[np.float32] = np.tile(self.gain, own.shape[1]).reshape(own.shape[1:])
         if self.vignetting:
-            gain = times(for_each_channel(self._given_back(part), self.shape[2]), gain)
-        out = own * gain
+            gain = for_each_channel(self._given_back(part), self.shape[2]) * gain
+        out: NDArray[np.float32] = own * gain
         if self.curve is not None:
             # the gain of a channel does not count: the curve was fitted on light before it
             light = np.maximum(out / self.gain, np.float32(math.exp(self.curve.dark)))
             out *= np.exp(self.curve.at(np.log(light, out=light)))
         if self.keeps_white:
-            of_white = 1.0 if self.curve is None else self.curve.of_white
-            rolled_off(out, gain * np.float32(of_white))
+            of_white = np.float32(1.0 if self.curve is None else self.curve.of_white)
+            rolled_off(out, gain if of_white == 1 else gain * of_white)
             if self.clipped is not None:
                 self.clipped.restore(own, out)
-            white_kept(own, out, self.gain * np.float32(of_white))
+            white_kept(own, out, self.gain * of_white)
         return out
 
     def _given_back(self, part: Part) -> Plane:
         """What the light (h, w) of rows and columns is multiplied by to undo vignetting."""
-        rows, columns = within(part, self.shape)
+        rows, columns = part
         box = columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start
         places = self.picture_map.within(box).arrays()
         lost = self.vignetting.at(radius_squared(places.x, places.y, places.size))
@@ -157,9 +168,9 @@ def rolled_off(light: NDArray[np.float32], gain: NDArray[np.float32]) -> None:
     Below the knee nothing changes; from there light follows a hyperbola that leaves the knee with slope 1 and arrives
     just below white at what is just not clipped. gain (C,) or (h, w, C): what white was multiplied by.
     """
-    above = light - np.float32(TONE.knee)
-    if above.max(initial=0) <= 0:
+    if light.max(initial=0) <= TONE.knee:
         return
+    above = light - np.float32(TONE.knee)
     np.maximum(above, 0, out=above)
     room = np.float32(TONE.below_white - TONE.knee)
     reach = np.maximum(np.float32(EXPOSURE.clipped_light) * gain - np.float32(TONE.knee), room)
@@ -177,6 +188,8 @@ def white_kept(own: NDArray[np.float32], light: NDArray[np.float32], gain: Chann
     That begins the earlier the more white is darkened, so that bright noise is not spread; gain (C,): of white.
     """
     start = near_white(gain)
+    if own.max(initial=0) <= start:
+        return
     smallest = reduce(np.minimum, (own[..., k] for k in range(own.shape[2])))
     near = smallest > start
     if not near.any():
