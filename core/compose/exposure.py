@@ -15,12 +15,15 @@ from numpy.typing import NDArray
 
 from ..choices import Exposing
 from ..panorama.layers import Layer
+from ..raster.arrays import Array
 from ..raster.picture_map import CanvasMap
 from .clipped import ClippedColours, clipped_colours
 from .options import CLIPPED, EXPOSURE, OVERLAP, TONE
 from .tone import NO_VIGNETTING, Exposed, ToneCurve, Toned, Vignetting
 from .tone_blocks import block_weights, bright_blocks, log_ratios, shared_blocks, weighted_median
 from .tone_fit import fit_tone
+
+_TOO_LITTLE = "too little of what both pictures show is neither clipped nor dark"
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Exposure:
         Share of what both pictures show that is clipped in this one alone.
     clipped : ClippedColours or None
         What is known of its clipped channels.
+    why_not : str
+        In words, why it could not be matched to the other's; empty if it was, or was not to be.
     """
 
     gain: NDArray[np.float32]
@@ -55,6 +60,7 @@ class Exposure:
     keeps_white: bool = False
     overexposed: float = 0.0
     clipped: ClippedColours | None = None
+    why_not: str = ""
 
     def applied(self, layer: Layer, picture_map: CanvasMap) -> Layer:
         """A picture's layer with its light changed; picture_map: where the canvas shows the picture."""
@@ -119,14 +125,16 @@ def match_exposure(
     """
     channels = before.light.shape[2]
     shared = shared_blocks(before, layer, hidden, floats)
-    blocks = None if shared is None else bright_blocks(shared)
-    if blocks is None or len(blocks) < EXPOSURE.min_blocks:
+    if shared is None:
         return unchanged(channels)
+    blocks = bright_blocks(shared)
+    if len(blocks) < EXPOSURE.min_blocks:
+        return replace(unchanged(channels), why_not=_TOO_LITTLE)
     ratios, weights = log_ratios(blocks.means), block_weights(blocks)
     middle = np.array([weighted_median(ratios[:, k], weights) for k in range(channels)])
     spread = np.median(np.abs(ratios - middle), axis=0)
     if np.abs(middle).max() > np.log(EXPOSURE.max_gain):
-        return unchanged(channels)
+        return replace(unchanged(channels), why_not=_too_different(np.exp(middle)))
     return Exposure(np.exp(middle).astype(np.float32), spread.astype(np.float32), len(blocks))
 
 
@@ -157,15 +165,18 @@ def match_tones(
     """
     channels, radiance = layers[0].light.shape[2], any(floats)
     shared = shared_blocks(*layers, hidden, floats)
-    blocks = None if shared is None else bright_blocks(shared)
     plain = replace(unchanged(channels, 2.0**stops), keeps_white=not radiance)
-    if shared is None or blocks is None or len(blocks) < EXPOSURE.min_blocks:
+    if shared is None:
         return plain, plain
+    blocks = bright_blocks(shared)
+    if len(blocks) < EXPOSURE.min_blocks:
+        return plain, replace(plain, why_not=_TOO_LITTLE)
     blocks = blocks.subset(slice(None, None, -(-len(blocks) // TONE.fitted_blocks)))
     fit = fit_tone(blocks, (blocks.radii(maps[0]), blocks.radii(maps[1])), with_curve=not radiance)
-    if np.abs(np.log(fit.gain)).max() > np.log(EXPOSURE.max_gain):
-        return plain, plain
-    common = 2.0**stops * (1.0 if radiance else float(np.median(fit.gain)) ** -TONE.reference_share)
+    if np.abs(np.log(fit.gain)).max() > np.log(TONE.max_gain):
+        return plain, replace(plain, why_not=_too_different(fit.gain))
+    moved = 0.0 if radiance else -TONE.reference_share * float(np.log2(np.median(fit.gain)))
+    common = 2.0 ** (stops + np.clip(moved, -TONE.most_reference_stops, TONE.most_reference_stops))
     spread = fit.spread.astype(np.float32)
     first, second = (
         Exposure(
@@ -197,6 +208,11 @@ def _with_clipped(
     return first, second
 
 
+def _too_different(gain: Array) -> str:
+    """What is said where a gain (C,) is too large."""
+    return f"it differs by {np.abs(np.log2(gain)).max():.1f} stops"
+
+
 def pooled(exposures: Sequence[Exposure]) -> Exposure:
     """The median of the exposures of several frames of fixed cameras, with a curve if most have one."""
     known = [one for one in exposures if one.blocks]
@@ -210,9 +226,12 @@ def pooled(exposures: Sequence[Exposure]) -> Exposure:
     curve = ToneCurve(*np.median(curves, axis=0).tolist()) if curved else None
     overexposed = float(np.median([one.overexposed for one in known]))
     blocks, keeps_white = sum(one.blocks for one in known), known[0].keeps_white
-    return Exposure(gain, spread, blocks, Vignetting(halfway, corner), curve, keeps_white, overexposed)
+    # a table cannot be averaged: one frame's serves all, so that nothing flickers
+    clipped = next((one.clipped for one in known if one.clipped is not None), None)
+    return Exposure(gain, spread, blocks, Vignetting(halfway, corner), curve, keeps_white, overexposed, clipped)
 
 
 def _median(values: list[NDArray[np.float32]]) -> NDArray[np.float32]:
     """The median (C,) of several rows (C,)."""
-    return np.median(values, axis=0).astype(np.float32)
+    median: NDArray[np.float32] = np.median(values, axis=0).astype(np.float32)
+    return median

@@ -17,8 +17,11 @@ class ExposureOptions:
     """px of the side of the blocks whose means are compared: they forgive an alignment that is a pixel or two off."""
 
     clipped_light: float = 0.956
-    """Light (white is 1) from which pictures of 8 and 16 bits count as clipped: level 250 of 255, since JPEG rings
-    around white."""
+    """Light (white is 1) from which pictures of 8 and 16 bits count as clipped: that level, since JPEG rings around
+    white."""
+
+    clipped_level: int = 250
+    """The same as a level of 8 bits."""
 
     min_brightness: float = 0.05
     """Share of the median block's light below which a block is left out: noise and flare tell more than exposure there.
@@ -40,6 +43,12 @@ class ToneOptions:
 
     reference_share: float = 0.35
     """Share of the difference in exposure that the reference goes towards the target: half way looks flat."""
+
+    most_reference_stops: float = 0.7
+    """Stops that it goes at most: beyond two stops of difference one of the two is wrong, and it may be the target."""
+
+    max_gain: float = 64.0
+    """Factor (six stops) beyond which it is no exposure: of 8 bits hardly anything is left."""
 
     fitted_blocks: int = 6000
     """Blocks that are fitted on, at most: more take time and change nothing."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +41,10 @@ class Vignetting:
     def __bool__(self) -> bool:
         return (self.halfway, self.corner) != (0, 0)
 
-    def at(self, radius_squared: NDArray[np.floating]) -> NDArray[np.floating]:
+    def at(self, radius_squared: NDArray[Any]) -> NDArray[Any]:
         """The logarithm (…) of what is left of the light at squared distances (…) from the middle."""
         linear, square = 4 * self.halfway - self.corner, 2 * self.corner - 4 * self.halfway
-        lost: NDArray[np.floating] = radius_squared * linear + radius_squared**2 * square
+        lost: NDArray[Any] = radius_squared * linear + radius_squared**2 * square
         return lost
 
 

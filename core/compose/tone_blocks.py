@@ -56,7 +56,8 @@ class Blocks:
         part = picture_map.within((left, top, width, height)).arrays()
         squared = radius_squared(part.x[middles], part.y[middles], part.size)
         rows, columns = (self.at - first).T
-        return squared[rows, columns].astype(np.float64)
+        radii: Array = squared[rows, columns].astype(np.float64)
+        return radii
 
 
 def radius_squared(

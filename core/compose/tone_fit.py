@@ -107,7 +107,7 @@ def fit_tone(blocks: Blocks, radii: tuple[Array, Array], with_curve: bool) -> To
 def _chosen(seen: _Seen, at: NDArray[np.intp], with_curve: bool) -> _Model:
     """The model with as many parts as earn it on blocks not fitted on."""
     black = (at // TONE.tile_blocks).sum(axis=1) % 2 == 0
-    light = sum(seen.logs).mean(axis=1)
+    light = (seen.logs[0] + seen.logs[1]).mean(axis=1)
     ends = np.quantile(light, [1 / 3, 2 / 3])
     thirds = light < ends[0], light > ends[1]
     best, least = (False, False), np.inf
