@@ -29,7 +29,8 @@ from .min_cut import FREE, SECOND
 from .moving_things import moving_labels
 from .options import EXPOSURE
 from .overlap import Overlap, overlap_of
-from .seam import added_price, find_seam, known_labels, seam_cost
+from .seam import find_seam, known_labels
+from .seam_costs import SeamCosts, averaged_costs, seam_costs
 from .wraparound import roll_for, rolled, rolled_layer, rolled_map
 
 
@@ -47,10 +48,10 @@ class Decided:
     exposure : Exposure
     chosen : (H, W) bool array or None
         What comes from this picture and not from those before; None without a seam.
-    known, cost, price, box : arrays and slices, or None
+    known, costs : (H, W) int8 array and SeamCosts, or None
         What the seam was cut by (see `find_seam`), if it was and is kept.
     roll : int
-        Columns by which these four are rolled (see `wraparound`).
+        Columns by which these are rolled (see `wraparound`).
     holes : int
         Pixels that the picture cannot see and none before it shows. They are transparent or filled.
     folds : float
@@ -62,9 +63,7 @@ class Decided:
     exposure: Exposure
     chosen: NDArray[np.bool_] | None = None
     known: NDArray[np.int8] | None = None
-    cost: NDArray[np.float32] | None = None
-    price: NDArray[np.float32] | None = None
-    box: tuple[slice, slice] | None = None
+    costs: SeamCosts | None = None
     roll: int = 0
     holes: int = 0
     folds: float = 0.0
@@ -235,7 +234,7 @@ def _add(
         chosen = None if found.chosen is None else rolled(found.chosen, -roll)
         found = replace(found, hidden_by_depth=by_depth, chosen=chosen)
         if not keep:
-            found = replace(found, hidden_by_depth=hidden, known=None, cost=None, price=None, box=None)
+            found = replace(found, hidden_by_depth=hidden, known=None, costs=None)
         del start
     if options.holes != "inpaint":
         holes = np.zeros(0, bool)
@@ -310,15 +309,15 @@ def _pooled(decisions: Sequence[Decided]) -> Decided:
     """The same about one picture, by the frames that overlap in the same box."""
     first = decisions[0]
     exposure = pooled([decision.exposure for decision in decisions])
-    if first.known is None or first.box is None:
+    if first.known is None or first.costs is None:
         return replace(first, exposure=exposure)
-    alike = [one for one in decisions if (one.box, one.roll) == (first.box, first.roll)]
-    cost, price = (
-        np.mean(np.stack([values for values in parts if values is not None]), axis=0)
-        for parts in ([decision.cost for decision in alike], [decision.price for decision in alike])
-    )
-    chosen = rolled(find_seam(first.known, cost, price, first.box), -first.roll)
-    return replace(first, exposure=exposure, cost=cost, price=price, chosen=chosen)
+    alike = [
+        one.costs for one in decisions
+        if one.costs is not None and (one.costs.box, one.roll) == (first.costs.box, first.roll)
+    ]  # fmt: skip
+    costs = averaged_costs(alike)
+    chosen = rolled(find_seam(first.known, costs), -first.roll)
+    return replace(first, exposure=exposure, costs=costs, chosen=chosen)
 
 
 def _without(layer: Layer, holes: NDArray[np.bool_]) -> Layer:
@@ -346,12 +345,12 @@ def _with_seam(
     if options.seam == "none":
         nearest = distance_labels(before, layer)
         return replace(so_far, chosen=np.where(known == FREE, nearest, known == SECOND))
-    picture_map, confidence = rolled_map(added.picture_map, so_far.roll), added.warp.lazy_confidence
-    if confidence is not None and so_far.roll:
-        confidence = rolled(whole(confidence), so_far.roll)
+    picture_map = rolled_map(added.picture_map, so_far.roll)
+    confidence, slide = (
+        rolled(whole(image), so_far.roll) if image is not None and so_far.roll else image
+        for image in (added.warp.lazy_confidence, added.warp.slide)
+    )
     unseen = so_far.hidden_by_depth if behind is None else so_far.hidden_by_depth | behind
     moving = moving_labels(overlap, picture_map, before, layer, unseen)
-    cost = seam_cost(overlap, picture_map, confidence)
-    price = added_price(overlap, so_far.hidden_by_depth, moving, behind)
-    chosen = find_seam(known, cost, price, overlap.box)
-    return replace(so_far, chosen=chosen, known=known, cost=cost, price=price, box=overlap.box)
+    costs = seam_costs(overlap, picture_map, confidence, so_far.hidden_by_depth, moving, behind, slide)
+    return replace(so_far, chosen=find_seam(known, costs), known=known, costs=costs)
