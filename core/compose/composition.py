@@ -18,7 +18,7 @@ from ..field.visibility import by_agreement, occluded
 from ..options import StitchOptions
 from ..panorama.layers import Layer
 from ..panorama.warp import Warp
-from ..raster.arrays import bounds, larger_parts, with_margin, without_specks
+from ..raster.arrays import bounds, larger_parts, with_margin
 from ..raster.lazy import AnyImage, Weighed, whole
 from ..raster.picture_map import PictureMap
 from ..system.progress import ReportProgress
@@ -335,16 +335,14 @@ def _with_seam(
     options = added.options
     if not options.has_seam:
         return so_far
-    cuts = options.seam != "none" and overlap is not None
-    hidden = without_specks(so_far.hidden_by_depth) if cuts else so_far.hidden_by_depth
-    known = known_labels(before, layer, hidden, painted)
-    if behind is not None:
-        known[larger_parts(behind) & (known == FREE)] = SECOND
-    if overlap is None:
-        return replace(so_far, chosen=known == SECOND)
-    if options.seam == "none":
-        nearest = distance_labels(before, layer)
+    if options.seam == "none" or overlap is None:
+        known = known_labels(before, layer, painted, so_far.hidden_by_depth)
+        if behind is not None:
+            known[larger_parts(behind) & (known == FREE)] = SECOND
+        # without an overlap nothing is free
+        nearest = distance_labels(before, layer) if overlap is not None else known == SECOND
         return replace(so_far, chosen=np.where(known == FREE, nearest, known == SECOND))
+    known = known_labels(before, layer, painted)
     picture_map = rolled_map(added.picture_map, so_far.roll)
     confidence, slide = (
         rolled(whole(image), so_far.roll) if image is not None and so_far.roll else image

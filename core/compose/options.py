@@ -122,8 +122,8 @@ class SeamOptions:
     reference is exact, the others are resampled by uncertain maps. Dearer, and the seam keeps to the border."""
 
     found_px: float = 450
-    """Cells along a picture's longer side, about, in which the seam is found: what the eye takes for a step. A price per
-    area against one per length also needs one size."""
+    """Cells along a picture's longer side, about, in which the seam is found: what the eye takes for a step. A price
+    per area against one per length also needs one size."""
 
     rim_price: float = 0.01
     """Price of a pixel near the overlap's rim, on top: beyond it there is nothing to blend with."""
@@ -132,16 +132,16 @@ class SeamOptions:
     """Pixels, or cells, that count as near."""
 
     hidden_price: float = 0.4
-    """Price of a cell of what the added picture cannot see, or what moved, beside one of the other's tones: what is thin
-    costs more to go around than to show. A quarter melted steps of a stair."""
+    """Price of a cell of what the added picture cannot see, or of what moved: what is thin costs more to go around than
+    to show. A quarter melted the steps of a stair."""
 
     least_hidden_price: float = 0.01
     """The same where the tones are alike."""
 
-    behind_price: float = 0.1
+    behind_price: float = 0.25
     """Price of a cell of what the panorama before cannot see, likewise: lower, as its own place is only filled in."""
 
-    least_behind_price: float = 0.002
+    least_behind_price: float = 0.005
     """The same where the tones are alike."""
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -22,25 +22,27 @@ from ..raster.lazy import AnyImage, Placed
 from ..system.threads import each, in_order
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
 from .options import OVERLAP, SEAM
-from .seam_costs import SeamCosts
+
+if TYPE_CHECKING:
+    from .seam_costs import SeamCosts
 
 
 def known_labels(
-    before: Layer, layer: Layer, hidden: NDArray[np.bool_], painted: NDArray[np.int8] | None = None
+    before: Layer, layer: Layer, painted: NDArray[np.int8] | None = None, hidden: NDArray[np.bool_] | None = None
 ) -> NDArray[np.int8]:
     """Which pixels are settled before a seam is sought.
 
-    What only one picture shows, or shows opaque, comes from it; what the added picture cannot see comes from the
-    panorama before where that shows it.
+    What only one picture shows, or shows opaque, comes from it.
 
     Parameters
     ----------
     before, layer : Layer
         The panorama before, and the added picture's layer.
-    hidden : (H, W) bool array
-        What the added picture cannot see.
     painted : (H, W) int8 array, optional
         An artist's decision, as FIRST, SECOND or FREE. It wins wherever that picture shows something.
+    hidden : (H, W) bool array, optional
+        What the added picture cannot see, if that is to come from the panorama before without being weighed against
+        what the seam costs.
 
     Returns
     -------
@@ -50,14 +52,15 @@ def known_labels(
     known = np.full(before.alpha.shape, NOWHERE, np.int8)
 
     def put(rows: slice) -> tuple[int, int]:
-        out, not_seen = known[rows], hidden[rows]
+        out, not_seen = known[rows], False if hidden is None else hidden[rows]
         (shows_before, opaque_before), (shows, opaque) = (
             (one.alpha[rows] > 0, one.alpha[rows] >= OVERLAP.opaque_alpha) for one in (before, layer)
         )
         out[shows_before & shows] = FREE
         # a soft edge of one gives way where the other is opaque
-        out[shows_before & (~shows | not_seen | (opaque_before & ~opaque))] = FIRST
-        out[shows & (~shows_before | (opaque & ~opaque_before & ~not_seen))] = SECOND
+        out[shows_before & (~shows | (opaque_before & ~opaque))] = FIRST
+        out[shows & (~shows_before | (opaque & ~opaque_before))] = SECOND
+        out[shows_before & not_seen] = FIRST
         return int(shows_before.sum()), int((shows_before & ~shows).sum())
 
     shown, alone = np.sum(list(in_order(put, strips(known.shape))), axis=0).tolist()
@@ -110,7 +113,7 @@ def _cut_levels(known: NDArray[np.int8], levels: Sequence[AnyImage], price: AnyI
     """The cut through pixels (True: SECOND), found in the cells of the last level; price: see `SeamCosts`."""
     if len(levels) == 1:
         return _cut(known, levels[0], price)
-    return _moved(known, _cut_levels(_halved_labels(known), levels[1:], price), levels[0], None)
+    return _within_band(known, _cut_levels(_halved_labels(known), levels[1:], price), levels[0], None)
 
 
 def _cut(known: NDArray[np.int8], cost: AnyImage, price: AnyImage) -> NDArray[np.bool_]:
@@ -120,10 +123,10 @@ def _cut(known: NDArray[np.int8], cost: AnyImage, price: AnyImage) -> NDArray[np
         return _cut_within(known, cost, price, free)
     # A cell has four pixels' area but two pixels' side: its price doubles beside its cost.
     coarse = _cut(_halved_labels(known), _halved(cost, free), 2 * _halved(price, free))
-    return _moved(known, coarse, cost, price)
+    return _within_band(known, coarse, cost, price)
 
 
-def _moved(
+def _within_band(
     known: NDArray[np.int8], coarse: NDArray[np.bool_], cost: AnyImage, price: AnyImage | None
 ) -> NDArray[np.bool_]:
     """The cut within a narrow band around that through cells of twice the side."""

@@ -63,7 +63,7 @@ def seam_costs(
     hidden : (H, W) bool array
         What the added picture cannot see: it costs by how different it looks.
     moving : (h, w) int8 array, optional
-        See `moving_labels`: what is to be shown from the other picture costs likewise.
+        See `moving_labels`: what is to be shown from the other picture costs likewise, and no seam goes through it.
     behind : (H, W) bool array, optional
         What the panorama before cannot see: it costs where it is shown from there.
     slide : (H, W) image, optional
@@ -79,7 +79,10 @@ def seam_costs(
     levels = []
     for level in range(count + 1):
         difference, share = _in_cells(overlap, 1 << level)
-        levels.append(_cost(difference, share > 0, _largest(risk, 1 << level)))
+        cost = _cost(difference, share > 0, _largest(risk, 1 << level))
+        if moving is not None:
+            cost[means(np.abs(moving).astype(np.float32), 1 << level) > 0] = 1
+        levels.append(cost)
     return SeamCosts(overlap.box, tuple(levels), _price(overlap, difference, 1 << count, hidden, moving, behind, slide))
 
 
