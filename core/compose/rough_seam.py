@@ -24,7 +24,8 @@ from ..raster.picture_map import PictureMap
 from ..raster.resizing import resized_points
 from .options import ROUGH_SEAM
 from .overlap import overlap_of
-from .seam import added_price, find_seam, known_labels, seam_cost
+from .seam import find_seam, known_labels
+from .seam_costs import seam_costs
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ class RoughSeam:
         difference = overlap.difference
         # as if exposure were matched already
         difference[overlap.both] -= np.median(difference[overlap.both], axis=0)
-        cost, price = seam_cost(overlap, maps[1], None), added_price(overlap, hidden, behind=warp.behind)
-        chosen = find_seam(known_labels(before, layer, hidden), cost, price, overlap.box)
+        costs = seam_costs(overlap, maps[1], None, hidden, behind=warp.behind, slide=warp.slide)
+        chosen = find_seam(known_labels(before, layer), costs)
         # also where the overlap ends: what the border of one picture cuts off does not go on in the other
         others = ((before.alpha > 0) | (layer.alpha > 0)) & ~chosen
         seam = (dilated(chosen, 1) & dilated(others, 1))[overlap.box] & overlap.both
