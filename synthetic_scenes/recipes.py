@@ -160,6 +160,8 @@ _RECIPES = (
            View(yaw=-26.0, pitch=4.0, lens=23.0), _view(0.3, 0.1, 0.04, 34, 6, 1.5, lens=23.0), seed=4),
     Recipe("occluder", "A post in front of everything", "occluder",
            _DOWN, _view(0.3, 0.0, 0.03, 11, 10, 1.5), seed=4),
+    Recipe("thin_things", "Posts, a railing, a lamp, a sign, leaves and a cup before a far wall", "thin_things",
+           View(pitch=2.0), _view(0.25, 0.03, 0.03, 9, 3, 1.5), seed=5),
 )  # fmt: skip
 RECIPES = {recipe.name: recipe for recipe in _RECIPES}
 
