@@ -67,7 +67,9 @@ def _contrast(layer: Layer, box: tuple[slice, slice]) -> NDArray[np.float32]:
     """Standard deviation (h, w) of a layer's tones around each pixel of a box: a seam is lost in foliage and gravel."""
     tones = log_encode(np.ascontiguousarray(layer.light[box])).mean(axis=2)
     side = (ROUGH_SEAM.contrast_px, ROUGH_SEAM.contrast_px)
-    return np.sqrt(np.maximum(cv2.blur(np.square(tones), side) - np.square(cv2.blur(tones, side)), 0))
+    variance = np.maximum(cv2.blur(np.square(tones), side) - np.square(cv2.blur(tones, side)), 0)
+    deviation: NDArray[np.float32] = np.sqrt(variance)
+    return deviation
 
 
 def _small(picture: Picture, scale: float) -> Picture:
