@@ -342,9 +342,6 @@ class CarryOptions:
     behind_px: float = 2.0
     """See `behind_share`."""
 
-    smaller_strips: int = 16
-    """Times that strips of rows are smaller than `PartOptions.strip_pixels`: they go through many hands."""
-
     reach_nodes: int = 200
     """Nodes along the longer side of the base at which the pictures' bounds are looked for."""
 

@@ -19,7 +19,7 @@ from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..cameras.view import View
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Box, box_of, cut, strips
+from ..raster.arrays import Array, Box, box_of, cut, small_strips, strips
 from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, Placed, whole
 from ..raster.options import GRID
@@ -248,7 +248,8 @@ def build_map(
                 x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
             out.x[part], out.y[part] = x, y
 
-    each(put, strips(shape))
+    # depth that is worked out again where it is read takes the larger strips of `Depth`
+    each(put, small_strips(shape) if held.size else strips(shape))
     confidence = None if refined is None else Confidence(canvas, camera, refined)
     return Warp(
         canvas, (own, *maps), held if held.size else depth, confidence, beside=held_beside if hold else None
