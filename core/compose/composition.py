@@ -18,7 +18,7 @@ from ..field.visibility import by_agreement, occluded
 from ..options import StitchOptions
 from ..panorama.layers import Layer
 from ..panorama.warp import Warp
-from ..raster.arrays import bounds, larger_parts, with_margin, without_specks
+from ..raster.arrays import bounds, larger_parts, with_margin
 from ..raster.lazy import AnyImage, Weighed, whole
 from ..raster.picture_map import CanvasMap, PictureMap
 from ..system.progress import ReportProgress
@@ -29,7 +29,8 @@ from .min_cut import FREE, SECOND
 from .moving_things import moving_labels
 from .options import EXPOSURE
 from .overlap import Overlap, overlap_of
-from .seam import added_price, find_seam, known_labels, seam_cost
+from .seam import find_seam, known_labels
+from .seam_costs import SeamCosts, averaged_costs, seam_costs
 from .wraparound import roll_for, rolled, rolled_layer, rolled_map
 
 
@@ -49,10 +50,10 @@ class Decided:
         What is done to the panorama before, when this picture is added: to the reference, if anything.
     chosen : (H, W) bool array or None
         What comes from this picture and not from those before; None without a seam.
-    known, cost, price, box : arrays and slices, or None
+    known, costs : (H, W) int8 array and SeamCosts, or None
         What the seam was cut by (see `find_seam`), if it was and is kept.
     roll : int
-        Columns by which these four are rolled (see `wraparound`).
+        Columns by which these are rolled (see `wraparound`).
     holes : int
         Pixels that the picture cannot see and none before it shows. They are transparent or filled.
     folds : float
@@ -65,9 +66,7 @@ class Decided:
     exposure_before: Exposure
     chosen: NDArray[np.bool_] | None = None
     known: NDArray[np.int8] | None = None
-    cost: NDArray[np.float32] | None = None
-    price: NDArray[np.float32] | None = None
-    box: tuple[slice, slice] | None = None
+    costs: SeamCosts | None = None
     roll: int = 0
     holes: int = 0
     folds: float = 0.0
@@ -245,7 +244,7 @@ def _add(
         chosen = None if found.chosen is None else rolled(found.chosen, -roll)
         found = replace(found, hidden_by_depth=by_depth, chosen=chosen)
         if not keep:
-            found = replace(found, hidden_by_depth=hidden, known=None, cost=None, price=None, box=None)
+            found = replace(found, hidden_by_depth=hidden, known=None, costs=None)
         del start
     if options.holes != "inpaint":
         holes = np.zeros(0, bool)
@@ -322,15 +321,15 @@ def _pooled(decisions: Sequence[Decided]) -> Decided:
         pooled([getattr(one, name) for one in decisions]) for name in ("exposure_before", "exposure")
     )
     first = replace(decisions[0], exposure=exposure, exposure_before=before)
-    if first.known is None or first.box is None:
+    if first.known is None or first.costs is None:
         return first
-    alike = [one for one in decisions if (one.box, one.roll) == (first.box, first.roll)]
-    cost, price = (
-        np.mean(np.stack([values for values in parts if values is not None]), axis=0)
-        for parts in ([decision.cost for decision in alike], [decision.price for decision in alike])
-    )
-    chosen = rolled(find_seam(first.known, cost, price, first.box), -first.roll)
-    return replace(first, cost=cost, price=price, chosen=chosen)
+    alike = [
+        one.costs for one in decisions
+        if one.costs is not None and (one.costs.box, one.roll) == (first.costs.box, first.roll)
+    ]  # fmt: skip
+    costs = averaged_costs(alike)
+    chosen = rolled(find_seam(first.known, costs), -first.roll)
+    return replace(first, costs=costs, chosen=chosen)
 
 
 def _without(layer: Layer, holes: NDArray[np.bool_]) -> Layer:
@@ -348,22 +347,20 @@ def _with_seam(
     options = added.options
     if not options.has_seam:
         return so_far
-    cuts = options.seam != "none" and overlap is not None
-    hidden = without_specks(so_far.hidden_by_depth) if cuts else so_far.hidden_by_depth
-    known = known_labels(before, layer, hidden, painted)
-    if behind is not None:
-        known[larger_parts(behind) & (known == FREE)] = SECOND
-    if overlap is None:
-        return replace(so_far, chosen=known == SECOND)
-    if options.seam == "none":
-        nearest = distance_labels(before, layer)
+    if options.seam == "none" or overlap is None:
+        known = known_labels(before, layer, painted, so_far.hidden_by_depth)
+        if behind is not None:
+            known[larger_parts(behind) & (known == FREE)] = SECOND
+        # without an overlap nothing is free
+        nearest = distance_labels(before, layer) if overlap is not None else known == SECOND
         return replace(so_far, chosen=np.where(known == FREE, nearest, known == SECOND))
-    picture_map, confidence = rolled_map(added.picture_map, so_far.roll), added.warp.lazy_confidence
-    if confidence is not None and so_far.roll:
-        confidence = rolled(whole(confidence), so_far.roll)
+    known = known_labels(before, layer, painted)
+    picture_map = rolled_map(added.picture_map, so_far.roll)
+    confidence, slide = (
+        rolled(whole(image), so_far.roll) if image is not None and so_far.roll else image
+        for image in (added.warp.lazy_confidence, added.warp.slide)
+    )
     unseen = so_far.hidden_by_depth if behind is None else so_far.hidden_by_depth | behind
     moving = moving_labels(overlap, picture_map, before, layer, unseen)
-    cost = seam_cost(overlap, picture_map, confidence)
-    price = added_price(overlap, so_far.hidden_by_depth, moving, behind)
-    chosen = find_seam(known, cost, price, overlap.box)
-    return replace(so_far, chosen=chosen, known=known, cost=cost, price=price, box=overlap.box)
+    costs = seam_costs(overlap, picture_map, confidence, so_far.hidden_by_depth, moving, behind, slide)
+    return replace(so_far, chosen=find_seam(known, costs), known=known, costs=costs)

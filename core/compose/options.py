@@ -233,9 +233,28 @@ class SeamOptions:
     """Price of showing the added picture from corner to corner of the overlap, for each pixel of its diagonal: the
     reference is exact, the others are resampled by uncertain maps. Dearer, and the seam keeps to the border."""
 
-    ghost_price: float = 0.5
-    """Price of a pixel of what the added picture cannot see: what is thinner than about eight px costs more to go
-    around than to show."""
+    found_px: float = 450
+    """Cells along a picture's longer side, about, in which the seam is found: what the eye takes for a step. A price
+    per area against one per length also needs one size."""
+
+    rim_price: float = 0.01
+    """Price of a pixel near the overlap's rim, on top: beyond it there is nothing to blend with."""
+
+    rim_width: int = 2
+    """Pixels, or cells, that count as near."""
+
+    hidden_price: float = 0.4
+    """Price of a cell of what the added picture cannot see, or of what moved: what is thin costs more to go around than
+    to show. A quarter melted the steps of a stair."""
+
+    least_hidden_price: float = 0.01
+    """The same where the tones are alike."""
+
+    behind_price: float = 0.25
+    """Price of a cell of what the panorama before cannot see, likewise: lower, as its own place is only filled in."""
+
+    least_behind_price: float = 0.005
+    """The same where the tones are alike."""
 
 
 @dataclass(frozen=True)
@@ -244,6 +263,12 @@ class RoughSeamOptions:
 
     visible_tone: float = 0.1
     """Tones by which the pictures differ at a seam that is seen: blending evens out less."""
+
+    contrast_px: int = 7
+    """px, side of the square in which the pictures' contrast is looked at."""
+
+    hidden_by_contrast: float = 2.0
+    """Times this contrast, of the picture that has less of it, by which they may differ more."""
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,8 @@ def make_report(
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
         "options": {
-            "field": options.field, "fade": options.fade, "dense": options.dense, "projection": options.projection,
+            "field": options.field, "fade": _fade(options, alignment), "dense": options.dense,
+            "projection": options.projection,
             "slide": options.slide if options.may_slide else 0, "level": options.level, "centre": options.centre,
             "fov": options.fov, "scale": options.scale, "crop": options.crop, "blend": options.blend,
             "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
@@ -220,6 +221,11 @@ def _picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:
             "focal_px": camera.focal, "source": camera.source, "fixed": camera.fixed, "distortion": camera.distortion,
         },
     }  # fmt: skip
+
+
+def _fade(options: StitchOptions, alignment: Alignment) -> str:
+    """The fade that was used: what goes on beyond the overlap needs depth, and a single pair of pictures."""
+    return "plane" if options.fade == "continue" and alignment.continuation is None else options.fade
 
 
 def _dense_entry(dense: Dense | None) -> dict[str, Any]:

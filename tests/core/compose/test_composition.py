@@ -154,13 +154,12 @@ def test_a_clips_seam_is_cheap_over_all_its_frames() -> None:
         walker[top : top + 40, 230:300] = 0.9
         decisions.append(compose(Layer(walker, first.alpha), second, warp, keep=True)[2])
     (shared,) = pooled_decision([[decision] for decision in decisions])
-    assert shared.chosen is not None and shared.cost is not None
-    for name in ("cost", "price"):
-        assert np.allclose(getattr(shared, name), np.mean([getattr(d, name) for d in decisions], axis=0))
+    assert shared.chosen is not None and shared.costs is not None
+    assert np.allclose(shared.costs.price, np.mean([d.costs.price for d in decisions if d.costs], axis=0))
     assert shared.exposure.gain == pytest.approx(np.median([d.exposure.gain for d in decisions], axis=0))
     dropped = compose(first, second, warp)[2]
-    assert dropped.chosen is not None and dropped.cost is dropped.price is dropped.known is None
-    (none,) = pooled_decision([[replace(d, known=None, cost=None, box=None, chosen=None)] for d in decisions])
+    assert dropped.chosen is not None and dropped.costs is dropped.known is None
+    (none,) = pooled_decision([[replace(d, known=None, costs=None, chosen=None)] for d in decisions])
     assert none.chosen is None
 
 
@@ -293,7 +292,9 @@ def test_narrow_strips_that_the_reference_cannot_see_come_from_the_target() -> N
     first, second, warp = pictures()
     behind = np.zeros(SHAPE, bool)
     behind[50:90, 158:162] = True
-    found = compose(first, second, replace(warp, behind=behind))[2]
+    rim = first.pixels.copy()
+    rim[behind] = 0.9
+    found = compose(Layer(rim, first.alpha), second, replace(warp, behind=behind))[2]
     seen = behind & ~found.hidden & (second.alpha > 0) & (first.alpha > 0)
     assert seen.sum() > 100 and found.chosen is not None and found.chosen[seen].all()
     assert not larger_parts(behind & (np.arange(SHAPE[0]) < 60)[:, None]).any()
