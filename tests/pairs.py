@@ -21,7 +21,10 @@ from edf_stitch.core.raster.picture_map import PictureMap
 ON_REFERENCE = StitchOptions(
     projection="reference", slide=0.0, fade="plane", crop="full", holes="transparent", exposure="reference"
 )  # fmt: skip
-REFERENCE_WORDS = ("--projection", "reference", "--fade", "plane", "--crop", "full", "--holes", "transparent")
+REFERENCE_WORDS = (
+    "--projection", "reference", "--fade", "plane", "--crop", "full", "--holes", "transparent", "--exposure",
+    "reference",
+)  # fmt: skip
 # What the small pair's fixture `known` says, in words.
 KNOWN_WORDS = ("--focal-px", "228", *REFERENCE_WORDS)
 

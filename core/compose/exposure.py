@@ -2,7 +2,7 @@
 
 Either one gain per channel matches a picture to the panorama so far, which keeps its values: a median of ratios between
 means over small blocks, for the means forgive an alignment that is a pixel off and the median what moved. Or two
-pictures meet at one exposure, with what more tells them apart (see `tone_fit`), and no light is blown (see `tone`).
+pictures meet at one exposure, with what more tells them apart (see `tone_fit`), and no light is blown (see `toned`).
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from ..raster.arrays import Array
 from ..raster.picture_map import CanvasMap
 from .clipped import ClippedColours, clipped_colours
 from .options import CLIPPED, EXPOSURE, OVERLAP, TONE
-from .tone import NO_VIGNETTING, Exposed, ToneCurve, Toned, Vignetting
 from .tone_blocks import block_weights, bright_blocks, log_ratios, shared_blocks, weighted_median
 from .tone_fit import fit_tone
+from .toned import NO_VIGNETTING, Exposed, ToneCurve, Toned, Vignetting
 
 _TOO_LITTLE = "too little of what both pictures show is neither clipped nor dark"
 

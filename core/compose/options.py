@@ -39,7 +39,7 @@ class ExposureOptions:
 
 @dataclass(frozen=True)
 class ToneOptions:
-    """Fitting what two pictures' light differs by, and one exposure for both (`tone_fit`, `tone`)."""
+    """Fitting what two pictures' light differs by, and one exposure for both (`tone_fit`, `toned`)."""
 
     reference_share: float = 0.35
     """Share of the difference in exposure that the reference goes towards the target: half way looks flat."""

@@ -53,24 +53,10 @@ class Blocks:
         top, left = (block * first).tolist()
         height, width = (block * (last - first + 1)).tolist()
         middles = np.s_[block // 2 :: block, block // 2 :: block]
-        part = picture_map.within((left, top, width, height)).arrays()
-        squared = radius_squared(part.x[middles], part.y[middles], part.size)
+        squared = picture_map.within((left, top, width, height)).arrays().from_middle(middles)
         rows, columns = (self.at - first).T
         radii: Array = squared[rows, columns].astype(np.float64)
         return radii
-
-
-def radius_squared(
-    x: NDArray[np.float32], y: NDArray[np.float32], size: tuple[int, int]
-) -> NDArray[np.float32]:
-    """Squared distance (…) of pixels x, y from the middle of a picture of `size` (W, H), 1 at its corners and at most
-    1 beyond, NaN too."""
-    middle_x, middle_y = ((side - 1) / 2 for side in size)
-    scale = np.float32(1 / max(middle_x**2 + middle_y**2, 1.0))
-    squared = (x - np.float32(middle_x)) ** 2
-    squared += (y - np.float32(middle_y)) ** 2
-    squared *= scale
-    return np.fmin(squared, np.float32(1), out=squared)
 
 
 def shared_blocks(

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from ..raster.arrays import Array
 from .options import TONE
-from .tone import NO_VIGNETTING, ToneCurve, Vignetting
 from .tone_blocks import Blocks, block_weights, weighted_median
+from .toned import NO_VIGNETTING, ToneCurve, Vignetting
 
 
 @dataclass(frozen=True)

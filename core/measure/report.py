@@ -16,9 +16,9 @@ from ..panorama.canvas import Canvas
 from ..panorama.levelling import angles_of
 from ..panorama.warp import build_map
 from ..raster.arrays import Array
+from .exposure_entry import exposure_entry, exposure_warnings
 from .focal_doubt import focal_doubt
 from .held_out import held_out
-from .light import light_entry, light_warnings
 from .metrics import coverage_samples, look_up, off_line_mean, overlap_quality
 from .options import WARNING
 from .projectivity import independent_fundamental, projectivity
@@ -111,13 +111,13 @@ def make_report(
         "composition": {
             "exposure_gain": further.exposure.gain / decided[0].exposure.gain,
             "exposure_spread": further.exposure.spread, "exposure_blocks": further.exposure.blocks,
-            "light": light_entry(pictures, decided), "occluded_px": int(further.hidden.sum()),
+            "light": exposure_entry(pictures, decided), "occluded_px": int(further.hidden.sum()),
             "hole_px": holes, "inpainted_px": inpainted, "holes": closed_holes(shows, small=False)[1],
         },
         "measured": measured,
     }  # fmt: skip
     warnings = doubt.warnings(alignment.cameras, edge) + _warnings(alignment, measured["folds"])
-    warnings += light_warnings(pictures, [one.exposure for one in decided])
+    warnings += exposure_warnings(pictures, [one.exposure for one in decided])
     if options.projection == "auto" and canvas.projection is None:
         warnings.append(
             f"the field {field.name!r} knows the reference's plane only: the panorama is drawn on it, as by "

@@ -102,7 +102,7 @@ def test_an_average_hides_nothing() -> None:
     first, second, warp = pictures()
     out, _, found = compose(first, second, warp, blend="linear")
     both = (first.alpha > 0) & (second.alpha > 0)
-    exposed = found.exposure.applied(second)
+    exposed = found.exposure.applied(second, warp.maps[1])
     assert np.allclose(out.pixels[both], (first.pixels[both] + exposed.pixels[both]) / 2, atol=1e-6)
     assert found.chosen is None
 
@@ -113,7 +113,7 @@ def test_exposure_is_evened_out_unless_it_is_to_stay() -> None:
     assert np.allclose(found.exposure.gain, 1.4, rtol=0.01)
     alone = (second.alpha > 0) & (first.alpha == 0) & (out.alpha > 0)
     assert np.allclose(out.pixels[alone], 1.4 * second.pixels[alone], rtol=0.05)
-    _, kept, found = compose(first, second, warp, exposure=False)
+    _, kept, found = compose(first, second, warp, exposure="none")
     assert np.array_equal(kept.pixels, second.pixels) and kept.alpha is second.alpha and found.exposure.blocks == 0
 
 
@@ -217,7 +217,7 @@ def wall() -> np.ndarray:
 @pytest.mark.parametrize("options", [{}, {"blend": "feather"}, {"seam": "none"}])
 def test_three_pictures_side_by_side_show_all_that_any_of_them_shows(options: dict) -> None:
     tones = np.float32([0.2, 0.35, 0.5])
-    made = three(tones[:, None, None, None] * np.ones((3, HEIGHT, WIDTH, 3)), exposure=False, **options)
+    made = three(tones[:, None, None, None] * np.ones((3, HEIGHT, WIDTH, 3)), exposure="none", **options)
     shown = np.stack([shown_in(columns) for columns in SIDE_BY_SIDE])
     assert np.array_equal(made.panorama.alpha > 0, shown.any(axis=0)) and len(made.decided) == len(made.exposed) == 3
     labels = made.labels
@@ -248,7 +248,7 @@ def test_the_third_pictures_exposure_follows_through_the_second() -> None:
 def test_an_average_of_three_counts_each_alike() -> None:
     lights = np.random.default_rng(2).random((3, HEIGHT, WIDTH, 3)).astype(np.float32)
     columns = (slice(0, 300), slice(60, 360), slice(120, WIDTH))
-    made = three(lights, columns, blend="linear", exposure=False)
+    made = three(lights, columns, blend="linear", exposure="none")
     shown = np.stack([shown_in(one) for one in columns])
     count = shown.sum(axis=0)
     assert made.labels is None and (count == 3).sum() > 10_000
@@ -260,7 +260,7 @@ def test_an_average_of_three_counts_each_alike() -> None:
 def test_pictures_that_do_not_meet_are_shown_side_by_side(options: dict) -> None:
     first, second, warp = pictures()
     first.alpha[:, 180:] = second.alpha[:, :200] = 0
-    out, _, found = compose(first, second, warp, exposure=False, **options)
+    out, _, found = compose(first, second, warp, exposure="none", **options)
     shown = second.alpha > 0
     shown &= ~found.hidden
     assert np.array_equal(found.chosen, shown) and shown.sum() > 5000

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..compose.composition import Decided
-from ..compose.exposure import Exposure
 from ..compose.options import EXPOSURE
-from ..pictures.picture import Picture
 from ..raster.arrays import in_any_channel
 from .options import WARNING
 
+if TYPE_CHECKING:
+    from ..compose.composition import Decided
+    from ..compose.exposure import Exposure
+    from ..pictures.picture import Picture
 
-def light_entry(pictures: Sequence[Picture], decided: Sequence[Decided]) -> dict[str, Any]:
+
+def exposure_entry(pictures: Sequence[Picture], decided: Sequence[Decided]) -> dict[str, Any]:
     """What was fitted and applied: lists hold one entry for each picture, the reference first."""
     exposures = [one.exposure for one in decided]
     curves = [one.curve for one in exposures]
@@ -30,7 +32,7 @@ def light_entry(pictures: Sequence[Picture], decided: Sequence[Decided]) -> dict
     }
 
 
-def light_warnings(pictures: Sequence[Picture], exposures: Sequence[Exposure]) -> list[str]:
+def exposure_warnings(pictures: Sequence[Picture], exposures: Sequence[Exposure]) -> list[str]:
     """What of the light could not be matched, and which picture is over-exposed beside the other."""
     out = []
     for picture, one in zip(pictures, exposures, strict=True):

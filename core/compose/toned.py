@@ -20,7 +20,6 @@ from ..raster.lazy import AnyImage, LazyImage
 from ..raster.picture_map import CanvasMap
 from .clipped import ClippedColours
 from .options import EXPOSURE, TONE
-from .tone_blocks import radius_squared
 
 Channels = NDArray[np.float32]
 
@@ -150,8 +149,7 @@ class Toned(LazyImage):
         """What the light (h, w) of rows and columns is multiplied by to undo vignetting."""
         rows, columns = part
         box = columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start
-        places = self.picture_map.within(box).arrays()
-        lost = self.vignetting.at(radius_squared(places.x, places.y, places.size))
+        lost = self.vignetting.at(self.picture_map.within(box).arrays().from_middle(np.s_[:, :]))
         given_back: Plane = np.exp(-lost).astype(np.float32, copy=False)
         return given_back
 
