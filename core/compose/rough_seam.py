@@ -52,7 +52,7 @@ class RoughSeam:
         # as if exposure were matched already
         difference[overlap.both] -= np.median(difference[overlap.both], axis=0)
         costs = seam_costs(overlap, maps[1], None, hidden, behind=warp.behind, slide=warp.slide)
-        chosen = find_seam(known_labels(before, layer), costs)
+        chosen = find_seam(known_labels(before, layer, hidden=hidden), costs)
         # also where the overlap ends: what the border of one picture cuts off does not go on in the other
         others = ((before.alpha > 0) | (layer.alpha > 0)) & ~chosen
         seam = (dilated(chosen, 1) & dilated(others, 1))[overlap.box] & overlap.both
