@@ -18,6 +18,7 @@ from .compose.rough_seam import RoughSeam
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
 from .field.refined_depth import RefinedDepth
+from .field.remembered import Remembered
 from .field.slack import SlackField
 from .field.strict import StrictField
 from .options import StitchOptions
@@ -163,7 +164,12 @@ class _Known:
 
     def on(self, projection: Projection | None, hold: bool = False) -> Warp:
         """The maps on a projection, or on the reference's plane, seen from the reference's place."""
-        return build_warp(self.field, self.views, projection, self.refined, self.continuation, hold)
+        return build_warp(self._remembered, self.views, projection, self.refined, self.continuation, hold)
+
+    @cached_property
+    def _remembered(self) -> Remembered:
+        """The field, whose nodes several maps share."""
+        return Remembered(self.field)
 
     def base(self, down: Array, px_per_radian: float, cache: Cache | None = None) -> Warp:
         """The maps on a levelled cylinder, with what a sliding viewpoint needs of them."""

@@ -45,6 +45,15 @@ def slid(pair: RenderedPair, way: str, slide: Slide, shared: Shared | None = Non
     return _stitched(pair, way, replace(PLAIN, projection="cylindrical", slide=slide), {} if shared is None else shared)
 
 
+def delivered(pair: RenderedPair, way: str, shared: Shared | None = None) -> StitchResult:
+    """The pair stitched in one of WAYS on the reference's plane, with seam, bands and exposure; shared: as for
+    `stitched`.
+
+    Raises StitchError.
+    """
+    return _stitched(pair, way, replace(ON_REFERENCE, measure=False), {} if shared is None else shared)
+
+
 def _stitched(pair: RenderedPair, way: str, options: StitchOptions, shared: Shared) -> StitchResult:
     known_of, field = way.split("/")
     K, K_prime = (pair.cameras[name].K for name in ("reference", "target"))

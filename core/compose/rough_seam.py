@@ -11,13 +11,15 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cameras.view import View
 from ..field.visibility import occluded
-from ..panorama.layers import layer_of
+from ..panorama.layers import Layer, layer_of
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture, picture_from_array
 from ..raster.arrays import dilated
+from ..raster.log_encoding import log_encode
 from ..raster.picture_map import PictureMap
 from ..raster.resizing import resized_points
 from .options import ROUGH_SEAM
@@ -56,8 +58,18 @@ class RoughSeam:
         # also where the overlap ends: what the border of one picture cuts off does not go on in the other
         others = ((before.alpha > 0) | (layer.alpha > 0)) & ~chosen
         seam = (dilated(chosen, 1) & dilated(others, 1))[overlap.box] & overlap.both
-        apart = np.abs(difference).mean(axis=2) > ROUGH_SEAM.visible_tone
+        busy = np.minimum(*(_contrast(one, overlap.box) for one in (before, layer)))
+        apart = np.abs(difference).mean(axis=2) > ROUGH_SEAM.visible_tone + ROUGH_SEAM.hidden_by_contrast * busy
         return float((seam & apart).sum()) / 2  # a pixel on either side of the seam
+
+
+def _contrast(layer: Layer, box: tuple[slice, slice]) -> NDArray[np.float32]:
+    """Standard deviation (h, w) of a layer's tones around each pixel of a box: a seam is lost in foliage and gravel."""
+    tones = log_encode(np.ascontiguousarray(layer.light[box])).mean(axis=2)
+    side = (ROUGH_SEAM.contrast_px, ROUGH_SEAM.contrast_px)
+    variance = np.maximum(cv2.blur(np.square(tones), side) - np.square(cv2.blur(tones, side)), 0)
+    deviation: NDArray[np.float32] = np.sqrt(variance)
+    return deviation
 
 
 def _small(picture: Picture, scale: float) -> Picture:

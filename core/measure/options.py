@@ -107,6 +107,9 @@ class WarningOptions:
     fold_share: float = 0.005
     """Share of what is shown of the target: more folds show as doubled or torn things."""
 
+    overexposed_share: float = 0.05
+    """Share of what both pictures show that is clipped in one alone: a sky is more, lamps and glints are less."""
+
 
 HELD_OUT = HeldOutOptions()
 QUALITY = QualityOptions()

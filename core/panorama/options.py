@@ -55,6 +55,10 @@ class LayerOptions:
     min_alpha: float = 1e-2
     """Alpha (0..1) below which a pixel counts as transparent: its colour, divided by so little, would be rounding."""
 
+    held_values: int = 16_000_000
+    """Values of light that are kept once they were fetched: 64 MB of a picture. Larger ones are fetched again where
+    they are read, which costs less than their memory."""
+
 
 @dataclass(frozen=True)
 class ProjectionOptions:
