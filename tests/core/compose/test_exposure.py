@@ -224,7 +224,7 @@ def test_an_over_exposed_picture_learns_its_clipped_colours_from_the_other() -> 
         assert shares[0] == 0 and shares[1] == pytest.approx(0.5, abs=0.03)
         assert [one.clipped is None for one in exposures] == [not swapped, swapped]
         both = shown(exposures, *pair)
-        assert np.abs(both[0] - both[1])[:116].max() < 0.03, "the sky is the same in both"
+        assert np.abs(both[0] - both[1])[:116].max() < 0.05, "the sky is the same in both"
 
 
 def test_what_cannot_be_matched_is_said() -> None:
