@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .cameras.view import View
+from .compose.cut_things import without_cut_things
 from .compose.rough_seam import RoughSeam
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
@@ -141,11 +142,15 @@ def map_pictures(
     frame = frame_for(asked, views, edges, down, coarsely)
     progress("warp", 0.5)
     if sliding is None:
-        return Mapped(known.on(frame), continuation, slide)
-    # who sets the slide by hand tries others
-    cache = Cache(options.cache if options.slide != "auto" else None)
-    base = known.base(lines.down, focal_of(views[0].K), cache)
-    return Mapped(slid_warp(base, views, sliding.viewpoint, frame), continuation, slide)
+        warp = known.on(frame)
+    else:
+        # who sets the slide by hand tries others
+        cache = Cache(options.cache if options.slide != "auto" else None)
+        base = known.base(lines.down, focal_of(views[0].K), cache)
+        warp = slid_warp(base, views, sliding.viewpoint, frame)
+    if options.fade == "continue":
+        warp = without_cut_things(warp, views, pictures)
+    return Mapped(warp, continuation, slide)
 
 
 def has_depth(field: Field, views: Sequence[View]) -> bool:

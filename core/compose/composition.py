@@ -275,7 +275,11 @@ def _hidden(before: Layer, added: _Added) -> tuple[NDArray[np.bool_], NDArray[np
     folded = folds(turns, hidden)
     # the panorama before is right where the map mirrors the picture
     mirrored = turned_over(turns) & shown
-    return hidden | mirrored, by_depth | mirrored, folded
+    hidden |= mirrored
+    by_depth |= mirrored
+    if added.warp.refilled is not None:
+        hidden, by_depth = hidden & ~added.warp.refilled, by_depth & ~added.warp.refilled
+    return hidden, by_depth, folded
 
 
 def _count(layers: Sequence[Layer]) -> NDArray[np.int16]:

@@ -272,6 +272,72 @@ class RoughSeamOptions:
 
 
 @dataclass(frozen=True)
+class CutThingsOptions:
+    """Things that a picture's border cuts (`cut_things`). Shares are of a picture's longer side."""
+
+    min_difference: float = 0.1
+    """Tones by which the pictures differ in such a thing: the one shows it, the other what is behind."""
+
+    joined: float = 0.004
+    """Share across which parts are joined: leaves of one branch."""
+
+    min_cells: int = 8
+    """Cells below which something is too small to be seen."""
+
+    near: float = 0.02
+    """Share from the border within which such a thing begins."""
+
+    deepest: float = 0.25
+    """Share of the overlap's shorter side beyond which nothing is refilled: it is no longer at the border."""
+
+    grown: float = 0.01
+    """Share by which a thing is taken to be larger than it looks."""
+
+    ring: float = 0.03
+    """Share around it in which its background is looked for."""
+
+    least_ring: int = 15
+    """Cells of background at least."""
+
+    far_percentile: float = 30.0
+    """Percentile of inverse depth around it up to which, and a cell of parallax more, something counts as background.
+    """
+
+    near_weight: float = 1e-3
+    """Weight of all else around it: it decides only where nothing counts as background."""
+
+    zone: float = 0.006
+    """Share around a refilled part in which it is judged."""
+
+    window: float = 0.025
+    """Share of the side of the window in which the worst place of a seam is looked for."""
+
+    jump_cells: float = 2.0
+    """Cells from one to the next by which a map jumps where a picture is cut within itself: twice the usual."""
+
+    much_less: float = 0.6
+    """Share of what was seen of a seam that may be left."""
+
+    least_gain: float = 1.0
+    """What is to be gained at least: a cell of seam between black and white."""
+
+    hardly_seen: float = 0.12
+    """Tones, over a window, below which the worst place is hardly seen."""
+
+    less_at_worst: float = 0.8
+    """Or the share of the worst place before."""
+
+    seam_gone: float = 0.2
+    """Share of the seam alone that may be left where much is left of a picture's own cuts,"""
+
+    somewhat_less: float = 0.9
+    """share of both together that may then be left,"""
+
+    worse_at_worst: float = 1.5
+    """and the factor by which the worst place may then be worse: such a cut is softer than a seam."""
+
+
+@dataclass(frozen=True)
 class BandOptions:
     """Blending in bands (`multiband`; Burt and Adelson, ACM TOG 1983), and feathering as widely."""
 
@@ -330,6 +396,7 @@ MOVING_THINGS = MovingThingsOptions()
 MIN_CUT = MinCutOptions()
 SEAM = SeamOptions()
 ROUGH_SEAM = RoughSeamOptions()
+CUT_THINGS = CutThingsOptions()
 BANDS = BandOptions()
 INPAINT = InpaintOptions()
 CROP = CropOptions()
