@@ -140,14 +140,17 @@ class VerdictOptions:
     mostly: float = 0.3
     """Share of a place that one of the pictures cannot see, from which depth is the cause."""
 
-    fold_share: float = 2e-4
-    """Of the longer side's square, folded: foliage in good pictures has up to 1.3e-4."""
+    fold_share: float = 1.8e-4
+    """Of the longer side's square, folded: foliage in good pictures has up to half of that."""
 
     stretch: float = 6.0
     """Times the median area of the picture that a pixel of the panorama shows: outlines without depth of their own."""
 
     stretch_share: float = 5e-5
-    """Of the longer side's square, stretched so: good pictures have up to 1e-5."""
+    """Of the longer side's square, stretched so: good pictures have up to a fifth of that."""
+
+    edge: int = 40
+    """Levels between the brightest and the darkest pixel near by, from which a fold is seen: none is on a bare wall."""
 
     white: int = 250
     """Levels from which light is clipped."""

@@ -264,10 +264,11 @@ def _seam_places(look: Look, steps: Plane, shift: tuple[int, int]) -> Iterator[P
 
 
 def _torn_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
-    """Where the map of the picture that is shown folds, or stretches it far more than elsewhere."""
+    """Where the map of the picture that is shown folds, or stretches it far more than elsewhere, and has detail that
+    shows it."""
     folds, stretched = np.zeros(look.hidden.shape, bool), np.zeros(look.hidden.shape, bool)
     for number, one in enumerate(look.maps):
-        shown = look.shows[number] if look.labels is None else look.labels == number
+        shown = (look.shows[number] if look.labels is None else look.labels == number) & _detailed(look.tones[number])
         turns = turning(one)
         folds |= turned_over(turns) & shown
         areas = np.zeros(shown.shape, np.float32)
@@ -282,6 +283,13 @@ def _torn_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
     ):
         for part in _parts(mask, share * square):
             yield Place(look.box(part, shift), what, float(part.sum()))
+
+
+def _detailed(tones: Levels) -> NDArray[np.bool_]:
+    """Where (h, w) there is an edge near by."""
+    green, window = tones[..., tones.shape[2] // 2], np.ones((7, 7), np.uint8)
+    detailed: NDArray[np.bool_] = cv2.subtract(cv2.dilate(green, window), cv2.erode(green, window)) >= VERDICT.edge
+    return detailed
 
 
 def _light_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:

@@ -20,7 +20,7 @@ PATCH = np.s_[100:140, 180:220]
 def look(step: int = 1) -> Look:
     """Two pictures of 400 × 300 px that agree, both shown everywhere, with a seam down the middle."""
     texture = np.random.default_rng(0).integers(60, 200, (300, 400, 3)).astype(np.uint8)
-    tones = cv2.GaussianBlur(texture, (0, 0), 2)
+    tones = cv2.GaussianBlur(texture, (0, 0), 1)
     x, y = (values.astype(np.float32) for values in np.meshgrid(np.arange(400), np.arange(300)))
     one, everywhere = PictureMap(x, y, (400, 300)), np.ones((300, 400), bool)
     labels = np.where(x < 200, 0, 1).astype(np.int16)
@@ -80,12 +80,15 @@ def test_a_map_that_folds_or_tears_is_a_place() -> None:
     for what, change in (("folds over", lambda x: 2 * 320 - x), ("torn", lambda x: 320 + 9 * (x - 320))):
         x = good.maps[1].x.copy()
         x[50:70, 310:330] = change(x[50:70, 310:330])
-        found = judged(replace(good, maps=(good.maps[0], replace(good.maps[1], x=x))))
+        found_in = replace(good, maps=(good.maps[0], replace(good.maps[1], x=x)))
+        found = judged(found_in)
         assert found.rating == "look" and [what in place.what for place in found.places].count(True) == 1
         left, top, width, height = next(place.box for place in found.places if what in place.what)
         assert 305 <= left and left + width <= 335 and 45 <= top and top + height <= 75
         elsewhere = replace(good, maps=(replace(good.maps[0], x=x), good.maps[1]))
         assert judged(elsewhere).rating == "good", "the reference is not shown there"
+        bare = np.full_like(good.tones[1], 128)
+        assert judged(replace(found_in, tones=(bare, bare))).rating == "good", "nothing on a bare wall shows it"
 
 
 def test_light_that_is_lost_is_a_place() -> None:
