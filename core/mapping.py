@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .cameras.view import View
+from .compose.cut_things import without_cut_things
 from .compose.rough_seam import RoughSeam
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
 from .field.refined_depth import RefinedDepth
+from .field.remembered import Remembered
 from .field.slack import SlackField
 from .field.strict import StrictField
 from .options import StitchOptions
@@ -140,11 +142,15 @@ def map_pictures(
     frame = frame_for(asked, views, edges, down, coarsely)
     progress("warp", 0.5)
     if sliding is None:
-        return Mapped(known.on(frame), continuation, slide)
-    # who sets the slide by hand tries others
-    cache = Cache(options.cache if options.slide != "auto" else None)
-    base = known.base(lines.down, focal_of(views[0].K), cache)
-    return Mapped(slid_warp(base, views, sliding.viewpoint, frame), continuation, slide)
+        warp = known.on(frame)
+    else:
+        # who sets the slide by hand tries others
+        cache = Cache(options.cache if options.slide != "auto" else None)
+        base = known.base(lines.down, focal_of(views[0].K), cache)
+        warp = slid_warp(base, views, sliding.viewpoint, frame)
+    if options.fade == "continue":
+        warp = without_cut_things(warp, views, pictures)
+    return Mapped(warp, continuation, slide)
 
 
 def has_depth(field: Field, views: Sequence[View]) -> bool:
@@ -163,7 +169,12 @@ class _Known:
 
     def on(self, projection: Projection | None, hold: bool = False) -> Warp:
         """The maps on a projection, or on the reference's plane, seen from the reference's place."""
-        return build_warp(self.field, self.views, projection, self.refined, self.continuation, hold)
+        return build_warp(self._remembered, self.views, projection, self.refined, self.continuation, hold)
+
+    @cached_property
+    def _remembered(self) -> Remembered:
+        """The field, whose nodes several maps share."""
+        return Remembered(self.field)
 
     def base(self, down: Array, px_per_radian: float, cache: Cache | None = None) -> Warp:
         """The maps on a levelled cylinder, with what a sliding viewpoint needs of them."""

@@ -162,6 +162,8 @@ _RECIPES = (
            View(yaw=-26.0, pitch=4.0, lens=23.0), _view(0.3, 0.1, 0.04, 34, 6, 1.5, lens=23.0), seed=4),
     Recipe("occluder", "A post in front of everything", "occluder",
            _DOWN, _view(0.3, 0.0, 0.03, 11, 10, 1.5), seed=4),
+    Recipe("thin_things", "Posts, a railing, a lamp, a sign, leaves and a cup before a far wall", "thin_things",
+           View(pitch=2.0), _view(0.25, 0.03, 0.03, 9, 3, 1.5), seed=5),
     Recipe("cut_branch", "A branch near by, cut by the reference's border, whole in the target", "cut_branch",
            _LEVEL, _view(0.4, 0.02, 0.03, 13, 2, 1.0), seed=5),
     Recipe("cut_person", "A person near by, whole in the reference, cut by the target's border", "cut_person",

@@ -21,7 +21,7 @@ WAYS = (
 # The reference's own plane and place, whole: there the truth is known pixel by pixel.
 ON_REFERENCE = StitchOptions(projection="reference", slide=0.0, fade="continue", crop="full", holes="transparent")
 # Feathered, without a seam: alignment is judged, and not what hides its errors.
-PLAIN = replace(ON_REFERENCE, exposure=False, seam="none", blend="feather", measure=False)
+PLAIN = replace(ON_REFERENCE, exposure="none", seam="none", blend="feather", measure=False)
 # How far the viewpoint slides in the stitches that show whether both pictures still meet: as is chosen, and half-way.
 SLIDES: dict[str, Slide] = {"auto": "auto", "half": 0.5}
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from .stage import Colour, Stage
+from .stage import Colour, Place, Stage
 
 BRICK: tuple[Colour, Colour] = ((0.42, 0.13, 0.08), (0.25, 0.09, 0.06))
 MORTAR: Colour = (0.45, 0.42, 0.38)
@@ -157,6 +157,44 @@ def occluder(stage: Stage) -> None:
     stage.post((0.25, 2.0, 0), (0.25, 2.0, 4.5), 0.11, stage.wood((0.08, 0.1, 0.12), (0.5, 0.52, 0.5), 9))
 
 
+def thin_things(stage: Stage) -> None:
+    """A far wall behind what is near and thin: posts, a railing, a lamp, a sign, leaves, and a cup on a table."""
+    stage.card((0, 9, 3), 40, 16, stage.bricks(BRICK, MORTAR, 0.5))
+    stage.card((0, 4, 0), 40, 14, stage.tiles((0.12, 0.11, 0.1), (0.5, 0.47, 0.42), 0.5), tilt=90)
+    for k in range(8):
+        at = -6.2 + 1.75 * k + stage.random.uniform(-0.2, 0.2), 8.95, stage.random.uniform(1.2, 3.4)
+        stage.card(at, 1.2, 1.6, stage.poster(6))
+    dark, pale = ((0.03, 0.035, 0.04), (0.07, 0.08, 0.09)), ((0.45, 0.44, 0.4), (0.62, 0.6, 0.56))
+    iron, paint = stage.stone(dark, 5), stage.stone(pale, 5)
+    for x, radius, colour in ((-2.05, 0.05, paint), (-1.65, 0.03, iron), (1.95, 0.06, iron), (2.4, 0.025, paint)):
+        stage.post((x, 4.6, 0), (x, 4.6, 3.4), radius, colour)
+    for height in (0.5, 1.05):
+        stage.post((-1.5, 4.0, height), (0.1, 4.0, height), 0.025, iron)
+    for k in range(9):
+        stage.post((-1.5 + 0.2 * k, 4.0, 0.5), (-1.5 + 0.2 * k, 4.0, 1.05), 0.014, iron, 12)
+    stage.post((0.45, 3.6, 0), (0.45, 3.6, 1.95), 0.035, iron)
+    stage.ball((0.45, 3.6, 2.05), 0.13, stage.stone(((0.6, 0.58, 0.5), (0.75, 0.72, 0.62)), 3))
+    stage.post((-0.45, 5.2, 0), (-0.45, 5.2, 2.2), 0.03, paint)
+    stage.box((-0.45, 5.15, 2.35), (0.6, 0.03, 0.5), stage.poster(4))
+    stage.box((1.0, 2.6, 0.92), (0.7, 0.5, 0.04), stage.wood(*_OAK, 8), yaw=-10)
+    stage.post((0.95, 2.5, 0.94), (0.95, 2.5, 1.06), 0.045, stage.stone(((0.7, 0.2, 0.15), (0.8, 0.3, 0.22)), 4))
+    _twig(stage, (-1.0, 3.2, 2.75), (0.2, 3.4, 2.3))
+
+
+def _twig(stage: Stage, start: Place, end: Place) -> None:
+    """A thin branch with single leaves."""
+    stage.post(start, end, 0.012, stage.wood((0.05, 0.03, 0.02), (0.3, 0.2, 0.12), 20), 10)
+    corners: list[Place] = []
+    for k in range(22):
+        share, a = (k + 0.5) / 22, stage.random.uniform(0, 2 * math.pi)
+        x, y, z = (begin + share * (stop - begin) for begin, stop in zip(start, end, strict=True))
+        along, across = (0.09 * math.cos(a), 0.09 * math.sin(a)), (-0.03 * math.sin(a), 0.03 * math.cos(a))
+        for i, j in ((0.1, 0), (1.1, -1), (2.1, 0), (1.1, 1)):
+            corners.append((x + i * along[0] + j * across[0], y + 0.02 * i, z + i * along[1] + j * across[1]))
+    leaves = [range(4 * k, 4 * k + 4) for k in range(len(corners) // 4)]
+    stage.mesh(corners, leaves, stage.stone(MOSS[1:], 9))
+
+
 def cut_branch(stage: Stage) -> None:
     two_planes(stage)
     bark = stage.wood((0.05, 0.03, 0.02), (0.3, 0.2, 0.12), 20)
@@ -188,6 +226,6 @@ def cut_person(stage: Stage) -> None:
 WORLDS: dict[str, Callable[[Stage], None]] = {
     build.__name__: build for build in (
         two_planes, layered_cards, corner_room, hdr_interior, low_texture, street, foliage, relief, tabletop,
-        single_plane, occluder, cut_branch, cut_person,
+        single_plane, occluder, thin_things, cut_branch, cut_person,
     )
 }  # fmt: skip

@@ -6,6 +6,7 @@ Ham, Sohn and Do, "Fast global image smoothing based on weighted least squares",
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -59,11 +60,13 @@ class Smoother:
     passes: tuple[tuple[_Systems, _Systems], ...]
 
     @staticmethod
-    def of(weights: tuple[NDArray[np.float32], NDArray[np.float32]], strength: float) -> Smoother:
-        """weights: see `edge_weights`; strength: λ."""
-        share = 1.5 * SMOOTHING.attenuation ** (SMOOTHING.passes - 1) / (SMOOTHING.attenuation**SMOOTHING.passes - 1)
+    def of(
+        weights: tuple[NDArray[np.float32], NDArray[np.float32]], strength: float, passes: int = SMOOTHING.passes
+    ) -> Smoother:
+        """weights: see `edge_weights`; strength: λ; passes: times that rows and columns are smoothed."""
+        share = 1.5 * SMOOTHING.attenuation ** (passes - 1) / (SMOOTHING.attenuation**passes - 1)
         across = cv2.transpose(weights[0])
-        lam = [np.float32(strength * share / SMOOTHING.attenuation**number) for number in range(SMOOTHING.passes)]
+        lam = [np.float32(strength * share / SMOOTHING.attenuation**number) for number in range(passes)]
         return Smoother(tuple((_Systems.of(each * across), _Systems.of(each * weights[1])) for each in lam))
 
     def smoothed(
@@ -73,19 +76,23 @@ class Smoother:
 
         Weighted values and confidences are smoothed alike and divided; floor: confidence of the value 0 everywhere.
         """
-        by_row = values * confidence, confidence
+        sums, total = self.averaged((values * confidence, confidence))
+        return sums / (total + np.float32(floor))
+
+    def averaged(self, planes: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
+        """Planes (H, W), all values of which count alike, smoothed at once."""
         for rows, columns in self.passes:
-            height, width = values.shape
-            transposed = np.empty((width, 2, height), np.float32)
-            for k in (0, 1):
-                transposed[:, k] = cv2.transpose(by_row[k])
+            height, width = planes[0].shape
+            transposed = np.empty((width, len(planes), height), np.float32)
+            for k, plane in enumerate(planes):
+                transposed[:, k] = cv2.transpose(plane)
             rows.solve(transposed)
-            layers = np.empty((height, 2, width), np.float32)
-            for k in (0, 1):
+            layers = np.empty((height, len(planes), width), np.float32)
+            for k in range(len(planes)):
                 layers[:, k] = cv2.transpose(transposed[:, k])
             columns.solve(layers)
-            by_row = layers[:, 0], layers[:, 1]
-        return by_row[0] / (by_row[1] + np.float32(floor))
+            planes = list(np.moveaxis(layers, 1, 0))
+        return list(planes)
 
 
 @dataclass(frozen=True)

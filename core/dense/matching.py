@@ -22,6 +22,7 @@ from ..system.threads import in_order
 from .epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
 from .epipolar_rows import EpipolarRows
 from .options import LINES, MATCHING
+from .row_gaps import hidden_gaps
 
 
 @dataclass(frozen=True)
@@ -127,8 +128,7 @@ def search(
     epipole = np.linalg.svd(sparse.two_view.F)[2][2]
     count = 16 * max(1, int(np.ceil(2 * reach / step / 16)))
     rows = EpipolarRows.over(epipole, box, step, count * step)
-    both_colour = reference.levels.shape[2] == target.levels.shape[2]
-    reference_levels, target_levels = (v.levels if both_colour else _levels(v.gray) for v in (reference, target))
+    reference_levels, target_levels = comparable_levels(reference, target)
     target_levels = cv2.multiply(target_levels, float(MATCHING.sublevels), dtype=cv2.CV_16U)
     points = rows.points(*coarse_places(rows.shape))
     target_points = sparse.target(points)
@@ -149,11 +149,20 @@ def search(
     cv2.copyTo(b, (in_target & ~in_reference).view(np.uint8), a)
     neither = ~(in_reference | in_target)
     a[neither] = b[neither] = 128
-    results = in_order(lambda match: match(a, b, count), (_matched, _matched_at_half))
-    (disparity, found), (coarse_disparity, coarse_found) = results
-    disparity = np.where(found, disparity, coarse_disparity)
+    # half the size searches twice as far, and tells whether that is worth while
+    coarse_disparity, coarse_found = _matched_at_half(a, b, 2 * count)
+    disparity, found = _matched(a, b, *_range(a, coarse_disparity, coarse_found, count))
+    filled, hidden = hidden_gaps(disparity, found, arc_lengths.nearer)
     confidence = np.where(found, np.float32(1), coarse_found * np.float32(MATCHING.coarse_confidence))
+    confidence[hidden] = MATCHING.hidden_confidence
+    disparity = np.where(found | hidden, filled, coarse_disparity)
     return _on_nodes(lines, rows, arc_lengths, disparity, confidence * in_reference, in_target)
+
+
+def comparable_levels(reference: ComparedPicture, target: ComparedPicture) -> tuple[NDArray[np.uint8], ...]:
+    """Levels of both pictures (…, C), in colour where both are."""
+    both_colour = reference.levels.shape[2] == target.levels.shape[2]
+    return tuple(view.levels if both_colour else _levels(view.gray)[..., None] for view in (reference, target))
 
 
 def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -161,9 +170,20 @@ def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDAr
 
     Each channel goes through the monotone curve that matches its histogram over the mask `both` (h, w) to the first's.
     """
-    ends = 256 * MATCHING.sublevels
     if not both.any():
         return _levels(second / np.float32(MATCHING.sublevels))
+    out = np.empty(second.shape, np.uint8)
+    for k, curve in enumerate(tone_curves(first, second, both, 256 * MATCHING.sublevels)):
+        channel = np.s_[..., k] if second.ndim == 3 else np.s_[...]
+        out[channel] = np.take(curve, second[channel], mode="clip")
+    return out
+
+
+def tone_curves(
+    first: NDArray[np.uint8], second: NDArray[Any], both: NDArray[np.bool_], levels: int
+) -> list[NDArray[np.uint8]]:
+    """For each channel of a second picture (h, w[, C]) the curve (levels,) from its levels to those of the first that
+    matches its histogram over the mask `both` (h, w) to the first's."""
     mask, share = both.view(np.uint8), np.linspace(0, 1, MATCHING.tone_quantiles + 1)
 
     def quantiles(picture: NDArray[Any], k: int, count: int) -> Array:
@@ -172,12 +192,10 @@ def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDAr
         occupied = np.flatnonzero(n)
         return np.interp(share * n.sum(), (np.cumsum(n) - n / 2)[occupied], occupied)
 
-    out = np.empty(second.shape, np.uint8)
-    for k in range(second.shape[2] if second.ndim == 3 else 1):
-        curve = _levels(np.interp(np.arange(ends), quantiles(second, k, ends), quantiles(first, k, 256)))
-        channel = np.s_[..., k] if second.ndim == 3 else np.s_[...]
-        out[channel] = np.take(curve, second[channel], mode="clip")
-    return out
+    channels = range(second.shape[2] if second.ndim == 3 else 1)
+    return [
+        _levels(np.interp(np.arange(levels), quantiles(second, k, levels), quantiles(first, k, 256))) for k in channels
+    ]
 
 
 def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
@@ -185,12 +203,26 @@ def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
     return result
 
 
+def _range(a: NDArray[np.uint8], disparity: Plane, found: NDArray[np.bool_], count: int) -> tuple[int, int]:
+    """The least disparity to be searched for and how many: `count` around 0, and as far beyond as the points of a
+    (h, w[, C]) with texture were found (h, w)."""
+    gradient = cv2.Sobel(cv2.blur(a, (3, 3)), cv2.CV_16S, 1, 0)
+    texture = np.abs(gradient).reshape(*found.shape, -1).max(axis=-1) >= MATCHING.wide_texture
+    values = disparity[found & texture]
+    share = MATCHING.wide_share
+    ends = np.percentile(values, [share, 100 - share]) if values.size else np.zeros(2)
+    margin = MATCHING.reach_margin_px * (np.abs(ends) > count / 2)
+    low, high = 16 * -(-(np.array([-1, 1]) * ends + margin) // 16)
+    low, high = (int(np.clip(end, -(-count // 32) * 16, count)) for end in (low, high))
+    return -low, low + high
+
+
 def _matched(
-    a: NDArray[np.uint8], b: NDArray[np.uint8], count: int, smoother: int = 1
+    a: NDArray[np.uint8], b: NDArray[np.uint8], least: int, count: int, smoother: int = 1
 ) -> tuple[Plane, NDArray[np.bool_]]:
-    """Disparities (h, w) between −count/2 and count/2, columns by which points of a (h, w[, C]) lie further left in b,
-    and the mask of pixels where one was found; smoother: factor of the costs of steps and jumps."""
-    least, block = -count // 2, MATCHING.block_px
+    """Disparities (h, w) between least and least + count, columns by which points of a (h, w[, C]) lie further left in
+    b, and the mask of pixels where one was found; smoother: factor of the costs of steps and jumps."""
+    block = MATCHING.block_px
     speckle = MATCHING.speckle_side**2 * a.shape[0] * a.shape[1]
     matcher = cv2.StereoSGBM_create(
         minDisparity=least, numDisparities=count, blockSize=block,
@@ -216,7 +248,8 @@ def _matched_at_half(a: NDArray[np.uint8], b: NDArray[np.uint8], count: int) -> 
     half = max(1, width // 2), max(1, height // 2)
     a_half, b_half = (cv2.resize(v, half, interpolation=cv2.INTER_AREA) for v in (a, b))
     # OpenCV wants a multiple of 16, so the range may be wider than asked for
-    half_disparity, half_found = _matched(a_half, b_half, 16 * -(-count // 32), MATCHING.coarse_smoothness)
+    half_count = 16 * -(-count // 32)
+    half_disparity, half_found = _matched(a_half, b_half, -half_count // 2, half_count, MATCHING.coarse_smoothness)
     disparity, found = (
         cv2.resize(v, (width, height), interpolation=cv2.INTER_NEAREST)
         for v in (half_disparity, half_found.astype(np.uint8))
@@ -231,6 +264,12 @@ class ArcLengths:
     from an arbitrary point of the line."""
 
     px: Plane
+
+    @property
+    def nearer(self) -> float:
+        """Sign of the change of disparity towards larger d, along which arc lengths grow."""
+        step = np.diff(self.px[:: LINES.strip_rows], axis=1)
+        return -float(np.sign(np.median(step[np.isfinite(step)])))
 
     @staticmethod
     def of(e_prime: Array, target: Array, rows: EpipolarRows) -> ArcLengths:

@@ -85,6 +85,25 @@ class MatchingOptions:
     coarse_confidence: float = 0.1
     """What is found only there counts, relative to what is found at full size."""
 
+    wide_texture: int = 16
+    """Gray levels, in a Sobel filter's units, along the row that a point has to have for what is found further away to
+    count: in a sky anything is found."""
+
+    wide_share: float = 0.05
+    """% of such points, at either end, that may lie further away than is searched at full size."""
+
+    hidden_jump_px: float = 2.0
+    """px of a jump between surfaces from which on the nearer one hides something."""
+
+    hidden_width: float = 1.3
+    """Width of a gap that it hides at most, in widths of the jump."""
+
+    hidden_rest_px: float = 3.0
+    """px of that width in addition."""
+
+    hidden_confidence: float = 0.5
+    """What is filled in there counts, relative to what is found."""
+
     speckle_side: float = 0.012
     """Side of the largest patch that is taken for an error, as a share of the side of the rows' picture."""
 
@@ -142,6 +161,63 @@ class SmoothingOptions:
 
     max_plain_odds: float = 20.0
     """Where there is no texture, neighbours are strengthened by so many times what half a texture gives: a bound."""
+
+
+@dataclass(frozen=True)
+class OutlinesOptions:
+    """Putting edges of depth where the reference has an edge (`outlines`). Gray levels are 0 to 255."""
+
+    reach: int = 6
+    """Nodes from a jump within which nodes are looked at: windows make near things wider by less."""
+
+    jump_px: float = 2.0
+    """px of the moves between a node and its neighbours from which on they jump."""
+
+    median_nodes: int = 5
+    """Nodes of the side of the median's window that takes out specks; OpenCV has 3 or 5 for floats."""
+
+    side_share: float = 0.3
+    """Share of the spread of moves around a node that belongs to the nearest of them, and to the farthest."""
+
+    unfound: float = 1e-3
+    """What a node that was not found counts among them, relative to one that was."""
+
+    max_levels: float = 24.0
+    """Gray levels of difference at and above which all count alike."""
+
+    usual_percentile: float = 80.0
+    """% of the differences at sure nodes that lie below the usual one."""
+
+    behind: float = 2.6
+    """What a node costs that lies behind something nearer, in usual differences: nearer nodes have to match so well to
+    be preferred."""
+
+    min_behind: float = 4.0
+    """The same at least, gray levels: noise."""
+
+    sure: float = 0.99
+    """How surely a node was found at least that says what is usual."""
+
+    same_px: float = 1.5
+    """px along the line by which something has to be nearer at least to hide a node."""
+
+    cell_px: float = 4.0
+    """px of the side of the cells of the target in which the nearest is looked for."""
+
+    every: int = 3
+    """One node in so many rows and columns says what is nearest and what is usual: at most a cell apart."""
+
+    row: int = 1024
+    """Nodes that are looked at in a row. No result depends on it."""
+
+    smoothness: float = 6.0
+    """λ of the edge-aware average of differences."""
+
+    least_gain: float = 0.5
+    """Gray levels by which the pictures have to be more alike for a node to change."""
+
+    least_px: float = 1.0
+    """px of change that is worth it: less is left to `polish`."""
 
 
 @dataclass(frozen=True)
@@ -328,6 +404,7 @@ REFINE = RefineOptions()
 MATCHING = MatchingOptions()
 LINES = LinesOptions()
 SMOOTHING = SmoothingOptions()
+OUTLINES = OutlinesOptions()
 UNFOLDING = UnfoldingOptions()
 POLISH = PolishOptions()
 BEYOND = BeyondOptions()

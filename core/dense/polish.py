@@ -29,15 +29,12 @@ class Polished:
     ----------
     along, across : (h, w) float32 arrays
         Moves along the epipolar lines and across them, px.
-    likeness : (h, w) float32 array
-        Correlation of the two pictures around each node, 0 where the target shows nothing.
     evidence : (h, w) float32 array
         0..1, how much texture there is to go by.
     """
 
     along: Plane
     across: Plane
-    likeness: Plane
     evidence: Plane
 
 
@@ -98,7 +95,7 @@ def polish(
             if slack:
                 weight = compared.trust(slice(None)) * compared.slope_across
                 across = across + _smooth_step(weight * compared.residual, weight * compared.slope_across)
-    return Polished(along, across, likeness(lines, reference, target, along, across), evidence)
+    return Polished(along, across, evidence)
 
 
 def likeness(

@@ -30,6 +30,7 @@ from .epipolar_lines import EpipolarLines, SparseMap
 from .matching import ComparedPicture, search, search_base
 from .moved_depth import build_refinement
 from .options import BEYOND, REFINE
+from .outlines import at_outlines
 from .polish import likeness, polish
 from .rim import Found, borne_out
 from .unfolding import unfolded
@@ -111,18 +112,19 @@ def refine(
     similar = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
     plain = _plain(lines, sparse, views[0]) * (1 - similar)
     guide = _guide(pictures[0].view, lines)
-    weights = edge_weights(guide, REFINE.edge_levels)
-    weights = strengthen(cut_edges(weights, along, found > 0, REFINE.depth_edge_px), plain, REFINE.plain_strength)
+    edges = edge_weights(guide, REFINE.edge_levels)
+    weights = strengthen(cut_edges(edges, along, found > 0, REFINE.depth_edge_px), plain, REFINE.plain_strength)
     weight = np.maximum(found * (1 - np.float32(REFINE.plain_doubt) * plain), np.float32(REFINE.field_confidence))
     along = Smoother.of(weights, REFINE.smoothness).smoothed(along, weight)
     known = np.maximum(found, np.float32(REFINE.field_confidence))
     polished = polish(lines, views[0], views[1], along, known, weights, slack)
-    confidence = np.clip(polished.likeness, 0, 1) * cv2.blur(found, (9, 9))
-    overlap = _in_both(lines, polished.along, polished.across, pictures)
+    along = at_outlines(lines, polished.along, polished.across, known, edges, views)
+    confidence = np.clip(likeness(lines, *views, along, polished.across), 0, 1) * cv2.blur(found, (9, 9))
+    overlap = _in_both(lines, along, polished.across, pictures)
     if not overlap.any():
         return Dense(None, "the overlap is too small")
     both = overlap & _in_both(lines, field_at, np.zeros_like(field_at), pictures)
-    along = borne_out(lines, Found(polished.along, polished.across, field_at, confidence), both, guide, views)
+    along = borne_out(lines, Found(along, polished.across, field_at, confidence), both, guide, views)
     overlap = _in_both(lines, along, polished.across, pictures)
     along = unfolded(lines, two_view, cameras[1].size, along, polished.across) - field_at
     refinement = build_refinement(lines, base, along, polished.across, confidence, overlap)

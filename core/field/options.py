@@ -102,6 +102,9 @@ class SplineOptions:
     kernel_values_at_once: int = 2_000_000
     """Kernel values that are held in memory at once: 16 MB in float64. Results do not depend on it."""
 
+    line_values_at_once: int = 200_000
+    """The same on a grid, in float32: few enough to stay in the processor's cache, which halves the time."""
+
 
 @dataclass(frozen=True)
 class PlaneOptions:

@@ -107,6 +107,9 @@ class WarningOptions:
     fold_share: float = 0.005
     """Share of what is shown of the target: more folds show as doubled or torn things."""
 
+    overexposed_share: float = 0.05
+    """Share of what both pictures show that is clipped in one alone: a sky is more, lamps and glints are less."""
+
 
 @dataclass(frozen=True)
 class VerdictOptions:
@@ -157,6 +160,9 @@ class VerdictOptions:
 
     greyed: int = 235
     """Levels below which a channel that was clipped is seen to be no longer white."""
+
+    restored: float = 1.02
+    """Times by which a clipped channel is brightened more than the others where what it lost was given back."""
 
     blown_share: float = 0.02
     """Of the panorama, that was not clipped and is now."""

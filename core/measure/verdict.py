@@ -149,7 +149,7 @@ def _small(
     small = small_picture(picture, 1 / max(1.0, float(np.nanmedian(apart))) if apart.size else 1.0)
     own = map_to_small(coarse, small)
     layer = layer_of(small, own)
-    tones, taken = (encode(one.pixels, 8) for one in (exposure.applied(layer), layer))
+    tones, taken = (encode(one.pixels, 8) for one in (exposure.applied(layer, own), layer))
     return own, tones, taken, layer.alpha > VERDICT.least_alpha
 
 
@@ -296,19 +296,26 @@ def _light_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
     """Where light is lost that the picture had, or clipped light got a colour."""
     for number, (tones, taken) in enumerate(zip(look.tones, look.taken, strict=True)):
         shown = look.shows[number] if look.labels is None else look.labels == number
-        blown, darker = shown.copy(), np.zeros_like(shown)
-        clipped = np.ones_like(shown)
-        for before, now in zip(cv2.split(taken), cv2.split(tones), strict=True):
-            clipped &= before >= VERDICT.white
-            blown &= now >= VERDICT.white
-            darker |= (before >= VERDICT.white) & (now < VERDICT.greyed)
-        blown &= ~clipped
+        clipped = [before >= VERDICT.white for before in cv2.split(taken)]
+        white = np.logical_and.reduce([now >= VERDICT.white for now in cv2.split(tones)])
+        blown = shown & white & ~np.logical_and.reduce(clipped)
         for mask, share, what in (
             (blown, VERDICT.blown_share, "light is blown here that the picture has"),
-            (shown & darker, VERDICT.greyed_share, "light that was too bright for the picture got a cast or a step"),
+            (shown & _greyed(tones, taken, clipped), VERDICT.greyed_share,
+             "light that was too bright for the picture got a cast or a step"),
         ):
             if mask.sum() > share * mask.size:
                 yield Place(look.box(max(_parts(mask, 1), key=np.sum), shift), what, float(mask.sum()))
+
+
+def _greyed(tones: Levels, taken: Levels, clipped: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """Where (h, w) a clipped channel is darkened with the others: there was more light in it than the picture tells."""
+    changes = [(now + np.float32(1)) / (before + np.float32(1))
+               for now, before in zip(cv2.split(tones), cv2.split(taken), strict=True)]  # fmt: skip
+    others = np.maximum.reduce([np.where(gone, np.float32(0), by) for gone, by in zip(clipped, changes, strict=True)])
+    as_others = [(by <= VERDICT.restored * others) | (others == 0) for by in changes]
+    dark = [now < VERDICT.greyed for now in cv2.split(tones)]
+    return np.logical_or.reduce([np.logical_and.reduce(one) for one in zip(clipped, dark, as_others, strict=True)])
 
 
 def _parts(mask: NDArray[np.bool_], least: float, apart: float = 2.0) -> Iterator[NDArray[np.bool_]]:

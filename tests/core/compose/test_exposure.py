@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from edf_stitch.core.compose.exposure import Exposure, match_exposure, pooled, unchanged
 from edf_stitch.core.panorama.layers import Layer
+from edf_stitch.core.raster.picture_map import PictureMap
 
 H, W = 240, 320
 GAIN = np.float32([1.35, 0.8, 1.1])
 LDR, HDR = (False, False), (True, True)
 NOTHING = np.zeros((H, W), bool)
+PLACES = PictureMap(*np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32)), (W, H))
 
 
 def scene(seed: int = 0, top: float = 0.9) -> np.ndarray:
@@ -29,7 +31,7 @@ def test_gain_of_each_channel() -> None:
     found = match_exposure(layer(light), layer(light / GAIN), NOTHING, LDR)
     assert found.gain.dtype == np.float32 and np.allclose(found.gain, GAIN, rtol=1e-4)
     assert (found.spread < 1e-3).all() and found.blocks > 500
-    assert np.allclose(found.applied(layer(light / GAIN)).pixels, light, rtol=1e-4)
+    assert np.allclose(found.applied(layer(light / GAIN), PLACES).pixels, light, rtol=1e-4)
 
 
 def test_clipped_pixels_are_left_out() -> None:
@@ -90,7 +92,7 @@ def test_gray_pictures_have_one_gain() -> None:
 
 def test_no_compensation_gives_the_very_same_layer() -> None:
     target = layer(scene())
-    assert unchanged(3).applied(target) is target
+    assert unchanged(3).applied(target, PLACES) is target
 
 
 def test_frames_of_a_clip_share_the_middle_of_their_gains() -> None:
