@@ -151,7 +151,9 @@ def search(
     a[neither] = b[neither] = 128
     # half the size searches twice as far, and tells whether that is worth while
     coarse_disparity, coarse_found = _matched_at_half(a, b, 2 * count)
-    disparity, found = _matched(a, b, *_range(a, coarse_disparity, coarse_found, count))
+    least, count = _range(a, coarse_disparity, coarse_found, count)
+    coarse_found &= (coarse_disparity >= least) & (coarse_disparity <= least + count)
+    disparity, found = _matched(a, b, least, count)
     filled, hidden = hidden_gaps(disparity, found, arc_lengths.nearer)
     confidence = np.where(found, np.float32(1), coarse_found * np.float32(MATCHING.coarse_confidence))
     confidence[hidden] = MATCHING.hidden_confidence
