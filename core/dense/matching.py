@@ -21,7 +21,8 @@ from ..raster.arrays import Array, Plane
 from ..system.threads import in_order
 from .epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
 from .epipolar_rows import EpipolarRows
-from .options import LINES, MATCHING, RIM
+from .options import LINES, MATCHING
+from .rim_options import RIM
 from .row_gaps import hidden_gaps
 
 
@@ -151,10 +152,13 @@ def search(
     a[neither] = b[neither] = 128
     # half the size searches twice as far, and tells whether that is worth while
     coarse_disparity, coarse_found = _matched_at_half(a, b, 2 * count)
-    disparity, found = _matched(a, b, *_range(a, coarse_disparity, coarse_found, count))
+    usual = count / 2
+    least, count = _range(a, coarse_disparity, coarse_found, count)
+    coarse_found &= (coarse_disparity >= least) & (coarse_disparity <= least + count)
+    disparity, found = _matched(a, b, least, count)
     doubtful = _at_rim(in_reference & in_target)
-    found &= ~(doubtful & (np.abs(disparity) > count / 2))
-    coarse_found &= ~(doubtful & (np.abs(coarse_disparity) > count / 2))
+    found &= ~(doubtful & (np.abs(disparity) > usual))
+    coarse_found &= ~(doubtful & (np.abs(coarse_disparity) > usual))
     filled, hidden = hidden_gaps(disparity, found, arc_lengths.nearer)
     confidence = np.where(found, np.float32(1), coarse_found * np.float32(MATCHING.coarse_confidence))
     confidence[hidden] = MATCHING.hidden_confidence
