@@ -34,18 +34,23 @@ class ClippedColours:
 
     def restore(self, own: NDArray[np.float32], light: NDArray[np.float32]) -> None:
         """Raise the channels of light (h, w, C) that are clipped in a picture's own light (h, w, C), in place."""
+        if own.max(initial=0) <= CLIPPED.begins:
+            return
+        owns, lights = own.reshape(-1, own.shape[2]), light.reshape(-1, own.shape[2])
         for k, factors in enumerate(self.factors):
             if factors is None:
                 continue
-            clipped = own[..., k] > CLIPPED.begins
-            if not clipped.any():
+            clipped = np.flatnonzero(owns[:, k] > CLIPPED.begins)
+            if not clipped.size:
                 continue
-            channel, colours, told = own[..., k][clipped], own[clipped], light[..., k][clipped]
-            weight = np.clip((channel - CLIPPED.begins) / np.float32(EXPOSURE.clipped_light - CLIPPED.begins), 0, 1)
+            colours, told = owns[clipped], lights[clipped, k]
+            weight = colours[:, k] - np.float32(CLIPPED.begins)
+            weight *= np.float32(1 / (EXPOSURE.clipped_light - CLIPPED.begins))
+            np.minimum(weight, 1, out=weight)
             weight *= weight * (3 - 2 * weight)
             raised = told * factors.reshape(-1)[_cells(colours, k, len(factors))]
             np.minimum(raised, np.float32(CLIPPED.most), out=raised)
-            light[..., k][clipped] = told + weight * np.maximum(raised - told, 0)
+            lights[clipped, k] = told + weight * np.maximum(raised - told, 0)
 
 
 def clipped_colours(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -189,14 +190,17 @@ def white_kept(own: NDArray[np.float32], light: NDArray[np.float32], gain: Chann
     start = near_white(gain)
     if own.max(initial=0) <= start:
         return
-    smallest = reduce(np.minimum, (own[..., k] for k in range(own.shape[2])))
-    near = smallest > start
-    if not near.any():
+    weight: Plane = reduce(cv2.min, cv2.split(own))
+    weight -= start
+    if weight.max() <= 0:
         return
-    weight = np.clip((smallest[near] - start) / np.float32(EXPOSURE.clipped_light - start), 0, 1)
+    weight *= np.float32(1 / (EXPOSURE.clipped_light - start))
+    np.clip(weight, 0, 1, out=weight)
     weight *= weight * (3 - 2 * weight)
-    lacking = np.maximum(own[near] - light[near], 0)
-    light[near] += lacking * weight[:, None]
+    lacking = own - light
+    np.maximum(lacking, 0, out=lacking)
+    lacking *= for_each_channel(weight, own.shape[2])
+    light += lacking
 
 
 def near_white(gain: Channels) -> np.float32:
