@@ -121,9 +121,6 @@ class ClippedOptions:
     begins: float = 0.88
     """Light from which a channel may be clipped in parts, as where a picture was made smaller: level 241."""
 
-    most: float = 0.947
-    """Light that a channel is raised to at most, that of `ToneOptions.below_white`: another may be unclipped."""
-
     cells: int = 16
     """Cells of a side of the table."""
 
@@ -133,11 +130,15 @@ class ClippedOptions:
     min_pixels: int = 50
     """Clipped pixels of a channel in these bands, below which nothing is learnt."""
 
-    band_rows: int = 8
-    """Rows that are looked at together."""
+    cell_px: int = 64
+    """px of a side of the cells of the canvas in which white is learnt."""
 
-    bands_apart: int = 64
-    """Rows from one such band to the next: all of them take eight times as long and tell the same."""
+    band_rows: int = 8
+    """Rows of each cell that are looked at: all of them take eight times as long and tell the same."""
+
+    min_unclipped_share: float = 0.5
+    """Share of what is clipped in all channels that the other picture has unclipped, above which it takes that light.
+    """
 
     least_light: float = 1e-3
     """Light that counts as black where logarithms are taken."""
