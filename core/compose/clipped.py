@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from ..raster.arrays import Array, Part, Plane, bounds
 from ..raster.lazy import AnyImage
 from ..raster.pull_push import filled
-from .options import CLIPPED, EXPOSURE, TONE
+from .options import EXPOSURE
+from .tone_options import CLIPPED, TONE
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,10 @@ from ..panorama.layers import Layer
 from ..raster.arrays import Array
 from ..raster.picture_map import CanvasMap
 from .clipped import ClippedLight, clipped_light
-from .options import CLIPPED, EXPOSURE, OVERLAP, TONE
+from .options import EXPOSURE, OVERLAP
 from .tone_blocks import block_weights, bright_blocks, log_ratios, shared_blocks, weighted_median
 from .tone_fit import fit_tone
+from .tone_options import CLIPPED, TONE
 from .toned import NO_VIGNETTING, Exposed, ToneCurve, Toned, Vignetting
 
 _TOO_LITTLE = "too little of what both pictures show is neither clipped nor dark"

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
-from .options import EXPOSURE, TONE
+from .options import EXPOSURE
 from .tone_blocks import Blocks, block_weights, weighted_median
+from .tone_options import TONE
 from .toned import NO_VIGNETTING, ToneCurve, Vignetting
 
 

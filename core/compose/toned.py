@@ -20,7 +20,8 @@ from ..raster.arrays import Part, Plane, for_each_channel, within
 from ..raster.lazy import AnyImage, LazyImage
 from ..raster.picture_map import CanvasMap
 from .clipped import ClippedLight
-from .options import EXPOSURE, TONE
+from .options import EXPOSURE
+from .tone_options import TONE
 
 Channels = NDArray[np.float32]
 

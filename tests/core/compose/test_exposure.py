@@ -16,7 +16,7 @@ from edf_stitch.core.compose.exposure import (
     pooled,
     unchanged,
 )
-from edf_stitch.core.compose.options import TONE
+from edf_stitch.core.compose.tone_options import TONE
 from edf_stitch.core.compose.toned import ToneCurve, Vignetting
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.picture_map import PictureMap
