@@ -134,6 +134,9 @@ class VerdictOptions:
     seam_share: float = 0.0045
     """Of the longer side: length of a part of the seam that is seen. Good pictures have up to 0.003."""
 
+    seam_px: float = 2.5
+    """px of the copy, the least length of such a part: what is smaller is noise of the resampling."""
+
     together_share: float = 0.008
     """Of the longer side: what is less than twice that apart is one place."""
 

@@ -248,7 +248,8 @@ def _along_seam(look: Look, unlike: Plane) -> Plane:
 def _seam_places(look: Look, steps: Plane, shift: tuple[int, int]) -> Iterator[Place]:
     """Where a seam is seen."""
     apart = VERDICT.together_share * look.side
-    for part in _parts(steps > VERDICT.step, 2 * VERDICT.seam_share * look.side, apart):
+    least = 2 * max(VERDICT.seam_px, VERDICT.seam_share * look.side)
+    for part in _parts(steps > VERDICT.step, least, apart):
         near = dilated(part, max(1, round(VERDICT.rim_share * look.side)))
         cut_by = [
             role(number) for number, (shown, other) in enumerate((look.shows, look.shows[::-1]))
