@@ -323,7 +323,7 @@ def compose(
     labels = None if labels is None else cut(labels, box, -1)
     look = look_at(pictures, warp.maps, [one.exposure for one in made.decided], occluded, labels)
     x, y = np.subtract(warp.canvas.offset, canvas.offset).tolist()
-    report["verdict"] = judge(look, (x, y), report["measured"]).entry
+    report["verdict"] = judge(look, (x, y), report).entry
     progress("write", 0.5)
     return StitchResult(
         panorama=panorama, canvas=canvas, pictures=pictures, layers=tuple(layer.within(box) for layer in layers),

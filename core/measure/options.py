@@ -167,6 +167,12 @@ class VerdictOptions:
     restored: float = 1.02
     """Times by which a clipped channel is brightened more than the others where what it lost was given back."""
 
+    cast: float = 12.0
+    """Levels by which darkened light may differ from what the other picture shows in its place."""
+
+    compared_px: int = 20
+    """px of the copy that suffice to compare them."""
+
     blown_share: float = 0.02
     """Of the panorama, that was not clipped and is now."""
 
