@@ -124,9 +124,8 @@ def map_pictures(
         )  # fmt: skip
     known = _Known(field, views, refined, continuation)
     if options.surface[0] == "reference":
-        return Mapped(
-            known.on(None), continuation, SlideChoice(0.0, (), "the reference's own plane has one viewpoint")
-        )
+        still = SlideChoice(0.0, (), "the reference's own plane has one viewpoint")
+        return Mapped(_settled(known.on(None), known, pictures), continuation, still)
     progress("warp", 0.2)
     slide, sliding = _slide(known, pictures, lines, options, lambda share: progress("warp", 0.2 + 0.2 * share))
 
@@ -148,9 +147,12 @@ def map_pictures(
         cache = Cache(options.cache if options.slide != "auto" else None)
         base = known.base(lines.down, focal_of(views[0].K), cache)
         warp = slid_warp(base, views, sliding.viewpoint, frame)
-    if options.fade == "continue":
-        warp = without_cut_things(warp, views, pictures)
-    return Mapped(warp, continuation, slide)
+    return Mapped(_settled(warp, known, pictures), continuation, slide)
+
+
+def _settled(warp: Warp, known: _Known, pictures: Sequence[Picture]) -> Warp:
+    """The warp without what a border cuts, if depth goes on beyond the border as well."""
+    return warp if known.continuation is None else without_cut_things(warp, known.views, pictures)
 
 
 def has_depth(field: Field, views: Sequence[View]) -> bool:

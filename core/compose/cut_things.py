@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..cameras.view import View
 from ..panorama.other_depth import every_nth, seen_at, with_depth
+from ..panorama.projection import focal_of
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture
 from ..raster.arrays import Part, Plane, dilated, with_margin
@@ -60,7 +61,7 @@ def without_cut_things(warp: Warp, views: Sequence[View], pictures: Sequence[Pic
     Parameters
     ----------
     warp : Warp
-        Of two pictures. On the reference's own plane it stays as it is.
+        Of two pictures.
     views : sequence of View
         What is known of the pictures, the reference first.
     pictures : sequence of Picture
@@ -69,12 +70,13 @@ def without_cut_things(warp: Warp, views: Sequence[View], pictures: Sequence[Pic
     -------
     Warp
     """
-    projection = warp.canvas.projection
-    if projection is None or not np.isfinite(views[1].t).all() or not views[1].t.any():
+    if not np.isfinite(views[1].t).all() or not views[1].t.any():
         return warp
     longer = max(max(view.size) for view in views)
     step = 1 << max(0, round(math.log2(longer / SEAM.found_px)))
-    coarse, rough = every_nth(warp, step), RoughSeam.of(pictures, views, projection.focal / step)
+    projection = warp.canvas.projection
+    focal = focal_of(views[0].K) if projection is None else projection.focal
+    coarse, rough = every_nth(warp, step), RoughSeam.of(pictures, views, focal / step)
     if not np.isfinite(coarse.inverse_depth).all():
         return warp
     look = rough.look(coarse)

@@ -13,23 +13,19 @@ from ..cameras.view import View
 from ..field.transfer import transfer
 from ..raster.arrays import Array, Plane, bounds
 from ..raster.lazy import AnyImage, Placed, whole
-from ..raster.picture_map import PictureMap
+from ..raster.picture_map import CanvasMap, PictureMap
 from .canvas import Canvas
 from .depth import Confidence
 from .warp import Warp
 
 
 def every_nth(warp: Warp, step: int) -> Warp:
-    """A warp of every `step`-th column and row of its canvas, which has a projection; its maps are arrays."""
-    canvas, projection = warp.canvas, warp.canvas.projection
-    if projection is None:
-        raise ValueError("only a panorama with a projection can be looked at more coarsely")
+    """A warp of every `step`-th column and row of its canvas; all it has are arrays."""
     first = step // 2
     here = (slice(first, None, step), slice(first, None, step))
-    xs, ys = canvas.xs[here[1]], canvas.ys[here[0]]
-    centre = (projection.centre[0] - float(xs[0])) / step, (projection.centre[1] - float(ys[0])) / step
-    coarser = replace(projection, focal=projection.focal / step, centre=centre, window=None)
-    coarse = Canvas(len(xs), len(ys), (0, 0), projection=coarser)
+    height, width = (len(range(first, side, step)) for side in (warp.canvas.height, warp.canvas.width))
+    offset = (warp.canvas.offset[0] - first, warp.canvas.offset[1] - first)
+    coarse = replace(warp.canvas, width=width, height=height, offset=offset, step=step)
     maps = [one.arrays() for one in warp.maps]
     return replace(
         warp, canvas=coarse,
@@ -56,7 +52,6 @@ def with_depth(warp: Warp, views: Sequence[View], depth: Plane, where: NDArray[n
     Parameters
     ----------
     warp : Warp
-        On a canvas with a projection.
     views : sequence of View
         What is known of the pictures, the reference first.
     depth : (H, W) float32 array
@@ -72,8 +67,12 @@ def with_depth(warp: Warp, views: Sequence[View], depth: Plane, where: NDArray[n
     box = bounds(where)
     if box is None:
         return warp
-    here, maps = where[box], []
+    here = where[box]
+    maps: list[CanvasMap] = []
     for number, one in enumerate(warp.maps):
+        if number == 0 and warp.slide is None:  # seen from its own place the reference only turns
+            maps.append(one)
+            continue
         old, new = (seen_at(warp, views, number, box, d[box]) for d in (warp.inverse_depth, depth))
         values = one.arrays()
         x, y = values.x.copy(), values.y.copy()
@@ -92,7 +91,9 @@ def seen_at(
     """Raw px x, y (h, w) of a picture that rows and columns of the canvas show at inverse depth (h, w)."""
     view, reference = views[number], views[0]
     d = depth.astype(np.float64)
-    seen = warp.canvas.project_rows(view.H_inf, warp.canvas.xs[box[1]], warp.canvas.ys[box[0]])
+    seen = warp.canvas.project_rows(
+        view.H_inf, warp.canvas.xs[box[1]], warp.canvas.ys[box[0]], reference.camera
+    )
     if warp.slide is not None and warp.viewpoint is not None:
         moved = d * np.asarray(warp.slide[box], np.float64)
         seen = [part + moved * k for part, k in zip(seen, view.H_inf @ reference.K @ warp.viewpoint.c, strict=True)]
