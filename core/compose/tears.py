@@ -59,7 +59,8 @@ def _torn_downwards(tones: Plane, busy: Plane, x: Plane, y: Plane, shown: NDArra
         return fetched
 
     before, after = (at_jumps(tones, places[:, one]) for one in (np.s_[1:-2], np.s_[2:-1]))
-    apart = np.minimum(np.abs(at_jumps(tones, ahead) - after), np.abs(at_jumps(tones, back) - before))
+    ends = ((before, after), (at_jumps(tones, ahead), after), (before, at_jumps(tones, back)))
+    apart = np.minimum.reduce([np.abs(one - other) for one, other in ends])
     # foliage is torn unseen; beside the jump, since an edge there is no foliage
     aside = TEARS.aside_px
     busy = np.minimum(
