@@ -26,6 +26,7 @@ from .compose.crop import crop_box
 from .field.field import Field
 from .measure.metrics import appearance
 from .measure.report import make_report
+from .measure.verdict import judge, look_at
 from .options import StitchOptions
 from .panorama.canvas import Canvas
 from .panorama.layers import Layer, layer_of
@@ -310,11 +311,15 @@ def compose(
     )  # fmt: skip
     warnings = (*(line for picture in pictures for line in _named(picture)), *alignment.warnings, *more)
     report["warnings"] = list(warnings)
+    warp, occluded = whole.within(box), tuple(cut(one.hidden, box) for one in made.decided)
+    labels = None if labels is None else cut(labels, box, -1)
+    look = look_at(pictures, warp.maps, [one.exposure for one in made.decided], occluded, labels)
+    x, y = np.subtract(warp.canvas.offset, canvas.offset).tolist()
+    report["verdict"] = judge(look, (x, y), report["measured"]).entry
     progress("write", 0.5)
     return StitchResult(
         panorama=panorama, canvas=canvas, pictures=pictures, layers=tuple(layer.within(box) for layer in layers),
-        warp=whole.within(box), occluded=tuple(cut(one.hidden, box) for one in made.decided),
-        labels=None if labels is None else cut(labels, box, -1), inpainted=cut(made.filled, box),
+        warp=warp, occluded=occluded, labels=labels, inpainted=cut(made.filled, box),
         decided=made.decided, edges=alignment.edges, views=alignment.views, field=alignment.field,
         cameras=alignment.cameras, warnings=warnings, report=report, seconds=progress.seconds,
         full_sizes=frame.full_sizes,

@@ -46,12 +46,13 @@ def things_half(result: StitchResult, pair: RenderedPair, truth: Truth) -> float
     Which picture a pixel comes from, and where it is fetched there, tell whether it shows a thing.
     """
     here, there = common_part(result, truth)
+    labels = np.zeros(result.alpha.shape, np.int16) if result.labels is None else result.labels
     shown: NDArray[np.uint8] = np.zeros(truth.in_target.shape, np.uint8)
     within = shown[there]
     for number, name in enumerate(("reference", "target")):
         picture_map = result.warp.maps[number].arrays()
         seen = fetch(pair.things[name][..., None], picture_map.x[here], picture_map.y[here], cv2.INTER_NEAREST)[..., 0]
-        comes_from = (result.labels[here] == number) & (result.alpha[here] > 0.5)
+        comes_from = (labels[here] == number) & (result.alpha[here] > 0.5)
         within[comes_from] = seen[comes_from]
     seen_at_all = np.where(truth.in_target | truth.in_reference, pair.things["wide"], 0)
     return max(_half(shown == number, seen_at_all == number) for number in np.unique(seen_at_all[seen_at_all > 0]))

@@ -39,7 +39,7 @@ class RoughSeam:
     def of(pictures: Sequence[Picture], views: Sequence[View], px_per_radian: float) -> RoughSeam:
         """With pictures that have so many px per radian in their middle."""
         scales = [px_per_radian / np.sqrt(view.K[0, 0] * view.K[1, 1]) for view in views]
-        small = [_small(picture, min(1.0, float(scale))) for picture, scale in zip(pictures, scales, strict=True)]
+        small = [small_picture(picture, float(scale)) for picture, scale in zip(pictures, scales, strict=True)]
         return RoughSeam(tuple(small), tuple(views))
 
     def __call__(self, warp: Warp) -> float:
@@ -58,7 +58,7 @@ class RoughSeam:
     def look(self, warp: Warp, forced: bool = False) -> Look:
         """Both small pictures on the canvas of a warp, and the seam between them; forced: whether what the added one
         cannot see comes from the other at any price."""
-        maps = [_resized(one.arrays(), picture) for one, picture in zip(warp.maps, self.pictures, strict=True)]
+        maps = [map_to_small(one.arrays(), picture) for one, picture in zip(warp.maps, self.pictures, strict=True)]
         before, layer = (layer_of(picture, one) for picture, one in zip(self.pictures, maps, strict=True))
         hidden = occluded(maps[1], warp.nearness(self.views, 1))
         if warp.lazy_confidence is not None:
@@ -101,8 +101,9 @@ def _contrast(layer: Layer, box: tuple[slice, slice]) -> NDArray[np.float32]:
     return deviation
 
 
-def _small(picture: Picture, scale: float) -> Picture:
-    """A picture as it is looked at, shrunk: its light itself would take long to decode."""
+def small_picture(picture: Picture, scale: float) -> Picture:
+    """A picture as it is looked at, shrunk where the scale is below 1: its light itself would take long to decode."""
+    scale = min(1.0, scale)
     height, width = picture.view.shape[:2]
     size = max(1, round(width * scale)), max(1, round(height * scale))
     small = picture_from_array(cv2.resize(picture.view, size, interpolation=cv2.INTER_AREA))
@@ -111,7 +112,7 @@ def _small(picture: Picture, scale: float) -> Picture:
     return replace(small, alpha=cv2.resize(picture.alpha, size, interpolation=cv2.INTER_AREA))
 
 
-def _resized(picture_map: PictureMap, small: Picture) -> PictureMap:
+def map_to_small(picture_map: PictureMap, small: Picture) -> PictureMap:
     """A map to a picture as one to its small copy."""
     height, width = small.view.shape[:2]
     x, y = (

@@ -209,8 +209,9 @@ def _range(a: NDArray[np.uint8], disparity: Plane, found: NDArray[np.bool_], cou
     gradient = cv2.Sobel(cv2.blur(a, (3, 3)), cv2.CV_16S, 1, 0)
     texture = np.abs(gradient).reshape(*found.shape, -1).max(axis=-1) >= MATCHING.wide_texture
     values = disparity[found & texture]
-    share = MATCHING.wide_share
-    ends = np.percentile(values, [share, 100 - share]) if values.size else np.zeros(2)
+    share, ends = MATCHING.wide_share, np.zeros(2)
+    if (np.abs(values) > count / 2).mean() < MATCHING.max_wide_share if values.size else False:
+        ends = np.percentile(values, [share, 100 - share])
     margin = MATCHING.reach_margin_px * (np.abs(ends) > count / 2)
     low, high = 16 * -(-(np.array([-1, 1]) * ends + margin) // 16)
     low, high = (int(np.clip(end, -(-count // 32) * 16, count)) for end in (low, high))

@@ -89,8 +89,11 @@ class MatchingOptions:
     """Gray levels, in a Sobel filter's units, along the row that a point has to have for what is found further away to
     count: in a sky anything is found."""
 
-    wide_share: float = 0.05
+    wide_share: float = 0.2
     """% of such points, at either end, that may lie further away than is searched at full size."""
+
+    max_wide_share: float = 0.05
+    """Share of them, 0 to 1, from which on the geometry is doubted rather than the range."""
 
     hidden_jump_px: float = 2.0
     """px of a jump between surfaces from which on the nearer one hides something."""

@@ -107,6 +107,14 @@ class SplineOptions:
 
 
 @dataclass(frozen=True)
+class RefinedOptions:
+    """Sampling what dense refinement found (`refined_depth`)."""
+
+    together_nodes: int = 4_000_000
+    """Nodes of which a copy is kept with all values side by side: 64 MB. Of more, each value is sampled by itself."""
+
+
+@dataclass(frozen=True)
 class PlaneOptions:
     """The plane that a field continues as outside the overlap (`plane`)."""
 
@@ -190,6 +198,7 @@ def decades(low: float, high: float) -> Array:
 STRICT = StrictOptions()
 SLACK = SlackOptions()
 SPLINE = SplineOptions()
+REFINED = RefinedOptions()
 PLANE = PlaneOptions()
 FADE = FadeOptions()
 VISIBILITY = VisibilityOptions()
