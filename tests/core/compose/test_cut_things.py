@@ -162,3 +162,11 @@ def test_without_a_baseline_there_is_nothing_to_do() -> None:
     warp, (first, second) = world.warp(), world.views
     still = (first, replace(second, t=np.zeros(3), e_prime=np.zeros(3)))
     assert without_cut_things(warp, still, world.pictures) is warp
+
+
+def test_what_was_refilled_is_free_to_the_seam() -> None:
+    world = World(0)
+    warp = world.warp()
+    everywhere = np.ones(warp.inverse_depth.shape, bool)
+    assert world.composed(warp).decided[1].hidden.any()
+    assert not world.composed(replace(warp, refilled=everywhere)).decided[1].hidden.any()
