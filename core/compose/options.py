@@ -173,6 +173,9 @@ class TearOptions:
     contrast_px: int = 7
     """px, side of the square in which contrast is looked at."""
 
+    least_px: int = 4
+    """px that a tear has at least: fewer are rounding of a coarse map."""
+
     aside_px: float = 4.0
     """px from a jump, on either side, at which it is."""
 

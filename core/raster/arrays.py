@@ -124,12 +124,12 @@ def without_specks(hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return opened > 0
 
 
-def larger_parts(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The connected parts of a mask (H, W) that have at least as many px as the smallest part that is no speck: strips
-    too, however narrow."""
+def larger_parts(mask: NDArray[np.bool_], least: int = MASKS.speck_side**2) -> NDArray[np.bool_]:
+    """The connected parts of a mask (H, W) that have at least so many px, by default as many as the smallest part that
+    is no speck: strips too, however narrow."""
     marked = np.ascontiguousarray(mask).view(np.uint8)
     _, number, about, _ = cv2.connectedComponentsWithStats(marked)
-    large = about[:, cv2.CC_STAT_AREA] >= MASKS.speck_side**2
+    large = about[:, cv2.CC_STAT_AREA] >= least
     large[0] = False
     parts: NDArray[np.bool_] = large[number]
     return parts
