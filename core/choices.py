@@ -33,3 +33,7 @@ SEAMS = ("graphcut", "none")
 # What becomes of pixels that no camera saw: small closed holes are filled and larger ones left out, all are left out,
 # or all that something near hid are filled smoothly.
 HOLES = ("auto", "transparent", "inpaint")
+# What becomes of the pictures' light: both meet at one exposure, the target comes to the reference's, or all stays as
+# it is; or a number of stops by which all gets brighter than at the common exposure.
+EXPOSURES = ("auto", "reference", "none")
+Exposing = str | float

@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .cameras.view import View
+from .compose.cut_things import without_cut_things
 from .compose.rough_seam import RoughSeam
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
 from .field.refined_depth import RefinedDepth
+from .field.remembered import Remembered
 from .field.slack import SlackField
 from .field.strict import StrictField
 from .options import StitchOptions
@@ -122,9 +124,8 @@ def map_pictures(
         )  # fmt: skip
     known = _Known(field, views, refined, continuation)
     if options.surface[0] == "reference":
-        return Mapped(
-            known.on(None), continuation, SlideChoice(0.0, (), "the reference's own plane has one viewpoint")
-        )
+        still = SlideChoice(0.0, (), "the reference's own plane has one viewpoint")
+        return Mapped(_settled(known.on(None), known, pictures), continuation, still)
     progress("warp", 0.2)
     slide, sliding = _slide(known, pictures, lines, options, lambda share: progress("warp", 0.2 + 0.2 * share))
 
@@ -140,11 +141,18 @@ def map_pictures(
     frame = frame_for(asked, views, edges, down, coarsely)
     progress("warp", 0.5)
     if sliding is None:
-        return Mapped(known.on(frame), continuation, slide)
-    # who sets the slide by hand tries others
-    cache = Cache(options.cache if options.slide != "auto" else None)
-    base = known.base(lines.down, focal_of(views[0].K), cache)
-    return Mapped(slid_warp(base, views, sliding.viewpoint, frame), continuation, slide)
+        warp = known.on(frame)
+    else:
+        # who sets the slide by hand tries others
+        cache = Cache(options.cache if options.slide != "auto" else None)
+        base = known.base(lines.down, focal_of(views[0].K), cache)
+        warp = slid_warp(base, views, sliding.viewpoint, frame)
+    return Mapped(_settled(warp, known, pictures), continuation, slide)
+
+
+def _settled(warp: Warp, known: _Known, pictures: Sequence[Picture]) -> Warp:
+    """The warp without what a border cuts, if depth goes on beyond the border as well."""
+    return warp if known.continuation is None else without_cut_things(warp, known.views, pictures)
 
 
 def has_depth(field: Field, views: Sequence[View]) -> bool:
@@ -163,7 +171,12 @@ class _Known:
 
     def on(self, projection: Projection | None, hold: bool = False) -> Warp:
         """The maps on a projection, or on the reference's plane, seen from the reference's place."""
-        return build_warp(self.field, self.views, projection, self.refined, self.continuation, hold)
+        return build_warp(self._remembered, self.views, projection, self.refined, self.continuation, hold)
+
+    @cached_property
+    def _remembered(self) -> Remembered:
+        """The field, whose nodes several maps share."""
+        return Remembered(self.field)
 
     def base(self, down: Array, px_per_radian: float, cache: Cache | None = None) -> Warp:
         """The maps on a levelled cylinder, with what a sliding viewpoint needs of them."""
@@ -196,8 +209,13 @@ def _slide(
     viewpoint = viewpoint_between(base, views)
     if viewpoint is None:
         return NO_WAY, None
+    rough = RoughSeam.of(pictures, views, CHOICE.base_px_per_radian)
+
+    def seam(warp: Warp) -> float:
+        """px of a rough seam that is seen, without what a border cuts, as it will be (see `_settled`)."""
+        return rough(without_cut_things(warp, views, pictures, rough) if known.continuation else warp)
+
     choice = SlideChoice(float(asked), (), "as asked for") if asked != "auto" else choose_slide(
-        base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None,
-        RoughSeam.of(pictures, views, CHOICE.base_px_per_radian), progress,
-    )  # fmt: skip
+        base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None, seam, progress
+    )
     return choice, _Sliding(base, viewpoint.sliding(choice.s1)) if choice.s1 else None

@@ -14,6 +14,7 @@ from .cameras.sources import CameraRequest
 from .choices import (
     BLENDS,
     CROPS,
+    EXPOSURES,
     FADES,
     FIELDS,
     HOLES,
@@ -22,6 +23,7 @@ from .choices import (
     ROUND_FIELDS,
     SEAMS,
     Crop,
+    Exposing,
     Level,
     Slide,
 )
@@ -29,6 +31,8 @@ from .system.errors import BadRequest
 
 # Below a fiftieth of its side a photograph has too few pixels for features.
 LEAST_SCALE = 0.02
+# Beyond ten stops nothing is left of a photograph.
+MOST_STOPS = 10
 
 
 @dataclass(frozen=True)
@@ -76,8 +80,9 @@ class StitchOptions:
     mask : Path or ndarray, optional
         Painted over the panorama, whole or as it is cropped: black = from the reference, white = from the target, gray
         or transparent = the seam decides.
-    exposure : bool, default True
-        Whether the target's exposure and white balance are matched to the reference's.
+    exposure : str or float, default "auto"
+        What becomes of the pictures' light: one of EXPOSURES, or stops that are added to "auto" (docs/method.md). At
+        "auto" both meet at one exposure between theirs, and of float pictures at the reference's.
     holes : str, default "auto"
         What becomes of pixels that no camera saw, one of HOLES: "auto" fills small closed holes, "inpaint" all that
         something near hid. `linear` blending has none of the latter.
@@ -107,7 +112,7 @@ class StitchOptions:
     blend: str = "multiband"
     seam: str = "graphcut"
     mask: Path | NDArray[Any] | None = None
-    exposure: bool = True
+    exposure: Exposing = "auto"
     holes: str = "auto"
     seed: int = 0
     measure: bool = True
@@ -167,6 +172,7 @@ class StitchOptions:
                 raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")
         if not (self.slide == "auto" if isinstance(self.slide, str) else 0 <= self.slide <= 1):
             raise BadRequest(f"a slide of {self.slide}: it is a number from 0 (the reference's place) to 1, or auto")
+        self._check_exposure()
         if not LEAST_SCALE <= self.scale <= 1.0:  # NaN too
             raise BadRequest(f"a scale of {self.scale:g}: it must lie between {LEAST_SCALE:g} and 1 (the full size)")
         if not 0 <= self.seed < 2**31:
@@ -179,6 +185,16 @@ class StitchOptions:
         if not isinstance(self.crop, str) and (len(self.crop) != 4 or min(self.crop[:2]) < 0 or min(self.crop[2:]) < 1):
             raise BadRequest(
                 f"the crop {self.crop} is no box: X, Y, W, H in px are needed, X and Y from 0, W and H at least 1"
+            )
+
+    def _check_exposure(self) -> None:
+        if isinstance(self.exposure, str) and self.exposure not in EXPOSURES:
+            raise BadRequest(
+                f"exposure {self.exposure!r} is not offered; choose from: {', '.join(EXPOSURES)}, or a number of stops"
+            )
+        if not isinstance(self.exposure, str) and not abs(self.exposure) <= MOST_STOPS:  # NaN too
+            raise BadRequest(
+                f"an exposure of {self.exposure:g} stops: it must lie between -{MOST_STOPS} and {MOST_STOPS}"
             )
 
     def _check_projection(self) -> None:

@@ -1,7 +1,8 @@
 """Settings that an earlier release left in files, panoramas and presets, as they have to stand now to mean the same.
 
 Until version 2 of the settings there was one flat projection, the reference's own plane, called PERSPECTIVE; the
-viewpoint stayed where the reference was taken, everything was kept, and the field faded to a plane. Imports nothing.
+viewpoint stayed where the reference was taken, everything was kept, and the field faded to a plane. The target's
+exposure was matched to the reference's, or nothing's: `exposure` was yes or no. Imports nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ VERSION = 2
 # What was meant where nothing was said.
 THEN = {
     "projection": "REFERENCE", "fade": "PLANE", "holes": "TRANSPARENT", "crop": "FULL", "slide_auto": False,
-    "slide": 0.0, "centre": (0.0, 0.0), "fov": 0.0,
+    "slide": 0.0, "centre": (0.0, 0.0), "fov": 0.0, "light": "REFERENCE",
 }  # fmt: skip
 # A setting that only came with version 2.
 _NEW = "slide_auto"
@@ -23,10 +24,19 @@ def kept_now(kept: Mapping[str, Any]) -> dict[str, Any]:
     """Settings by name that a panorama or a preset keeps, of whatever version, as they are written now."""
     if _NEW in kept:
         return dict(kept)
-    now = {**THEN, **kept}
+    now = {**THEN, "light": _light(kept.get("exposure", True)), **kept}
     if now["projection"] == "PERSPECTIVE":
         now["projection"] = "REFERENCE"
     return now
+
+
+def asked_for_exposure(settings: Any, _context: Any = None) -> None:
+    """Somebody asks for the exposure as in earlier releases: a script, or a preset of then."""
+    settings.light = _light(settings.exposure)
+
+
+def _light(exposure: bool) -> str:
+    return "REFERENCE" if exposure else "NONE"
 
 
 def mark(settings: Any) -> None:
@@ -41,5 +51,5 @@ def bring_up_to_date(settings: Any) -> None:
     if settings.version == 0 and (settings.reference is not None or settings.target is not None):
         for name, value in THEN.items():
             if not settings.is_property_set(name):
-                setattr(settings, name, value)
+                setattr(settings, name, value if name != "light" else _light(settings.exposure))
         mark(settings)

@@ -7,7 +7,7 @@ from typing import Any
 
 # The properties that are options of the engine under the same name: one word of several, or a plain value.
 CHOICES = ("field", "fade", "seam", "blend", "holes")
-VALUES = ("dense", "exposure", "seed")
+VALUES = ("dense", "seed")
 # Projections whose frame is neither moved nor narrowed.
 WHOLE = ("REFERENCE", "EQUIRECTANGULAR")
 # Degrees below which no frame can be as narrow, and all is shown.
@@ -19,6 +19,7 @@ def options_of(settings: Any, scale: float | None = None) -> dict[str, Any]:
     scene cameras (masks, matches, CAMERAS) is added by whoever has them. scale: instead of the settings' own."""
     options: dict[str, Any] = {name: getattr(settings, name).lower() for name in CHOICES}
     options |= {name: getattr(settings, name) for name in VALUES}
+    options["exposure"] = _exposure_of(settings)
     options["scale"] = settings.scale if scale is None else scale
     options |= frame_of(settings, options["scale"])
     options["camera"] = _camera_of(settings)
@@ -48,6 +49,13 @@ def frame_of(settings: Any, scale: float = 1.0) -> dict[str, Any]:
     fov = min(360.0, math.degrees(settings.fov))
     frame["fov"] = fov if fov >= LEAST_FOV and not is_whole else None
     return frame
+
+
+def _exposure_of(settings: Any) -> str | float:
+    """The exposure by name, or the stops that are added to it."""
+    if settings.light == "AUTO" and settings.light_stops:
+        return float(settings.light_stops)
+    return str(settings.light.lower())
 
 
 def _camera_of(settings: Any) -> dict[str, Any]:

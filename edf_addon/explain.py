@@ -29,7 +29,8 @@ def facts(report: dict[str, Any]) -> list[tuple[str, str]]:
     """(what, value) of a report, in the order in which an artist asks."""
     view, matches, measured = report["two_view"], report["matches"], report["measured"]
     found, inliers = matches["found"], matches["inliers"]
-    out = [("Model", MODELS.get(view["model"], view["model"]))]
+    out = verdict_facts(report.get("verdict") or {})
+    out += [("Model", MODELS.get(view["model"], view["model"]))]
     out += [("Size", f"{report['canvas']['width']} × {report['canvas']['height']} px")]
     out += [("Matches", f"{found}"), ("Inliers", f"{inliers} ({_share(inliers, found)})")]
     out += viewpoint_facts(report.get("slide") or {})
@@ -42,6 +43,29 @@ def facts(report: dict[str, Any]) -> list[tuple[str, str]]:
         projectivity = measured.get("off_line_mean_px")
     out += [("Projectivity", _pixels(projectivity))]
     return [(what, value) for what, value in out if value]
+
+
+def verdict_facts(verdict: dict[str, Any]) -> list[tuple[str, str]]:
+    """What a report's verdict says of the panorama: what is wrong, where from its upper left corner, and what to do."""
+    if not verdict:
+        return []
+    if verdict["is"] == "good":
+        return [("Verdict", "Good")]
+    said = [] if verdict["is"] == "look" else [sentence(verdict["because"])]
+    for place in verdict["places"]:
+        left, top, width, height = place["box"]
+        said.append(f"{left}, {top} ({width} × {height} px from the upper left): {place['what']}")
+    heading = "Look at these places" if verdict["is"] == "look" else "Not usable"
+    return [("Verdict", heading), *(("", words) for words in said)]
+
+
+def verdict_in_short(report: dict[str, Any]) -> str:
+    """The same in a few words, for the line that ends a stitch; nothing of a good panorama."""
+    verdict = report.get("verdict") or {"is": "good"}
+    if verdict["is"] == "look":
+        places = len(verdict["places"])
+        return f"look at {places} place{'s' * (places > 1)} (see Result)"
+    return "" if verdict["is"] == "good" else f"not usable: {verdict['because']}"
 
 
 def focal_facts(view: dict[str, Any]) -> list[tuple[str, str]]:

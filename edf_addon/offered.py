@@ -46,6 +46,11 @@ BLENDS = (
     ("FEATHER", "Feather", "A soft change from one picture to the other, across the whole overlap"),
     ("LINEAR", "Average", "The plain average of both: doubled edges show where they do not fit"),
 )
+EXPOSURES = (
+    ("AUTO", "Automatic", "Both pictures meet at one exposure, and nothing that they show unclipped is blown", 2),
+    ("REFERENCE", "Reference", "The target's exposure and white balance are matched to the reference's", 1),
+    ("NONE", "As Taken", "The light of both pictures stays as it is", 0),
+)
 HOLES = (
     ("AUTO", "Automatic", "Small ones are filled smoothly, large ones left open", 2),
     ("TRANSPARENT", "Transparent", "Left open, to be painted or filled with another picture", 0),

@@ -172,9 +172,16 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         description="An image of the whole panorama's shape: black comes from the reference, white "
         "from the target; elsewhere the seam decides",
     )
+    light: EnumProperty(
+        name="Exposure", description="What becomes of the pictures' light", items=offered.EXPOSURES, default="AUTO",
+    )
     exposure: BoolProperty(
-        name="Match Exposure", description="Match the target's exposure and white balance to the reference's",
-        default=True,
+        name="Match Exposure", description="As earlier releases asked it: on is Reference, off is As Taken",
+        default=True, options={"HIDDEN"}, update=earlier.asked_for_exposure,
+    )
+    light_stops: FloatProperty(
+        name="Brighter", description="Stops by which the panorama is brighter than by itself; no light is blown",
+        default=0.0, min=-10.0, max=10.0, soft_min=-3.0, soft_max=3.0, precision=2,
     )
     holes: EnumProperty(
         name="Holes", description="What neither camera saw, because something near hid it from the only one that "
@@ -278,7 +285,7 @@ PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ig
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))
 # What is no setting: what is stitched, what came of it, and how it is looked at.
 NO_SETTINGS = frozenset({"name", "reference", "target", "result", "matches", "matches_reference", "matches_target",
-                         "match_index", "version", "overlay", "overlay_opacity", "show_matches",
+                         "match_index", "version", "exposure", "overlay", "overlay_opacity", "show_matches",
                          "show_epipolar"})  # fmt: skip
 
 

@@ -84,7 +84,7 @@ def figures(result: StitchResult, truth: Truth) -> dict[str, float]:
     off = np.full(1, np.nan)
     if geometry.baseline and beyond.any():
         off = distance_to_line(geometry.F.T, shown.target[beyond], shown.points[beyond])
-    here, there = _common(result, truth)
+    here, there = common_part(result, truth)
     found = result.warp.maps[1].arrays()
     apart = np.hypot(found.x[here] - truth.target[there][..., 0], found.y[here] - truth.target[there][..., 1])
     only = truth.in_target & ~truth.in_reference
@@ -126,7 +126,7 @@ def meeting(result: StitchResult, pair: RenderedPair, truth: Truth) -> dict[str,
 def on_the_wide_canvas(result: StitchResult, truth: Truth) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
     """The panorama (H, W, 3) as the true panorama lies, uint8, and where (H, W) it shows something that either camera
     really saw: what no picture shows cannot be asked for."""
-    here, there = _common(result, truth)
+    here, there = common_part(result, truth)
     picture = np.zeros(truth.picture.shape, np.uint8)
     picture[there] = encode(result.pixels[here], 8)
     shown = np.zeros(truth.in_target.shape, bool)
@@ -171,7 +171,7 @@ def composition(result: StitchResult, truth: Truth) -> dict[str, float]:
 def hidden_quality(result: StitchResult, truth: Truth) -> dict[str, float]:
     """occluded_precision and occluded_recall of what a stitch says is hidden from the target, among what the reference
     sees and what lies within the target's frame; NaN where nothing is said or nothing is hidden."""
-    here, there = _common(result, truth)
+    here, there = common_part(result, truth)
     width, height = result.cameras[1].size
     with np.errstate(invalid="ignore"):
         within = ((truth.target[there] >= 0) & (truth.target[there] <= (width - 1, height - 1))).all(axis=-1)
@@ -184,7 +184,7 @@ def hidden_quality(result: StitchResult, truth: Truth) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _common(result: StitchResult, truth: Truth) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+def common_part(result: StitchResult, truth: Truth) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
     """Rows and columns of the part that panorama and true panorama share, in either."""
     first = -np.array(result.warp.canvas.offset)
     sizes = np.array(result.alpha.shape[::-1]), np.array(truth.in_target.shape[::-1])

@@ -17,15 +17,16 @@ NOTHING = 1e9
 @dataclass(frozen=True)
 class Passes:
     """light (H, W, 3) scene-linear; depth (H, W) along the camera's axis, inf where there is nothing; position
-    (H, W, 3) in the world; all float32."""
+    (H, W, 3) in the world; all float32. things (H, W) uint8: numbers of the things that a world names, else 0."""
 
     light: NDArray[np.float32]
     depth: NDArray[np.float32]
     position: NDArray[np.float32]
+    things: NDArray[np.uint8]
 
 
 def read_passes(path: Path) -> Passes:
-    """Reads Combined, Depth and Position. Raises RenderFailed where one is missing."""
+    """Reads Combined, Depth, Position and the object index. Raises RenderFailed where one is missing."""
     import OpenEXR
 
     with OpenEXR.File(str(path), separate_channels=True) as file:
@@ -40,4 +41,9 @@ def read_passes(path: Path) -> Passes:
             raise RenderFailed(f"{path.name} has no pass {error}; it has {', '.join(sorted(found))}") from None
 
     depth = stacked("Depth", "Z")[..., 0]
-    return Passes(stacked("Combined", "RGB"), np.where(depth > NOTHING, np.inf, depth), stacked("Position", "XYZ"))
+    # as Blender 5 calls it, and as earlier ones do
+    things = stacked("Object Index" if "Object Index.X" in found else "IndexOB", "X")[..., 0]
+    return Passes(
+        stacked("Combined", "RGB"), np.where(depth > NOTHING, np.inf, depth), stacked("Position", "XYZ"),
+        np.rint(things).astype(np.uint8),
+    )  # fmt: skip

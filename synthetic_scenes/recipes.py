@@ -58,7 +58,8 @@ class Recipe:
 
     world: a function of `worlds`; model: the one that must be chosen; focal_determined: whether two pictures tell the
     focal length at all (docs/method.md, 3); hdr: float pictures instead of 8 bit; gain: what the target's exposure and
-    white balance multiply its linear R, G, B by.
+    white balance multiply its linear R, G, B by; vignetting: share of the light that both pictures lose in their
+    corners.
     """
 
     name: str
@@ -72,6 +73,7 @@ class Recipe:
     focal_determined: bool = True
     hdr: bool = False
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    vignetting: float = 0.0
 
     @property
     def parallax(self) -> bool:
@@ -162,6 +164,12 @@ _RECIPES = (
            _DOWN, _view(0.3, 0.0, 0.03, 11, 10, 1.5), seed=4),
     Recipe("thin_things", "Posts, a railing, a lamp, a sign, leaves and a cup before a far wall", "thin_things",
            View(pitch=2.0), _view(0.25, 0.03, 0.03, 9, 3, 1.5), seed=5),
+    Recipe("cut_branch", "A branch near by, cut by the reference's border, whole in the target", "cut_branch",
+           _LEVEL, _view(0.4, 0.02, 0.03, 13, 2, 1.0), seed=5),
+    Recipe("cut_person", "A person near by, whole in the reference, cut by the target's border", "cut_person",
+           View(pitch=3.0), _view(0.45, 0.02, 0.03, 14, 4, 1.0), seed=6),
+    Recipe("vignetted", "A street, dark in the corners; the target one stop over, where its sky clips", "street",
+           View(pitch=2.0), _view(0.5, 0.2, 0.05, 12, 3, 1.0), seed=7, gain=(2.0, 2.0, 2.0), vignetting=0.35),
 )  # fmt: skip
 RECIPES = {recipe.name: recipe for recipe in _RECIPES}
 

@@ -2,8 +2,8 @@
 
 The command line ends with `-- JOB.json FOLDER` (`blender_process` writes it). The job names a world, a seed, the
 samples a pixel and two cameras. Into the folder go, for the reference, the target and the wide reference camera, a
-multilayer EXR (Combined, Depth, Position) each, and cameras.json: the cameras as Blender had them, and some rays cast
-through them. What is true of the pictures is computed elsewhere, without bpy, from these files alone.
+multilayer EXR (Combined, Depth, Position, object index) each, and cameras.json: the cameras as Blender had them, and
+some rays cast through them. What is true of the pictures is computed elsewhere, without bpy, from these files alone.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def _settings(samples: int) -> None:
     scene.render.use_compositing = scene.render.use_sequencer = False
     scene.render.use_persistent_data = True
     layer = bpy.context.view_layer
-    layer.use_pass_z = layer.use_pass_position = True
+    layer.use_pass_z = layer.use_pass_position = layer.use_pass_object_index = True
     image = scene.render.image_settings
     if hasattr(image, "media_type"):
         image.media_type = "MULTI_LAYER_IMAGE"

@@ -6,7 +6,7 @@ import hashlib
 import io
 import json
 import tempfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,8 @@ class RenderedPair:
 
     reference, target: uint8 RGB, or float32 scene-linear (hdr); wide: what the reference camera would see with a larger
     sensor, float32 scene-linear, without noise; wide_camera is that camera, `corner` (x, y) the reference's pixel that
-    is its first; wide_depth, target_depth (H, W) float32, inf where there is nothing. proof: see `proof.prove`.
+    is its first; wide_depth, target_depth (H, W) float32, inf where there is nothing. proof: see `proof.prove`. things:
+    by view, where (H, W) it shows things that the world names, uint8 numbers from 1; empty where it names none.
     """
 
     reference: NDArray
@@ -51,6 +52,7 @@ class RenderedPair:
     target_depth: NDArray[np.float32]
     proof: dict[str, float]
     blender: str
+    things: dict[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     @property
     def geometry(self) -> TrueGeometry:
@@ -101,7 +103,7 @@ def _keep(rendered: Path, place: Path, recipe: Recipe, difficulty: Difficulty) -
     random = np.random.default_rng(recipe.seed)
     with OutputFiles(overwrite=True) as files:
         for name, gain in (("reference", (1.0, 1.0, 1.0)), ("target", recipe.gain)):
-            taken = expose(passes[name].light, gain, difficulty.noise, recipe.hdr, random)
+            taken = expose(passes[name].light, gain, difficulty.noise, recipe.hdr, random, recipe.vignetting)
             suffix, bits = (".exr", 32) if recipe.hdr else (".png", 8)
             data, _ = encode_picture(picture_from_array(taken).pixels, None, bits, suffix)
             files.add_to_folder(place, name + suffix, data)
@@ -109,6 +111,9 @@ def _keep(rendered: Path, place: Path, recipe: Recipe, difficulty: Difficulty) -
         files.add_to_folder(place, "wide.exr", data)
         for name in ("target", "wide"):
             files.add_to_folder(place, f"{name}_depth.npy", _npy(passes[name].depth))
+        if passes["wide"].things.any():
+            for name in VIEWS:
+                files.add_to_folder(place, f"{name}_things.npy", _npy(passes[name].things))
         files.add_to_folder(place, "cameras.json", json.dumps(entries, indent=1).encode())
 
 
@@ -126,6 +131,7 @@ def _load(place: Path, hdr: bool) -> RenderedPair:
         reference, target, load_picture(place / "wide.exr").pixels,
         {name: blenders_camera(entries[name]) for name in VIEWS}, (entries["box"][0], entries["box"][1]),
         np.load(place / "wide_depth.npy"), np.load(place / "target_depth.npy"), entries["proof"], entries["blender"],
+        {path.stem.partition("_")[0]: np.load(path) for path in sorted(place.glob("*_things.npy"))},
     )  # fmt: skip
 
 
@@ -141,13 +147,17 @@ def blenders_camera(entry: dict[str, Any]) -> SceneCamera:
 
 
 def expose(
-    light: NDArray[np.float32], gain: tuple[float, float, float], noise: float, hdr: bool, random: np.random.Generator
-) -> NDArray:
+    light: NDArray[np.float32], gain: tuple[float, float, float], noise: float, hdr: bool, random: np.random.Generator,
+    vignetting: float = 0.0,
+) -> NDArray:  # fmt: skip
     """The picture that a sensor takes: uint8 sRGB (Blender's view transform Standard), or the light itself where hdr.
 
-    noise: σ in levels of 8 bit, of hdr pictures in 255ths of white.
+    noise: σ in levels of 8 bit, of hdr pictures in 255ths of white; vignetting: share of the light that the corners
+    lose, by the square of the distance from the middle.
     """
-    taken = light * np.array(gain, np.float32)
+    y, x = (np.linspace(-1, 1, side, dtype=np.float32) for side in light.shape[:2])
+    falloff = 1 - np.float32(vignetting / 2) * (y[:, None] ** 2 + x**2)
+    taken = light * np.array(gain, np.float32) * falloff[..., None]
     grain = noise * random.standard_normal(light.shape).astype(np.float32) if noise else np.float32(0)
     if hdr:
         return np.maximum(taken + grain / np.float32(255), 0)

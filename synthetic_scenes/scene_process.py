@@ -17,11 +17,12 @@ from ..core.measure.report import plain
 from ..core.output.outputs import json_bytes
 from ..core.system.errors import StitchError
 from ..core.system.output_files import OutputFiles
+from .finished import finished
 from .measures import Truth, composition, figures, meeting, on_the_wide_canvas, truth_of, whole_picture
 from .recipes import parse_scene
 from .rendered import RenderedPair, rendered_pair
 from .scene_pictures import scene_pictures
-from .stitches import SLIDES, WAYS, Shared, slid, stitched
+from .stitches import SLIDES, WAYS, Shared, delivered, slid, stitched
 
 SCHEMA = 1
 # The stitch that the report shows, and that whose composition is judged: of the default field.
@@ -60,7 +61,8 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
         if common is not None:
             measured |= whole_picture(placed[way][0], common, truth)
         if way == COMPOSED:
-            measured |= composition(result, truth) | _slid_figures(pair, truth, shared)
+            measured |= composition(result, truth) | finished(delivered(pair, way, shared), pair, truth)
+            measured |= _slid_figures(pair, truth, shared)
         said = any("not determined" in text for text in (view.focal_source, *result.warnings))
         # in a rival's hands the model is no decision
         model = None if way.endswith(RIVALS) else view.model

@@ -86,6 +86,11 @@ class Stage:
                 corners.append((x, depth(x, z), z))
         return self.mesh(corners, _quads(rows, columns + 1, closed=False), paint, smooth=True)
 
+    def thing(self, number: int, *parts: Any) -> None:
+        """Objects that are one thing, with a number from 1, in the object pass."""
+        for part in parts:
+            part.pass_index = number
+
     def mesh(self, corners: Sequence[Place], faces: Sequence[Sequence[int]], paint: Any, smooth: bool = False) -> Any:
         """An object of corner points and faces."""
         data = bpy.data.meshes.new("part")

@@ -21,7 +21,7 @@ WAYS = (
 # The reference's own plane and place, whole: there the truth is known pixel by pixel.
 ON_REFERENCE = StitchOptions(projection="reference", slide=0.0, fade="continue", crop="full", holes="transparent")
 # Feathered, without a seam: alignment is judged, and not what hides its errors.
-PLAIN = replace(ON_REFERENCE, exposure=False, seam="none", blend="feather", measure=False)
+PLAIN = replace(ON_REFERENCE, exposure="none", seam="none", blend="feather", measure=False)
 # How far the viewpoint slides in the stitches that show whether both pictures still meet: as is chosen, and half-way.
 SLIDES: dict[str, Slide] = {"auto": "auto", "half": 0.5}
 
@@ -43,6 +43,15 @@ def slid(pair: RenderedPair, way: str, slide: Slide, shared: Shared | None = Non
     Raises StitchError.
     """
     return _stitched(pair, way, replace(PLAIN, projection="cylindrical", slide=slide), {} if shared is None else shared)
+
+
+def delivered(pair: RenderedPair, way: str, shared: Shared | None = None) -> StitchResult:
+    """The pair stitched in one of WAYS on the reference's plane, with seam, bands and exposure; shared: as for
+    `stitched`.
+
+    Raises StitchError.
+    """
+    return _stitched(pair, way, replace(ON_REFERENCE, measure=False), {} if shared is None else shared)
 
 
 def _stitched(pair: RenderedPair, way: str, options: StitchOptions, shared: Shared) -> StitchResult:

@@ -195,9 +195,37 @@ def _twig(stage: Stage, start: Place, end: Place) -> None:
     stage.mesh(corners, leaves, stage.stone(MOSS[1:], 9))
 
 
+def cut_branch(stage: Stage) -> None:
+    two_planes(stage)
+    bark = stage.wood((0.05, 0.03, 0.02), (0.3, 0.2, 0.12), 20)
+    parts = [stage.post((2.15, 2.6, 2.3), (0.8, 2.5, 1.75), 0.035, bark)]
+    for k in range(7):
+        x, z = 0.95 + 0.17 * k, 1.81 + 0.07 * k
+        side = 0.3 if k % 2 else -0.3
+        parts.append(stage.post((x, 2.55, z), (x - 0.2, 2.5, z + side), 0.014, bark, 10))
+        leaf = stage.stone(MOSS, 14)
+        for along in (0.5, 0.75, 1.0):
+            at = x - 0.2 * along, 2.53 - 0.02 * along, z + side * along
+            parts.append(stage.card(at, 0.16, 0.1, leaf, yaw=stage.random.uniform(-25, 25)))
+    stage.thing(1, *parts)
+
+
+def cut_person(stage: Stage) -> None:
+    two_planes(stage)
+    cloth, trousers = stage.poster(6), stage.stone(STONE, 9)
+    skin = stage.stone(((0.35, 0.2, 0.14), (0.6, 0.4, 0.3)), 5)
+    x, y = -0.62, 3.9
+    parts = [stage.ball((x, y, 1.62), 0.12, skin), stage.box((x, y, 1.2), (0.44, 0.24, 0.6), cloth, yaw=10)]
+    for side in (-1, 1):
+        parts.append(stage.post((x + 0.12 * side, y, 0), (x + 0.1 * side, y, 0.92), 0.085, trousers))
+        parts.append(stage.post((x + 0.34 * side, y, 0.8), (x + 0.26 * side, y, 1.46), 0.055, cloth))
+    parts.append(stage.post((x, y, 1.45), (x, y, 1.55), 0.06, skin))
+    stage.thing(1, *parts)
+
+
 WORLDS: dict[str, Callable[[Stage], None]] = {
     build.__name__: build for build in (
         two_planes, layered_cards, corner_room, hdr_interior, low_texture, street, foliage, relief, tabletop,
-        single_plane, occluder, thin_things,
+        single_plane, occluder, thin_things, cut_branch, cut_person,
     )
 }  # fmt: skip

@@ -18,8 +18,13 @@ from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.raster.picture_map import PictureMap
 
 # The reference's own plane, whole, where what holds for single pixels of the reference can be asked; in words as well.
-ON_REFERENCE = StitchOptions(projection="reference", slide=0.0, fade="plane", crop="full", holes="transparent")
-REFERENCE_WORDS = ("--projection", "reference", "--fade", "plane", "--crop", "full", "--holes", "transparent")
+ON_REFERENCE = StitchOptions(
+    projection="reference", slide=0.0, fade="plane", crop="full", holes="transparent", exposure="reference"
+)  # fmt: skip
+REFERENCE_WORDS = (
+    "--projection", "reference", "--fade", "plane", "--crop", "full", "--holes", "transparent", "--exposure",
+    "reference",
+)  # fmt: skip
 # What the small pair's fixture `known` says, in words.
 KNOWN_WORDS = ("--focal-px", "228", *REFERENCE_WORDS)
 

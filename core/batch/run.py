@@ -59,7 +59,7 @@ class Outcome:
 
     status: "done", "skipped" (it existed) or "failed" (of a clip: any frame); message, exit_code: why, empty and 0
     if nothing failed; panorama: path relative to the folder, of a clip that of its first frame; size: (W, H) px;
-    measured: the report's figures, empty without a report.
+    measured, verdict: the report's, empty without a report.
     """
 
     name: str
@@ -70,6 +70,7 @@ class Outcome:
     panorama: str = ""
     size: tuple[int, int] | None = None
     measured: dict[str, Any] = field(default_factory=dict)
+    verdict: dict[str, Any] = field(default_factory=dict)
     frames: Frames | None = None
 
     def in_words(self, figures: bool = False) -> str:
@@ -77,6 +78,9 @@ class Outcome:
         words = [self.status if self.status == "skipped" else "×".join(map(str, self.size or ())) or self.status]
         if self.frames is not None:
             words.append(f"{self.frames.done} frames done, {self.frames.skipped} skipped")
+        if self.verdict.get("is", "good") != "good":
+            places = f" at {len(self.verdict['places'])} places" if self.verdict["is"] == "look" else ""
+            words.append(self.verdict["is"] + places)
         for name, form in _FIGURES.items():
             if figures and self.measured.get(name) is not None:
                 words.append(form.format(self.measured[name]))
@@ -248,7 +252,9 @@ def _with_report(job: Job, outcome: Outcome) -> Outcome:
     if report:
         canvas, warnings = report["canvas"], dict.fromkeys((*report["warnings"], *outcome.warnings))
         size = canvas["width"], canvas["height"]
-        outcome = replace(outcome, size=size, measured=report["measured"], warnings=tuple(warnings))
+        outcome = replace(
+            outcome, size=size, measured=report["measured"], verdict=report.get("verdict", {}), warnings=tuple(warnings)
+        )
     return outcome
 
 

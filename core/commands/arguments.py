@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..choices import BLENDS, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS, Slide
+from ..choices import BLENDS, EXPOSURES, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS, Exposing, Slide
 
 if TYPE_CHECKING:
     from ..options import StitchOptions
@@ -132,9 +132,13 @@ def _add_composition(how: argparse._ArgumentGroup) -> None:
         "seam's",
     )  # fmt: skip
     how.add_argument(
-        "--exposure", action=argparse.BooleanOptionalAction, default=True,
-        help="match TARGET's exposure and white balance to REF's (default)",
+        "--exposure", default="auto", type=_exposure, metavar="EXPOSURE",
+        help="auto (default: both pictures meet at one exposure, and no light is blown), reference (TARGET is matched "
+        "to REF), none (the light stays as it is), or a number of stops to add to auto, as --exposure=-0.5",
     )  # fmt: skip
+    how.add_argument(
+        "--no-exposure", dest="exposure", action="store_const", const="none", help="the same as --exposure none"
+    )
     how.add_argument(
         "--holes", default="auto", type=_choice(HOLES), metavar="HOLES",
         help="what neither camera saw: auto (default: small closed holes are filled smoothly), transparent, or "
@@ -204,6 +208,14 @@ def _slide(text: str) -> Slide:
         return text if text == "auto" else float(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor a share from 0 to 1") from None
+
+
+def _exposure(text: str) -> Exposing:
+    try:
+        return text if text in EXPOSURES else float(text)
+    except ValueError:
+        known = ", ".join(EXPOSURES)
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a number of stops nor one of: {known}") from None
 
 
 def _choice(known: tuple[str, ...]) -> Callable[[str], str]:

@@ -17,7 +17,7 @@ from typing import NoReturn
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
 from .arguments import add_options, options_from
-from .messages import print_summary, progress_shown, say
+from .messages import print_summary, progress_shown, say, verdict_line
 from .options import MESSAGES
 
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
@@ -41,8 +41,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 1 a threshold of the validation missed, 2 a wrong call, 3 pictures that cannot be stitched, 4 a file
-        that cannot be read or written, 130 interrupted.
+        0 done, 1 a threshold of the validation missed or a panorama not usable (--strict-verdict), 2 a wrong call,
+        3 pictures that cannot be stitched, 4 a file that cannot be read or written, 130 interrupted.
     """
     with messages_may_be_lost():
         code = _run(argv)
@@ -141,8 +141,9 @@ class _Version(argparse.Action):
 
 
 _STITCH = """Stitch TARGET into the plane of REF. REF keeps every pixel it has; TARGET slides along its epipolar lines
-to meet it. Messages go to stderr. Exit codes: 0 done, 2 the call is wrong, 3 the pictures can't be stitched, 4 a file
-can't be read or written, 130 interrupted."""
+to meet it. Messages go to stderr; the last line says whether the panorama is good, where to look at it, or why it is
+not usable. Exit codes: 0 done, 1 not usable (with --strict-verdict), 2 the call is wrong, 3 the pictures can't be
+stitched, 4 a file can't be read or written, 130 interrupted."""
 _BATCH = """Stitch every line of LIST.csv: a pair of pictures, or a clip of two cameras that stand still (a_%04d.png or
 a_####.png), whose frames share one alignment. A line holds reference,target and, if wanted, a name; a header may name
 first, last, step, focal_px and focal35 as well. A bad pair is reported and the rest goes on; DIR/batch.json says what
@@ -183,6 +184,9 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
     files.add_argument("--warp", type=Path, metavar="FILE.npz", help="the maps, the inverse depth and the geometry")
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")
     _add_loudness(parser)
+    parser.add_argument(
+        "--strict-verdict", action="store_true", help="exit with 1 where the panorama is found not to be usable"
+    )
 
 
 def _add_batch(parser: argparse.ArgumentParser) -> None:
@@ -284,7 +288,10 @@ def _stitch(args: argparse.Namespace) -> int:
         print(f"edf: {args.output}: {width}×{height}", file=sys.stderr)
     if args.verbose:
         print_summary(result.report, result.seconds)
-    return 0
+    verdict = result.report["verdict"]
+    if not args.quiet or verdict["is"] != "good":
+        print(f"edf: verdict: {verdict_line(verdict)}", file=sys.stderr)
+    return 1 if args.strict_verdict and verdict["is"] == "not usable" else 0
 
 
 def _batch(args: argparse.Namespace) -> int:

@@ -44,6 +44,20 @@ def print_summary(report: dict[str, Any], seconds: dict[str, float]) -> None:
     print("\n".join(f"edf: {line}" for line in lines), file=sys.stderr)
 
 
+def verdict_line(verdict: dict[str, Any]) -> str:
+    """A report's verdict in a line: what is wrong, where (left, top, width×height in px), and what to do."""
+    if verdict["is"] == "good":
+        return "good"
+    if verdict["is"] == "not usable":
+        return f"not usable: {verdict['because']}; {verdict['what_to_do']}"
+    places: dict[str, list[str]] = {}
+    for place in verdict["places"]:
+        left, top, width, height = place["box"]
+        places.setdefault(place["what"], []).append(f"{left},{top} {width}×{height}")
+    found = "; ".join(f"{what} ({', '.join(boxes)})" for what, boxes in places.items())
+    return f"look at these places: {found}; {verdict['what_to_do']}"
+
+
 @contextmanager
 def progress_shown(quiet: bool) -> Iterator[Callable[[str, float], None]]:
     """A progress callable: a bar on a terminal, one plain line for each stage elsewhere, nothing when quiet."""

@@ -18,18 +18,19 @@ from ..field.visibility import by_agreement, occluded
 from ..options import StitchOptions
 from ..panorama.layers import Layer
 from ..panorama.warp import Warp
-from ..raster.arrays import bounds, larger_parts, with_margin, without_specks
+from ..raster.arrays import bounds, larger_parts, with_margin
 from ..raster.lazy import AnyImage, Weighed, whole
-from ..raster.picture_map import PictureMap
+from ..raster.picture_map import CanvasMap, PictureMap
 from ..system.progress import ReportProgress
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
-from .exposure import Exposure, match_exposure, pooled, unchanged
+from .exposure import Exposure, exposures_for, pooled, unchanged
 from .inpaint import closed_holes, holes_of, inpainted
 from .min_cut import FREE, SECOND
 from .moving_things import moving_labels
 from .options import EXPOSURE
 from .overlap import Overlap, overlap_of
-from .seam import added_price, find_seam, known_labels, seam_cost
+from .seam import find_seam, known_labels
+from .seam_costs import SeamCosts, averaged_costs, seam_costs
 from .wraparound import roll_for, rolled, rolled_layer, rolled_map
 
 
@@ -45,12 +46,14 @@ class Decided:
         The part of it that the depth order alone tells, which the seam avoids: with all of it, foliage would leave the
         seam no way through. `hidden` itself if not kept.
     exposure : Exposure
+    exposure_before : Exposure
+        What is done to the panorama before, when this picture is added: to the reference, if anything.
     chosen : (H, W) bool array or None
         What comes from this picture and not from those before; None without a seam.
-    known, cost, price, box : arrays and slices, or None
+    known, costs : (H, W) int8 array and SeamCosts, or None
         What the seam was cut by (see `find_seam`), if it was and is kept.
     roll : int
-        Columns by which these four are rolled (see `wraparound`).
+        Columns by which these are rolled (see `wraparound`).
     holes : int
         Pixels that the picture cannot see and none before it shows. They are transparent or filled.
     folds : float
@@ -60,11 +63,10 @@ class Decided:
     hidden: NDArray[np.bool_]
     hidden_by_depth: NDArray[np.bool_]
     exposure: Exposure
+    exposure_before: Exposure
     chosen: NDArray[np.bool_] | None = None
     known: NDArray[np.int8] | None = None
-    cost: NDArray[np.float32] | None = None
-    price: NDArray[np.float32] | None = None
-    box: tuple[slice, slice] | None = None
+    costs: SeamCosts | None = None
     roll: int = 0
     holes: int = 0
     folds: float = 0.0
@@ -107,7 +109,7 @@ def composed(
     Parameters
     ----------
     layers : sequence of Layer
-        All on the same canvas. The first is the reference's and keeps its light.
+        All on the same canvas, the reference's first.
     warp : Warp
         Of the same canvas.
     views : sequence of View
@@ -131,10 +133,11 @@ def composed(
     """
     out, shape = layers[0], layers[0].alpha.shape
     behind = np.broadcast_to(np.False_, shape) if warp.behind is None else warp.behind & (out.alpha > 0)
-    steps = [_Step(out, out, Decided(behind, behind, unchanged(out.light.shape[2])), np.zeros(0, bool))]
+    as_it_is = unchanged(out.light.shape[2])
+    steps = [_Step(out, out, Decided(behind, behind, as_it_is, as_it_is), np.zeros(0, bool))]
     for number, layer in enumerate(layers[1:], 1):
         added = _Added(
-            layer, warp.maps[number].arrays(), warp.nearness(views, number), warp, options,
+            layer, warp.maps[number].arrays(), warp.maps[: number + 1], warp.nearness(views, number), warp, options,
             (any(floats[:number]), floats[number]), _count(layers[:number]) if options.blend == "linear" else None,
         )  # fmt: skip
 
@@ -143,6 +146,10 @@ def composed(
 
         steps.append(_add(out, added, painted, report, decided[number] if decided else None, keep))
         out = steps[-1].panorama
+        if number == 1:
+            light = steps[1].decided.exposure_before
+            reference = light.applied(layers[0], warp.maps[0])
+            steps[0] = replace(steps[0], layer=reference, decided=replace(steps[0].decided, exposure=light))
     exposed, found = tuple(step.layer for step in steps), tuple(step.decided for step in steps)
     filled = _filled(out, steps, options)
     labels = _labels((layers[0].alpha > 0) & (out.alpha > 0), found)
@@ -162,12 +169,14 @@ def _filled(panorama: Layer, steps: Sequence[_Step], options: StitchOptions) -> 
 class _Added:
     """A picture to be added.
 
-    nearness (H, W): see `Warp.nearness`; floats: whether the panorama before, and this picture, come from floats;
+    maps: of all pictures so far and this one; nearness (H, W): see `Warp.nearness`; floats: whether the panorama
+    before, and this picture, come from floats;
     count (H, W): how many pictures the panorama before is the average of, None where none is made.
     """
 
     layer: Layer
     picture_map: PictureMap
+    maps: tuple[CanvasMap, ...]
     nearness: AnyImage
     warp: Warp
     options: StitchOptions
@@ -201,18 +210,16 @@ def _add(
     box = bounds((before.alpha > 0) & (layer.alpha > 0))
     # Exposure and overlap both read it. It is dropped before the seam: fetching again costs less than its memory.
     fetched = layer if decided or box is None else layer.keep(with_margin(box, EXPOSURE.block_px, before.alpha.shape))
-    if decided:
-        exposure = decided.exposure
-    elif options.exposure:
-        exposure = match_exposure(before, fetched, hidden if behind is None else hidden | behind, added.floats)
-    else:
-        exposure = unchanged(layer.light.shape[2])
-    fetched, layer = exposure.applied(fetched), exposure.applied(layer)
+    exposure_before, exposure = (decided.exposure_before, decided.exposure) if decided else exposures_for(
+        (before, fetched), added.maps, hidden if behind is None else hidden | behind, added.floats, options.exposure
+    )  # fmt: skip
+    before = exposure_before.applied(before, added.warp.maps[0])
+    fetched, layer = (exposure.applied(one, added.picture_map) for one in (fetched, layer))
 
     progress("seam", 0.0)
     if added.count is not None:
         progress("blend", 0.0)
-        found = Decided(hidden, by_depth, exposure, folds=folded)
+        found = Decided(hidden, by_depth, exposure, exposure_before, folds=folded)
         return _Step(averaged(before, fetched, added.count), fetched, found, np.zeros(0, bool))
     holes = holes_of(hidden, before, layer)
     if behind is not None:
@@ -228,14 +235,16 @@ def _add(
     if decided:
         found = decided
     else:
-        start = Decided(hidden, rolled_hidden, exposure, roll=roll, holes=int(holes.sum()), folds=folded)
+        start = Decided(
+            hidden, rolled_hidden, exposure, exposure_before, roll=roll, holes=int(holes.sum()), folds=folded
+        )  # fmt: skip
         found = _with_seam(
             start, before, visible, overlap, added, behind, None if painted is None else rolled(painted, roll)
         )
         chosen = None if found.chosen is None else rolled(found.chosen, -roll)
         found = replace(found, hidden_by_depth=by_depth, chosen=chosen)
         if not keep:
-            found = replace(found, hidden_by_depth=hidden, known=None, cost=None, price=None, box=None)
+            found = replace(found, hidden_by_depth=hidden, known=None, costs=None)
         del start
     if options.holes != "inpaint":
         holes = np.zeros(0, bool)
@@ -266,7 +275,11 @@ def _hidden(before: Layer, added: _Added) -> tuple[NDArray[np.bool_], NDArray[np
     folded = folds(turns, hidden)
     # the panorama before is right where the map mirrors the picture
     mirrored = turned_over(turns) & shown
-    return hidden | mirrored, by_depth | mirrored, folded
+    hidden |= mirrored
+    by_depth |= mirrored
+    if added.warp.refilled is not None:
+        hidden, by_depth = hidden & ~added.warp.refilled, by_depth & ~added.warp.refilled
+    return hidden, by_depth, folded
 
 
 def _count(layers: Sequence[Layer]) -> NDArray[np.int16]:
@@ -308,17 +321,19 @@ def pooled_decision(decisions: Sequence[Sequence[Decided]]) -> tuple[Decided, ..
 
 def _pooled(decisions: Sequence[Decided]) -> Decided:
     """The same about one picture, by the frames that overlap in the same box."""
-    first = decisions[0]
-    exposure = pooled([decision.exposure for decision in decisions])
-    if first.known is None or first.box is None:
-        return replace(first, exposure=exposure)
-    alike = [one for one in decisions if (one.box, one.roll) == (first.box, first.roll)]
-    cost, price = (
-        np.mean(np.stack([values for values in parts if values is not None]), axis=0)
-        for parts in ([decision.cost for decision in alike], [decision.price for decision in alike])
+    before, exposure = (
+        pooled([getattr(one, name) for one in decisions]) for name in ("exposure_before", "exposure")
     )
-    chosen = rolled(find_seam(first.known, cost, price, first.box), -first.roll)
-    return replace(first, exposure=exposure, cost=cost, price=price, chosen=chosen)
+    first = replace(decisions[0], exposure=exposure, exposure_before=before)
+    if first.known is None or first.costs is None:
+        return first
+    alike = [
+        one.costs for one in decisions
+        if one.costs is not None and (one.costs.box, one.roll) == (first.costs.box, first.roll)
+    ]  # fmt: skip
+    costs = averaged_costs(alike)
+    chosen = rolled(find_seam(first.known, costs), -first.roll)
+    return replace(first, costs=costs, chosen=chosen)
 
 
 def _without(layer: Layer, holes: NDArray[np.bool_]) -> Layer:
@@ -336,22 +351,20 @@ def _with_seam(
     options = added.options
     if not options.has_seam:
         return so_far
-    cuts = options.seam != "none" and overlap is not None
-    hidden = without_specks(so_far.hidden_by_depth) if cuts else so_far.hidden_by_depth
-    known = known_labels(before, layer, hidden, painted)
-    if behind is not None:
-        known[larger_parts(behind) & (known == FREE)] = SECOND
-    if overlap is None:
-        return replace(so_far, chosen=known == SECOND)
-    if options.seam == "none":
-        nearest = distance_labels(before, layer)
+    if options.seam == "none" or overlap is None:
+        known = known_labels(before, layer, painted, so_far.hidden_by_depth)
+        if behind is not None:
+            known[larger_parts(behind) & (known == FREE)] = SECOND
+        # without an overlap nothing is free
+        nearest = distance_labels(before, layer) if overlap is not None else known == SECOND
         return replace(so_far, chosen=np.where(known == FREE, nearest, known == SECOND))
-    picture_map, confidence = rolled_map(added.picture_map, so_far.roll), added.warp.lazy_confidence
-    if confidence is not None and so_far.roll:
-        confidence = rolled(whole(confidence), so_far.roll)
+    known = known_labels(before, layer, painted)
+    picture_map = rolled_map(added.picture_map, so_far.roll)
+    confidence, slide = (
+        rolled(whole(image), so_far.roll) if image is not None and so_far.roll else image
+        for image in (added.warp.lazy_confidence, added.warp.slide)
+    )
     unseen = so_far.hidden_by_depth if behind is None else so_far.hidden_by_depth | behind
     moving = moving_labels(overlap, picture_map, before, layer, unseen)
-    cost = seam_cost(overlap, picture_map, confidence)
-    price = added_price(overlap, so_far.hidden_by_depth, moving, behind)
-    chosen = find_seam(known, cost, price, overlap.box)
-    return replace(so_far, chosen=chosen, known=known, cost=cost, price=price, box=overlap.box)
+    costs = seam_costs(overlap, picture_map, confidence, so_far.hidden_by_depth, moving, behind, slide)
+    return replace(so_far, chosen=find_seam(known, costs), known=known, costs=costs)

@@ -1,72 +1,112 @@
-"""Exposure and white balance: one gain per channel, in scene-linear light, matches a picture to the panorama so far.
+"""Exposure and white balance, in scene-linear light: what is done to a picture's light so that it meets the others'.
 
-The gain is a median of ratios between means over small blocks: the means forgive an alignment that is a pixel off, the
-median forgives what moved. The panorama so far keeps its values.
+Either one gain per channel matches a picture to the panorama so far, which keeps its values: a median of ratios between
+means over small blocks, for the means forgive an alignment that is a pixel off and the median what moved. Or two
+pictures meet at one exposure, with what more tells them apart (see `tone_fit`), and no light is blown (see `toned`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..choices import Exposing
 from ..panorama.layers import Layer
-from ..raster.arrays import Part, bounds
-from ..raster.lazy import AnyImage, LazyImage
-from ..raster.options import PARTS
-from ..system.threads import in_order
+from ..raster.arrays import Array
+from ..raster.picture_map import CanvasMap
+from .clipped import ClippedLight, clipped_light
 from .options import EXPOSURE, OVERLAP
+from .tone_blocks import block_weights, bright_blocks, log_ratios, shared_blocks, weighted_median
+from .tone_fit import fit_tone
+from .tone_options import CLIPPED, TONE
+from .toned import NO_VIGNETTING, Exposed, ToneCurve, Toned, Vignetting
+
+_TOO_LITTLE = "too little of what both pictures show is neither clipped nor dark"
 
 
 @dataclass(frozen=True)
 class Exposure:
-    """A measured gain.
+    """What is done to a picture's light.
 
     Attributes
     ----------
     gain : (C,) float32 array
-        What a picture's light is multiplied by.
+        What it is multiplied by.
     spread : (C,) float32 array
         Median absolute deviation of the blocks' log ratios; NaN where the gain is unknown.
     blocks : int
         How many blocks were measured; 0 where the gain is unknown and taken for 1.
+    vignetting : Vignetting
+        What the lens takes off towards the corners, which is given back.
+    curve : ToneCurve or None
+        By how much more the dark is raised than the bright.
+    keeps_white : bool
+        Whether highlights are rolled off below white, and white stays white.
+    overexposed : float
+        Share of what both pictures show that is clipped in this one alone.
+    clipped : ClippedLight or None
+        What is known of its clipped light.
+    why_not : str
+        In words, why it could not be matched to the other's; empty if it was, or was not to be.
     """
 
     gain: NDArray[np.float32]
     spread: NDArray[np.float32]
     blocks: int
+    vignetting: Vignetting = NO_VIGNETTING
+    curve: ToneCurve | None = None
+    keeps_white: bool = False
+    overexposed: float = 0.0
+    clipped: ClippedLight | None = None
+    why_not: str = ""
 
-    def applied(self, layer: Layer) -> Layer:
-        """A picture's layer as the reference's camera would have exposed it."""
-        if (self.gain == 1).all():
+    def applied(self, layer: Layer, picture_map: CanvasMap) -> Layer:
+        """A picture's layer with its light changed; picture_map: where the canvas shows the picture."""
+        is_gain = not self.vignetting and self.curve is None
+        if is_gain and (self.gain == 1).all():
             return layer
-        return Layer(Exposed(layer.light, self.gain), layer.alpha)
+        if is_gain and not self.keeps_white:
+            return Layer(Exposed(layer.light, self.gain), layer.alpha)
+        toned = Toned(layer.light, self.gain, self.vignetting, self.curve, self.keeps_white, picture_map, self.clipped)
+        return Layer(toned, layer.alpha)
 
 
-@dataclass(frozen=True, eq=False)
-class Exposed(LazyImage):
-    """Light times a gain (C,)."""
-
-    light: AnyImage
-    gain: NDArray[np.float32]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(H, W, C)."""
-        return self.light.shape
-
-    def __getitem__(self, part: Part) -> NDArray[np.float32]:
-        light = self.light[part]
-        height, width, channels = light.shape
-        # along whole rows: along a pixel's channels alone NumPy is slow
-        return (light.reshape(height, width * channels) * np.tile(self.gain, width)).reshape(light.shape)
+def unchanged(channels: int, gain: float = 1.0) -> Exposure:
+    """The exposure that changes nothing, or multiplies all by one number."""
+    return Exposure(np.full(channels, gain, np.float32), np.full(channels, np.nan, np.float32), 0)
 
 
-def unchanged(channels: int) -> Exposure:
-    """The exposure that changes nothing."""
-    return Exposure(np.ones(channels, np.float32), np.full(channels, np.nan, np.float32), 0)
+def exposures_for(
+    layers: tuple[Layer, Layer], maps: Sequence[CanvasMap], hidden: NDArray[np.bool_], floats: tuple[bool, bool],
+    wanted: Exposing,
+) -> tuple[Exposure, Exposure]:  # fmt: skip
+    """What is done to the light of the panorama before and of an added layer.
+
+    Parameters
+    ----------
+    layers, hidden, floats
+        See `match_tones`.
+    maps : sequence of CanvasMap
+        Where the canvas shows the pictures so far, and the added one.
+    wanted : str or float
+        See `StitchOptions.exposure`. Of more than two pictures, those after the second are matched to the panorama so
+        far.
+
+    Returns
+    -------
+    pair of Exposure
+    """
+    nothing = unchanged(layers[0].light.shape[2])
+    if wanted == "none":
+        return nothing, nothing
+    if wanted == "reference":
+        return nothing, match_exposure(*layers, hidden, floats)
+    if len(maps) > 2:
+        return nothing, replace(match_exposure(*layers, hidden, floats), keeps_white=not any(floats))
+    return match_tones(layers, (maps[0], maps[1]), hidden, floats, 0.0 if isinstance(wanted, str) else wanted)
 
 
 def match_exposure(
@@ -76,12 +116,8 @@ def match_exposure(
 
     Parameters
     ----------
-    before, layer : Layer
-        On the same canvas.
-    hidden : (H, W) bool array
-        What the added picture cannot see, and so shows something else.
-    floats : (bool, bool)
-        Whether the two come from float pictures, which do not clip.
+    before, layer, hidden, floats
+        See `shared_blocks`.
 
     Returns
     -------
@@ -89,74 +125,114 @@ def match_exposure(
         `unchanged` where too little is known, or where the light differs beyond what exposure explains.
     """
     channels = before.light.shape[2]
-    shown = (before.alpha > OVERLAP.opaque_alpha) & (layer.alpha > OVERLAP.opaque_alpha) & ~hidden
-    box = bounds(shown)
-    if box is None:
+    shared = shared_blocks(before, layer, hidden, floats)
+    if shared is None:
         return unchanged(channels)
-    block = EXPOSURE.block_px
-    # whole blocks of the canvas
-    rows, columns = (slice(part.start - part.start % block, part.stop + -part.stop % block) for part in box)
-    at_once = block * max(1, PARTS.strip_pixels // (block * (columns.stop - columns.start)))
-
-    def means_of(top: int) -> list[NDArray[np.float64]]:
-        part = slice(top, min(rows.stop, top + at_once)), columns
-        pixels, counts = [one.light[part] for one in (before, layer)], shown[part]
-        for light, unclipped in zip(pixels, floats, strict=True):
-            if not unclipped:
-                for k in range(channels):
-                    counts = counts & (light[..., k] < EXPOSURE.clipped_light)
-        return [_block_means(light, counts) for light in pixels]
-
-    parts = list(in_order(means_of, range(rows.start, rows.stop, at_once)))
-    means_before, means = (np.concatenate(one) for one in zip(*parts, strict=True))
-    bright = _bright(means_before) & _bright(means)
-    if bright.sum() < EXPOSURE.min_blocks:
-        return unchanged(channels)
-    ratios = np.log(means_before[bright]) - np.log(means[bright])
-    # errors count as the eye sees them: tones grow about as the root of light
-    weights = np.sqrt(means_before[bright].mean(axis=1))
-    middle = np.array([_weighted_median(ratios[:, k], weights) for k in range(channels)])
+    blocks = bright_blocks(shared)
+    if len(blocks) < EXPOSURE.min_blocks:
+        return replace(unchanged(channels), why_not=_TOO_LITTLE)
+    ratios, weights = log_ratios(blocks.means), block_weights(blocks)
+    middle = np.array([weighted_median(ratios[:, k], weights) for k in range(channels)])
     spread = np.median(np.abs(ratios - middle), axis=0)
     if np.abs(middle).max() > np.log(EXPOSURE.max_gain):
-        return unchanged(channels)
-    return Exposure(np.exp(middle).astype(np.float32), spread.astype(np.float32), int(bright.sum()))
+        return replace(unchanged(channels), why_not=_too_different(np.exp(middle)))
+    return Exposure(np.exp(middle).astype(np.float32), spread.astype(np.float32), len(blocks))
 
 
-def pooled(exposures: list[Exposure]) -> Exposure:
-    """The median of the exposures of several frames of fixed cameras."""
-    known = [exposure for exposure in exposures if exposure.blocks]
+def match_tones(
+    layers: tuple[Layer, Layer], maps: tuple[CanvasMap, CanvasMap], hidden: NDArray[np.bool_],
+    floats: tuple[bool, bool], stops: float = 0.0,
+) -> tuple[Exposure, Exposure]:  # fmt: skip
+    """Bring two pictures to one exposure between their own.
+
+    Parameters
+    ----------
+    layers : pair of Layer
+        On the same canvas, the reference's first.
+    maps : pair of CanvasMap
+        Where the canvas shows the two.
+    hidden : (H, W) bool array
+        What either cannot see, and so shows something else.
+    floats : (bool, bool)
+        Whether they come from float pictures. Beside one, radiance is kept: at the reference's exposure, with neither
+        a curve nor a roll-off.
+    stops : float
+        Added to the exposure of both.
+
+    Returns
+    -------
+    pair of Exposure
+        Without gains against each other where too little is known, or where the light differs too much.
+    """
+    channels, radiance = layers[0].light.shape[2], any(floats)
+    shared = shared_blocks(*layers, hidden, floats)
+    plain = replace(unchanged(channels, 2.0**stops), keeps_white=not radiance)
+    if shared is None:
+        return plain, plain
+    blocks = bright_blocks(shared)
+    if len(blocks) < EXPOSURE.min_blocks:
+        return plain, replace(plain, why_not=_TOO_LITTLE)
+    blocks = blocks.subset(slice(None, None, -(-len(blocks) // TONE.fitted_blocks)))
+    fit = fit_tone(blocks, (blocks.radii(maps[0]), blocks.radii(maps[1])), with_curve=not radiance)
+    if np.abs(np.log(fit.gain)).max() > np.log(TONE.max_gain):
+        return plain, replace(plain, why_not=_too_different(fit.gain))
+    moved = 0.0 if radiance else -TONE.reference_share * float(np.log2(np.median(fit.gain)))
+    common = 2.0 ** (stops + np.clip(moved, -TONE.most_reference_stops, TONE.most_reference_stops))
+    spread = fit.spread.astype(np.float32)
+    first, second = (
+        Exposure(
+            (gain * common).astype(np.float32), spread, len(blocks), fit.vignetting, curve, not radiance, overexposed
+        )
+        for gain, curve, overexposed in zip(
+            (np.ones(channels), fit.gain), (None, fit.curve), shared.overexposed, strict=True
+        )
+    )
+    if radiance:
+        return first, second
+    return _with_clipped((first, second), layers, maps, hidden)
+
+
+def _with_clipped(
+    exposures: tuple[Exposure, Exposure], layers: tuple[Layer, Layer], maps: tuple[CanvasMap, CanvasMap],
+    hidden: NDArray[np.bool_],
+) -> tuple[Exposure, Exposure]:  # fmt: skip
+    """The same with what each picture tells of the other's clipped light, where that is over-exposed."""
+    if max(one.overexposed for one in exposures) < CLIPPED.least_share:
+        return exposures
+    shown = (layers[0].alpha > OVERLAP.opaque_alpha) & (layers[1].alpha > OVERLAP.opaque_alpha) & ~hidden
+    toned = [one.applied(layer, at).light for one, layer, at in zip(exposures, layers, maps, strict=True)]
+    first, second = (
+        replace(one, clipped=clipped_light(layer.light, toned[k], toned[1 - k], shown))
+        if one.overexposed >= CLIPPED.least_share else one
+        for k, (one, layer) in enumerate(zip(exposures, layers, strict=True))
+    )  # fmt: skip
+    return first, second
+
+
+def _too_different(gain: Array) -> str:
+    """What is said where a gain (C,) is too large."""
+    return f"it differs by {np.abs(np.log2(gain)).max():.1f} stops"
+
+
+def pooled(exposures: Sequence[Exposure]) -> Exposure:
+    """The median of the exposures of several frames of fixed cameras, with a curve if most have one."""
+    known = [one for one in exposures if one.blocks]
     if not known:
         return exposures[0]
-    gain, spread = (np.median([getattr(e, name) for e in known], axis=0) for name in ("gain", "spread"))
-    return Exposure(gain.astype(np.float32), spread.astype(np.float32), sum(e.blocks for e in known))
+    curved = 2 * sum(one.curve is not None for one in known) > len(known)
+    known = [one for one in known if (one.curve is not None) == curved]
+    gain, spread = (_median([getattr(one, name) for one in known]) for name in ("gain", "spread"))
+    halfway, corner = np.median([astuple(one.vignetting) for one in known], axis=0).tolist()
+    curves = [astuple(one.curve) for one in known if one.curve is not None]
+    curve = ToneCurve(*np.median(curves, axis=0).tolist()) if curved else None
+    overexposed = float(np.median([one.overexposed for one in known]))
+    blocks, keeps_white = sum(one.blocks for one in known), known[0].keeps_white
+    # a table cannot be averaged: one frame's serves all, so that nothing flickers
+    clipped = next((one.clipped for one in known if one.clipped is not None), None)
+    return Exposure(gain, spread, blocks, Vignetting(halfway, corner), curve, keeps_white, overexposed, clipped)
 
 
-def _block_means(pixels: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Means (N, C) over the blocks, of what is shown, where enough of a block is."""
-    block = EXPOSURE.block_px
-    height, width = (block * (side // block) for side in shown.shape)
-    if not height or not width:
-        return np.zeros((0, pixels.shape[2]))
-    size = (width // block, height // block)
-    weight = shown[:height, :width].astype(np.float32)
-    share = cv2.resize(weight, size, interpolation=cv2.INTER_AREA)
-    enough = share >= EXPOSURE.min_block_share
-    means = [
-        cv2.resize(pixels[:height, :width, k] * weight, size, interpolation=cv2.INTER_AREA)[enough] / share[enough]
-        for k in range(pixels.shape[2])
-    ]
-    stacked: NDArray[np.float64] = np.stack(means, axis=-1).astype(np.float64)
-    return stacked
-
-
-def _bright(means: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which blocks (N,) have no channel that is dark compared with the median block."""
-    typical = float(np.median(means.mean(axis=1))) if len(means) else 0.0
-    bright: NDArray[np.bool_] = means.min(axis=1, initial=np.inf) > max(EXPOSURE.min_brightness * typical, 0.0)
-    return bright
-
-
-def _weighted_median(values: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
-    order = np.argsort(values, kind="stable")
-    total = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(total, total[-1] / 2)])
+def _median(values: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+    """The median (C,) of several rows (C,)."""
+    median: NDArray[np.float32] = np.median(values, axis=0).astype(np.float32)
+    return median

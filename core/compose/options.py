@@ -17,8 +17,11 @@ class ExposureOptions:
     """px of the side of the blocks whose means are compared: they forgive an alignment that is a pixel or two off."""
 
     clipped_light: float = 0.956
-    """Light (white is 1) from which pictures of 8 and 16 bits count as clipped: level 250 of 255, since JPEG rings
-    around white."""
+    """Light (white is 1) from which pictures of 8 and 16 bits count as clipped: that level, since JPEG rings around
+    white."""
+
+    clipped_level: int = 250
+    """The same as a level of 8 bits."""
 
     min_brightness: float = 0.05
     """Share of the median block's light below which a block is left out: noise and flare tell more than exposure there.
@@ -121,9 +124,28 @@ class SeamOptions:
     """Price of showing the added picture from corner to corner of the overlap, for each pixel of its diagonal: the
     reference is exact, the others are resampled by uncertain maps. Dearer, and the seam keeps to the border."""
 
-    ghost_price: float = 0.5
-    """Price of a pixel of what the added picture cannot see: what is thinner than about eight px costs more to go
-    around than to show."""
+    found_px: float = 450
+    """Cells along a picture's longer side, about, in which the seam is found: what the eye takes for a step. A price
+    per area against one per length also needs one size."""
+
+    rim_price: float = 0.01
+    """Price of a pixel near the overlap's rim, on top: beyond it there is nothing to blend with."""
+
+    rim_width: int = 2
+    """Pixels, or cells, that count as near."""
+
+    hidden_price: float = 0.4
+    """Price of a cell of what the added picture cannot see, or of what moved: what is thin costs more to go around than
+    to show. A quarter melted the steps of a stair."""
+
+    least_hidden_price: float = 0.01
+    """The same where the tones are alike."""
+
+    behind_price: float = 0.25
+    """Price of a cell of what the panorama before cannot see, likewise: lower, as its own place is only filled in."""
+
+    least_behind_price: float = 0.005
+    """The same where the tones are alike."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +154,91 @@ class RoughSeamOptions:
 
     visible_tone: float = 0.1
     """Tones by which the pictures differ at a seam that is seen: blending evens out less."""
+
+    hidden_by_contrast: float = 2.0
+    """Times the contrast around a seam, of the picture that has less of it, by which they may differ more: a seam is
+    lost in foliage and gravel."""
+
+
+@dataclass(frozen=True)
+class TearOptions:
+    """Where a small picture is torn within itself (`tears`)."""
+
+    jump_px: float = 2.0
+    """px from one pixel to the next by which a map jumps: twice the usual."""
+
+    visible_tone: float = 0.1
+    """Tones by which what comes after a jump differs from what the picture shows there, on either side of it."""
+
+    contrast_px: int = 7
+    """px, side of the square in which contrast is looked at."""
+
+    aside_px: float = 4.0
+    """px from a jump, on either side, at which it is."""
+
+    hidden_by_contrast: float = 2.0
+    """Times the contrast, of the side that has less of it, by which the tones may differ more."""
+
+
+@dataclass(frozen=True)
+class CutThingsOptions:
+    """Things that a picture's border cuts (`cut_things`). Shares are of a picture's longer side."""
+
+    min_difference: float = 0.1
+    """Tones by which the pictures differ in such a thing: the one shows it, the other what is behind."""
+
+    joined: float = 0.004
+    """Share across which parts are joined: leaves of one branch."""
+
+    min_cells: int = 8
+    """Cells below which something is too small to be seen."""
+
+    near: float = 0.02
+    """Share from the border within which such a thing begins."""
+
+    deepest: tuple[float, ...] = (0.25, 0.08)
+    """Shares of the overlap's shorter side beyond which nothing is refilled, one tried after the other: what is further
+    from the border is no longer cut by it, and what hangs together there may be more than one thing."""
+
+    grown: float = 0.01
+    """Share by which a thing is taken to be larger than it looks."""
+
+    ring: float = 0.03
+    """Share around it in which its background is looked for."""
+
+    least_ring: int = 15
+    """Cells of background at least."""
+
+    far_percentile: float = 30.0
+    """Percentile of inverse depth around it up to which, and a cell of parallax more, something counts as background.
+    """
+
+    near_weight: float = 1e-3
+    """Weight of all else around it: it decides only where nothing counts as background."""
+
+    zone: float = 0.006
+    """Share around a refilled part in which it is judged."""
+
+    window: float = 0.025
+    """Share of the side of the window in which the worst place of a seam is looked for."""
+
+    jump_cells: float = 2.0
+    """Cells from one to the next by which a map jumps where a picture is cut within itself: twice the usual."""
+
+    much_less: float = 0.6
+    """Share of what was seen of a seam that may be left."""
+
+    least_gain: float = 1.0
+    """What is to be gained at least: a cell of seam between black and white."""
+
+    gain_per_cell: float = 0.001
+    """And more for each cell that is refilled: in all of it both pictures are shown with a depth that was not found."""
+
+    hardly_seen: float = 0.12
+    """Tones, over a window, below which the worst place is hardly seen."""
+
+    less_at_worst: float = 0.8
+    """Or the share of the worst place before."""
 
 
 @dataclass(frozen=True)
@@ -191,6 +298,8 @@ MOVING_THINGS = MovingThingsOptions()
 MIN_CUT = MinCutOptions()
 SEAM = SeamOptions()
 ROUGH_SEAM = RoughSeamOptions()
+TEARS = TearOptions()
+CUT_THINGS = CutThingsOptions()
 BANDS = BandOptions()
 INPAINT = InpaintOptions()
 CROP = CropOptions()

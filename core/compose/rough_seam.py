@@ -11,18 +11,23 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cameras.view import View
-from ..field.visibility import occluded
-from ..panorama.layers import layer_of
+from ..field.visibility import by_agreement, occluded
+from ..panorama.layers import Layer, layer_of
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture, picture_from_array
 from ..raster.arrays import dilated
+from ..raster.lazy import whole
+from ..raster.log_encoding import log_encode
 from ..raster.picture_map import PictureMap
 from ..raster.resizing import resized_points
 from .options import ROUGH_SEAM
-from .overlap import overlap_of
-from .seam import added_price, find_seam, known_labels, seam_cost
+from .overlap import Overlap, overlap_of
+from .seam import find_seam, known_labels
+from .seam_costs import seam_costs
+from .tears import contrast, tears
 
 
 @dataclass(frozen=True)
@@ -36,31 +41,68 @@ class RoughSeam:
     def of(pictures: Sequence[Picture], views: Sequence[View], px_per_radian: float) -> RoughSeam:
         """With pictures that have so many px per radian in their middle."""
         scales = [px_per_radian / np.sqrt(view.K[0, 0] * view.K[1, 1]) for view in views]
-        small = [_small(picture, min(1.0, float(scale))) for picture, scale in zip(pictures, scales, strict=True)]
+        small = [small_picture(picture, float(scale)) for picture, scale in zip(pictures, scales, strict=True)]
         return RoughSeam(tuple(small), tuple(views))
 
     def __call__(self, warp: Warp) -> float:
-        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out."""
-        maps = [_resized(one.arrays(), picture) for one, picture in zip(warp.maps, self.pictures, strict=True)]
+        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out, and of
+        tears within a picture that are seen."""
+        seen = self.look(warp)
+        if seen.overlap is None:
+            return 0.0
+        # also where the overlap ends: what the border of one picture cuts off does not go on in the other
+        others = (seen.shown[0] | seen.shown[1]) & ~seen.chosen
+        seam = (dilated(seen.chosen, 1) & dilated(others, 1))[seen.overlap.box] & seen.overlap.both
+        tones = [log_encode(np.ascontiguousarray(one.light[seen.overlap.box])).mean(axis=2) for one in seen.layers]
+        busy = np.minimum(*(contrast(one) for one in tones))
+        visible = ROUGH_SEAM.visible_tone + ROUGH_SEAM.hidden_by_contrast * busy
+        apart = np.abs(seen.overlap.difference).mean(axis=2) > visible
+        torn = 0
+        for number, (picture, places) in enumerate(zip(self.pictures, seen.maps, strict=True)):
+            own = log_encode(whole(picture.light)).mean(axis=2)
+            torn += int(tears(own, places, seen.shown[number] & (seen.chosen == bool(number))).sum())
+        return float((seam & apart).sum()) / 2 + torn  # a pixel on either side of the seam
+
+    def look(self, warp: Warp, forced: bool = False) -> Look:
+        """Both small pictures on the canvas of a warp, and the seam between them; forced: whether what the added one
+        cannot see comes from the other at any price."""
+        maps = [map_to_small(one.arrays(), picture) for one, picture in zip(warp.maps, self.pictures, strict=True)]
         before, layer = (layer_of(picture, one) for picture, one in zip(self.pictures, maps, strict=True))
         hidden = occluded(maps[1], warp.nearness(self.views, 1))
+        if warp.lazy_confidence is not None:
+            hidden &= by_agreement(hidden, maps[1], warp.lazy_confidence, before.alpha > 0)
+        if warp.refilled is not None:
+            hidden &= ~warp.refilled
         overlap = overlap_of(before, layer, hidden)
         if overlap is None:
-            return 0.0
-        difference = overlap.difference
+            return Look((before, layer), maps, hidden, None, layer.alpha > 0)
         # as if exposure were matched already
-        difference[overlap.both] -= np.median(difference[overlap.both], axis=0)
-        cost, price = seam_cost(overlap, maps[1], None), added_price(overlap, hidden, behind=warp.behind)
-        chosen = find_seam(known_labels(before, layer, hidden), cost, price, overlap.box)
-        # also where the overlap ends: what the border of one picture cuts off does not go on in the other
-        others = ((before.alpha > 0) | (layer.alpha > 0)) & ~chosen
-        seam = (dilated(chosen, 1) & dilated(others, 1))[overlap.box] & overlap.both
-        apart = np.abs(difference).mean(axis=2) > ROUGH_SEAM.visible_tone
-        return float((seam & apart).sum()) / 2  # a pixel on either side of the seam
+        overlap.difference[overlap.both] -= np.median(overlap.difference[overlap.both], axis=0)
+        costs = seam_costs(overlap, maps[1], warp.lazy_confidence, hidden, behind=warp.behind, slide=warp.slide)
+        chosen = find_seam(known_labels(before, layer, hidden=hidden if forced else None), costs)
+        return Look((before, layer), maps, hidden, overlap, chosen)
 
 
-def _small(picture: Picture, scale: float) -> Picture:
-    """A picture as it is looked at, shrunk: its light itself would take long to decode."""
+@dataclass(frozen=True)
+class Look:
+    """Two small pictures on a canvas; hidden, chosen (H, W): what the second cannot see, and where it is shown."""
+
+    layers: tuple[Layer, Layer]
+    maps: list[PictureMap]
+    hidden: NDArray[np.bool_]
+    overlap: Overlap | None
+    chosen: NDArray[np.bool_]
+
+    @property
+    def shown(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Where (H, W) each shows something."""
+        first, second = self.layers
+        return first.alpha > 0, second.alpha > 0
+
+
+def small_picture(picture: Picture, scale: float) -> Picture:
+    """A picture as it is looked at, shrunk where the scale is below 1: its light itself would take long to decode."""
+    scale = min(1.0, scale)
     height, width = picture.view.shape[:2]
     size = max(1, round(width * scale)), max(1, round(height * scale))
     small = picture_from_array(cv2.resize(picture.view, size, interpolation=cv2.INTER_AREA))
@@ -69,7 +111,7 @@ def _small(picture: Picture, scale: float) -> Picture:
     return replace(small, alpha=cv2.resize(picture.alpha, size, interpolation=cv2.INTER_AREA))
 
 
-def _resized(picture_map: PictureMap, small: Picture) -> PictureMap:
+def map_to_small(picture_map: PictureMap, small: Picture) -> PictureMap:
     """A map to a picture as one to its small copy."""
     height, width = small.view.shape[:2]
     x, y = (

@@ -8,39 +8,41 @@ number of cells at any picture size, and each finer one only looks at a narrow b
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import beside, bounds, dilated, strips, with_margin
+from ..raster.arrays import bounds, cut, dilated, strips, with_margin
 from ..raster.distance import distance_to_border
 from ..raster.lazy import AnyImage, Placed
-from ..raster.picture_map import PictureMap
 from ..system.threads import each, in_order
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
 from .options import OVERLAP, SEAM
-from .overlap import Overlap
+
+if TYPE_CHECKING:
+    from .seam_costs import SeamCosts
 
 
 def known_labels(
-    before: Layer, layer: Layer, hidden: NDArray[np.bool_], painted: NDArray[np.int8] | None = None
+    before: Layer, layer: Layer, painted: NDArray[np.int8] | None = None, hidden: NDArray[np.bool_] | None = None
 ) -> NDArray[np.int8]:
     """Which pixels are settled before a seam is sought.
 
-    What only one picture shows, or shows opaque, comes from it; what the added picture cannot see comes from the
-    panorama before where that shows it.
+    What only one picture shows, or shows opaque, comes from it.
 
     Parameters
     ----------
     before, layer : Layer
         The panorama before, and the added picture's layer.
-    hidden : (H, W) bool array
-        What the added picture cannot see.
     painted : (H, W) int8 array, optional
         An artist's decision, as FIRST, SECOND or FREE. It wins wherever that picture shows something.
+    hidden : (H, W) bool array, optional
+        What the added picture cannot see, if that is to come from the panorama before without being weighed against
+        what the seam costs.
 
     Returns
     -------
@@ -50,14 +52,15 @@ def known_labels(
     known = np.full(before.alpha.shape, NOWHERE, np.int8)
 
     def put(rows: slice) -> tuple[int, int]:
-        out, not_seen = known[rows], hidden[rows]
+        out, not_seen = known[rows], False if hidden is None else hidden[rows]
         (shows_before, opaque_before), (shows, opaque) = (
             (one.alpha[rows] > 0, one.alpha[rows] >= OVERLAP.opaque_alpha) for one in (before, layer)
         )
         out[shows_before & shows] = FREE
         # a soft edge of one gives way where the other is opaque
-        out[shows_before & (~shows | not_seen | (opaque_before & ~opaque))] = FIRST
-        out[shows & (~shows_before | (opaque & ~opaque_before & ~not_seen))] = SECOND
+        out[shows_before & (~shows | (opaque_before & ~opaque))] = FIRST
+        out[shows & (~shows_before | (opaque & ~opaque_before))] = SECOND
+        out[shows_before & not_seen] = FIRST
         return int(shows_before.sum()), int((shows_before & ~shows).sum())
 
     shown, alone = np.sum(list(in_order(put, strips(known.shape))), axis=0).tolist()
@@ -71,124 +74,15 @@ def known_labels(
     return known
 
 
-def seam_cost(overlap: Overlap, picture_map: PictureMap, confidence: AnyImage | None) -> NDArray[np.float32]:
-    """What a seam costs at each pixel of the overlap.
-
-    A difference that is small enough for blending to even out costs as its square, a larger one in proportion: a long
-    seam that nobody sees is better than a short one through what moved. The cost doubles at a depth edge of a pixel of
-    parallax, and where dense refinement has no confidence at all.
-
-    Parameters
-    ----------
-    overlap : Overlap
-    picture_map : PictureMap
-        Of the added picture, over the whole canvas.
-    confidence : (H, W) image or None
-        Of dense refinement, None without it.
-
-    Returns
-    -------
-    (h, w) float32 array
-        In [0, 1], in the overlap's box.
-    """
-    cost = np.empty(overlap.both.shape, np.float32)
-
-    def put(rows: slice) -> None:
-        near, here = beside(rows, 1, len(cost))
-        box = slice(overlap.box[0].start + near.start, overlap.box[0].start + near.stop), overlap.box[1]
-        cost[rows] = _cost(overlap.difference[near], picture_map, confidence, box)[here]
-
-    each(put, strips(cost.shape))
-    return cost
-
-
-def _cost(
-    difference: NDArray[np.float32], picture_map: PictureMap, confidence: AnyImage | None, box: tuple[slice, slice]
-) -> NDArray[np.float32]:
-    """What a seam costs (h, w) in a box of the canvas, by the difference of tones (h, w, C) there."""
-    apart = _mean(np.abs(difference))
-    risk = np.ones(apart.shape, np.float32)
-    for axis in (0, 1):
-        step = _mean(np.abs(np.diff(difference, axis=axis)))
-        apart += np.maximum(_padded(step, axis, 0, 1), _padded(step, axis, 1, 0))
-        risk += np.minimum(_second_differences(picture_map, box, axis), np.float32(1))
-    if confidence is not None:
-        risk += 1 - confidence[box]
-    cost = apart * apart
-    cost /= apart + np.float32(OVERLAP.same_tone)
-    cost *= risk
-    cost += np.float32(SEAM.length_price)
-    return np.minimum(cost, np.float32(1), out=cost)
-
-
-def _mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Means (h, w) over channels (h, w, C); NumPy's own takes several times as long over so few."""
-    total = values[..., 0].copy()
-    for k in range(1, values.shape[2]):
-        total += values[..., k]
-    return total / np.float32(values.shape[2])
-
-
-def _second_differences(picture_map: PictureMap, box: tuple[slice, slice], axis: int) -> NDArray[np.float32]:
-    """Second differences of the map (h, w), px of the picture: large at depth edges."""
-    bends = [np.diff(values[box], n=2, axis=axis) for values in (picture_map.x, picture_map.y)]
-    return _padded(np.nan_to_num(np.hypot(*bends), nan=0.0), axis, 1, 1)
-
-
-def _padded(values: NDArray[np.float32], axis: int, before: int, after: int) -> NDArray[np.float32]:
-    """Values (h, w) with so many zeros before and after them along an axis."""
-    return np.pad(values, [(before, after) if k == axis else (0, 0) for k in range(2)])
-
-
-def added_price(
-    overlap: Overlap, hidden: NDArray[np.bool_], moving: NDArray[np.int8] | None = None,
-    behind: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float32]:  # fmt: skip
-    """What it costs to show the added picture at each pixel of the overlap.
-
-    What it cannot see costs by how different it looks, and so does what moved and is to be shown from the other
-    picture; what the panorama before cannot see costs where that is shown.
-
-    Parameters
-    ----------
-    overlap : Overlap
-    hidden : (H, W) bool array
-        What the added picture cannot see.
-    moving : (h, w) int8 array, optional
-        See `moving_labels`.
-    behind : (H, W) bool array, optional
-        What the panorama before cannot see.
-
-    Returns
-    -------
-    (h, w) float32 array
-        In the overlap's box, in units of a border between opposite tones; negative where it costs not to show it.
-    """
-    misplaced = hidden[overlap.box].astype(np.int8)
-    if behind is not None:
-        misplaced -= behind[overlap.box]
-    if moving is not None:
-        misplaced -= moving
-    price = np.zeros(misplaced.shape, np.float32)
-    where = misplaced != 0
-    price[where] = np.float32(SEAM.ghost_price) * np.abs(overlap.difference[where]).mean(axis=1) * misplaced[where]
-    price += np.float32(SEAM.added_price / math.hypot(*price.shape))
-    return price
-
-
-def find_seam(
-    known: NDArray[np.int8], cost: NDArray[np.float32], price: NDArray[np.float32], box: tuple[slice, slice]
-) -> NDArray[np.bool_]:
+def find_seam(known: NDArray[np.int8], costs: SeamCosts) -> NDArray[np.bool_]:
     """Find the cheapest seam.
 
     Parameters
     ----------
     known : (H, W) int8 array
         See `known_labels`.
-    cost, price : (h, w) float32 arrays
-        See `seam_cost` and `added_price`.
-    box : (slice, slice)
-        Rows and columns of the canvas in which these two lie.
+    costs : SeamCosts
+        Of the overlap.
 
     Returns
     -------
@@ -199,16 +93,27 @@ def find_seam(
     free = int((known == FREE).sum())
     if not free:
         return out
-    # wider than the box by a coarse cell, so that the settled pixels beside it anchor the cut
-    reach = 2 << max(0, math.ceil(math.log(free / SEAM.coarse_cells, 4)))
-    wider = [
-        slice(max(0, part.start - reach), min(side, part.stop + reach))
-        for part, side in zip(box, known.shape, strict=True)
+    cell = 1 << (len(costs.levels) - 1)
+    # wider than the box by a coarsest cell, so that the settled pixels beside it anchor the cut
+    reach = cell * (2 << max(0, math.ceil(math.log(free / cell**2 / SEAM.coarse_cells, 4))))
+    rows, columns = costs.box
+    sides = [-(-(part.stop - part.start) // cell) * cell + 2 * reach for part in costs.box]
+    here = (columns.start - reach, rows.start - reach, sides[1], sides[0])
+    levels = [
+        Placed(cost, (reach >> level, reach >> level), (sides[0] >> level, sides[1] >> level))
+        for level, cost in enumerate(costs.levels)
     ]
-    here, at = (wider[0], wider[1]), (box[0].start - wider[0].start, box[1].start - wider[1].start)
-    height, width = out[here].shape
-    out[here] = _cut(known[here], *(Placed(values, at, (height, width)) for values in (cost, price)))
+    last = levels[-1]
+    found = _cut_levels(cut(known, here, NOWHERE), levels, Placed(costs.price, last.at, last.size))
+    out[costs.box] = cut(found, (reach, reach, columns.stop - columns.start, rows.stop - rows.start))
     return out
+
+
+def _cut_levels(known: NDArray[np.int8], levels: Sequence[AnyImage], price: AnyImage) -> NDArray[np.bool_]:
+    """The cut through pixels (True: SECOND), found in the cells of the last level; price: see `SeamCosts`."""
+    if len(levels) == 1:
+        return _cut(known, levels[0], price)
+    return _within_band(known, _cut_levels(_halved_labels(known), levels[1:], price), levels[0], None)
 
 
 def _cut(known: NDArray[np.int8], cost: AnyImage, price: AnyImage) -> NDArray[np.bool_]:
@@ -218,6 +123,13 @@ def _cut(known: NDArray[np.int8], cost: AnyImage, price: AnyImage) -> NDArray[np
         return _cut_within(known, cost, price, free)
     # A cell has four pixels' area but two pixels' side: its price doubles beside its cost.
     coarse = _cut(_halved_labels(known), _halved(cost, free), 2 * _halved(price, free))
+    return _within_band(known, coarse, cost, price)
+
+
+def _within_band(
+    known: NDArray[np.int8], coarse: NDArray[np.bool_], cost: AnyImage, price: AnyImage | None
+) -> NDArray[np.bool_]:
+    """The cut within a narrow band around that through cells of twice the side."""
     finer = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[: known.shape[0], : known.shape[1]]
     labels: NDArray[np.bool_] = np.where(known == FREE, finer, known == SECOND)
     for reach in (SEAM.band_half_width_px, 1):
@@ -226,19 +138,19 @@ def _cut(known: NDArray[np.int8], cost: AnyImage, price: AnyImage) -> NDArray[np
         settled[near] = known[near]
         settled[known == NOWHERE] = NOWHERE
         if (settled == FREE).sum() <= SEAM.band_pixels:
-            return _cut_within(settled, cost, price, free)
+            return _cut_within(settled, cost, price, known == FREE)
     return labels
 
 
 def _cut_within(
-    known: NDArray[np.int8], cost: AnyImage, price: AnyImage, free: NDArray[np.bool_]
+    known: NDArray[np.int8], cost: AnyImage, price: AnyImage | None, free: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """The cut through what is FREE in `known`; free (h, w): where the cost is known."""
     out: NDArray[np.bool_] = known == SECOND
     box = bounds(known == FREE)
     if box is not None:
         part = with_margin(box, 2, known.shape)  # neighbours, and what their cost is continued from
-        out[part] = min_cut(_continued(cost[part], free[part]), known[part], price[part])
+        out[part] = min_cut(_continued(cost[part], free[part]), known[part], None if price is None else price[part])
     return out
 
 

@@ -102,6 +102,17 @@ class SplineOptions:
     kernel_values_at_once: int = 2_000_000
     """Kernel values that are held in memory at once: 16 MB in float64. Results do not depend on it."""
 
+    line_values_at_once: int = 200_000
+    """The same on a grid, in float32: few enough to stay in the processor's cache, which halves the time."""
+
+
+@dataclass(frozen=True)
+class RefinedOptions:
+    """Sampling what dense refinement found (`refined_depth`)."""
+
+    together_nodes: int = 4_000_000
+    """Nodes of which a copy is kept with all values side by side: 64 MB. Of more, each value is sampled by itself."""
+
 
 @dataclass(frozen=True)
 class PlaneOptions:
@@ -187,6 +198,7 @@ def decades(low: float, high: float) -> Array:
 STRICT = StrictOptions()
 SLACK = SlackOptions()
 SPLINE = SplineOptions()
+REFINED = RefinedOptions()
 PLANE = PlaneOptions()
 FADE = FadeOptions()
 VISIBILITY = VisibilityOptions()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..raster.arrays import Array, Plane
 from ..raster.sampling import fetch
+from .options import REFINED
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,17 @@ class RefinedDepth:
         x, y = (
             np.asarray((v - s) / step, np.float32) for v, s, step in zip((x, y), self.start, self.step, strict=True)
         )
+        if self.inverse_depth.size <= REFINED.together_nodes:
+            values = fetch(self._together, x, y, cv2.INTER_LINEAR)
+            return values[..., 0], values[..., 1:3], values[..., 3]
         parts = (self.inverse_depth[..., None], self.shift, self.confidence[..., None])
         inverse_depth, shift, confidence = (fetch(part, x, y, cv2.INTER_LINEAR) for part in parts)
         return inverse_depth[..., 0], shift, confidence[..., 0]
+
+    @cached_property
+    def _together(self) -> Plane:
+        """inverse_depth, shift and confidence (h, w, 4): sampled at once, they take less than half the time."""
+        return np.dstack([self.inverse_depth, self.shift, self.confidence])
 
     def over(self, xs: Array, ys: Array) -> tuple[Plane, Plane, Plane]:
         """The same as `at` where columns xs (W,) and rows ys (H,) cross: ascending, evenly spaced raw reference px."""

@@ -54,7 +54,7 @@ class ThinPlateSpline:
         out: Array = across[None] + down[:, None]
         if not len(self.centres):
             return out
-        rows = max(1, SPLINE.kernel_values_at_once // max(1, dx2.size))
+        rows = max(1, SPLINE.line_values_at_once // max(1, dx2.size))
         for start in range(0, len(y), rows):
             r2 = dy2[start : start + rows, None, :] + dx2[None, :, :]
             np.maximum(r2, np.float32(1e-20), out=r2)

@@ -107,9 +107,103 @@ class WarningOptions:
     fold_share: float = 0.005
     """Share of what is shown of the target: more folds show as doubled or torn things."""
 
+    overexposed_share: float = 0.05
+    """Share of what both pictures show that is clipped in one alone: a sky is more, lamps and glints are less."""
+
+
+@dataclass(frozen=True)
+class VerdictOptions:
+    """What makes a panorama good, one to look at, or not usable (`verdict`).
+
+    Chosen so that the seventeen photographed pairs of docs/validation.md and the bad ones beside them are judged as by
+    eye; levels are of 255, shares are of the small copy that is looked at.
+    """
+
+    side_px: int = 600
+    """Longer side of the copy at most: a seam is seen in what is larger than a pixel of that."""
+
+    least_alpha: float = 0.5
+    """Alpha from which a picture shows something."""
+
+    evened_share: float = 0.03
+    """Half the width of what changes slowly, of the longer side: the bands that even out light are about as wide."""
+
+    step: float = 30.0
+    """Levels by which the pictures differ where a seam is seen: no good picture has more along as much of it."""
+
+    seam_share: float = 0.0045
+    """Of the longer side: length of a part of the seam that is seen. Good pictures have up to 0.003."""
+
+    seam_px: float = 2.5
+    """px of the copy, the least length of such a part: what is smaller is noise of the resampling."""
+
+    together_share: float = 0.008
+    """Of the longer side: what is less than twice that apart is one place."""
+
+    rim_share: float = 0.02
+    """Of the longer side: a seam so near to a picture's border is where that cuts something."""
+
+    mostly: float = 0.3
+    """Share of a place that one of the pictures cannot see, from which depth is the cause."""
+
+    fold_share: float = 1.8e-4
+    """Of the longer side's square, folded: foliage in good pictures has up to half of that."""
+
+    stretch: float = 6.0
+    """Times the median area of the picture that a pixel of the panorama shows: outlines without depth of their own."""
+
+    stretch_share: float = 5e-5
+    """Of the longer side's square, stretched so: good pictures have up to a fifth of that."""
+
+    edge: int = 40
+    """Levels between the brightest and the darkest pixel near by, from which a fold is seen: none is on a bare wall."""
+
+    white: int = 250
+    """Levels from which light is clipped."""
+
+    greyed: int = 235
+    """Levels below which a channel that was clipped is seen to be no longer white."""
+
+    restored: float = 1.02
+    """Times by which a clipped channel is brightened more than the others where what it lost was given back."""
+
+    cast: float = 12.0
+    """Levels by which darkened light may differ from what the other picture shows in its place."""
+
+    compared_px: int = 20
+    """px of the copy that suffice to compare them."""
+
+    blown_share: float = 0.02
+    """Of the panorama, that was not clipped and is now."""
+
+    greyed_share: float = 0.005
+    """Of the panorama, that was clipped in some channel and is now darker."""
+
+    most_places: int = 12
+    """Places that are named, the worst first."""
+
+    folded: float = 0.03
+    """Share of the target's map: a mirrored picture has 0.08, the worst of the good ones 0.005."""
+
+    seen_seam: float = 0.1
+    """Share of the seam that is seen, from which a wrong geometry shows. Pictures to look at have up to 0.19."""
+
+    missed: float = 0.03
+    """Of the longer side, by which 5 % of the matches are missed: 0.013 at most where the picture is right."""
+
+    missed_by_far: float = 0.1
+    """The same where no seam is seen, since one picture alone is shown."""
+
+    hidden: float = 0.25
+    """Share of the overlap that one picture cannot see: 0.12 at most where the picture is right."""
+
+    unlike: float = 0.15
+    """Share of the overlap in which the pictures differ: 0.085 at most where the picture is right."""
+
 
 HELD_OUT = HeldOutOptions()
 QUALITY = QualityOptions()
 INDEPENDENT = IndependentOptions()
 FOCAL_DOUBT = FocalDoubtOptions()
 WARNING = WarningOptions()
+VERDICT = VerdictOptions()

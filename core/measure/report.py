@@ -16,6 +16,7 @@ from ..panorama.canvas import Canvas
 from ..panorama.levelling import angles_of
 from ..panorama.warp import build_map
 from ..raster.arrays import Array
+from .exposure_entry import exposure_entry, exposure_warnings
 from .focal_doubt import focal_doubt
 from .held_out import held_out
 from .metrics import coverage_samples, look_up, off_line_mean, overlap_quality
@@ -76,7 +77,8 @@ def make_report(
         "schema": SCHEMA,
         "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
         "options": {
-            "field": options.field, "fade": options.fade, "dense": options.dense, "projection": options.projection,
+            "field": options.field, "fade": _fade(options, alignment), "dense": options.dense,
+            "projection": options.projection,
             "slide": options.slide if options.may_slide else 0, "level": options.level, "centre": options.centre,
             "fov": options.fov, "scale": options.scale, "crop": options.crop, "blend": options.blend,
             "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
@@ -107,13 +109,15 @@ def make_report(
             "projection": _projection_entry(canvas, two_view),
         },
         "composition": {
-            "exposure_gain": further.exposure.gain, "exposure_spread": further.exposure.spread,
-            "exposure_blocks": further.exposure.blocks, "occluded_px": int(further.hidden.sum()),
+            "exposure_gain": further.exposure.gain / decided[0].exposure.gain,
+            "exposure_spread": further.exposure.spread, "exposure_blocks": further.exposure.blocks,
+            "light": exposure_entry(pictures, decided), "occluded_px": int(further.hidden.sum()),
             "hole_px": holes, "inpainted_px": inpainted, "holes": closed_holes(shows, small=False)[1],
         },
         "measured": measured,
     }  # fmt: skip
     warnings = doubt.warnings(alignment.cameras, edge) + _warnings(alignment, measured["folds"])
+    warnings += exposure_warnings(pictures, [one.exposure for one in decided])
     if options.projection == "auto" and canvas.projection is None:
         warnings.append(
             f"the field {field.name!r} knows the reference's plane only: the panorama is drawn on it, as by "
@@ -217,6 +221,11 @@ def _picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:
             "focal_px": camera.focal, "source": camera.source, "fixed": camera.fixed, "distortion": camera.distortion,
         },
     }  # fmt: skip
+
+
+def _fade(options: StitchOptions, alignment: Alignment) -> str:
+    """The fade that was used: what goes on beyond the overlap needs depth, and a single pair of pictures."""
+    return "plane" if options.fade == "continue" and alignment.continuation is None else options.fade
 
 
 def _dense_entry(dense: Dense | None) -> dict[str, Any]:

@@ -36,6 +36,8 @@ class Canvas:
         Part of the pictures lies beyond the canvas.
     projection : Projection or None
         Of a round panorama; None for a flat one.
+    step : int
+        px of the plane from one pixel to the next, of a canvas that is looked at more coarsely than it is shown.
     """
 
     width: int
@@ -43,16 +45,17 @@ class Canvas:
     offset: tuple[int, int]
     cropped: bool = False
     projection: Projection | None = None
+    step: int = 1
 
     @property
     def xs(self) -> Array:
         """x of the columns, px of the plane."""
-        return np.arange(-self.offset[0], self.width - self.offset[0], dtype=np.float64)
+        return np.arange(self.width, dtype=np.float64) * self.step - self.offset[0]
 
     @property
     def ys(self) -> Array:
         """y of the lines, px of the plane."""
-        return np.arange(-self.offset[1], self.height - self.offset[1], dtype=np.float64)
+        return np.arange(self.height, dtype=np.float64) * self.step - self.offset[1]
 
     @property
     def whole(self) -> Box:

@@ -7,7 +7,7 @@ look up where a pixel comes from, again and again, would be simpler, but tears a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..cameras.lens import distort
 from ..cameras.projective import ahead_of_camera, inverse_intrinsics
 from ..cameras.view import View
-from ..raster.arrays import Array, Plane, beside, bounds, strips, with_margin
+from ..raster.arrays import Array, Plane, beside, bounds, small_strips, with_margin
 from ..raster.options import PARTS
 from ..raster.picture_map import falls_inside
 from ..raster.pull_push import filled
@@ -105,11 +105,6 @@ def looked_up(values: NDArray[np.float32], x: NDArray[np.float32], y: NDArray[np
         return found
     found = fetch(values.reshape(*values.shape[:2], -1), x, y, cv2.INTER_LINEAR)
     return found.reshape(*x.shape, *values.shape[2:])
-
-
-def small_strips(shape: tuple[int, ...]) -> Iterator[slice]:
-    """Rows of a picture (H, W), so few at a time that what is worked out of them stays in the processor's cache."""
-    return strips((shape[0], CARRY.smaller_strips * shape[1]))
 
 
 def carried_depth(surface: Surface, viewpoint: Viewpoint, projection: Projection, lattice: Lattice) -> Plane:

@@ -87,7 +87,9 @@ def _fetched_layer(picture: Picture, picture_map: PictureMap) -> Layer:
     box = bounds(inside)
     if box is None:
         return Layer(np.broadcast_to(np.float32(0), (*inside.shape, channels)), inside)
-    light, alpha = Fetched.of(picture, map_x[box], map_y[box], inside[box])
+    fetched, alpha = Fetched.of(picture, map_x[box], map_y[box], inside[box])
+    # exposure, seam, blending and the report all read it: what is small is fetched once
+    light = whole(fetched) if np.prod(fetched.shape) <= LAYER.held_values else fetched
     placed = Placed(light, (box[0].start, box[1].start), (inside.shape[0], inside.shape[1]))
     if picture.alpha is None:
         return Layer(placed, inside)

@@ -55,6 +55,10 @@ class LayerOptions:
     min_alpha: float = 1e-2
     """Alpha (0..1) below which a pixel counts as transparent: its colour, divided by so little, would be rounding."""
 
+    held_values: int = 16_000_000
+    """Values of light that are kept once they were fetched: 64 MB of a picture. Larger ones are fetched again where
+    they are read, which costs less than their memory."""
+
 
 @dataclass(frozen=True)
 class ProjectionOptions:
@@ -240,10 +244,11 @@ class ChoiceOptions:
     hole_radius: float = 0.03
     """Radians from what is shown within which what is not shown, on all sides, is a hole."""
 
-    tie_px: float = 0.005
-    """Cost by which candidates may differ and still be as good: the one that slides least is taken."""
+    tie_px: float = 0.02
+    """Cost by which candidates may differ and still be as good: the one that slides least is taken, since what moved or
+    has no depth of its own is torn by a slide."""
 
-    tie_share: float = 0.03
+    tie_share: float = 0.05
     """The same as a share of the least cost; the larger counts."""
 
     cells: int = 90
@@ -336,9 +341,6 @@ class CarryOptions:
 
     behind_px: float = 2.0
     """See `behind_share`."""
-
-    smaller_strips: int = 16
-    """Times that strips of rows are smaller than `PartOptions.strip_pixels`: they go through many hands."""
 
     reach_nodes: int = 200
     """Nodes along the longer side of the base at which the pictures' bounds are looked for."""

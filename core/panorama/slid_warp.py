@@ -20,12 +20,12 @@ from ..cameras.lens import distort, undistort
 from ..cameras.projective import homogeneous, inverse_intrinsics
 from ..cameras.view import View
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Plane
+from ..raster.arrays import Array, Plane, small_strips
 from ..raster.grid import Grid
 from ..raster.picture_map import PictureMap
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas
-from .carried_depth import Lattice, Rays, Surface, carried_depth, looked_up, small_strips, turned
+from .carried_depth import Lattice, Rays, Surface, carried_depth, looked_up, turned
 from .options import CANVAS, CARRY, SLIDE
 from .projection import Projection, focal_of
 from .viewpoint import Viewpoint

@@ -19,7 +19,7 @@ from ..cameras.projective import ahead_of_camera, homogeneous, project
 from ..cameras.view import View
 from ..field.field import Field, FieldValues
 from ..field.transfer import transfer
-from ..raster.arrays import Array, Box, box_of, cut, strips
+from ..raster.arrays import Array, Box, box_of, cut, small_strips, strips
 from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, Placed, whole
 from ..raster.options import GRID
@@ -60,6 +60,8 @@ class Warp:
         What the reference cannot see though its map falls inside it, likewise: something nearer hides it.
     viewpoint : Viewpoint or None
         How far it slides in any direction.
+    refilled : (H, W) bool array or None
+        Where depth was taken from the background, since a border cuts what was there: nothing counts as hidden there.
     beside : (H, W, 3) float32 array or None
         px x and y (before the lens) by which picture 1 is seen beside its epipolar lines, and confidence; only where it
         was asked for, with all of depth.
@@ -72,6 +74,7 @@ class Warp:
     slide: AnyImage | None = None
     behind: NDArray[np.bool_] | None = None
     viewpoint: Viewpoint | None = None
+    refilled: NDArray[np.bool_] | None = None
     beside: NDArray[np.float32] | None = None
 
     @property
@@ -96,9 +99,11 @@ class Warp:
             None if values is None else Placed(values, (-top, -left), (height, width))
             for values in (self.lazy_confidence, self.slide)
         )
-        behind = None if self.behind is None else cut(self.behind, box)
-        beside = None if self.beside is None else cut(self.beside, box)
-        return Warp(self.canvas.within(box), maps, depth, confidence, slide, behind, self.viewpoint, beside)
+        behind, refilled, beside = (
+            None if values is None else cut(values, box) for values in (self.behind, self.refilled, self.beside)
+        )
+        canvas = self.canvas.within(box)
+        return Warp(canvas, maps, depth, confidence, slide, behind, self.viewpoint, refilled, beside)
 
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
@@ -248,7 +253,8 @@ def build_map(
                 x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
             out.x[part], out.y[part] = x, y
 
-    each(put, strips(shape))
+    # depth that is worked out again where it is read takes the larger strips of `Depth`
+    each(put, small_strips(shape) if held.size else strips(shape))
     confidence = None if refined is None else Confidence(canvas, camera, refined)
     return Warp(
         canvas, (own, *maps), held if held.size else depth, confidence, beside=held_beside if hold else None

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cameras.camera import Camera, Knowledge, zoomed
 from ..cameras.matches import Matches
@@ -140,15 +141,19 @@ class _Directions:
         """Of the longest edges only."""
         return replace(self, lines=self.lines[:count], middles=self.middles[:count], lengths=self.lengths[:count])
 
-    def agreeing(self, directions: Array) -> Array:
-        """exp(−½ (angle / σ)²) (M, N) of the angle in the picture between each edge and the way from its middle to the
-        vanishing point of each direction (M, 3)."""
-        points = directions @ self.P.T
+    def agreeing(self, directions: Array) -> NDArray[np.float32]:
+        """exp(−½ (angle / σ)²) (…, N) of the angle in the picture between each edge and the way from its middle to the
+        vanishing point of each direction (…, 3)."""
+        points = directions.reshape(-1, 3) @ self.P.T
         u, v, w = points.T
-        squared = np.column_stack([u * u + v * v, -2 * u * w, -2 * v * w, w * w]) @ self.middles.T
-        sine = np.square(points @ self.lines.T) / np.maximum(squared, 1e-12)
-        sine *= -0.5 / np.radians(EDGE_FOCAL.edge_sigma_deg) ** 2
-        return np.asarray(np.exp(sine, out=sine))
+        squared = np.array([u * u + v * v, -2 * u * w, -2 * v * w, w * w]).T @ self.middles.T
+        sine = points @ self.lines.T
+        sine *= sine
+        sine /= np.maximum(squared, 1e-12, out=squared)
+        # float32 from where nothing cancels any more: several times as fast, and the sums are right to six digits
+        out: NDArray[np.float32] = sine.astype(np.float32)
+        out *= np.float32(-0.5 / np.radians(EDGE_FOCAL.edge_sigma_deg) ** 2)
+        return np.exp(out, out=out).reshape(*directions.shape[:-1], -1)
 
 
 def _best_frame(pictures: tuple[_Directions, _Directions]) -> tuple[Array, float]:
@@ -160,7 +165,7 @@ def _best_frame(pictures: tuple[_Directions, _Directions]) -> tuple[Array, float
         ))
     )  # fmt: skip
     longest = [picture.longest(EDGE_FOCAL.first_edges) for picture in pictures]
-    found = _total(longest, [down_at(pitch, roll)])
+    found = _total(longest, down_at(pitch, roll)[None])
     best, value = np.zeros(3), -1.0
     for start in _apart(down_at(pitch, roll), found):
         yaw = np.radians(np.arange(0.0, 90.0, EDGE_FOCAL.yaw_step_deg))
@@ -198,21 +203,26 @@ def _apart(down: Array, values: Array) -> list[int]:
     return out
 
 
-def _total(pictures: Sequence[_Directions], directions: list[Array]) -> Array:
-    """Evidence (M,) of the edges of all pictures for frames, whose directions are (M, 3) each: the logarithm of how
+def _total(pictures: Sequence[_Directions], directions: Array) -> Array:
+    """Evidence (M,) of the edges of all pictures for frames of some directions each (k, M, 3): the logarithm of how
     much likelier each edge is if some edges run in these directions than if all run anywhere, weighted by length."""
     density = EDGE_FOCAL.aligned_share / 3 * np.sqrt(np.pi / 2) / np.radians(EDGE_FOCAL.edge_sigma_deg)
-    total: Array = sum(
-        np.log1p(density * sum(picture.agreeing(one) for one in directions)) @ picture.lengths for picture in pictures
-    )
+    total = np.zeros(directions.shape[1])
+    for picture in pictures:
+        agreeing = picture.agreeing(directions).sum(axis=0)
+        agreeing *= np.float32(density)
+        total += np.log1p(agreeing, out=agreeing) @ picture.lengths
     return total
 
 
-def _frame(angles: Array) -> list[Array]:
-    """The directions (M, 3) of frames with angles (M, 3), pitch, roll and yaw in radians: down and two level ones."""
-    down = down_at(angles[:, 0], angles[:, 1])
-    level = np.cross(down, [0.0, 0.0, 1.0])
-    level /= np.linalg.norm(level, axis=1, keepdims=True)
-    other = np.cross(down, level)
-    sine, cosine = np.sin(angles[:, 2:]), np.cos(angles[:, 2:])
-    return [down, cosine * level + sine * other, cosine * other - sine * level]
+def _frame(angles: Array) -> Array:
+    """The directions (3, M, 3) of frames with angles (M, 3), pitch, roll and yaw in radians: down and two level ones.
+    """
+    x, y, z = down_at(angles[:, 0], angles[:, 1]).T
+    sine, cosine = np.sin(angles[:, 2]), np.cos(angles[:, 2])
+    wide = np.hypot(x, y)
+    level = y / wide, -x / wide, np.zeros_like(z)
+    other = x * z / wide, y * z / wide, -wide
+    first = [cosine * a + sine * b for a, b in zip(level, other, strict=True)]
+    second = [cosine * b - sine * a for a, b in zip(level, other, strict=True)]
+    return np.array([[x, y, z], first, second]).transpose(0, 2, 1)

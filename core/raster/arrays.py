@@ -42,6 +42,11 @@ def strips(shape: tuple[int, ...]) -> Iterator[slice]:
         yield slice(top, min(shape[0], top + rows))
 
 
+def small_strips(shape: tuple[int, ...]) -> Iterator[slice]:
+    """Rows of a picture (H, W), so few at a time that what is worked out of them stays in the processor's cache."""
+    return strips((shape[0], PARTS.smaller_strips * shape[1]))
+
+
 def beside(rows: slice, margin: int, height: int) -> tuple[slice, slice]:
     """Some rows of `height` with so many more on either side, as far as there are; and which of those they are."""
     near = slice(max(0, rows.start - margin), min(height, rows.stop + margin))

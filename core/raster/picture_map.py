@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array, Box, cut, cut_in_place
+from .arrays import Array, Box, Part, cut, cut_in_place
 
 
 class CanvasMap(Protocol):
@@ -53,6 +53,15 @@ class PictureMap:
     def inside(self) -> NDArray[np.bool_]:
         """Where (H, W) the map falls inside the picture."""
         return falls_inside(self.x, self.y, self.size)
+
+    def from_middle(self, part: Part) -> NDArray[np.float32]:
+        """How far (h, w) rows and columns of the canvas are from the middle of the picture, squared: 1 at its corners,
+        and at most 1 beyond them, where the map is NaN too."""
+        middle_x, middle_y = ((side - 1) / 2 for side in self.size)
+        squared = (self.x[part] - np.float32(middle_x)) ** 2
+        squared += (self.y[part] - np.float32(middle_y)) ** 2
+        squared *= np.float32(1 / max(middle_x**2 + middle_y**2, 1.0))
+        return np.fmin(squared, np.float32(1), out=squared)
 
     def between(self, at: Array) -> Array:
         """The pixels (N, 2) that the map has at places (N, 2) px of the canvas, bilinear; NaN outside it."""

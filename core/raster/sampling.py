@@ -51,10 +51,14 @@ def _fetch_tile(
     height, width = source.shape[:2]
     with np.errstate(invalid="ignore"):
         inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
-    if not inside.any():
+    whole_tile = bool(inside.all())
+    if not whole_tile and not inside.any():
         return
-    x0, x1 = max(0, int(x[inside].min()) - 2), min(width, int(x[inside].max()) + 4)
-    y0, y1 = max(0, int(y[inside].min()) - 2), min(height, int(y[inside].max()) + 4)
+    within = [values if whole_tile else values[inside] for values in (x, y)]
+    (x0, x1), (y0, y1) = (
+        (max(0, int(values.min()) - 2), min(side, int(values.max()) + 4))
+        for values, side in zip(within, (width, height), strict=True)
+    )
     # a tile that shrinks a huge picture is quartered
     if max(x1 - x0, y1 - y0) > PARTS.max_remap_side and max(out.shape[:2]) > 1:
         half = (max(1, out.shape[0] // 2), max(1, out.shape[1] // 2))
@@ -65,7 +69,6 @@ def _fetch_tile(
         return
     part = np.ascontiguousarray(source[y0:y1, x0:x1])
     x, y = x - np.float32(x0), y - np.float32(y0)
-    whole_tile = bool(inside.all())
     if not whole_tile:
         x[~inside] = y[~inside] = -9
     # one picture's own border repeated: bicubic needs a pixel beyond the last

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from .. import engine_options, pair, properties
+from .. import engine_options, explain, pair, properties
 from ..bridge import cameras, compat, images, ownership, result
 from ..bridge.images import Unusable
 
@@ -235,4 +235,6 @@ def _in_words(image: bpy.types.Image, found: dict[str, Any]) -> str:
     width, height = image.size
     warnings = len(found["warnings"])
     said = f", {warnings} warning{'s' * (warnings > 1)}" if warnings else ""
+    verdict = explain.verdict_in_short(found["report"])
+    said += f"; {verdict}" if verdict else ""
     return f"{image.name}: {width} × {height} px in {sum(found['seconds'].values()):.1f} s{said}."

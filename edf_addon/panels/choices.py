@@ -65,7 +65,8 @@ FRAME = (
 OUTPUT = (
     Row("blend"),
     Row("seam", why_not=lambda settings: "An average has no seam" if settings.blend == "LINEAR" else ""),
-    Row("exposure"),
+    Row("light"),
+    Row("light_stops", shown=lambda settings: settings.light == "AUTO"),
     Row("holes", why_not=lambda settings: "An average has no holes" if settings.blend == "LINEAR" else ""),
     Row("scale"),
     Row("seed"),

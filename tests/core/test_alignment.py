@@ -181,12 +181,15 @@ def test_three_frames_tell_more_than_one(clip: list[Pair], alone: list[Alignment
     assert map_error(clip[0], pooled) < np.mean(maps) and map_error(clip[0], pooled) < 0.3
 
 
-def test_every_frame_is_made_by_the_same_warp(clip: list[Pair], pooled: Alignment, quick: StitchOptions) -> None:
+def test_every_frame_is_made_by_the_same_warp(clip: list[Pair], quick: StitchOptions) -> None:
+    quick = replace(quick, fade="continue")
+    pooled = align([frame_of(pair, quick) for pair in clip], quick, silent)
     results = [compose(frame_of(pair, quick), pooled, quick, Stopwatch(Progress())) for pair in clip]
     for one, pair in zip(results, clip, strict=True):
         assert np.array_equal(one.warp.maps[1].x, pooled.warp.maps[1].x) and one.warp.canvas == pooled.warp.canvas
         assert one.edges[0].two_view is pooled.edges[0].two_view and one.field is pooled.field
         assert all(map(np.array_equal, [p.view for p in one.pictures], (pair.reference, pair.target)))
+        assert one.report["options"]["fade"] == "plane", "as used: what goes on beyond the overlap is one frame's"
     assert not np.array_equal(results[0].pixels, results[1].pixels)
 
 

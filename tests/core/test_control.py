@@ -201,7 +201,7 @@ def test_what_is_masked_is_not_seen_in_the_panorama(
 ) -> None:
     pair, first, second = passer_by
     assert not of_the_thing(small_result.pixels).any()
-    options = replace(quick, blend=blend, exposure=False, ignore=(first, second))
+    options = replace(quick, blend=blend, exposure="none", ignore=(first, second))
     result = stitch((pair.reference, pair.target), options)
     assert of_the_thing(result.pictures[0].pixels).sum() > 3000, "the pictures hold it, alpha hides it"
     # where next to nothing is shown, bicubic's negative lobes alone decide about its colour

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
-from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, HOLES, PROJECTIONS, ROUND_FIELDS, SEAMS
+from edf_stitch.core.choices import BLENDS, CROPS, EXPOSURES, FADES, FIELDS, HOLES, PROJECTIONS, ROUND_FIELDS, SEAMS
 from edf_stitch.core.options import LEAST_SCALE, StitchOptions
 from edf_stitch.core.system.errors import BadRequest
 
@@ -21,7 +21,7 @@ def test_the_defaults_are_the_designs() -> None:
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "continue", "camera": CameraRequest(), "matches": None, "ignore": (),
         "slide": "auto", "projection": "auto", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
-        "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": True,
+        "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": "auto",
         "holes": "auto", "seed": 0, "measure": True, "cache": None,
     }  # fmt: skip
 
@@ -40,7 +40,8 @@ def test_nothing_changes_them_afterwards() -> None:
 @pytest.mark.parametrize("asked", [
     *({"field": name} for name in FIELDS), *({"fade": name} for name in FADES), *({"blend": name} for name in BLENDS),
     *({"seam": name} for name in SEAMS), *({"holes": name} for name in HOLES), {"mask": Path("m.png")},
-    {"exposure": False}, *({"projection": name} for name in (*PROJECTIONS, "pannini:0.3")),
+    *({"exposure": one} for one in (*EXPOSURES, 0.0, -1.5, 10)),
+    *({"projection": name} for name in (*PROJECTIONS, "pannini:0.3")),
     {"projection": "auto", "slide": "auto"}, {"projection": "auto", "slide": 1.0}, {"slide": "auto"},
     {"projection": "auto", "field": "apap"}, {"projection": "auto", "centre": (-10.0, 3.0), "fov": 75.0},
     *({"crop": name} for name in CROPS), {"crop": (0, 0, 1, 1)}, {"crop": (3, 4, 500, 600)}, {"scale": 1},
@@ -60,6 +61,9 @@ def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
       for name in ("none", "", "Plane")),
     *(({"blend": name}, ("blend", repr(name), "choose from: multiband, feather, linear")) for name in ("", "Linear")),
     *(({"seam": name}, ("seam", repr(name), "choose from: graphcut, none")) for name in ("", "voronoi")),
+    *(({"exposure": name}, (repr(name), "choose from: auto, reference, none, or a number of stops"))
+      for name in ("", "Auto", "1")),
+    *(({"exposure": value}, ("stops", "between -10 and 10")) for value in (10.1, -11, math.nan, math.inf)),
     *(({"holes": name}, ("holes", repr(name), "choose from: auto, transparent, inpaint")) for name in ("", "fill")),
     *(({"crop": name}, ("crop", repr(name), "choose from: auto, full, inscribed, reference, or X, Y, W, H"))
       for name in ("tight", "", "1,2,3,4", "Full")),

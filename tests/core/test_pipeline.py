@@ -486,7 +486,7 @@ def test_arrays_that_are_no_pictures(array: np.ndarray, small_pair: Pair) -> Non
 
 
 def test_the_blend_is_the_one_asked_for(small_pair: Pair, small_result: StitchResult, known: StitchOptions) -> None:
-    linear = stitch((small_pair.reference, small_pair.target), replace(known, blend="linear", exposure=False))
+    linear = stitch((small_pair.reference, small_pair.target), replace(known, blend="linear", exposure="none"))
     assert np.array_equal(linear.warp.maps[1].x, small_result.warp.maps[1].x)
     assert linear.report["options"]["blend"] == "linear"
     both = (linear.layers[0].alpha > 0) & (linear.layers[1].alpha > 0)

@@ -10,7 +10,8 @@ explain = pytest.importorskip("edf_stitch.edf_addon.explain")
 def test_a_report_becomes_facts_in_the_order_of_interest(small_result):
     report = small_result.report
     facts = dict(explain.facts(report))
-    assert list(facts)[:4] == ["Model", "Size", "Matches", "Inliers"]
+    assert list(facts)[:5] == ["Verdict", "Model", "Size", "Matches", "Inliers"]
+    assert facts["Verdict"] == "Good"
     assert facts["Model"] == "General scene"
     assert facts["Size"] == f"{report['canvas']['width']} × {report['canvas']['height']} px"
     assert facts["Inliers"].startswith(f"{report['matches']['inliers']} (") and facts["Inliers"].endswith("%)")
@@ -18,6 +19,21 @@ def test_a_report_becomes_facts_in_the_order_of_interest(small_result):
     assert facts["Source"] == report["two_view"]["focal_source"]
     assert facts["Alignment"].startswith(f"{report['measured']['alignment_median_px']:.2f} px")
     assert facts["Projectivity"] == f"{report['measured']['projectivity_independent_px']:.2f} px"
+
+
+def test_a_verdict_is_told_with_its_places(small_result):
+    places = [{"box": [3, 4, 50, 60], "what": "something moved"}]
+    verdict = {"is": "look", "because": "x", "what_to_do": "y", "places": places}
+    look = {**small_result.report, "verdict": verdict}
+    assert explain.facts(look)[:2] == [
+        ("Verdict", "Look at these places"), ("", "3, 4 (50 × 60 px from the upper left): something moved"),
+    ]  # fmt: skip
+    assert explain.verdict_in_short(look) == "look at 1 place (see Result)"
+    worse = {**look, "verdict": {**verdict, "is": "not usable", "because": "it is mirrored"}}
+    assert explain.facts(worse)[:2] == [("Verdict", "Not usable"), ("", "It is mirrored.")]
+    assert explain.verdict_in_short(worse) == "not usable: it is mirrored"
+    assert explain.verdict_in_short(small_result.report) == "" == explain.verdict_in_short({})
+    assert "Verdict" not in dict(explain.facts({**look, "verdict": None})), "of an earlier release"
 
 
 def test_a_preview_measures_less_and_says_what_it_knows(small_result):

@@ -141,11 +141,38 @@ def test_the_frame_is_moved_and_sized_in_degrees_and_the_reference_keeps_its_own
     assert options["centre"] is None and options["fov"] is None
 
 
+def test_the_exposure_is_a_name_or_stops(blender):
+    settings = blender.settings
+    for item in settings.bl_rna.properties["light"].enum_items:
+        settings.light = item.identifier
+        assert options_in_words(settings).exposure == item.identifier.lower()
+    settings.light_stops = -1.5
+    assert options_in_words(settings).exposure == "none", "what is left as taken gets no brighter"
+    settings.light = "AUTO"
+    assert options_in_words(settings).exposure == -1.5
+
+
+@pytest.mark.parametrize(("exposure", "light"), [(True, "REFERENCE"), (False, "NONE")])
+def test_the_exposure_that_an_earlier_release_asked_for_is_the_same(blender, exposure, light):
+    settings = blender.settings
+    settings.exposure = exposure
+    assert settings.light == light, "a script of then"
+    settings.light = "AUTO"
+    properties.restore(settings, {"exposure": exposure, "fade": "PLANE"}, {})
+    assert settings.light == light, "a panorama of then"
+    settings.property_unset("light")
+    settings.version, settings.reference = 0, bpy.data.images.new("a", 8, 8)
+    settings.version = 0
+    earlier.bring_up_to_date(settings)
+    assert settings.light == light, "a file of then"
+
+
 @pytest.mark.parametrize("projection", ["PERSPECTIVE", "CYLINDRICAL"])
 def test_a_panorama_of_an_earlier_release_brings_back_what_was_meant(blender, projection):
     kept = {"projection": projection, "fade": "INFINITY", "crop": "INSCRIBED", "holes": "TRANSPARENT"}
     properties.restore(blender.settings, kept, {})
     options = options_in_words(blender.settings)
+    assert options.exposure == "reference"
     assert options.projection == ("reference" if projection == "PERSPECTIVE" else "cylindrical")
     assert (options.fade, options.crop, options.holes, options.slide) == ("infinity", "inscribed", "transparent", 0.0)
 

@@ -10,7 +10,7 @@ import pytest
 from edf_stitch.synthetic_scenes.blender_process import RenderFailed
 from edf_stitch.synthetic_scenes.passes import read_passes
 
-CHANNELS = [*(f"Combined.{c}" for c in "RGBA"), "Depth.Z", *(f"Position.{c}" for c in "XYZ")]
+CHANNELS = [*(f"Combined.{c}" for c in "RGBA"), "Depth.Z", *(f"Position.{c}" for c in "XYZ"), "IndexOB.X"]
 
 
 def values(name: str) -> np.ndarray:
@@ -42,12 +42,13 @@ def test_what_blender_writes_is_read(tmp_path: Path, in_parts: bool) -> None:
         assert np.array_equal(passes.light[..., k], values(f"Combined.{c}"))
     for k, c in enumerate("XYZ"):
         assert np.array_equal(passes.position[..., k], values(f"Position.{c}"))
+    assert np.array_equal(passes.things, values("IndexOB.X") % 256)
     nothing = np.eye(3, 4) > 0
     assert np.isinf(passes.depth[nothing]).all()
     assert np.array_equal(passes.depth[~nothing], values("Depth.Z")[~nothing])
 
 
-@pytest.mark.parametrize("missing", ["Depth.Z", "Position.Y", "Combined.G"])
+@pytest.mark.parametrize("missing", ["Depth.Z", "Position.Y", "Combined.G", "IndexOB.X"])
 def test_a_missing_pass_is_named(tmp_path: Path, missing: str) -> None:
     write(tmp_path / "a.exr", [name for name in CHANNELS if name != missing])
     with pytest.raises(RenderFailed, match=missing):

@@ -94,6 +94,13 @@ def test_exposing_is_blenders_standard_view_with_gain(rendered: RenderedPair) ->
     assert kept.dtype == np.float32 and np.allclose(kept, LIGHT / 2) and kept.max() > 1
 
 
+def test_corners_lose_the_light_that_was_asked_for() -> None:
+    gray = np.full((21, 31, 3), 0.5, np.float32)
+    taken = expose(gray, (1, 1, 1), 0, True, from_seed(0), vignetting=0.4)
+    assert np.allclose(taken[[0, 0, -1], [0, -1, -1]], 0.3) and np.allclose(taken[10, 15], 0.5)
+    assert np.allclose(taken[10, 0], 0.4), "half-way by the square of the distance"
+
+
 @pytest.mark.parametrize("sigma", [1.0, 5.0])
 def test_noise_has_the_sigma_that_was_asked_for(sigma: float) -> None:
     gray = np.full((200, 200, 3), 0.2, np.float32)
@@ -121,3 +128,11 @@ def test_every_recipe_renders_and_is_proved(name: str, rendered_folder: Path) ->
     assert proved(pair.proof), pair.proof
     assert (pair.reference.dtype == np.float32) == recipe.hdr
     assert not recipe.hdr or pair.reference.max() > 20
+    # the border of one picture cuts the thing, the other shows it whole
+    cut = {"cut_branch": ("reference", np.s_[:, -1]), "cut_person": ("target", np.s_[:, 0])}
+    assert bool(pair.things) == (name in cut)
+    for view, border in [cut[name]] if name in cut else []:
+        other = {"reference": "target", "target": "reference"}[view]
+        assert pair.things[view][border].any() and pair.things["wide"].any()
+        inner = pair.things[other][1:-1, 1:-1]
+        assert inner.sum() == pair.things[other].sum()

@@ -50,6 +50,10 @@ def test_a_bad_pair_is_reported_and_the_rest_goes_on(
     assert report["pictures"][0]["name"] == "reference1.png"
     assert (bad["status"], bad["exit_code"], bad["panorama"]) == ("failed", 3, "") and "at least" in bad["message"]
     assert third["status"] == "done"
+    assert first["verdict"] == report["verdict"] and not bad["verdict"]
+    assert Outcome("p", "done", size=(3, 2), verdict={"is": "good", "places": []}).in_words() == "3×2"
+    looked_at = Outcome("p", "done", size=(3, 2), verdict={"is": "look", "places": [1, 2]})
+    assert looked_at.in_words() == "3×2, look at 2 places"
 
 
 @pytest.mark.parametrize(("troubles", "expected"), [

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
-from edf_stitch.core.choices import BLENDS, CROPS, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS
+from edf_stitch.core.choices import BLENDS, CROPS, EXPOSURES, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS
 from edf_stitch.core.commands.arguments import add_options, options_from
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.system.errors import BadRequest
@@ -63,7 +63,9 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--scale", "0.5", "--crop", "inscribed"], {"scale": 0.5, "crop": "inscribed"}),
     (["--crop", "3,4,50,60"], {"crop": (3, 4, 50, 60)}), (["--crop", "reference"], {"crop": "reference"}),
     (["--dense"], {}),
-    (["--no-dense", "--no-exposure"], {"dense": False, "exposure": False}), (["--exposure", "--seam", "graphcut"], {}),
+    (["--no-dense", "--no-exposure"], {"dense": False, "exposure": "none"}), (["--exposure", "auto"], {}),
+    (["--exposure", "reference"], {"exposure": "reference"}), (["--exposure", "none"], {"exposure": "none"}),
+    (["--exposure=-1.5"], {"exposure": -1.5}), (["--exposure", "2"], {"exposure": 2.0}),
     (["--holes", "inpaint"], {"holes": "inpaint"}), (["--holes", "transparent"], {"holes": "transparent"}),
     (["--mask", "m.png"], {"mask": Path("m.png")}),
     (["--blend", "linear"], {"blend": "linear"}), (["--blend", "feather"], {"blend": "feather"}),
@@ -122,7 +124,7 @@ def test_the_help_names_every_option_and_choice() -> None:
         "focal-px", "focal-mm", "sensor-mm", "focal35", "principal", "cameras", "matches", "ignore-ref",
         "ignore-target", "scale", "crop", "field", "fade", "dense", "projection", "blend", "seam", "mask",
         "exposure", "holes", "seed", "slide", "level", "centre", "fov",
-    )), *PROJECTIONS, *FIELDS, *FADES, *BLENDS, *SEAMS, *HOLES, *CROPS):  # fmt: skip
+    )), *PROJECTIONS, *FIELDS, *FADES, *BLENDS, *SEAMS, *EXPOSURES, *HOLES, *CROPS):  # fmt: skip
         assert word in said, word
 
 

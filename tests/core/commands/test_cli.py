@@ -79,7 +79,7 @@ def test_a_stitch_from_files_to_files(
     out, err = said()
     assert out == ""
     height, width = small_result.alpha.shape
-    assert err.splitlines()[-1] == f"edf: {tmp_path / 'out.png'}: {width}×{height}"
+    assert err.splitlines()[-2:] == [f"edf: {tmp_path / 'out.png'}: {width}×{height}", "edf: verdict: good"]
     assert set(files(tmp_path)) == {
         "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/00_reference.png",
         "layers/01_target.png", "layers/occluded_01.png", "layers/confidence.png", "layers/labels.png",
@@ -97,9 +97,9 @@ def test_progress_is_plain_lines_where_there_is_no_terminal(
     pictures: list[str], tmp_path: Path, said: Callable
 ) -> None:
     assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *KNOWN_WORDS]) == 0
-    lines = said()[1].splitlines()
-    assert [line.split()[1] for line in lines[:-1]] == list(STAGES), "one for each stage"
-    shares = [int(line.split("(")[1].rstrip("%)")) for line in lines[:-1]]
+    lines = said()[1].splitlines()[:-2]
+    assert [line.split()[1] for line in lines] == list(STAGES), "one for each stage"
+    shares = [int(line.split("(")[1].rstrip("%)")) for line in lines]
     assert shares[0] == 0 and shares == sorted(shares) and shares[-1] == round(100 - 100 * STAGES["write"])
 
 
@@ -124,6 +124,29 @@ def test_warnings_are_told_even_when_quiet(
     assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), "--quiet", "--report", str(report)]) == 0
     assert said() == ("", "edf: warning: the sky is falling\n")
     assert json.loads(report.read_text("utf-8"))["warnings"] == ["the sky is falling"]
+
+
+@pytest.mark.parametrize("rating, last, code", [
+    ("good", None, 0),
+    ("look", "edf: verdict: look at these places: a seam (3,4 5×6, 7,8 9×10); a fold (1,2 3×4); mend it", 0),
+    ("not usable", "edf: verdict: not usable: it is mirrored; mend it", 1),
+])  # fmt: skip
+def test_the_verdict_is_the_last_line_and_may_be_the_exit_code(
+    rating: str, last: str | None, code: int, pictures: list[str], tmp_path: Path, said: Callable,
+    monkeypatch: pytest.MonkeyPatch, small_result: StitchResult,
+) -> None:  # fmt: skip
+    places = [([3, 4, 5, 6], "a seam"), ([1, 2, 3, 4], "a fold"), ([7, 8, 9, 10], "a seam")]
+    verdict = {
+        "is": rating, "because": "it is mirrored", "what_to_do": "mend it",
+        "places": [{"box": box, "what": what} for box, what in places],
+    }  # fmt: skip
+    told = replace(small_result, report={**small_result.report, "verdict": verdict})
+    monkeypatch.setattr(pipeline, "stitch", lambda *_, **__: told)
+    given = ["stitch", *pictures, "-o", str(tmp_path / "out.png"), "--overwrite"]
+    assert main(given) == 0
+    assert said()[1].splitlines()[-1] == (last or "edf: verdict: good")
+    assert main([*given, "--quiet", "--strict-verdict"]) == code
+    assert said()[1].splitlines() == ([last] if last else [])
 
 
 def test_pictures_and_options_reach_the_stitch(pictures: list[str], tmp_path: Path, quick: list) -> None:
@@ -481,4 +504,4 @@ def test_on_a_terminal_there_is_a_bar(folder: Path, tmp_path: Path) -> None:
     os.close(ours)
     text = shown.decode("utf-8")
     assert "features" in text and " %" in text and "\r" in text and "edf: features" not in text
-    assert re.search(r"out\.png: \d+×\d+$", text.rstrip()), "the last line is the panorama's"
+    assert re.search(r"out\.png: \d+×\d+\s+edf: verdict: good$", text.rstrip()), "the last lines are the panorama's"

@@ -35,7 +35,7 @@ def run(folder: Path, job: dict) -> tuple[int, list[dict], dict]:
     return worker.returncode, said, json.loads(index.read_text("utf-8")) if index.exists() else {}
 
 
-ON_PLANE = {name: getattr(ON_REFERENCE, name) for name in ("projection", "slide", "fade", "crop", "holes")}
+ON_PLANE = {name: getattr(ON_REFERENCE, name) for name in ("projection", "slide", "fade", "crop", "holes", "exposure")}
 
 
 @pytest.fixture

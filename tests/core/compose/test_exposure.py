@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.compose.exposure import Exposure, match_exposure, pooled, unchanged
+from edf_stitch.core.compose.clipped import ClippedLight
+from edf_stitch.core.compose.exposure import (
+    Exposure,
+    exposures_for,
+    match_exposure,
+    match_tones,
+    pooled,
+    unchanged,
+)
+from edf_stitch.core.compose.tone_options import TONE
+from edf_stitch.core.compose.toned import ToneCurve, Vignetting
 from edf_stitch.core.panorama.layers import Layer
+from edf_stitch.core.raster.picture_map import PictureMap
 
 H, W = 240, 320
 GAIN = np.float32([1.35, 0.8, 1.1])
 LDR, HDR = (False, False), (True, True)
 NOTHING = np.zeros((H, W), bool)
+PLACES = PictureMap(*np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32)), (W, H))
 
 
 def scene(seed: int = 0, top: float = 0.9) -> np.ndarray:
@@ -29,7 +43,7 @@ def test_gain_of_each_channel() -> None:
     found = match_exposure(layer(light), layer(light / GAIN), NOTHING, LDR)
     assert found.gain.dtype == np.float32 and np.allclose(found.gain, GAIN, rtol=1e-4)
     assert (found.spread < 1e-3).all() and found.blocks > 500
-    assert np.allclose(found.applied(layer(light / GAIN)).pixels, light, rtol=1e-4)
+    assert np.allclose(found.applied(layer(light / GAIN), PLACES).pixels, light, rtol=1e-4)
 
 
 def test_clipped_pixels_are_left_out() -> None:
@@ -90,7 +104,7 @@ def test_gray_pictures_have_one_gain() -> None:
 
 def test_no_compensation_gives_the_very_same_layer() -> None:
     target = layer(scene())
-    assert unchanged(3).applied(target) is target
+    assert unchanged(3).applied(target, PLACES) is target
 
 
 def test_frames_of_a_clip_share_the_middle_of_their_gains() -> None:
@@ -136,3 +150,118 @@ def test_a_level_less_than_whole_is_not_whole() -> None:
         found = match_exposure(one, other, NOTHING, HDR)
         assert found.blocks <= (H // 8) * (W - 96) // 8 and np.allclose(found.gain, GAIN, rtol=1e-3)
         assert (found.spread < 1e-3).all()
+
+
+# --- one exposure for both ------------------------------------------------------------------------------------------
+
+STOP = np.float32(2)
+
+
+def meet(first: np.ndarray, second: np.ndarray, floats: tuple[bool, bool] = LDR, stops: float = 0.0) -> tuple:
+    return match_tones((layer(first), layer(second)), (PLACES, PLACES), NOTHING, floats, stops)
+
+
+def shown(exposures: tuple, *lights: np.ndarray) -> list[np.ndarray]:
+    return [one.applied(layer(light), PLACES).pixels for one, light in zip(exposures, lights, strict=True)]
+
+
+def test_two_exposures_meet_between_their_own() -> None:
+    light = scene(top=0.4)
+    first, second = meet(light, light / STOP)
+    assert first.gain == pytest.approx(STOP**-0.35, rel=1e-3) and second.gain == pytest.approx(STOP**0.65, rel=1e-3)
+    both = shown((first, second), light, light / STOP)
+    assert np.allclose(*both, atol=1e-4) and first.blocks == second.blocks > 500
+    further = meet(light, light / 16)[0].gain
+    assert further == pytest.approx(2**-TONE.most_reference_stops, rel=1e-3), "beyond two stops no further"
+
+
+@pytest.mark.parametrize("stops", [-1.0, 1.5])
+def test_stops_are_added_to_both(stops: float) -> None:
+    light = scene(top=0.4)
+    plain, more = meet(light, light / STOP), meet(light, light / STOP, stops=stops)
+    for one, other in zip(plain, more, strict=True):
+        assert other.gain == pytest.approx(one.gain * 2**stops, rel=1e-5)
+    nowhere = layer(light, np.zeros((H, W), np.float32))
+    alone = match_tones((layer(light), nowhere), (PLACES, PLACES), NOTHING, LDR, stops)
+    assert all(one.gain == pytest.approx(2**stops) and not one.blocks and not one.why_not for one in alone)
+
+
+@pytest.mark.parametrize("floats", [(True, True), (True, False), (False, True)])
+def test_beside_float_pictures_radiance_is_kept(floats: tuple[bool, bool]) -> None:
+    """At the reference's exposure, unbounded, without a curve."""
+    light = 3 * scene(top=0.6)
+    first, second = meet(light, light**1.3 / STOP, floats)
+    assert (first.gain == 1).all() and first.curve is second.curve is None
+    assert not first.keeps_white and not second.keeps_white and first.clipped is None
+    assert shown((first, second), light, light)[0].max() == light.max() > 1.5
+
+
+def test_vignetting_is_given_back_to_both() -> None:
+    true = scene(top=0.45)
+    lens = Vignetting(-0.15, -0.4)
+    right = PictureMap(PLACES.x - W // 2, PLACES.y, (W, H))
+    lights = [true * np.exp(lens.at(one.from_middle(np.s_[:, :])))[..., None] for one in (PLACES, right)]
+    alpha = (PLACES.x >= W // 2).astype(np.float32)
+    layers = layer(lights[0]), layer(lights[1] / STOP, alpha)
+    for floats in (LDR, HDR):
+        exposures = match_tones(layers, (PLACES, right), NOTHING, floats)
+        assert exposures[0].vignetting == exposures[1].vignetting
+        assert exposures[0].vignetting.corner == pytest.approx(-0.4, abs=0.04)
+        both = [
+            one.applied(part, at).pixels for one, part, at in zip(exposures, layers, (PLACES, right), strict=True)
+        ]
+        assert np.abs(both[0] / both[1] - 1)[:, W // 2 :][both[0][:, W // 2 :] < 0.5].max() < 0.03
+
+
+def test_an_over_exposed_picture_learns_its_clipped_light_from_the_other() -> None:
+    light = scene(top=0.45)
+    light[:120] = [0.15, 0.3, 0.75]
+    over = np.minimum(STOP * light, 1)
+    for swapped in (False, True):
+        pair = (over, light) if swapped else (light, over)
+        exposures = meet(*pair)
+        shares = [one.overexposed for one in exposures][:: -1 if swapped else 1]
+        assert shares[0] == 0 and shares[1] == pytest.approx(0.5, abs=0.03)
+        assert [one.clipped is None for one in exposures] == [not swapped, swapped]
+        both = shown(exposures, *pair)
+        assert np.abs(both[0] - both[1])[:116].max() < 0.05, "the sky is the same in both"
+
+
+def test_what_cannot_be_matched_is_said() -> None:
+    light = scene(top=0.6)
+    assert all(one.why_not == "" for one in meet(light, light / 16))
+    first, second = meet(light, light / 100)
+    assert (first.gain == second.gain).all() and first.why_not == "" and "6.6 stops" in second.why_not
+    assert "clipped" in meet(light, np.ones_like(light))[1].why_not
+    assert "clipped" in match_exposure(layer(light), layer(np.ones_like(light)), NOTHING, LDR).why_not
+    assert "4.1 stops" in match_exposure(layer(light), layer(light / 17), NOTHING, LDR).why_not
+
+
+def test_what_is_wanted_is_done() -> None:
+    light = scene(top=0.4)
+    layers = layer(light), layer(light / STOP)
+
+    def of(wanted: object, pictures: int = 2, floats: tuple[bool, bool] = LDR) -> list[float]:
+        exposures = exposures_for(layers, (PLACES,) * pictures, NOTHING, floats, wanted)
+        return [float(np.median(one.gain)) for one in exposures]
+
+    assert of("none") == [1, 1]
+    assert of("reference") == pytest.approx([1, 2], rel=1e-3)
+    assert of("auto") == pytest.approx([2**-0.35, 2**0.65], rel=1e-3)
+    assert of(1.0) == pytest.approx([2**0.65, 2**1.65], rel=1e-3)
+    assert of("auto", pictures=3) == pytest.approx([1, 2], rel=1e-3), "the panorama so far keeps its light"
+    third = exposures_for(layers, (PLACES,) * 3, NOTHING, LDR, "auto")[1]
+    assert third.keeps_white and not exposures_for(layers, (PLACES,) * 3, NOTHING, HDR, "auto")[1].keeps_white
+
+
+def test_frames_of_a_clip_share_all_of_it() -> None:
+    curve, table = ToneCurve(-0.2, -4.0, -1.0), ClippedLight((None, None, np.ones((4, 4), np.float32)))
+    lens, gain = Vignetting(-0.1, -0.2), np.float32([2, 1, 1])
+    plain = Exposure(gain, np.zeros(3, np.float32), 10, lens, curve, True, 0.1, table)
+    frames = [plain, replace(plain, curve=replace(curve, slope=-0.4)), replace(plain, curve=replace(curve, slope=-0.1)),
+              replace(plain, curve=None, gain=np.float32([9, 9, 9])), unchanged(3)]  # fmt: skip
+    frames[1] = replace(frames[1], vignetting=Vignetting(-0.3, -0.6), overexposed=0.5, clipped=None)
+    shared = pooled(frames)
+    assert shared.curve == curve and shared.vignetting == plain.vignetting and shared.clipped is table
+    assert (shared.gain.tolist(), shared.keeps_white, shared.overexposed, shared.blocks) == ([2, 1, 1], True, 0.1, 30)
+    assert pooled([frames[3], frames[3], plain]).curve is None

@@ -10,7 +10,8 @@ import pytest
 from edf_stitch.core.compose import moving_things
 from edf_stitch.core.compose.moving_things import moving_labels
 from edf_stitch.core.compose.overlap import overlap_of
-from edf_stitch.core.compose.seam import added_price, find_seam, known_labels, seam_cost
+from edf_stitch.core.compose.seam import find_seam, known_labels
+from edf_stitch.core.compose.seam_costs import seam_costs
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.picture_map import PictureMap
 
@@ -66,10 +67,9 @@ def test_who_walks_out_of_the_reference_is_seen_once() -> None:
     first, second = layer(LEFT, reference), layer(RIGHT, target)
     overlap = overlap_of(first, second, NOTHING)
     assert overlap is not None
-    known, cost = known_labels(first, second, NOTHING), seam_cost(overlap, flat(), None)
-    when = moving_labels(overlap, flat(), first, second, NOTHING)
+    known, when = known_labels(first, second), moving_labels(overlap, flat(), first, second, NOTHING)
     alone, together = (
-        find_seam(known, cost, added_price(overlap, NOTHING, given), overlap.box) for given in (None, when)
+        find_seam(known, seam_costs(overlap, flat(), None, NOTHING, given)) for given in (None, when)
     )
     assert not alone[WALKER].any() and together[WALKER].all()
 

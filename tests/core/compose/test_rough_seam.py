@@ -91,3 +91,14 @@ def test_it_reads_pictures_of_any_size_and_their_alpha(views: tuple[View, ...]) 
     assert found(far_away(views, COARSE)) < 5
     height, width = found.pictures[0].view.shape[:2]
     assert (width, height) == (160, 120), "so many px per radian"
+
+
+def test_a_seam_is_lost_where_both_pictures_are_busy(views: tuple[View, ...]) -> None:
+    def leaves(number: int) -> np.ndarray:
+        """Spots in any place, and thus elsewhere in the other picture; FOCAL / COARSE px are one of the small picture.
+        """
+        spots = np.random.default_rng(number).integers(40, 216, (SIZE[1] // 6, SIZE[0] // 6), np.uint8)
+        return np.repeat(cv2.resize(spots, SIZE, interpolation=cv2.INTER_NEAREST)[..., None], 3, axis=2)
+
+    assert rough(views, leaves(0), leaves(1)) < 10
+    assert rough(views, leaves(0), seen(views, 1, bands=False)) > 20

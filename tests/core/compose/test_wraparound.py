@@ -46,7 +46,7 @@ def world(turn: int) -> tuple[Layer, Layer, Warp]:
 
 def compose(turn: int, decided: Any = None, painted: np.ndarray | None = None, **options: Any) -> Composition:
     *layers, warp = world(turn)
-    return composed(layers, warp, VIEWS, replace(ON_REFERENCE, exposure=False, **options), (True, True), painted,
+    return composed(layers, warp, VIEWS, replace(ON_REFERENCE, exposure="none", **options), (True, True), painted,
                     lambda *_: None, decided, keep=True)  # fmt: skip
 
 

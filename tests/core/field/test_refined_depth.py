@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from edf_stitch.core.field import refined_depth
+from edf_stitch.core.field.options import RefinedOptions
 from edf_stitch.core.field.refined_depth import RefinedDepth
 
 START, STEP = (3.0, -4.0), (2.0, 2.5)  # px of the first node, px from each to the next
@@ -83,3 +85,12 @@ def test_one_line_or_one_column_of_nodes_is_enough() -> None:
     line = RefinedDepth(START, STEP, refined.inverse_depth[:1], refined.shift[:1], refined.confidence[:1])
     xs = START[0] + STEP[0] * np.arange(COLUMNS)
     assert np.array_equal(line.at(xs[None], np.full((1, COLUMNS), START[1]))[0], refined.inverse_depth[:1])
+
+
+def test_many_nodes_are_sampled_value_by_value_and_just_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    refined = random_depth()
+    places = np.meshgrid(np.linspace(2.0, 16.0, 29), np.linspace(-5.0, 7.0, 23))
+    together = refined.at(*places)
+    monkeypatch.setattr(refined_depth, "REFINED", RefinedOptions(together_nodes=0))
+    for one, other in zip(together, refined.at(*places), strict=True):
+        assert one.shape == other.shape and np.array_equal(one, other)

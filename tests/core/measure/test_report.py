@@ -153,7 +153,7 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
         assert entry["camera"]["fixed"] and entry["camera"]["focal_px"] == view.K[0, 0]
     assert report["options"] == {
         "field": "slack", "fade": "plane", "dense": True, "projection": "reference", "level": "auto", "scale": 1.0,
-        "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": True,
+        "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": "reference",
         "holes": "transparent", "seed": 0, "slide": 0, "centre": None, "fov": None}
     assert report["composition"]["exposure_blocks"] > 100
     assert report["composition"]["exposure_gain"] == pytest.approx([1, 1, 1], abs=0.01)

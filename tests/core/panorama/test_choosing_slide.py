@@ -171,6 +171,12 @@ def test_a_seam_that_runs_unseen_is_worth_it(by_hand: SimpleNamespace, monkeypat
     assert choice_for(base, views, NONE, DOWN, lambda warp: 500 - 100 * slid(warp)).s1 == 0, "bad is bad"
 
 
+def test_it_stays_where_sliding_gains_next_to_nothing(by_hand: SimpleNamespace) -> None:
+    base, views = rig(by_hand, lambda heading, rise: np.full_like(heading, 0.05))
+    little, much = (choice_for(base, views, NONE, DOWN, better_far(px)) for px in (1.4, 10))
+    assert little.s1 == 0 and little.costs[-1].cost < little.costs[0].cost and much.s1 == 1
+
+
 def test_it_stays_where_sliding_gains_nothing(by_hand: SimpleNamespace) -> None:
     base, views = rig(by_hand, lambda heading, rise: np.full_like(heading, 0.05))
     assert choice_for(base, views, NONE, DOWN, steady).s1 == 0

@@ -7,7 +7,8 @@ bpy = pytest.importorskip("bpy")
 from edf_stitch.edf_addon import engine_options  # noqa: E402
 from edf_stitch.edf_addon.panels import presets  # noqa: E402
 
-OLD = {"field": "STRICT", "fade": "PLANE", "projection": "PERSPECTIVE", "crop": "INSCRIBED", "holes": "TRANSPARENT"}
+OLD = {"field": "STRICT", "fade": "PLANE", "projection": "PERSPECTIVE", "crop": "INSCRIBED", "holes": "TRANSPARENT",
+       "exposure": False, "scale": 0.5}  # fmt: skip
 
 
 @pytest.fixture
@@ -51,7 +52,8 @@ def test_a_preset_of_an_earlier_release_means_what_it_meant_then(blender, resour
     file.write_text("\n".join(lines), "utf-8")
     bpy.ops.script.execute_preset(filepath=str(file), menu_idname="EDF_PT_presets")
     assert (settings.projection, settings.fade, settings.crop) == ("REFERENCE", "PLANE", "INSCRIBED")
-    assert (settings.slide_auto, settings.holes) == (False, "TRANSPARENT")
+    assert (settings.slide_auto, settings.holes, settings.light) == (False, "TRANSPARENT", "NONE")
+    assert settings.scale == 0.5, "what stands behind the exposure is read, too"
     settings.projection = "PERSPECTIVE"
     bpy.ops.edf.preset_add(name="New")
     settings.projection = "AUTO"

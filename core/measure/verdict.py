@@ -1,0 +1,335 @@
+"""What a finished panorama is worth, in words: good, good but for some places, or not usable.
+
+It is looked at as a person would, in a small copy: where the seam changes pictures that do not agree, where light is
+lost that a picture had, where the map folds. What fails as a whole fails by its geometry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.sources import role
+from ..compose.rough_seam import map_to_small, small_picture
+from ..field.folding import NO_TURN, cell_areas, turned_over, turning
+from ..panorama.layers import layer_of
+from ..raster.arrays import Box, Plane, dilated
+from ..raster.colour import encode
+from ..raster.picture_map import CanvasMap, PictureMap
+from .options import VERDICT
+
+if TYPE_CHECKING:
+    from ..compose.exposure import Exposure
+    from ..pictures.picture import Picture
+
+Levels = NDArray[np.uint8]
+
+GOOD, LOOK, NOT_USABLE = "good", "look", "not usable"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where (left, top, width, height in px of the panorama) to look, and at what; size: how much of it is wrong, in
+    px of the small copy."""
+
+    box: Box
+    what: str
+    size: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a panorama is worth.
+
+    Attributes
+    ----------
+    rating : str
+        GOOD, LOOK or NOT_USABLE.
+    because : str
+        Why, in plain words.
+    what_to_do : str
+        What would help; empty where nothing has to be done.
+    places : tuple of Place
+        Where to look, the worst first.
+    """
+
+    rating: str
+    because: str
+    what_to_do: str
+    places: tuple[Place, ...] = ()
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """As the report holds it."""
+        places = [{"box": list(place.box), "what": place.what} for place in self.places]
+        return {"is": self.rating, "because": self.because, "what_to_do": self.what_to_do, "places": places}
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A small copy of a panorama: every `step`-th pixel of its canvas.
+
+    Attributes
+    ----------
+    step : int
+    maps : tuple of PictureMap
+        To the small pictures.
+    tones, taken : tuple of (h, w, C) uint8 arrays
+        Each picture on the canvas, in levels of 255: as it is shown, and as it was taken.
+    shows : tuple of (h, w) bool arrays
+        Where each shows anything.
+    hidden : (h, w) bool array
+        What one of them shows though something nearer hides it there.
+    labels : (h, w) int array or None
+        Which picture each pixel comes from, −1 for none.
+    """
+
+    step: int
+    maps: tuple[PictureMap, ...]
+    tones: tuple[Levels, ...]
+    taken: tuple[Levels, ...]
+    shows: tuple[NDArray[np.bool_], ...]
+    hidden: NDArray[np.bool_]
+    labels: NDArray[np.int16] | None
+
+    @property
+    def side(self) -> int:
+        """Its longer side, px."""
+        return max(self.hidden.shape)
+
+    def box(self, mask: NDArray[np.bool_], shift: tuple[int, int]) -> Box:
+        """The box around a mask (h, w) in px of the panorama."""
+        x, y, width, height = (self.step * int(v) for v in cv2.boundingRect(mask.astype(np.uint8)))
+        return x + shift[0], y + shift[1], width, height
+
+
+def look_at(
+    pictures: Sequence[Picture], maps: Sequence[CanvasMap], exposures: Sequence[Exposure],
+    hidden: Sequence[NDArray[np.bool_]], labels: NDArray[np.int16] | None,
+) -> Look:  # fmt: skip
+    """A small copy of a panorama.
+
+    Parameters
+    ----------
+    pictures : sequence of Picture
+    maps : sequence of CanvasMap
+        Of the panorama's canvas, as it is cropped.
+    exposures : sequence of Exposure
+        What was done to the pictures' light.
+    hidden : sequence of (H, W) bool arrays
+        What each picture cannot see.
+    labels : (H, W) int array, optional
+
+    Returns
+    -------
+    Look
+    """
+    height, width = hidden[0].shape
+    step = -(-max(height, width) // VERDICT.side_px)
+    nodes = np.s_[step // 2 :: step, step // 2 :: step]
+    found = [_small(*each, nodes) for each in zip(pictures, maps, exposures, strict=True)]
+    small_maps, tones, taken, shows = zip(*found, strict=True)
+    unseen = np.logical_or.reduce([one[nodes] for one in hidden])
+    return Look(step, small_maps, tones, taken, shows, unseen, None if labels is None else labels[nodes])
+
+
+def _small(
+    picture: Picture, picture_map: CanvasMap, exposure: Exposure, nodes: tuple[slice, slice]
+) -> tuple[PictureMap, Levels, Levels, NDArray[np.bool_]]:
+    """One picture of a small copy: its map, tones as shown and as taken, and where it shows anything."""
+    full = picture_map.arrays()
+    coarse = PictureMap(full.x[nodes], full.y[nodes], full.size)
+    with np.errstate(invalid="ignore"):
+        apart = np.hypot(np.diff(coarse.x, axis=1), np.diff(coarse.y, axis=1))[coarse.inside()[:, 1:]]
+    small = small_picture(picture, 1 / max(1.0, float(np.nanmedian(apart))) if apart.size else 1.0)
+    own = map_to_small(coarse, small)
+    layer = layer_of(small, own)
+    tones, taken = (encode(one.pixels, 8) for one in (exposure.applied(layer, own), layer))
+    return own, tones, taken, layer.alpha > VERDICT.least_alpha
+
+
+def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict:
+    """Judge a panorama.
+
+    Parameters
+    ----------
+    look : Look
+    shift : (int, int)
+        px from the panorama's first pixel to that of the canvas which was looked at.
+    report : dict
+        It tells how far the map misses 5 % of its own matches, which share of it is folded, and where there are holes.
+
+    Returns
+    -------
+    Verdict
+    """
+    unlike = _unlike(look)
+    seam = _along_seam(look, unlike)
+    places = sorted(
+        (*_seam_places(look, seam, shift), *_torn_places(look, shift), *_light_places(look, shift),
+         *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2)
+           for box in report["composition"]["holes"])),
+        key=lambda place: -place.size,
+    )  # fmt: skip
+    missed = (report["measured"]["alignment_p95_px"] or 0.0) / (look.side * look.step)
+    cause = _cause(look, unlike, seam, missed, report["measured"]["folds"] or 0.0)
+    if cause:
+        return Verdict(NOT_USABLE, *cause, tuple(places[: VERDICT.most_places]))
+    if not places:
+        return Verdict(GOOD, "the pictures agree where the seam changes from one to the other", "")
+    kinds = list(dict.fromkeys(place.what for place in places))
+    return Verdict(
+        LOOK, "; ".join(kinds),
+        "paint over these places which picture is shown there (--mask), or leave them out (--ignore-ref, "
+        "--ignore-target)", tuple(places[: VERDICT.most_places]),
+    )  # fmt: skip
+
+
+def _cause(look: Look, unlike: Plane, seam: Plane, missed: float, folded: float) -> tuple[str, str] | None:
+    """Why a panorama is not usable, and what to do; None where it is. unlike, seam: see `_unlike`, `_along_seam`;
+    missed: share of the longer side."""
+    if folded > VERDICT.folded:
+        return (
+            f"the target would be folded in {folded:.0%} of what it shows: it is mirrored, or another place that looks "
+            "alike",
+            "check that neither picture is mirrored and that both show the same things; else give matches by hand "
+            "(--matches)",
+        )
+    along = seam >= 0
+    seen = along.any() and (seam[along] > VERDICT.step).mean() > VERDICT.seen_seam
+    both = look.shows[0] & look.shows[1]
+    hidden, differ = ((both & part).sum() / max(1, both.sum()) for part in (look.hidden, unlike > VERDICT.step))
+    if missed > (VERDICT.missed if seen else VERDICT.missed_by_far):
+        why = f"5 % of the matches are missed by more than {missed:.0%} of the panorama: the geometry is wrong"
+    elif not seen:
+        return None
+    elif hidden > VERDICT.hidden:
+        why = f"{hidden:.0%} of the overlap is hidden from one of the pictures: they were taken too far apart"
+    elif differ > VERDICT.unlike:
+        why = f"the pictures differ in {differ:.0%} of what both show: they have only a part in common"
+    else:
+        return None
+    return why, (
+        "take the pictures from places nearer to each other, with a larger overlap; give the focal length (--focal35, "
+        "--focal-px) if it is known, or matches by hand (--matches)"
+    )
+
+
+def _unlike(look: Look) -> Plane:
+    """Levels (h, w) by which two pictures differ where both show something, else 0; not counted is what changes so
+    slowly that blending evens it out."""
+    both = (look.shows[0] & look.shows[1]).astype(np.float32)
+    window = (2 * round(VERDICT.evened_share * look.side) + 1,) * 2
+    shown = np.maximum(cv2.blur(both, window), np.float32(1e-6))
+    total = np.zeros_like(both)
+    for first, second in zip(*(cv2.split(tones.astype(np.float32)) for tones in look.tones[:2]), strict=True):
+        apart = (second - first) * both
+        total += np.abs(apart - cv2.blur(apart, window) / shown)
+    unlike: Plane = cv2.blur(total * both, (3, 3)) / look.tones[0].shape[2]
+    return unlike
+
+
+def _along_seam(look: Look, unlike: Plane) -> Plane:
+    """`_unlike` (h, w) along the seam, where both pictures show something, −1 elsewhere."""
+    steps = np.full(look.hidden.shape, np.float32(-1))
+    if look.labels is None:
+        return steps
+    seam = np.zeros(steps.shape, bool)
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        changes = (look.labels[here] != look.labels[there]) & (look.labels[here] >= 0) & (look.labels[there] >= 0)
+        seam[here] |= changes
+        seam[there] |= changes
+    return np.where(seam & look.shows[0] & look.shows[1], unlike, steps)
+
+
+def _seam_places(look: Look, steps: Plane, shift: tuple[int, int]) -> Iterator[Place]:
+    """Where a seam is seen."""
+    apart = VERDICT.together_share * look.side
+    least = 2 * max(VERDICT.seam_px, VERDICT.seam_share * look.side)
+    for part in _parts(steps > VERDICT.step, least, apart):
+        near = dilated(part, max(1, round(VERDICT.rim_share * look.side)))
+        cut_by = [
+            role(number) for number, (shown, other) in enumerate((look.shows, look.shows[::-1]))
+            if (near & ~shown & other).any()
+        ]  # fmt: skip
+        if cut_by:
+            what = f"a thing is cut by the border of the {' and the '.join(cut_by)}"
+        elif look.hidden[part].mean() > VERDICT.mostly:
+            what = "near and far do not meet at the seam: depth is doubtful"
+        else:
+            what = "the pictures differ at the seam: something moved, or its depth is wrong"
+        yield Place(look.box(part, shift), what, float((steps[part] - VERDICT.step).sum()))
+
+
+def _torn_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
+    """Where the map of the picture that is shown folds, or stretches it far more than elsewhere, and has detail that
+    shows it."""
+    folds, stretched = np.zeros(look.hidden.shape, bool), np.zeros(look.hidden.shape, bool)
+    for number, one in enumerate(look.maps):
+        shown = (look.shows[number] if look.labels is None else look.labels == number) & _detailed(look.tones[number])
+        turns = turning(one)
+        folds |= turned_over(turns) & shown
+        areas = np.zeros(shown.shape, np.float32)
+        areas[:-1, :-1] = np.abs(cell_areas(one.x, one.y))
+        counts = shown & (turns != NO_TURN)
+        if counts.any():
+            stretched |= counts & (areas > VERDICT.stretch * np.median(areas[counts]))
+    square = look.side * look.side
+    for mask, share, what in (
+        (folds, VERDICT.fold_share, "the picture folds over: things may be torn or doubled"),
+        (stretched, VERDICT.stretch_share, "the picture is torn or smeared: depth is doubtful"),
+    ):
+        for part in _parts(mask, share * square):
+            yield Place(look.box(part, shift), what, float(part.sum()))
+
+
+def _detailed(tones: Levels) -> NDArray[np.bool_]:
+    """Where (h, w) there is an edge near by."""
+    green, window = tones[..., tones.shape[2] // 2], np.ones((7, 7), np.uint8)
+    detailed: NDArray[np.bool_] = cv2.subtract(cv2.dilate(green, window), cv2.erode(green, window)) >= VERDICT.edge
+    return detailed
+
+
+def _light_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
+    """Where light is lost that the picture had, or clipped light got a colour."""
+    for number, (tones, taken) in enumerate(zip(look.tones, look.taken, strict=True)):
+        shown = look.shows[number] if look.labels is None else look.labels == number
+        clipped = [before >= VERDICT.white for before in cv2.split(taken)]
+        white = np.logical_and.reduce([now >= VERDICT.white for now in cv2.split(tones)])
+        blown = shown & white & ~np.logical_and.reduce(clipped)
+        greyed = shown & _greyed(tones, taken, clipped)
+        both = greyed & look.shows[0] & look.shows[1]
+        apart = np.abs(look.tones[1][both].astype(int) - look.tones[0][both]).max(axis=1)
+        if both.sum() >= VERDICT.compared_px and np.median(apart) <= VERDICT.cast:
+            greyed[:] = False  # darker, but as the other picture has it
+        for mask, share, what in (
+            (blown, VERDICT.blown_share, "light is blown here that the picture has"),
+            (greyed, VERDICT.greyed_share, "light that was too bright for the picture got a cast or a step"),
+        ):
+            if mask.sum() > share * mask.size:
+                yield Place(look.box(max(_parts(mask, 1), key=np.sum), shift), what, float(mask.sum()))
+
+
+def _greyed(tones: Levels, taken: Levels, clipped: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """Where (h, w) a clipped channel is darkened with the others: there was more light in it than the picture tells."""
+    changes = [(now + np.float32(1)) / (before + np.float32(1))
+               for now, before in zip(cv2.split(tones), cv2.split(taken), strict=True)]  # fmt: skip
+    others = np.maximum.reduce([np.where(gone, np.float32(0), by) for gone, by in zip(clipped, changes, strict=True)])
+    as_others = [(by <= VERDICT.restored * others) | (others == 0) for by in changes]
+    dark = [now < VERDICT.greyed for now in cv2.split(tones)]
+    return np.logical_or.reduce([np.logical_and.reduce(one) for one in zip(clipped, dark, as_others, strict=True)])
+
+
+def _parts(mask: NDArray[np.bool_], least: float, apart: float = 2.0) -> Iterator[NDArray[np.bool_]]:
+    """The parts (h, w) of a mask with at least so many pixels; those less than twice `apart` px apart are one."""
+    if mask.sum() < least:
+        return
+    number = cv2.connectedComponents(dilated(mask, max(1, round(apart))).astype(np.uint8))[1]
+    number[~mask] = 0
+    for one in np.flatnonzero(np.bincount(number[mask]) >= max(1, least)):
+        yield number == one

@@ -1,0 +1,66 @@
+"""What a panorama is worth as it is delivered: beyond the overlap, and whether things are whole or gone."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.measure.metrics import psnr
+from ..core.pipeline import StitchResult
+from ..core.raster.arrays import dilated
+from ..core.raster.colour import decode, encode
+from ..core.raster.sampling import fetch
+from .measures import Truth, common_part, on_the_wide_canvas
+from .rendered import RenderedPair
+
+# Levels of 8 bit between which a picture's light is known well enough to tell its exposure.
+DARKEST, BRIGHTEST = 5, 250
+# px beside a thing's true place that are still its own: its rim is mixed with what lies behind.
+RIM_PX = 3
+
+
+def finished(result: StitchResult, pair: RenderedPair, truth: Truth) -> dict[str, float]:
+    """Figures of a panorama on the reference's plane, made with all that the defaults do.
+
+    target_only_psnr_db: what the target alone sees, against the true panorama; what is not shown is black. One gain per
+    channel is allowed for: no picture says which exposure is the true one. things_half, of worlds that name things: see
+    `things_half`.
+    """
+    picture, _ = on_the_wide_canvas(result, truth)
+    alone = truth.in_target & ~truth.in_reference
+    known = truth.in_reference & (picture > DARKEST).all(axis=-1) & (picture < BRIGHTEST).all(axis=-1)
+    shown, true = decode(picture), decode(truth.picture)
+    gain = np.median(true[known] / shown[known], axis=0) if known.any() else np.float32(1)
+    exposed = encode((shown * gain).astype(np.float32), 8)
+    found = {"target_only_psnr_db": psnr(exposed, truth.picture, alone) if alone.any() else math.nan}
+    return found | ({"things_half": things_half(result, pair, truth)} if pair.things else {})
+
+
+def things_half(result: StitchResult, pair: RenderedPair, truth: Truth) -> float:
+    """How far things are from being whole or gone, of that which is farthest: the share of its true pixels that show it
+    or that do not, whichever is less, or the pixels beside its place that show it, by the same area, if they are more.
+
+    Which picture a pixel comes from, and where it is fetched there, tell whether it shows a thing.
+    """
+    here, there = common_part(result, truth)
+    labels = np.zeros(result.alpha.shape, np.int16) if result.labels is None else result.labels
+    shown: NDArray[np.uint8] = np.zeros(truth.in_target.shape, np.uint8)
+    within = shown[there]
+    for number, name in enumerate(("reference", "target")):
+        picture_map = result.warp.maps[number].arrays()
+        seen = fetch(pair.things[name][..., None], picture_map.x[here], picture_map.y[here], cv2.INTER_NEAREST)[..., 0]
+        comes_from = (labels[here] == number) & (result.alpha[here] > 0.5)
+        within[comes_from] = seen[comes_from]
+    seen_at_all = np.where(truth.in_target | truth.in_reference, pair.things["wide"], 0)
+    return max(_half(shown == number, seen_at_all == number) for number in np.unique(seen_at_all[seen_at_all > 0]))
+
+
+def _half(shown: NDArray[np.bool_], true: NDArray[np.bool_]) -> float:
+    """The figure of one thing: where (H, W) it is shown, and where it is."""
+    area = int(true.sum())
+    whole = int((shown & true).sum()) / area
+    beside = int((shown & ~dilated(true, RIM_PX)).sum()) / area
+    return max(min(whole, 1 - whole), beside)

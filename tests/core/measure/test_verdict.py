@@ -1,0 +1,167 @@
+"""What is wrong is seen, where it is, and what is right is not called wrong: at any size of the picture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from edf_stitch.core.compose.exposure import unchanged
+from edf_stitch.core.measure.verdict import Look, Verdict, judge, look_at
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
+from edf_stitch.core.raster.picture_map import PictureMap
+from edf_stitch.synthetic_scenes.two_planes import Pair
+
+RIGHT = {"measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []}}
+# Rows and columns across the seam, which runs down the middle (column 200).
+PATCH = np.s_[100:140, 180:220]
+
+
+def look(step: int = 1) -> Look:
+    """Two pictures of 400 × 300 px that agree, both shown everywhere, with a seam down the middle."""
+    texture = np.random.default_rng(0).integers(60, 200, (300, 400, 3)).astype(np.uint8)
+    tones = cv2.GaussianBlur(texture, (0, 0), 1)
+    x, y = (values.astype(np.float32) for values in np.meshgrid(np.arange(400), np.arange(300)))
+    one, everywhere = PictureMap(x, y, (400, 300)), np.ones((300, 400), bool)
+    labels = np.where(x < 200, 0, 1).astype(np.int16)
+    return Look(step, (one, one), (tones, tones), (tones, tones), (everywhere, everywhere), ~everywhere, labels)
+
+
+def with_second(good: Look, tones: np.ndarray) -> Look:
+    return replace(good, tones=(good.tones[0], tones), taken=(good.taken[0], tones))
+
+
+def differing(good: Look, part: tuple[slice, slice]) -> Look:
+    """Where the target shows something else: stripes brighter by 110 levels."""
+    tones = good.tones[1].copy()
+    tones[part] += np.where(np.arange(300) % 8 < 4, 110, 0).astype(np.uint8)[part[0], None, None]
+    return with_second(good, tones)
+
+
+def judged(seen: Look, **measured: float) -> Verdict:
+    return judge(seen, (0, 0), {**RIGHT, "measured": {**RIGHT["measured"], **measured}})
+
+
+def test_pictures_that_agree_are_good_and_so_is_light_that_changes_slowly() -> None:
+    good = look()
+    assert judged(good).rating == "good" and not judged(good).places
+    ramp = np.linspace(-40, 40, 400).astype(np.float32)[:, None]
+    assert judged(with_second(good, np.clip(good.tones[1] + ramp, 0, 255).astype(np.uint8))).rating == "good"
+    away = differing(good, np.s_[100:140, 300:340])
+    assert judged(away).rating == "good", "what differs away from the seam is not seen"
+
+
+def test_a_seam_that_is_seen_is_a_place_with_its_cause() -> None:
+    good = look()
+    wrong = differing(good, PATCH)
+    found = judged(wrong)
+    assert found.rating == "look" and len(found.places) == 1 and "--mask" in found.what_to_do
+    x, y, width, height = found.places[0].box
+    assert 196 <= x and x + width <= 204 and 98 <= y and y + height <= 142 and height >= 30
+    assert "moved" in found.places[0].what
+    hides = good.hidden.copy()
+    hides[PATCH] = True
+    assert "near and far" in judged(replace(wrong, hidden=hides)).places[0].what
+    for number, name in enumerate(("reference", "target")):
+        shows = [good.shows[0].copy(), good.shows[1].copy()]
+        shows[number][:, 204:] = False
+        what = judged(replace(wrong, shows=(shows[0], shows[1]))).places[0].what
+        assert what == f"a thing is cut by the border of the {name}"
+
+
+def test_places_are_told_in_pixels_of_the_panorama() -> None:
+    small = judged(differing(look(), PATCH)).places[0].box
+    large = judge(differing(look(step=3), PATCH), (10, -20), RIGHT).places[0].box
+    assert large == (3 * small[0] + 10, 3 * small[1] - 20, 3 * small[2], 3 * small[3])
+
+
+def test_a_map_that_folds_or_tears_is_a_place() -> None:
+    good = look()
+    for what, change in (("folds over", lambda x: 2 * 320 - x), ("torn", lambda x: 320 + 9 * (x - 320))):
+        x = good.maps[1].x.copy()
+        x[50:70, 310:330] = change(x[50:70, 310:330])
+        found_in = replace(good, maps=(good.maps[0], replace(good.maps[1], x=x)))
+        found = judged(found_in)
+        assert found.rating == "look" and [what in place.what for place in found.places].count(True) == 1
+        left, top, width, height = next(place.box for place in found.places if what in place.what)
+        assert 305 <= left and left + width <= 335 and 45 <= top and top + height <= 75
+        elsewhere = replace(good, maps=(replace(good.maps[0], x=x), good.maps[1]))
+        assert judged(elsewhere).rating == "good", "the reference is not shown there"
+        bare = np.full_like(good.tones[1], 128)
+        assert judged(replace(found_in, tones=(bare, bare))).rating == "good", "nothing on a bare wall shows it"
+
+
+def test_light_that_is_lost_is_a_place() -> None:
+    good = look()
+    sky = np.s_[:60, 250:]
+    for taken, shown, what in ((240, 255, "blown"), (255, 220, "too bright")):
+        before, now = good.taken[1].copy(), good.tones[1].copy()
+        before[sky], now[sky] = taken, shown
+        found = judged(replace(good, tones=(good.tones[0], now), taken=(good.taken[0], before)))
+        assert [what in place.what for place in found.places] == [True] and found.places[0].box == (250, 0, 150, 60)
+        alike = replace(good, tones=(np.where(now == shown, now, good.tones[0]), now), taken=(good.taken[0], before))
+        assert (judged(alike).rating == "good") == (what == "too bright"), "darker, as the other picture has it"
+        white = replace(good, tones=(good.tones[0], before), taken=(good.taken[0], before))
+        assert judged(white).rating == "good", "nothing was lost by us"
+
+
+def test_a_geometry_that_is_wrong_is_not_usable_and_says_why() -> None:
+    good, off = look(), 400 * 0.05
+    wrong = differing(good, np.s_[:, 150:250])
+    assert judged(good, alignment_p95_px=off).rating == "good", "the picture is right all the same"
+    found = judged(differing(good, np.s_[:, 190:200]), alignment_p95_px=off)
+    assert found.rating == "not usable" and "matches" in found.because and "--focal35" in found.what_to_do
+    assert judged(good, alignment_p95_px=400 * 0.2).rating == "not usable", "one picture alone is shown"
+    assert "mirrored" in judged(good, folds=0.08).because
+    assert "in common" in judged(wrong).because
+    assert "too far apart" in judged(replace(differing(good, PATCH), hidden=~good.hidden)).because
+    assert judged(differing(good, PATCH)).rating == "look"
+
+
+def test_a_hole_is_a_place() -> None:
+    found = judge(look(), (0, 0), {**RIGHT, "composition": {"holes": [(10, 20, 30, 40)]}})
+    assert found.rating == "look" and len(found.places) == 1 and "hole" in found.places[0].what
+    assert found.places[0].box == (10, 20, 30, 40)
+
+
+def test_without_a_seam_only_geometry_and_light_are_judged() -> None:
+    plain = replace(differing(look(), PATCH), labels=None)
+    assert judged(plain).rating == "good" and judged(plain, folds=0.1).rating == "not usable"
+
+
+def test_a_panorama_is_looked_at_small(small_result: StitchResult) -> None:
+    """As large as it is where it is small; every second pixel where it is larger than that."""
+    maps = [one.arrays() for one in small_result.warp.maps]
+    twice = [
+        PictureMap(*(np.repeat(np.repeat(v, 3, 0), 3, 1) for v in (one.x, one.y)), one.size)  # type: ignore[arg-type]
+        for one in maps
+    ]
+    hidden = [np.zeros(one.shape, bool) for one in maps]
+    as_it_is, smaller = (
+        look_at(small_result.pictures, which, [unchanged(3)] * 2, [np.zeros(one.shape, bool) for one in which],
+                np.zeros(which[0].shape, np.int16))
+        for which in (maps, twice)
+    )  # fmt: skip
+    assert as_it_is.step == 1 and as_it_is.hidden.shape == hidden[0].shape
+    assert smaller.step == -(-3 * max(maps[0].shape) // 600) > 1 and max(smaller.hidden.shape) <= 600
+    rows, columns = np.nonzero(as_it_is.shows[0])
+    x, y = (np.rint(values[rows, columns]).astype(int) for values in (maps[0].x, maps[0].y))
+    apart = np.abs(as_it_is.tones[0][rows, columns].astype(int) - small_result.pictures[0].view[y, x])
+    assert np.median(apart) <= 1
+
+
+def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> None:
+    result = stitch((small_pair.reference, small_pair.target), known)
+    assert result.report["verdict"]["is"] == "good" and result.report["verdict"]["places"] == []
+    # something that the target alone shows, cut by a painted seam
+    changed = small_pair.target.copy()
+    changed[80:100, 20:100] = np.where(np.arange(20) % 12 < 6, 255, 0)[:, None, None]
+    height, width = result.alpha.shape
+    found, cropped = (
+        stitch((small_pair.reference, changed), replace(known, mask=mask, crop=crop)).report["verdict"]
+        for mask in [np.repeat(np.where(np.arange(width) < 120, 0, 255).astype(np.uint8)[None], height, axis=0)]
+        for crop in ("full", (60, 10, 120, 150))
+    )  # fmt: skip
+    assert found["is"] == cropped["is"] == "look"
+    (x, y, wide, _), (x_too, y_too, *_) = (one["places"][0]["box"] for one in (found, cropped))
+    assert abs(x + wide / 2 - 120) <= 3 and abs(x - 60 - x_too) <= 2 and abs(y - 10 - y_too) <= 2
