@@ -155,11 +155,29 @@ class RoughSeamOptions:
     visible_tone: float = 0.1
     """Tones by which the pictures differ at a seam that is seen: blending evens out less."""
 
+    hidden_by_contrast: float = 2.0
+    """Times the contrast around a seam, of the picture that has less of it, by which they may differ more: a seam is
+    lost in foliage and gravel."""
+
+
+@dataclass(frozen=True)
+class TearOptions:
+    """Where a small picture is torn within itself (`tears`)."""
+
+    jump_px: float = 2.0
+    """px from one pixel to the next by which a map jumps: twice the usual."""
+
+    visible_tone: float = 0.1
+    """Tones by which what comes after a jump differs from what the picture shows there, on either side of it."""
+
     contrast_px: int = 7
-    """px, side of the square in which the pictures' contrast is looked at."""
+    """px, side of the square in which contrast is looked at."""
+
+    aside_px: float = 4.0
+    """px from a jump, on either side, at which it is."""
 
     hidden_by_contrast: float = 2.0
-    """Times this contrast, of the picture that has less of it, by which they may differ more."""
+    """Times the contrast, of the side that has less of it, by which the tones may differ more."""
 
 
 @dataclass(frozen=True)
@@ -178,8 +196,9 @@ class CutThingsOptions:
     near: float = 0.02
     """Share from the border within which such a thing begins."""
 
-    deepest: float = 0.25
-    """Share of the overlap's shorter side beyond which nothing is refilled: it is no longer at the border."""
+    deepest: tuple[float, ...] = (0.25, 0.08)
+    """Shares of the overlap's shorter side beyond which nothing is refilled, one tried after the other: what is further
+    from the border is no longer cut by it, and what hangs together there may be more than one thing."""
 
     grown: float = 0.01
     """Share by which a thing is taken to be larger than it looks."""
@@ -212,20 +231,14 @@ class CutThingsOptions:
     least_gain: float = 1.0
     """What is to be gained at least: a cell of seam between black and white."""
 
+    gain_per_cell: float = 0.001
+    """And more for each cell that is refilled: in all of it both pictures are shown with a depth that was not found."""
+
     hardly_seen: float = 0.12
     """Tones, over a window, below which the worst place is hardly seen."""
 
     less_at_worst: float = 0.8
     """Or the share of the worst place before."""
-
-    seam_gone: float = 0.2
-    """Share of the seam alone that may be left where much is left of a picture's own cuts,"""
-
-    somewhat_less: float = 0.9
-    """share of both together that may then be left,"""
-
-    worse_at_worst: float = 1.5
-    """and the factor by which the worst place may then be worse: such a cut is softer than a seam."""
 
 
 @dataclass(frozen=True)
@@ -285,6 +298,7 @@ MOVING_THINGS = MovingThingsOptions()
 MIN_CUT = MinCutOptions()
 SEAM = SeamOptions()
 ROUGH_SEAM = RoughSeamOptions()
+TEARS = TearOptions()
 CUT_THINGS = CutThingsOptions()
 BANDS = BandOptions()
 INPAINT = InpaintOptions()
