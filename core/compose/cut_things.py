@@ -75,7 +75,9 @@ class _Refill:
     weight: Plane
 
 
-def without_cut_things(warp: Warp, views: Sequence[View], pictures: Sequence[Picture]) -> Warp:
+def without_cut_things(
+    warp: Warp, views: Sequence[View], pictures: Sequence[Picture], rough: RoughSeam | None = None
+) -> Warp:
     """Give what a picture's border cuts the depth of its background, where that shows less.
 
     Parameters
@@ -85,6 +87,8 @@ def without_cut_things(warp: Warp, views: Sequence[View], pictures: Sequence[Pic
     views : sequence of View
         What is known of the pictures, the reference first.
     pictures : sequence of Picture
+    rough : RoughSeam, optional
+        With pictures as small as the warp, if that is coarse already.
 
     Returns
     -------
@@ -92,11 +96,12 @@ def without_cut_things(warp: Warp, views: Sequence[View], pictures: Sequence[Pic
     """
     if not np.isfinite(views[1].t).all() or not views[1].t.any():
         return warp
-    longer = max(max(view.size) for view in views)
-    step = 1 << max(0, round(math.log2(longer / SEAM.found_px)))
     projection = warp.canvas.projection
     focal = focal_of(views[0].K) if projection is None else projection.focal
-    coarse, rough = every_nth(warp, step), RoughSeam.of(pictures, views, focal / step)
+    # px of the canvas along a picture's longer side
+    longer = max(max(view.size) for view in views) * focal / focal_of(views[0].K)
+    step = 1 << max(0, round(math.log2(longer / SEAM.found_px)))
+    coarse, rough = every_nth(warp, step), rough or RoughSeam.of(pictures, views, focal / step)
     if not np.isfinite(coarse.inverse_depth).all():
         return warp
     kept: list[_Refill] = []

@@ -68,11 +68,29 @@ class RoughSeamOptions:
     visible_tone: float = 0.1
     """Tones by which the pictures differ at a seam that is seen: blending evens out less."""
 
+    hidden_by_contrast: float = 2.0
+    """Times the contrast around a seam, of the picture that has less of it, by which they may differ more: a seam is
+    lost in foliage and gravel."""
+
+
+@dataclass(frozen=True)
+class TearOptions:
+    """Where a small picture is torn within itself (`tears`)."""
+
+    jump_px: float = 2.0
+    """px from one pixel to the next by which a map jumps: twice the usual."""
+
+    visible_tone: float = 0.1
+    """Tones by which what comes after a jump differs from what the picture shows there, on either side of it."""
+
     contrast_px: int = 7
-    """px, side of the square in which the pictures' contrast is looked at."""
+    """px, side of the square in which contrast is looked at."""
+
+    aside_px: float = 4.0
+    """px from a jump, on either side, at which it is."""
 
     hidden_by_contrast: float = 2.0
-    """Times this contrast, of the picture that has less of it, by which they may differ more."""
+    """Times the contrast, of the side that has less of it, by which the tones may differ more."""
 
 
 @dataclass(frozen=True)
@@ -141,4 +159,5 @@ class CutThingsOptions:
 
 SEAM = SeamOptions()
 ROUGH_SEAM = RoughSeamOptions()
+TEARS = TearOptions()
 CUT_THINGS = CutThingsOptions()

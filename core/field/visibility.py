@@ -7,6 +7,7 @@ Method: docs/method.md, 7.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import bounds, dilated, with_margin, without_specks
-from ..raster.lazy import AnyImage
-from ..raster.picture_map import PictureMap
-from ..system.threads import in_order
+from ..raster.lazy import AnyImage, part_of
+from ..raster.picture_map import PictureMap, falls_inside
+from ..system.threads import each, in_order
 from .options import VISIBILITY
 
 
@@ -45,13 +46,17 @@ def occluded(picture_map: PictureMap, nearness: AnyImage) -> NDArray[np.bool_]:
     points, near = contested.points, contested.near
     found = np.zeros(points.size, bool)
     for level in np.flatnonzero(np.bincount(contested.levels)).tolist():
-        cells, count = contested.cells(level, picture_map.size)
-        owner = _owners(cells, np.flatnonzero(contested.levels == level), near, count)
-        claimed = owner[cells]
-        # a cell without an owner has -1, which indexes the last point: it is left out
-        rivals = np.flatnonzero((near[claimed] > near) & (claimed >= 0) & ~found)
+        owner = _owners(contested, level, picture_map.size)
         stray = VISIBILITY.surface_cells * 2.0**level
-        found[rivals] = _apart(picture_map, points[rivals], points[claimed[rivals]], stray)
+
+        def look(part: slice, owner: NDArray[np.int32] = owner, level: int = level, stray: float = stray) -> None:
+            claimed = owner[contested.cells(part, level, picture_map.size)]
+            # a cell without an owner has -1, which indexes the last point: it is left out
+            rivals = np.flatnonzero((near[claimed] > near[part]) & (claimed >= 0) & ~found[part])
+            first, second = points[part][rivals], points[claimed[rivals]]
+            found[part][rivals] = _apart(picture_map, first, second, stray)
+
+        each(look, contested.parts)
     hidden.ravel()[points[found]] = True
     # gaps between samples of a magnified surface that hides
     closed = cv2.morphologyEx(hidden.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
@@ -87,11 +92,10 @@ def by_agreement(
         return hidden
     reach = max(1, round(VISIBILITY.max_growth * max(picture_map.size)))
     box = with_margin(extent, reach, hidden.shape)
-    rows, columns = box
-    part = picture_map.within((columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start))
-    confidence_here = np.asarray(confidence[box])
+    inside = falls_inside(picture_map.x[box], picture_map.y[box], picture_map.size)
+    confidence_here = confidence[box] if isinstance(confidence, np.ndarray) else part_of(confidence, box)
     confirmed = hidden[box] & (confidence_here <= VISIBILITY.agreed_confidence)
-    alone = (shown[box] & part.inside() & (confidence_here < VISIBILITY.alone_confidence)) | confirmed
+    alone = (shown[box] & inside & (confidence_here < VISIBILITY.alone_confidence)) | confirmed
     reached = without_specks(confirmed)
     for _ in range(reach):
         reached = dilated(reached, 1) & alone
@@ -102,24 +106,30 @@ def by_agreement(
 
 @dataclass(frozen=True)
 class Contested:
-    """Canvas points (N,), as flat indices, that may hide one another.
+    """Canvas points (N,), as ascending flat indices, that may hide one another.
 
-    x, y: where the map sends them, px of the picture; near: their nearness; levels: their cells (see `_levels`).
+    rows, columns: pixels of the picture that the map sends them to; near: their nearness; levels: their cells (see
+    `_levels`). There may be as many as the canvas has pixels, so that numbers are no larger than they have to be.
     """
 
-    points: NDArray[np.intp]
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
+    points: NDArray[np.int32]
+    rows: NDArray[np.unsignedinteger[Any]]
+    columns: NDArray[np.unsignedinteger[Any]]
     near: NDArray[np.float32]
     levels: NDArray[np.uint8]
 
-    def cells(self, level: int, size: tuple[int, int]) -> tuple[NDArray[np.int32], int]:
-        """In which cell of a level each point falls, and how many cells there are."""
-        columns, rows = ((side >> level) + 1 for side in size)
-        row, column = ((v + np.float32(0.5)).astype(np.int32) >> level for v in (self.y, self.x))
-        row *= columns
-        row += column
-        return row, rows * columns
+    @property
+    def parts(self) -> Iterator[slice]:
+        """Some points after the other."""
+        at_once = VISIBILITY.strip_pixels
+        return (slice(first, first + at_once) for first in range(0, self.points.size, at_once))
+
+    def cells(self, part: slice | NDArray[np.intp], level: int, size: tuple[int, int]) -> NDArray[np.int32]:
+        """In which cell of a level some points fall; size (W, H): of the picture."""
+        cells: NDArray[np.int32] = (self.rows[part] >> level).astype(np.int32)
+        cells *= (size[0] >> level) + 1
+        cells += self.columns[part] >> level
+        return cells
 
 
 def _contested(picture_map: PictureMap, nearness: AnyImage) -> Contested:
@@ -131,17 +141,18 @@ def _contested(picture_map: PictureMap, nearness: AnyImage) -> Contested:
     """
     blocks = _folded_blocks(picture_map)
     height, width = picture_map.x.shape
+    kind = np.min_scalar_type(max(picture_map.size))
     rows = max(1, VISIBILITY.strip_pixels // width)
 
     def found_from(top: int) -> Contested:
         strip = slice(top, min(top + rows, height))
         part = PictureMap(picture_map.x[strip], picture_map.y[strip], picture_map.size)
         inside = np.flatnonzero(part.inside())
-        x, y = (values.ravel()[inside] for values in (part.x, part.y))
-        row, column = ((v + np.float32(0.5)).astype(np.int32) >> VISIBILITY.block_level for v in (y, x))
-        row *= blocks.shape[1]
-        row += column
-        there = np.flatnonzero(blocks.ravel()[row])
+        row, column = ((values.ravel()[inside] + np.float32(0.5)).astype(kind) for values in (part.y, part.x))
+        block = (row >> VISIBILITY.block_level).astype(np.int32)
+        block *= blocks.shape[1]
+        block += column >> VISIBILITY.block_level
+        there = np.flatnonzero(blocks.ravel()[block])
         near = np.empty(0, np.float32)
         if there.size:
             with np.errstate(invalid="ignore", divide="ignore"):
@@ -149,17 +160,15 @@ def _contested(picture_map: PictureMap, nearness: AnyImage) -> Contested:
             known = np.isfinite(near)
             there, near = (there, near) if known.all() else (there[known], near[known])
         points = inside[there] + top * width
-        return Contested(points, x[there], y[there], near, _levels(picture_map, top, part.shape[0], points))
+        levels = _levels(picture_map, top, part.shape[0], points)
+        return Contested(points.astype(np.int32), row[there], column[there], near, levels)
 
     # one strip at least, whose parts have the right types
-    parts = list(in_order(found_from, range(0, height if blocks.any() else 1, rows)))
-    return Contested(
-        points=np.concatenate([part.points for part in parts]),
-        x=np.concatenate([part.x for part in parts]),
-        y=np.concatenate([part.y for part in parts]),
-        near=np.concatenate([part.near for part in parts]),
-        levels=np.concatenate([part.levels for part in parts]),
-    )
+    found = in_order(found_from, range(0, height if blocks.any() else 1, rows))
+    parts = [[one.points, one.rows, one.columns, one.near, one.levels] for one in found]
+    # each part is dropped as soon as it is joined
+    joined = [np.concatenate([values.pop(0) for values in parts]) for _ in range(5)]
+    return Contested(*joined)
 
 
 def _folded_blocks(picture_map: PictureMap) -> NDArray[np.bool_]:
@@ -249,16 +258,21 @@ def _along(axis: int, part: slice) -> tuple[slice, ...]:
     return (*[slice(None)] * axis, part)
 
 
-def _owners(
-    cells: NDArray[np.int32], points: NDArray[np.intp], near: NDArray[np.float32], count: int
-) -> NDArray[np.int32]:
-    """For each of `count` cells the nearest of some points (indices into cells and near), -1 where none is in it; of
-    equally near ones the last."""
-    owner = np.full(count, -1, np.int32)
-    while points.size:
-        there = cells[points]
-        owner[there] = points  # of equal indices NumPy keeps the last
-        points = points[near[points] > near[owner[there]]]
+def _owners(contested: Contested, level: int, size: tuple[int, int]) -> NDArray[np.int32]:
+    """For each cell of a level the nearest of the points of that level (indices), -1 where none is in it; of equally
+    near ones the last. size (W, H): of the picture."""
+    columns, rows = ((side >> level) + 1 for side in size)
+    owner, near = np.full(rows * columns, -1, np.int32), contested.near
+    for part in contested.parts:
+        points = part.start + np.flatnonzero(contested.levels[part] == level)
+        there = contested.cells(points, level, size)
+        before = owner[there]
+        least = (before < 0) | (near[points] >= near[before])
+        points, there = points[least], there[least]
+        while points.size:
+            owner[there] = points  # of equal indices NumPy keeps the last
+            more = near[points] > near[owner[there]]
+            points, there = points[more], there[more]
     return owner
 
 
