@@ -39,15 +39,16 @@ class _Cells:
     """
 
     warp: Warp
-    views: Sequence[View]
+    rough: RoughSeam
     look: Look
     side: float
     bad: NDArray[np.bool_]
     seen: Plane
 
     @staticmethod
-    def of(warp: Warp, views: Sequence[View], look: Look, side: float) -> _Cells:
+    def of(warp: Warp, rough: RoughSeam, side: float) -> _Cells:
         """By how both look."""
+        look = rough.look(warp)
         hidden = look.hidden if warp.behind is None else look.hidden | warp.behind
         bad = hidden & look.shown[0] & look.shown[1]
         if look.overlap is not None:
@@ -55,14 +56,13 @@ class _Cells:
             bad[look.overlap.box] |= look.overlap.both & (apart > CUT_THINGS.min_difference)
         close = np.ones((2 * round(CUT_THINGS.joined * side) + 1,) * 2, np.uint8)
         bad = cv2.morphologyEx(bad.astype(np.uint8), cv2.MORPH_CLOSE, close) > 0
-        return _Cells(warp, views, look, side, bad, _seam_seen(look) + _own_cuts(look))
+        return _Cells(warp, rough, look, side, bad, _seam_seen(look) + _own_cuts(look))
 
-    def refilled(self, refills: Sequence[_Refill], rough: RoughSeam) -> _Cells:
+    def refilled(self, refills: Sequence[_Refill]) -> _Cells:
         """The same with the depth of refills."""
         if not refills:
             return self
-        warp = _refilled(self.warp, self.views, refills)
-        return _Cells.of(warp, self.views, rough.look(warp), self.side)
+        return _Cells.of(_refilled(self.warp, self.rough.views, refills), self.rough, self.side)
 
 
 @dataclass(frozen=True)
@@ -104,25 +104,22 @@ def without_cut_things(
     coarse, rough = every_nth(warp, step), rough or RoughSeam.of(pictures, views, focal / step)
     if not np.isfinite(coarse.inverse_depth).all():
         return warp
+    cells = _Cells.of(coarse, rough, longer / step)
     kept: list[_Refill] = []
-    look = rough.look(coarse)
-    if look.overlap is None:
-        return warp
-    cells = _Cells.of(coarse, views, look, longer / step)
     for deepest in CUT_THINGS.deepest:
-        refills, cells = _better(cells, rough, deepest)
+        refills, cells = _better(cells, deepest)
         kept += refills
     return _enlarged(warp, views, kept, step) if kept else warp
 
 
-def _better(cells: _Cells, rough: RoughSeam, deepest: float) -> tuple[list[_Refill], _Cells]:
+def _better(cells: _Cells, deepest: float) -> tuple[list[_Refill], _Cells]:
     """The refills within a share of the overlap's shorter side from its border with which less is seen, and how all
     looks with them."""
     refills = _refills(cells, deepest)
-    after = cells.refilled(refills, rough)
+    after = cells.refilled(refills)
     kept = [one for one in refills if _is_better(one, cells, after)]
     if kept and len(kept) < len(refills):
-        after = cells.refilled(kept, rough)
+        after = cells.refilled(kept)
         kept = kept if float(after.seen.sum()) < float(cells.seen.sum()) else []
     return (kept, after) if kept else ([], cells)
 
@@ -133,6 +130,8 @@ def _refills(cells: _Cells, share: float) -> list[_Refill]:
     out: list[_Refill] = []
     first, second = cells.look.shown
     both = first & second
+    if not both.any():
+        return out
     rows, columns = np.flatnonzero(both.any(axis=1)), np.flatnonzero(both.any(axis=0))
     deepest = share * min(np.ptp(rows), np.ptp(columns))
     for mine, other in ((first, second), (second, first)):
@@ -194,8 +193,8 @@ def _one_px(cells: _Cells, place: Part, around: NDArray[np.bool_]) -> float:
     depth = cells.warp.inverse_depth[place]
     more = np.float32(1e-3)
     moved = 0.0
-    for number, view in enumerate(cells.views):
-        before, after = (seen_at(cells.warp, cells.views, number, place, d) for d in (depth, depth + more))
+    for number, view in enumerate(cells.rough.views):
+        before, after = (seen_at(cells.warp, cells.rough.views, number, place, d) for d in (depth, depth + more))
         away = np.hypot(*(b - a for a, b in zip(before, after, strict=True)))[around]
         moved += float(np.nanmedian(away)) / max(view.size) * cells.side
     return float(more) / max(moved, 1e-9)

@@ -37,7 +37,7 @@ class SeamOptions:
     """Price of showing the added picture from corner to corner of the overlap, for each pixel of its diagonal: the
     reference is exact, the others are resampled by uncertain maps. Dearer, and the seam keeps to the border."""
 
-    found_px: float = 450
+    found_px: float = 500
     """Cells along a picture's longer side, about, in which the seam is found: what the eye takes for a step. A price
     per area against one per length also needs one size."""
 
