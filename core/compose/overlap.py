@@ -64,10 +64,15 @@ def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overla
 
 def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Where (h, w) the difference is close to its median over what is `shown` (h, w)."""
-    places = np.flatnonzero(shown)
-    if not places.size:
+    count = np.count_nonzero(shown)
+    if not count:
         return shown
-    sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // OVERLAP.sample_pixels)]]
+    every, before, samples = max(1, count // OVERLAP.sample_pixels), 0, []
+    for rows in strips(shown.shape):  # numbers of all pixels would be as large as two of three channels
+        places = np.flatnonzero(shown[rows])
+        samples.append(difference[rows].reshape(-1, difference.shape[2])[places[-before % every :: every]])
+        before += places.size
+    sample = np.concatenate(samples)
     middle = np.median(sample, axis=0)
     sigma = np.median(np.abs(sample - middle), axis=0) / NORMAL_MEDIAN
     most = np.maximum(OVERLAP.same_sigmas * sigma, OVERLAP.same_tone)
