@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .alignment import Alignment, Frame, align, prepare
+from .alignment import Alignment, Frame, estimate_geometry, fit_and_warp, prepare
 from .cameras.camera import Camera
 from .cameras.edge import Edge
 from .cameras.matches import Matches
@@ -24,6 +24,7 @@ from .cameras.view import View
 from .compose.composition import Composition, Decided, composed
 from .compose.crop import crop_box
 from .field.field import Field
+from .measure.fallback import first_usable
 from .measure.metrics import appearance
 from .measure.report import make_report
 from .measure.verdict import judge, look_at
@@ -177,6 +178,8 @@ def stitch(
 ) -> StitchResult:
     """Stitches pictures into one panorama, seen from where the first of them was taken, or from there on (see `slide`).
 
+    Where that is not usable (see `measure.verdict`) and something simpler is, the simpler one is the result.
+
     Parameters
     ----------
     pictures
@@ -207,7 +210,12 @@ def stitch(
 
     stopwatch("read")
     frame = read_frame(pictures, options)
-    return compose(frame, align([frame], options, stopwatch), options, stopwatch)
+    geometry = estimate_geometry([frame], options, stopwatch)
+
+    def made(by: StitchOptions) -> StitchResult:
+        return compose(frame, fit_and_warp(geometry, [frame], by, stopwatch), by, stopwatch)
+
+    return first_usable(made, options)
 
 
 def check_count(count: int) -> None:
@@ -315,7 +323,7 @@ def compose(
     labels = None if labels is None else cut(labels, box, -1)
     look = look_at(pictures, warp.maps, [one.exposure for one in made.decided], occluded, labels)
     x, y = np.subtract(warp.canvas.offset, canvas.offset).tolist()
-    report["verdict"] = judge(look, (x, y), report["measured"]).entry
+    report["verdict"] = judge(look, (x, y), report).entry
     progress("write", 0.5)
     return StitchResult(
         panorama=panorama, canvas=canvas, pictures=pictures, layers=tuple(layer.within(box) for layer in layers),

@@ -55,7 +55,9 @@ class _Refill:
     weight: Plane
 
 
-def without_cut_things(warp: Warp, views: Sequence[View], pictures: Sequence[Picture]) -> Warp:
+def without_cut_things(
+    warp: Warp, views: Sequence[View], pictures: Sequence[Picture], rough: RoughSeam | None = None
+) -> Warp:
     """Give what a picture's border cuts the depth of its background, where that shows less.
 
     Parameters
@@ -65,6 +67,8 @@ def without_cut_things(warp: Warp, views: Sequence[View], pictures: Sequence[Pic
     views : sequence of View
         What is known of the pictures, the reference first.
     pictures : sequence of Picture
+    rough : RoughSeam, optional
+        With pictures as small as the warp, if that is coarse already.
 
     Returns
     -------
@@ -72,33 +76,50 @@ def without_cut_things(warp: Warp, views: Sequence[View], pictures: Sequence[Pic
     """
     if not np.isfinite(views[1].t).all() or not views[1].t.any():
         return warp
-    longer = max(max(view.size) for view in views)
-    step = 1 << max(0, round(math.log2(longer / SEAM.found_px)))
     projection = warp.canvas.projection
     focal = focal_of(views[0].K) if projection is None else projection.focal
-    coarse, rough = every_nth(warp, step), RoughSeam.of(pictures, views, focal / step)
+    # px of the canvas along a picture's longer side
+    longer = max(max(view.size) for view in views) * focal / focal_of(views[0].K)
+    step = 1 << max(0, round(math.log2(longer / SEAM.found_px)))
+    coarse, rough = every_nth(warp, step), rough or RoughSeam.of(pictures, views, focal / step)
     if not np.isfinite(coarse.inverse_depth).all():
         return warp
+    kept: list[_Refill] = []
     look = rough.look(coarse)
-    if look.overlap is None:
-        return warp
-    cells = _cells(coarse, views, look, longer / step)
-    seen = _seen(look)
-    refills = [one for one in _refills(cells, seen) if one is not None]
-    if not refills:
-        return warp
-    after = rough.look(_refilled(coarse, views, refills))
-    seen_after = _seen(after)
-    alone = seen_after.copy()
-    seen, seen_after = seen + _own_cuts(look), seen_after + _own_cuts(after)
-    kept = [one for one in refills if _is_better(one, cells.side, seen, seen_after, alone)]
-    if not kept:
-        return warp
-    if len(kept) < len(refills):
-        after = rough.look(_refilled(coarse, views, kept))
-        if _seen(after).sum() >= seen.sum():
+    for deepest in CUT_THINGS.deepest:
+        if look.overlap is None:
             return warp
-    return _enlarged(warp, views, kept, step)
+        cells = _cells(coarse, views, look, longer / step)
+        found = _better(cells, rough, deepest)
+        if found is not None:
+            kept, coarse, look = [*kept, *found.refills], found.warp, found.look
+    return _enlarged(warp, views, kept, step) if kept else warp
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Refills, and the coarse warp with them, and how that looks."""
+
+    refills: list[_Refill]
+    warp: Warp
+    look: Look
+
+
+def _better(cells: _Cells, rough: RoughSeam, deepest: float) -> _Found | None:
+    """The refills within a share of the overlap's shorter side from its border with which less is seen."""
+    seen = _what_is_seen(cells.look)
+    refills = _refills(cells, seen, deepest)
+    if not refills:
+        return None
+    warp = _refilled(cells.warp, cells.views, refills)
+    after = rough.look(warp)
+    seen_after = _what_is_seen(after)
+    kept = [one for one in refills if _is_better(one, cells.side, seen, seen_after)]
+    if kept and len(kept) < len(refills):
+        warp = _refilled(cells.warp, cells.views, kept)
+        after = rough.look(warp)
+        kept = kept if float(_what_is_seen(after).sum()) < float(seen.sum()) else []
+    return _Found(kept, warp, after) if kept else None
 
 
 def _cells(warp: Warp, views: Sequence[View], look: Look, side: float) -> _Cells:
@@ -114,18 +135,19 @@ def _cells(warp: Warp, views: Sequence[View], look: Look, side: float) -> _Cells
     return _Cells(warp, views, look, side, apart, cv2.morphologyEx(bad, cv2.MORPH_CLOSE, close) > 0)
 
 
-def _refills(cells: _Cells, seen: Plane) -> list[_Refill | None]:
-    """Depth for each thing at the border of either picture, beyond which the other goes on, where a seam is seen."""
-    out = []
+def _refills(cells: _Cells, seen: Plane, share: float) -> list[_Refill]:
+    """Depth for each thing at the border of either picture, beyond which the other goes on, around which something is
+    seen (H, W); share: of the overlap's shorter side from the border."""
+    out: list[_Refill] = []
     first, second = cells.look.shown
     both = first & second
     rows, columns = np.flatnonzero(both.any(axis=1)), np.flatnonzero(both.any(axis=0))
-    deepest = CUT_THINGS.deepest * min(np.ptp(rows), np.ptp(columns))
+    deepest = share * min(np.ptp(rows), np.ptp(columns))
     for mine, other in ((first, second), (second, first)):
         rim = both & dilated(other & ~mine, 1)
         if not rim.any():
             continue
-        from_rim = distance_to(rim)
+        from_rim = distance_to(rim).astype(np.float32)
         things = (cells.bad & (from_rim < deepest)).astype(np.uint8)
         count, number, stats, _ = cv2.connectedComponentsWithStats(things, connectivity=8)
         for label in range(1, count):
@@ -135,9 +157,20 @@ def _refills(cells: _Cells, seen: Plane) -> list[_Refill | None]:
                 continue
             place = with_margin(box, round((CUT_THINGS.grown + CUT_THINGS.ring) * cells.side) + 2, both.shape)
             thing = number[place] == label
-            if seen[place][dilated(thing, _px(CUT_THINGS.zone, cells.side))].sum() > CUT_THINGS.least_gain:
-                out.append(_refill(cells, thing, place, mine[place], from_rim[place]))
+            one = _refill(cells, thing, place, mine[place], from_rim[place])
+            if one is not None and seen[place][_zone(one, cells.side)].sum() > _least_gain(one):
+                out.append(one)
     return out
+
+
+def _zone(one: _Refill, side: float) -> NDArray[np.bool_]:
+    """Where (h, w), at its place, a refill is judged."""
+    return dilated(one.part, _px(CUT_THINGS.zone, side))
+
+
+def _least_gain(one: _Refill) -> float:
+    """By how much less must be seen for a refill."""
+    return CUT_THINGS.least_gain + CUT_THINGS.gain_per_cell * float(one.part.sum())
 
 
 def _px(share: float, side: float) -> int:
@@ -151,7 +184,7 @@ def _refill(
     """What lies behind a thing (h, w) at a place, by the farthest of what surrounds it; None where nothing tells."""
     grown = _px(CUT_THINGS.grown, cells.side)
     shown = cells.look.shown[0][place] | cells.look.shown[1][place]
-    part = dilated(thing, grown) & mine
+    part = dilated(thing, grown) & dilated(mine, 1)  # small pictures end up to a cell early
     around = dilated(part, _px(CUT_THINGS.ring, cells.side)) & ~dilated(thing, grown) & shown & ~cells.bad[place]
     if around.sum() < CUT_THINGS.least_ring:
         return None
@@ -197,15 +230,22 @@ def _enlarged(warp: Warp, views: Sequence[View], refills: Sequence[_Refill], ste
         rows, columns = slice(rows.start, min(rows.stop, height)), slice(columns.start, min(columns.stop, width))
         inner = slice(rows.stop - rows.start), slice(columns.stop - columns.start)
         part = cv2.resize(one.part.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)[inner] > 0
+        # a cell further, or interpolation would fade it out at the border itself
+        wider = cv2.dilate(one.weight, np.ones((3, 3), np.uint8))
         depth, weight = (
-            cv2.resize(values, size, interpolation=cv2.INTER_LINEAR)[inner] for values in (one.depth, one.weight)
+            cv2.resize(values, size, interpolation=cv2.INTER_LINEAR)[inner] for values in (one.depth, wider)
         )
         larger.append(_Refill((rows, columns), part, depth, weight * part))
     return _refilled(warp, views, larger)
 
 
-def _seen(look: Look) -> Plane:
-    """What is seen of the seam (H, W): by how much the tones differ where it runs."""
+def _what_is_seen(look: Look) -> Plane:
+    """What is seen of seams (H, W), those between the pictures and those within each."""
+    return _seam_seen(look) + _own_cuts(look)
+
+
+def _seam_seen(look: Look) -> Plane:
+    """By how much (H, W) the pictures differ where the seam runs."""
     overlap = look.overlap
     out = np.zeros(look.chosen.shape, np.float32)
     if overlap is None:
@@ -237,19 +277,14 @@ def _own_cuts(look: Look) -> Plane:
     return out
 
 
-def _is_better(one: _Refill, side: float, before: Plane, after: Plane, alone: Plane) -> bool:
-    """Whether less is seen around a refill than before; alone (H, W): of the seam only, without a picture's own cuts.
-    """
-    zone = dilated(one.part, _px(CUT_THINGS.zone, side))
+def _is_better(one: _Refill, side: float, before: Plane, after: Plane) -> bool:
+    """Whether much less is seen (H, W) around a refill than before, and at its worst place, too."""
+    zone = _zone(one, side)
     window = 2 * (_px(CUT_THINGS.window, side) // 2) + 1
-    old, new, seam = (float(values[one.place][zone].sum()) for values in (before, after, alone))
+    old, new = (float(values[one.place][zone].sum()) for values in (before, after))
     most_old, most_new = (
         float(cv2.boxFilter(values[one.place], -1, (window, window), normalize=False)[zone].max()) / window
         for values in (before, after)
     )
-    gain = old - new
-    clean = new < CUT_THINGS.much_less * old and gain > CUT_THINGS.least_gain
-    clean &= most_new < CUT_THINGS.hardly_seen or most_new < CUT_THINGS.less_at_worst * most_old
-    no_seam = seam < CUT_THINGS.seam_gone * old and new < CUT_THINGS.somewhat_less * old
-    no_seam &= gain > 2 * CUT_THINGS.least_gain and most_new < CUT_THINGS.worse_at_worst * most_old
-    return clean or no_seam
+    hardly_seen = most_new < max(CUT_THINGS.hardly_seen, CUT_THINGS.less_at_worst * most_old)
+    return new < CUT_THINGS.much_less * old and old - new > _least_gain(one) and hardly_seen

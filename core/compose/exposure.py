@@ -17,10 +17,11 @@ from ..choices import Exposing
 from ..panorama.layers import Layer
 from ..raster.arrays import Array
 from ..raster.picture_map import CanvasMap
-from .clipped import ClippedColours, clipped_colours
-from .options import CLIPPED, EXPOSURE, OVERLAP, TONE
+from .clipped import ClippedLight, clipped_light
+from .options import EXPOSURE, OVERLAP
 from .tone_blocks import block_weights, bright_blocks, log_ratios, shared_blocks, weighted_median
 from .tone_fit import fit_tone
+from .tone_options import CLIPPED, TONE
 from .toned import NO_VIGNETTING, Exposed, ToneCurve, Toned, Vignetting
 
 _TOO_LITTLE = "too little of what both pictures show is neither clipped nor dark"
@@ -46,8 +47,8 @@ class Exposure:
         Whether highlights are rolled off below white, and white stays white.
     overexposed : float
         Share of what both pictures show that is clipped in this one alone.
-    clipped : ClippedColours or None
-        What is known of its clipped channels.
+    clipped : ClippedLight or None
+        What is known of its clipped light.
     why_not : str
         In words, why it could not be matched to the other's; empty if it was, or was not to be.
     """
@@ -59,7 +60,7 @@ class Exposure:
     curve: ToneCurve | None = None
     keeps_white: bool = False
     overexposed: float = 0.0
-    clipped: ClippedColours | None = None
+    clipped: ClippedLight | None = None
     why_not: str = ""
 
     def applied(self, layer: Layer, picture_map: CanvasMap) -> Layer:
@@ -195,13 +196,13 @@ def _with_clipped(
     exposures: tuple[Exposure, Exposure], layers: tuple[Layer, Layer], maps: tuple[CanvasMap, CanvasMap],
     hidden: NDArray[np.bool_],
 ) -> tuple[Exposure, Exposure]:  # fmt: skip
-    """The same with what each picture tells of the other's clipped channels, where that is over-exposed."""
+    """The same with what each picture tells of the other's clipped light, where that is over-exposed."""
     if max(one.overexposed for one in exposures) < CLIPPED.least_share:
         return exposures
     shown = (layers[0].alpha > OVERLAP.opaque_alpha) & (layers[1].alpha > OVERLAP.opaque_alpha) & ~hidden
     toned = [one.applied(layer, at).light for one, layer, at in zip(exposures, layers, maps, strict=True)]
     first, second = (
-        replace(one, clipped=clipped_colours(layer.light, toned[k], toned[1 - k], shown))
+        replace(one, clipped=clipped_light(layer.light, toned[k], toned[1 - k], shown))
         if one.overexposed >= CLIPPED.least_share else one
         for k, (one, layer) in enumerate(zip(exposures, layers, strict=True))
     )  # fmt: skip

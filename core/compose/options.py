@@ -38,115 +38,6 @@ class ExposureOptions:
 
 
 @dataclass(frozen=True)
-class ToneOptions:
-    """Fitting what two pictures' light differs by, and one exposure for both (`tone_fit`, `toned`)."""
-
-    reference_share: float = 0.35
-    """Share of the difference in exposure that the reference goes towards the target: half way looks flat."""
-
-    most_reference_stops: float = 0.7
-    """Stops that it goes at most: beyond two stops of difference one of the two is wrong, and it may be the target."""
-
-    max_gain: float = 64.0
-    """Factor (six stops) beyond which it is no exposure: of 8 bits hardly anything is left."""
-
-    fitted_blocks: int = 6000
-    """Blocks that are fitted on, at most: more take time and change nothing."""
-
-    min_blocks: int = 60
-    """Blocks below which gains alone are fitted."""
-
-    tile_blocks: int = 12
-    """Blocks of the side of the tiles of a chessboard: what is fitted on the black tiles is tried on the white."""
-
-    rounds: int = 12
-    """Rounds of reweighting."""
-
-    robust_log: float = 0.02
-    """Differences of log light from which on they count less: noise of 8 bits in the middle tones."""
-
-    prior: float = 0.003
-    """Weight of no vignetting and no curve, beside all blocks: they are as good as unknown where little tells them."""
-
-    min_improvement: float = 0.07
-    """Share by which vignetting or a curve must lower what is left of the difference on blocks not fitted on."""
-
-    min_third_improvement: float = 0.05
-    """The same, for a curve, in the darkest and in the brightest third alike."""
-
-    most_corner: float = -0.05
-    """Logarithm of the light left in the corners above which it is no vignetting."""
-
-    least_corner: float = -1.0
-    """The same below which it is none: lenses take off less."""
-
-    max_rise: float = 0.03
-    """By how much that logarithm may rise anywhere: vignetting only takes off."""
-
-    max_slope: float = 0.8
-    """Slope of a curve in log light against the mean of both pictures, at most: exponents from 0.43 to 2.3."""
-
-    curve_ends: tuple[float, float] = (2.0, 98.0)
-    """Percentiles of the blocks' log light between which a curve was seen."""
-
-    knee: float = 0.5
-    """Light from which highlights roll off: below, two pictures have to meet."""
-
-    below_white: float = 0.947
-    """Light that what is just not clipped comes to at most: level 249 of 255."""
-
-    display_gamma: float = 2.2
-    """About that of a display."""
-
-    steepest: float = 2.0
-    """How many times as steep tones may become between near white and white."""
-
-    least_near_white: float = 0.35
-    """Light from which on white is kept, at least: level 160."""
-
-    most_near_white: float = 0.84
-    """The same at most, level 235: so that no edge is seen."""
-
-    pixels_at_once: int = 1 << 14
-    """Pixels whose tones are worked out at once: more leave the processor's cache, fewer cost calls."""
-
-
-@dataclass(frozen=True)
-class ClippedOptions:
-    """What clipped channels were (`clipped`)."""
-
-    least_share: float = 0.005
-    """Share of what both pictures show that is clipped in one alone, from which that is asked."""
-
-    begins: float = 0.88
-    """Light from which a channel may be clipped in parts, as where a picture was made smaller: level 241."""
-
-    most: float = 0.947
-    """Light that a channel is raised to at most, that of `ToneOptions.below_white`: another may be unclipped."""
-
-    cells: int = 16
-    """Cells of a side of the table."""
-
-    fineness: int = 8
-    """Cells of a side into which a cell is divided, so that none is seen."""
-
-    min_pixels: int = 50
-    """Clipped pixels of a channel in these bands, below which nothing is learnt."""
-
-    band_rows: int = 8
-    """Rows that are looked at together."""
-
-    bands_apart: int = 64
-    """Rows from one such band to the next: all of them take eight times as long and tell the same."""
-
-    least_light: float = 1e-3
-    """Light that counts as black where logarithms are taken."""
-
-    sure_pixels: float = 20.0
-    """Pixels of a cell from which it counts for more than its neighbours."""
-
-
-@dataclass(frozen=True)
 class OverlapOptions:
     """Where two layers show the same (`overlap`)."""
 
@@ -264,11 +155,29 @@ class RoughSeamOptions:
     visible_tone: float = 0.1
     """Tones by which the pictures differ at a seam that is seen: blending evens out less."""
 
+    hidden_by_contrast: float = 2.0
+    """Times the contrast around a seam, of the picture that has less of it, by which they may differ more: a seam is
+    lost in foliage and gravel."""
+
+
+@dataclass(frozen=True)
+class TearOptions:
+    """Where a small picture is torn within itself (`tears`)."""
+
+    jump_px: float = 2.0
+    """px from one pixel to the next by which a map jumps: twice the usual."""
+
+    visible_tone: float = 0.1
+    """Tones by which what comes after a jump differs from what the picture shows there, on either side of it."""
+
     contrast_px: int = 7
-    """px, side of the square in which the pictures' contrast is looked at."""
+    """px, side of the square in which contrast is looked at."""
+
+    aside_px: float = 4.0
+    """px from a jump, on either side, at which it is."""
 
     hidden_by_contrast: float = 2.0
-    """Times this contrast, of the picture that has less of it, by which they may differ more."""
+    """Times the contrast, of the side that has less of it, by which the tones may differ more."""
 
 
 @dataclass(frozen=True)
@@ -287,8 +196,9 @@ class CutThingsOptions:
     near: float = 0.02
     """Share from the border within which such a thing begins."""
 
-    deepest: float = 0.25
-    """Share of the overlap's shorter side beyond which nothing is refilled: it is no longer at the border."""
+    deepest: tuple[float, ...] = (0.25, 0.08)
+    """Shares of the overlap's shorter side beyond which nothing is refilled, one tried after the other: what is further
+    from the border is no longer cut by it, and what hangs together there may be more than one thing."""
 
     grown: float = 0.01
     """Share by which a thing is taken to be larger than it looks."""
@@ -321,20 +231,14 @@ class CutThingsOptions:
     least_gain: float = 1.0
     """What is to be gained at least: a cell of seam between black and white."""
 
+    gain_per_cell: float = 0.001
+    """And more for each cell that is refilled: in all of it both pictures are shown with a depth that was not found."""
+
     hardly_seen: float = 0.12
     """Tones, over a window, below which the worst place is hardly seen."""
 
     less_at_worst: float = 0.8
     """Or the share of the worst place before."""
-
-    seam_gone: float = 0.2
-    """Share of the seam alone that may be left where much is left of a picture's own cuts,"""
-
-    somewhat_less: float = 0.9
-    """share of both together that may then be left,"""
-
-    worse_at_worst: float = 1.5
-    """and the factor by which the worst place may then be worse: such a cut is softer than a seam."""
 
 
 @dataclass(frozen=True)
@@ -389,13 +293,12 @@ class CropOptions:
 
 
 EXPOSURE = ExposureOptions()
-TONE = ToneOptions()
-CLIPPED = ClippedOptions()
 OVERLAP = OverlapOptions()
 MOVING_THINGS = MovingThingsOptions()
 MIN_CUT = MinCutOptions()
 SEAM = SeamOptions()
 ROUGH_SEAM = RoughSeamOptions()
+TEARS = TearOptions()
 CUT_THINGS = CutThingsOptions()
 BANDS = BandOptions()
 INPAINT = InpaintOptions()

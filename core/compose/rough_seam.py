@@ -19,6 +19,7 @@ from ..panorama.layers import Layer, layer_of
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture, picture_from_array
 from ..raster.arrays import dilated
+from ..raster.lazy import whole
 from ..raster.log_encoding import log_encode
 from ..raster.picture_map import PictureMap
 from ..raster.resizing import resized_points
@@ -26,6 +27,7 @@ from .options import ROUGH_SEAM
 from .overlap import Overlap, overlap_of
 from .seam import find_seam, known_labels
 from .seam_costs import seam_costs
+from .tears import contrast, tears
 
 
 @dataclass(frozen=True)
@@ -43,17 +45,23 @@ class RoughSeam:
         return RoughSeam(tuple(small), tuple(views))
 
     def __call__(self, warp: Warp) -> float:
-        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out."""
-        seen = self.look(warp, forced=True)
+        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out, and of
+        tears within a picture that are seen."""
+        seen = self.look(warp)
         if seen.overlap is None:
             return 0.0
         # also where the overlap ends: what the border of one picture cuts off does not go on in the other
         others = (seen.shown[0] | seen.shown[1]) & ~seen.chosen
         seam = (dilated(seen.chosen, 1) & dilated(others, 1))[seen.overlap.box] & seen.overlap.both
-        busy = np.minimum(*(_contrast(one, seen.overlap.box) for one in seen.layers))
+        tones = [log_encode(np.ascontiguousarray(one.light[seen.overlap.box])).mean(axis=2) for one in seen.layers]
+        busy = np.minimum(*(contrast(one) for one in tones))
         visible = ROUGH_SEAM.visible_tone + ROUGH_SEAM.hidden_by_contrast * busy
         apart = np.abs(seen.overlap.difference).mean(axis=2) > visible
-        return float((seam & apart).sum()) / 2  # a pixel on either side of the seam
+        torn = 0
+        for number, (picture, places) in enumerate(zip(self.pictures, seen.maps, strict=True)):
+            own = log_encode(whole(picture.light)).mean(axis=2)
+            torn += int(tears(own, places, seen.shown[number] & (seen.chosen == bool(number))).sum())
+        return float((seam & apart).sum()) / 2 + torn  # a pixel on either side of the seam
 
     def look(self, warp: Warp, forced: bool = False) -> Look:
         """Both small pictures on the canvas of a warp, and the seam between them; forced: whether what the added one
@@ -90,15 +98,6 @@ class Look:
         """Where (H, W) each shows something."""
         first, second = self.layers
         return first.alpha > 0, second.alpha > 0
-
-
-def _contrast(layer: Layer, box: tuple[slice, slice]) -> NDArray[np.float32]:
-    """Standard deviation (h, w) of a layer's tones around each pixel of a box: a seam is lost in foliage and gravel."""
-    tones = log_encode(np.ascontiguousarray(layer.light[box])).mean(axis=2)
-    side = (ROUGH_SEAM.contrast_px, ROUGH_SEAM.contrast_px)
-    variance = np.maximum(cv2.blur(np.square(tones), side) - np.square(cv2.blur(tones, side)), 0)
-    deviation: NDArray[np.float32] = np.sqrt(variance)
-    return deviation
 
 
 def small_picture(picture: Picture, scale: float) -> Picture:

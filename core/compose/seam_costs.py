@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -21,7 +21,9 @@ from ..raster.lazy import AnyImage
 from ..raster.picture_map import PictureMap
 from ..system.threads import each
 from .options import OVERLAP, SEAM
-from .overlap import Overlap
+
+if TYPE_CHECKING:
+    from .overlap import Overlap
 
 
 @dataclass(frozen=True)

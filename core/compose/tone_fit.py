@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
-from .options import TONE
+from .options import EXPOSURE
 from .tone_blocks import Blocks, block_weights, weighted_median
+from .tone_options import TONE
 from .toned import NO_VIGNETTING, ToneCurve, Vignetting
 
 
@@ -187,7 +188,7 @@ def _curve_of(model: _Model, seen: _Seen) -> tuple[ToneCurve, Array]:
     ln before = ln added + g + p (s − s0) with s their mean, solved for ln before.
     """
     added = seen.without(model.vignetting)[1].mean(axis=1)
-    dark, bright = np.percentile(added, TONE.curve_ends).tolist()
+    dark, bright = np.minimum(np.percentile(added, TONE.curve_ends), np.log(EXPOSURE.clipped_light)).tolist()
     slope = model.slope / (1 - model.slope / 2)
     gains = (model.gains - model.slope * model.middle) / (1 - model.slope / 2) + slope * (dark + bright) / 2
     return ToneCurve(slope, dark, bright), gains

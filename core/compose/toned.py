@@ -12,14 +12,16 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import Part, Plane, for_each_channel, within
 from ..raster.lazy import AnyImage, LazyImage
 from ..raster.picture_map import CanvasMap
-from .clipped import ClippedColours
-from .options import EXPOSURE, TONE
+from .clipped import ClippedLight
+from .options import EXPOSURE
+from .tone_options import TONE
 
 Channels = NDArray[np.float32]
 
@@ -56,7 +58,8 @@ class ToneCurve:
     slope : float
         Of the gain's logarithm, above −1: so the curve always rises.
     dark, bright : float
-        Logarithms of light between which the gain changes. Halfway between them the curve changes nothing.
+        Logarithms of light between which the gain changes, none above what is clipped. Halfway between them the curve
+        changes nothing.
     """
 
     slope: float
@@ -109,7 +112,7 @@ class Toned(LazyImage):
     curve: ToneCurve | None
     keeps_white: bool
     picture_map: CanvasMap
-    clipped: ClippedColours | None = None
+    clipped: ClippedLight | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -142,7 +145,8 @@ class Toned(LazyImage):
             rolled_off(out, gain if of_white == 1 else gain * of_white)
             if self.clipped is not None:
                 self.clipped.restore(own, out)
-            white_kept(own, out, self.gain * of_white)
+            white = own if self.clipped is None else self.clipped.white_at(own, part)
+            white_kept(own, out, white, self.gain * of_white)
         return out
 
     def _given_back(self, part: Part) -> Plane:
@@ -181,22 +185,28 @@ def rolled_off(light: NDArray[np.float32], gain: NDArray[np.float32]) -> None:
     light -= above
 
 
-def white_kept(own: NDArray[np.float32], light: NDArray[np.float32], gain: Channels) -> None:
-    """Where a picture's own light (h, w, C) comes near to clipping, `light` does not fall below it, in place.
+def white_kept(
+    own: NDArray[np.float32], light: NDArray[np.float32], white: NDArray[np.float32], gain: Channels
+) -> None:
+    """Where a picture's own light (h, w, C) comes near to clipping, `light` does not fall below `white`, in place.
 
-    That begins the earlier the more white is darkened, so that bright noise is not spread; gain (C,): of white.
+    That begins the earlier the more white is darkened, so that bright noise is not spread. white (h, w, C): what is
+    clipped; gain (C,): of white.
     """
     start = near_white(gain)
     if own.max(initial=0) <= start:
         return
-    smallest = reduce(np.minimum, (own[..., k] for k in range(own.shape[2])))
-    near = smallest > start
-    if not near.any():
+    weight: Plane = reduce(cv2.min, cv2.split(own))
+    weight -= start
+    if weight.max() <= 0:
         return
-    weight = np.clip((smallest[near] - start) / np.float32(EXPOSURE.clipped_light - start), 0, 1)
+    weight *= np.float32(1 / (EXPOSURE.clipped_light - start))
+    np.clip(weight, 0, 1, out=weight)
     weight *= weight * (3 - 2 * weight)
-    lacking = np.maximum(own[near] - light[near], 0)
-    light[near] += lacking * weight[:, None]
+    lacking = white - light
+    np.maximum(lacking, 0, out=lacking)
+    lacking *= for_each_channel(weight, own.shape[2])
+    light += lacking
 
 
 def near_white(gain: Channels) -> np.float32:

@@ -22,6 +22,7 @@ from ..system.threads import in_order
 from .epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
 from .epipolar_rows import EpipolarRows
 from .options import LINES, MATCHING
+from .rim_options import RIM
 from .row_gaps import hidden_gaps
 
 
@@ -151,7 +152,13 @@ def search(
     a[neither] = b[neither] = 128
     # half the size searches twice as far, and tells whether that is worth while
     coarse_disparity, coarse_found = _matched_at_half(a, b, 2 * count)
-    disparity, found = _matched(a, b, *_range(a, coarse_disparity, coarse_found, count))
+    usual = count / 2
+    least, count = _range(a, coarse_disparity, coarse_found, count)
+    coarse_found &= (coarse_disparity >= least) & (coarse_disparity <= least + count)
+    disparity, found = _matched(a, b, least, count)
+    doubtful = _at_rim(in_reference & in_target)
+    found &= ~(doubtful & (np.abs(disparity) > usual))
+    coarse_found &= ~(doubtful & (np.abs(coarse_disparity) > usual))
     filled, hidden = hidden_gaps(disparity, found, arc_lengths.nearer)
     confidence = np.where(found, np.float32(1), coarse_found * np.float32(MATCHING.coarse_confidence))
     confidence[hidden] = MATCHING.hidden_confidence
@@ -201,6 +208,15 @@ def tone_curves(
 def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
     result: NDArray[np.uint8] = np.clip(np.rint(values), 0, 255).astype(np.uint8)
     return result
+
+
+def _at_rim(both: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What (h, w) lies near the rim of what both pictures show: a match from far away has no neighbours there that
+    would speak against it."""
+    side = 2 * round(RIM.width * min(both.shape)) + 1
+    kernel = np.ones((side, side), np.uint8)
+    inner = cv2.erode(both.view(np.uint8), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    return inner == 0
 
 
 def _range(a: NDArray[np.uint8], disparity: Plane, found: NDArray[np.bool_], count: int) -> tuple[int, int]:

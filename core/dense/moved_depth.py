@@ -16,7 +16,7 @@ from ..raster.arrays import Plane
 from ..raster.distance import distance_inside, outside
 from ..raster.pull_push import carried_on
 from .epipolar_lines import EpipolarLines, SparseMap
-from .options import BEYOND
+from .rim_options import BEYOND
 
 
 def build_refinement(

@@ -29,10 +29,11 @@ from .edge_aware_smoothing import Smoother, cut_edges, edge_weights, strengthen
 from .epipolar_lines import EpipolarLines, SparseMap
 from .matching import ComparedPicture, search, search_base
 from .moved_depth import build_refinement
-from .options import BEYOND, REFINE
+from .options import REFINE
 from .outlines import at_outlines
 from .polish import likeness, polish
 from .rim import Found, borne_out
+from .rim_options import BEYOND
 from .unfolding import unfolded
 
 

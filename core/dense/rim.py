@@ -19,7 +19,8 @@ from ..raster.distance import distance_to_border
 from .edge_aware_smoothing import Smoother, edge_weights
 from .epipolar_lines import EpipolarLines
 from .matching import ComparedPicture
-from .options import REFINE, RIM
+from .options import REFINE
+from .rim_options import RIM
 
 
 @dataclass(frozen=True)

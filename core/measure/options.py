@@ -134,6 +134,9 @@ class VerdictOptions:
     seam_share: float = 0.0045
     """Of the longer side: length of a part of the seam that is seen. Good pictures have up to 0.003."""
 
+    seam_px: float = 2.5
+    """px of the copy, the least length of such a part: what is smaller is noise of the resampling."""
+
     together_share: float = 0.008
     """Of the longer side: what is less than twice that apart is one place."""
 
@@ -163,6 +166,12 @@ class VerdictOptions:
 
     restored: float = 1.02
     """Times by which a clipped channel is brightened more than the others where what it lost was given back."""
+
+    cast: float = 12.0
+    """Levels by which darkened light may differ from what the other picture shows in its place."""
+
+    compared_px: int = 20
+    """px of the copy that suffice to compare them."""
 
     blown_share: float = 0.02
     """Of the panorama, that was not clipped and is now."""

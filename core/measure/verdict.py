@@ -153,7 +153,7 @@ def _small(
     return own, tones, taken, layer.alpha > VERDICT.least_alpha
 
 
-def judge(look: Look, shift: tuple[int, int], measured: dict[str, float | None]) -> Verdict:
+def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict:
     """Judge a panorama.
 
     Parameters
@@ -161,8 +161,8 @@ def judge(look: Look, shift: tuple[int, int], measured: dict[str, float | None])
     look : Look
     shift : (int, int)
         px from the panorama's first pixel to that of the canvas which was looked at.
-    measured : dict
-        The report's: how far the map misses 5 % of its own matches, px, and which share of it is folded.
+    report : dict
+        It tells how far the map misses 5 % of its own matches, which share of it is folded, and where there are holes.
 
     Returns
     -------
@@ -171,11 +171,13 @@ def judge(look: Look, shift: tuple[int, int], measured: dict[str, float | None])
     unlike = _unlike(look)
     seam = _along_seam(look, unlike)
     places = sorted(
-        (*_seam_places(look, seam, shift), *_torn_places(look, shift), *_light_places(look, shift)),
+        (*_seam_places(look, seam, shift), *_torn_places(look, shift), *_light_places(look, shift),
+         *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2)
+           for box in report["composition"]["holes"])),
         key=lambda place: -place.size,
     )  # fmt: skip
-    missed = (measured["alignment_p95_px"] or 0.0) / (look.side * look.step)
-    cause = _cause(look, unlike, seam, missed, measured["folds"] or 0.0)
+    missed = (report["measured"]["alignment_p95_px"] or 0.0) / (look.side * look.step)
+    cause = _cause(look, unlike, seam, missed, report["measured"]["folds"] or 0.0)
     if cause:
         return Verdict(NOT_USABLE, *cause, tuple(places[: VERDICT.most_places]))
     if not places:
@@ -248,7 +250,8 @@ def _along_seam(look: Look, unlike: Plane) -> Plane:
 def _seam_places(look: Look, steps: Plane, shift: tuple[int, int]) -> Iterator[Place]:
     """Where a seam is seen."""
     apart = VERDICT.together_share * look.side
-    for part in _parts(steps > VERDICT.step, 2 * VERDICT.seam_share * look.side, apart):
+    least = 2 * max(VERDICT.seam_px, VERDICT.seam_share * look.side)
+    for part in _parts(steps > VERDICT.step, least, apart):
         near = dilated(part, max(1, round(VERDICT.rim_share * look.side)))
         cut_by = [
             role(number) for number, (shown, other) in enumerate((look.shows, look.shows[::-1]))
@@ -299,10 +302,14 @@ def _light_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         clipped = [before >= VERDICT.white for before in cv2.split(taken)]
         white = np.logical_and.reduce([now >= VERDICT.white for now in cv2.split(tones)])
         blown = shown & white & ~np.logical_and.reduce(clipped)
+        greyed = shown & _greyed(tones, taken, clipped)
+        both = greyed & look.shows[0] & look.shows[1]
+        apart = np.abs(look.tones[1][both].astype(int) - look.tones[0][both]).max(axis=1)
+        if both.sum() >= VERDICT.compared_px and np.median(apart) <= VERDICT.cast:
+            greyed[:] = False  # darker, but as the other picture has it
         for mask, share, what in (
             (blown, VERDICT.blown_share, "light is blown here that the picture has"),
-            (shown & _greyed(tones, taken, clipped), VERDICT.greyed_share,
-             "light that was too bright for the picture got a cast or a step"),
+            (greyed, VERDICT.greyed_share, "light that was too bright for the picture got a cast or a step"),
         ):
             if mask.sum() > share * mask.size:
                 yield Place(look.box(max(_parts(mask, 1), key=np.sum), shift), what, float(mask.sum()))

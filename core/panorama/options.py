@@ -248,7 +248,7 @@ class ChoiceOptions:
     """Cost by which candidates may differ and still be as good: the one that slides least is taken, since what moved or
     has no depth of its own is torn by a slide."""
 
-    tie_share: float = 0.1
+    tie_share: float = 0.05
     """The same as a share of the least cost; the larger counts."""
 
     cells: int = 90

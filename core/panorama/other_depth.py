@@ -26,10 +26,12 @@ def every_nth(warp: Warp, step: int) -> Warp:
     height, width = (len(range(first, side, step)) for side in (warp.canvas.height, warp.canvas.width))
     offset = (warp.canvas.offset[0] - first, warp.canvas.offset[1] - first)
     coarse = replace(warp.canvas, width=width, height=height, offset=offset, step=step)
-    maps = [one.arrays() for one in warp.maps]
+    maps = (
+        PictureMap(one.x[here].copy(), one.y[here].copy(), one.size) for one in (one.arrays() for one in warp.maps)
+    )
     return replace(
         warp, canvas=coarse,
-        maps=tuple(PictureMap(*(np.ascontiguousarray(v[here]) for v in (one.x, one.y)), one.size) for one in maps),
+        maps=tuple(maps),
         depth=np.ascontiguousarray(warp.inverse_depth[here]),
         lazy_confidence=None if warp.lazy_confidence is None else _confidence(warp.lazy_confidence, coarse, here),
         slide=None if warp.slide is None else np.ascontiguousarray(whole(warp.slide)[here]),

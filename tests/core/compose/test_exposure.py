@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.compose.clipped import ClippedColours
+from edf_stitch.core.compose.clipped import ClippedLight
 from edf_stitch.core.compose.exposure import (
     Exposure,
     exposures_for,
@@ -16,7 +16,7 @@ from edf_stitch.core.compose.exposure import (
     pooled,
     unchanged,
 )
-from edf_stitch.core.compose.options import TONE
+from edf_stitch.core.compose.tone_options import TONE
 from edf_stitch.core.compose.toned import ToneCurve, Vignetting
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.picture_map import PictureMap
@@ -213,7 +213,7 @@ def test_vignetting_is_given_back_to_both() -> None:
         assert np.abs(both[0] / both[1] - 1)[:, W // 2 :][both[0][:, W // 2 :] < 0.5].max() < 0.03
 
 
-def test_an_over_exposed_picture_learns_its_clipped_colours_from_the_other() -> None:
+def test_an_over_exposed_picture_learns_its_clipped_light_from_the_other() -> None:
     light = scene(top=0.45)
     light[:120] = [0.15, 0.3, 0.75]
     over = np.minimum(STOP * light, 1)
@@ -255,7 +255,7 @@ def test_what_is_wanted_is_done() -> None:
 
 
 def test_frames_of_a_clip_share_all_of_it() -> None:
-    curve, table = ToneCurve(-0.2, -4.0, -1.0), ClippedColours((None, None, np.ones((4, 4), np.float32)))
+    curve, table = ToneCurve(-0.2, -4.0, -1.0), ClippedLight((None, None, np.ones((4, 4), np.float32)))
     lens, gain = Vignetting(-0.1, -0.2), np.float32([2, 1, 1])
     plain = Exposure(gain, np.zeros(3, np.float32), 10, lens, curve, True, 0.1, table)
     frames = [plain, replace(plain, curve=replace(curve, slope=-0.4)), replace(plain, curve=replace(curve, slope=-0.1)),

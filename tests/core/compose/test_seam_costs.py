@@ -110,6 +110,27 @@ def test_a_person_is_whole_or_not_there() -> None:
     assert not borders(found)[62:146, 122:178].any()
 
 
+def priced(**more: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What a seam costs, and the price of the second picture, which is lighter in one half."""
+    other = gray()
+    other[:100] = 0.5
+    overlap = overlap_of(layer(LEFT, gray()), layer(RIGHT, other), NOTHING)
+    assert overlap is not None
+    x, y = np.meshgrid(np.arange(W, dtype=np.float32), np.arange(H, dtype=np.float32))
+    costs = seam_costs(overlap, PictureMap(x, y, (W, H)), None, **{"hidden": NOTHING, **more})
+    return costs.levels[0], costs.price
+
+
+def test_no_seam_goes_through_what_moved() -> None:
+    assert (priced(moving=moved()[2])[0][60:200, 40:100] == 1).all()
+
+
+def test_what_cannot_be_seen_costs_more_the_more_it_differs() -> None:
+    plain, hidden, behind = priced()[1], priced(hidden=~NOTHING)[1], priced(behind=~NOTHING)[1]
+    assert (hidden[:100] > hidden[100:]).all() and (hidden > plain).all()
+    assert (behind[:100] < behind[100:]).all() and (behind < plain).all()
+
+
 def test_what_one_picture_cannot_see_comes_from_the_other() -> None:
     place = NOTHING.copy()
     place[50:90, 100:210] = True

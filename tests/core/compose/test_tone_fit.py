@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.options import TONE
 from edf_stitch.core.compose.tone_blocks import Blocks
 from edf_stitch.core.compose.tone_fit import ToneFit, fit_tone
+from edf_stitch.core.compose.tone_options import TONE
 from edf_stitch.core.compose.toned import NO_VIGNETTING, ToneCurve, Vignetting
 
 GAIN = np.array([1.6, 1.2, 0.9])

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
-from edf_stitch.core.dense import edge_aware_smoothing
 from edf_stitch.core.dense.edge_aware_smoothing import Smoother, edge_weights
-from edf_stitch.core.dense.options import SMOOTHING
 
 
 def halves(shape: tuple[int, int] = (40, 60)) -> np.ndarray:
@@ -60,9 +55,8 @@ def test_a_constant_stays_and_rows_and_columns_are_alike() -> None:
     assert abs(out.sum() - 1) < 0.05
 
 
-def test_one_pass_solves_the_systems_of_rows_and_of_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_pass_solves_the_systems_of_rows_and_of_columns() -> None:
     """Against dense matrices."""
-    monkeypatch.setattr(edge_aware_smoothing, "SMOOTHING", replace(SMOOTHING, passes=1))
     rng = np.random.default_rng(4)
     values = rng.normal(size=(7, 9)).astype(np.float32)
     across, down = (rng.uniform(0, 30, shape).astype(np.float32) for shape in ((7, 8), (6, 9)))
@@ -76,5 +70,5 @@ def test_one_pass_solves_the_systems_of_rows_and_of_columns(monkeypatch: pytest.
         return out
 
     expected = solved(solved(values.T.astype(float), across.T).T, down)
-    found = Smoother.of((across, down), 2.0).smoothed(values, np.ones_like(values), floor=0.0)
+    found = Smoother.of((across, down), 2.0, passes=1).smoothed(values, np.ones_like(values), floor=0.0)
     np.testing.assert_allclose(found, expected, atol=1e-5)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
 from edf_stitch.core.dense.moved_depth import build_refinement
-from edf_stitch.core.dense.options import BEYOND
+from edf_stitch.core.dense.rim_options import BEYOND
 from edf_stitch.core.field.refined_depth import RefinedDepth
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.raster.pull_push import carried_on

@@ -11,7 +11,7 @@ from edf_stitch.core.dense import polish as polish_module
 from edf_stitch.core.dense.edge_aware_smoothing import edge_weights
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines
 from edf_stitch.core.dense.matching import ComparedPicture
-from edf_stitch.core.dense.polish import Polished, polish
+from edf_stitch.core.dense.polish import Polished, likeness, polish
 
 from ..line_scenes import MOTIONS, SIZE, Scene, scene
 
@@ -119,7 +119,8 @@ def test_with_slack_an_offset_across_the_lines_is_found_and_else_it_is_left() ->
     assert np.median(np.abs(loose.along[here])) < 0.12
     strict = polished(pair, lines, start)
     assert not strict.across.any()
-    assert np.median(loose.likeness[here]) > np.median(strict.likeness[here])
+    alike, apart = (likeness(lines, *pair.views(), one.along, one.across) for one in (loose, strict))
+    assert np.median(alike[here]) > np.median(apart[here])
 
 
 def test_likeness_says_where_the_pictures_agree() -> None:
@@ -130,12 +131,13 @@ def test_likeness_says_where_the_pictures_agree() -> None:
     target[:, 100:140] = np.random.default_rng(1).integers(0, 256, (SIZE[1], 40, 3))  # something else stands there
     alpha = np.ones(SIZE[::-1], np.float32)
     alpha[:, :60] = 0
-    found = polished(pair, lines, start, views=(pair.views()[0], ComparedPicture.of(target, alpha, 1.0)))
+    views = pair.views()[0], ComparedPicture.of(target, alpha, 1.0)
+    found = likeness(lines, *views, polished(pair, lines, start, views=views).along)
     x, _ = lines.target(start)
-    assert found.likeness.max() <= 1.01
-    assert np.median(found.likeness[here & (x > 150)]) > 0.9
-    assert np.median(np.abs(found.likeness[(x > 108) & (x < 132)])) < 0.4
-    assert not found.likeness[(x < 55)].any(), "the target shows nothing"
+    assert found.max() <= 1.01
+    assert np.median(found[here & (x > 150)]) > 0.9
+    assert np.median(np.abs(found[(x > 108) & (x < 132)])) < 0.4
+    assert not found[(x < 55)].any(), "the target shows nothing"
 
 
 def test_where_there_is_nothing_to_see_the_search_is_believed() -> None:
@@ -183,9 +185,10 @@ def test_strip_by_strip_it_comes_to_the_same(monkeypatch: pytest.MonkeyPatch) ->
     found = []
     for rows in (1000, 31):
         monkeypatch.setattr(polish_module, "POLISH", replace(polish_module.POLISH, strip_rows=rows))
-        found.append(polished(pair, lines, start, slack=True, views=views))
-    for name in ("along", "across", "likeness", "evidence"):
-        np.testing.assert_allclose(*(getattr(one, name) for one in found), atol=2e-3, err_msg=name)
+        one = polished(pair, lines, start, slack=True, views=views)
+        found.append((one.along, one.across, one.evidence, likeness(lines, *views, one.along, one.across)))
+    for first, second in zip(*found, strict=True):
+        np.testing.assert_allclose(first, second, atol=2e-3)
 
 
 def test_contrast_is_evened_out_by_no_more_than_a_factor_of_two() -> None:

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.dense.epipolar_lines import EpipolarLines
-from edf_stitch.core.dense.options import RIM
 from edf_stitch.core.dense.rim import Found, borne_out
+from edf_stitch.core.dense.rim_options import RIM
 from edf_stitch.core.raster.distance import distance_to_border
 
 from ..line_scenes import SIZE, Scene, scene

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.clipped import ClippedColours
+from edf_stitch.core.compose.clipped import ClippedLight
 from edf_stitch.core.compose.composition import Decided
 from edf_stitch.core.compose.exposure import Exposure, unchanged
 from edf_stitch.core.compose.toned import ToneCurve, Vignetting
@@ -23,7 +23,7 @@ def test_all_that_was_done_is_told() -> None:
     pictures = picture_from_array(levels, "a"), picture_from_array(2 * np.ones((4, 4, 3), np.float32), "b")
     lens = Vignetting(-0.1, -0.3)
     first = Exposure(np.float32([0.5, 0.5, 0.5]), np.zeros(3, np.float32), 9, lens, overexposed=0.25)
-    table = ClippedColours((None, None, None))
+    table = ClippedLight((None, None, None))
     second = replace(first, gain=np.float32([2, 4, 8]), curve=ToneCurve(-0.2, -4, -1), overexposed=0, clipped=table)
     entry = exposure_entry(pictures, [Decided(NOTHING, NOTHING, one, one) for one in (first, second)])
     assert [gain.tolist() for gain in entry.pop("gain")] == [[0.5, 0.5, 0.5], [2, 4, 8]]

@@ -12,7 +12,7 @@ from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
-RIGHT = {"alignment_p95_px": 1.0, "folds": 0.001}
+RIGHT = {"measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []}}
 # Rows and columns across the seam, which runs down the middle (column 200).
 PATCH = np.s_[100:140, 180:220]
 
@@ -39,7 +39,7 @@ def differing(good: Look, part: tuple[slice, slice]) -> Look:
 
 
 def judged(seen: Look, **measured: float) -> Verdict:
-    return judge(seen, (0, 0), {**RIGHT, **measured})
+    return judge(seen, (0, 0), {**RIGHT, "measured": {**RIGHT["measured"], **measured}})
 
 
 def test_pictures_that_agree_are_good_and_so_is_light_that_changes_slowly() -> None:
@@ -99,6 +99,8 @@ def test_light_that_is_lost_is_a_place() -> None:
         before[sky], now[sky] = taken, shown
         found = judged(replace(good, tones=(good.tones[0], now), taken=(good.taken[0], before)))
         assert [what in place.what for place in found.places] == [True] and found.places[0].box == (250, 0, 150, 60)
+        alike = replace(good, tones=(np.where(now == shown, now, good.tones[0]), now), taken=(good.taken[0], before))
+        assert (judged(alike).rating == "good") == (what == "too bright"), "darker, as the other picture has it"
         white = replace(good, tones=(good.tones[0], before), taken=(good.taken[0], before))
         assert judged(white).rating == "good", "nothing was lost by us"
 
@@ -114,6 +116,12 @@ def test_a_geometry_that_is_wrong_is_not_usable_and_says_why() -> None:
     assert "in common" in judged(wrong).because
     assert "too far apart" in judged(replace(differing(good, PATCH), hidden=~good.hidden)).because
     assert judged(differing(good, PATCH)).rating == "look"
+
+
+def test_a_hole_is_a_place() -> None:
+    found = judge(look(), (0, 0), {**RIGHT, "composition": {"holes": [(10, 20, 30, 40)]}})
+    assert found.rating == "look" and len(found.places) == 1 and "hole" in found.places[0].what
+    assert found.places[0].box == (10, 20, 30, 40)
 
 
 def test_without_a_seam_only_geometry_and_light_are_judged() -> None:

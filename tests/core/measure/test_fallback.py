@@ -1,0 +1,63 @@
+"""Where dense depth makes a panorama that is not usable, something simpler is shown, and both are reported."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edf_stitch.core import pipeline
+from edf_stitch.core.measure.verdict import GOOD, NOT_USABLE, Verdict
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
+from edf_stitch.core.system.errors import Cancelled
+from edf_stitch.synthetic_scenes.two_planes import Pair
+
+
+def judged(monkeypatch: pytest.MonkeyPatch, *ratings: str) -> None:
+    """As if stitches were rated so, one after the other."""
+    left: Iterator[str] = iter(ratings)
+    monkeypatch.setattr(pipeline, "judge", lambda *_: Verdict(next(left), "it is torn", "mend it"))
+
+
+@pytest.mark.parametrize(("ratings", "field", "dense"), [
+    ((NOT_USABLE, GOOD), "slack", False), ((NOT_USABLE, NOT_USABLE, GOOD), "homography", False),
+    ((NOT_USABLE,) * 3, "slack", True), ((GOOD,), "slack", True),
+])  # fmt: skip
+def test_the_first_simpler_stitch_that_is_usable_is_shown(
+    ratings: tuple[str, ...], field: str, dense: bool, monkeypatch: pytest.MonkeyPatch, small_pair: Pair,
+    known: StitchOptions, small_result: StitchResult,
+) -> None:  # fmt: skip
+    judged(monkeypatch, *ratings)
+    result = stitch((small_pair.reference, small_pair.target), known)
+    asked = result.report["options"]
+    assert (asked["field"], asked["dense"], result.report["verdict"]["is"]) == (field, dense, ratings[-1])
+    assert np.array_equal(result.pixels, small_result.pixels) == dense
+    fallback = result.report.get("fallback")
+    assert (fallback is not None) == (not dense)
+    if fallback:
+        told = [line for line in result.warnings if line.startswith("fell back to ")]
+        assert len(told) == 1 and fallback["to"] in told[0] and "it is torn" in told[0]
+        assert result.report["warnings"] == list(result.warnings)
+        assert fallback["instead_of"]["options"]["dense"] and fallback["instead_of"]["verdict"]["is"] == NOT_USABLE
+
+
+def test_what_was_asked_to_be_simple_is_left_alone(
+    monkeypatch: pytest.MonkeyPatch, small_pair: Pair, known: StitchOptions
+) -> None:
+    judged(monkeypatch, NOT_USABLE)
+    result = stitch((small_pair.reference, small_pair.target), replace(known, dense=False))
+    assert result.report["verdict"]["is"] == NOT_USABLE and "fallback" not in result.report
+
+
+def test_it_stops_when_asked_to_in_the_second_stitch_too(
+    monkeypatch: pytest.MonkeyPatch, small_pair: Pair, known: StitchOptions
+) -> None:
+    judged(monkeypatch, NOT_USABLE)
+    written: list[str] = []
+
+    def asked() -> bool:
+        return written.count("write") >= 2 and written[-1] != "write"
+
+    with pytest.raises(Cancelled):
+        stitch((small_pair.reference, small_pair.target), known, lambda stage, _: written.append(stage), asked)
