@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import beside, bounds, dilated, shown_only, strips
+from ..raster.arrays import beside, bounds, dilated, shown_only, small_strips, strips
 from ..raster.log_encoding import log_encode
 from ..raster.robust import NORMAL_MEDIAN
 from ..system.threads import each
@@ -57,7 +57,7 @@ def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overla
         tones -= log_encode(before.light[part])
         difference[rows] = shown_only(tones, both[rows])
 
-    each(put, strips(difference.shape))
+    each(put, small_strips(difference.shape))
     same = both & ~dilated(hidden[box] & both, OVERLAP.hidden_margin_px)
     return Overlap(box, both, difference, same & _alike(difference, same))
 
@@ -85,5 +85,5 @@ def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray
         within = [np.abs(blurred[..., k] - middle[k]) <= most[k] for k in range(len(most))]
         alike[rows] = np.logical_and.reduce(within)
 
-    each(put, strips(difference.shape))
+    each(put, small_strips(difference.shape))
     return alike

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import Part, Plane, beside, dilated, strips
+from ..raster.arrays import Part, Plane, beside, dilated, small_strips, strips
 from ..raster.lazy import AnyImage
 from ..raster.picture_map import PictureMap
 from ..system.threads import each
@@ -162,7 +162,7 @@ def _risk(picture_map: PictureMap, confidence: AnyImage | None, box: Part) -> Pl
         if confidence is not None:
             risk[rows] += 1 - confidence[part][here]
 
-    each(put, strips(risk.shape))
+    each(put, small_strips(risk.shape))
     return risk
 
 
@@ -186,7 +186,7 @@ def _cost(difference: Plane, both: NDArray[np.bool_], risk: Plane) -> Plane:
         part[rim[rows]] += np.float32(SEAM.rim_price)
         cost[rows] = np.minimum(part, np.float32(1), out=part)
 
-    each(put, strips(cost.shape))
+    each(put, small_strips(cost.shape))
     return cost
 
 
