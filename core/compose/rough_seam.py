@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -23,10 +24,10 @@ from ..raster.lazy import whole
 from ..raster.log_encoding import log_encode
 from ..raster.picture_map import PictureMap
 from ..raster.resizing import resized_points
-from .options import ROUGH_SEAM
 from .overlap import Overlap, overlap_of
 from .seam import find_seam, known_labels
 from .seam_costs import seam_costs
+from .seam_options import ROUGH_SEAM
 from .tears import contrast, tears
 
 
@@ -83,7 +84,7 @@ class RoughSeam:
         return Look((before, layer), maps, hidden, overlap, chosen)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Look:
     """Two small pictures on a canvas; hidden, chosen (H, W): what the second cannot see, and where it is shown."""
 
@@ -93,7 +94,7 @@ class Look:
     overlap: Overlap | None
     chosen: NDArray[np.bool_]
 
-    @property
+    @cached_property
     def shown(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Where (H, W) each shows something."""
         first, second = self.layers

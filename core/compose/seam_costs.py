@@ -20,7 +20,8 @@ from ..raster.arrays import Part, Plane, beside, dilated, small_strips, strips
 from ..raster.lazy import AnyImage
 from ..raster.picture_map import PictureMap
 from ..system.threads import each
-from .options import OVERLAP, SEAM
+from .options import OVERLAP
+from .seam_options import SEAM
 
 if TYPE_CHECKING:
     from .overlap import Overlap

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..raster.arrays import Plane
 from ..raster.picture_map import PictureMap
 from ..raster.sampling import fetch
-from .options import TEARS
+from .seam_options import TEARS
 
 
 def tears(tones: Plane, seen: PictureMap, shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
