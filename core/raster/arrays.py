@@ -137,11 +137,13 @@ def larger_parts(mask: NDArray[np.bool_], least: int = MASKS.speck_side**2) -> N
 
 def cut(array: NDArray[Any], box: Box, beyond: float = 0.0) -> NDArray[Any]:
     """The part of an array (H, W, …) in a box (left, top, width, height); `beyond` where that reaches over its edges.
+
+    Where it does not, that is a view of the array: parts of what is as large as a canvas take no memory of their own.
     """
     left, top, width, height = box
     right, bottom = left + width, top + height
     if left >= 0 and top >= 0 and right <= array.shape[1] and bottom <= array.shape[0]:
-        return np.ascontiguousarray(array[top:bottom, left:right])
+        return array[top:bottom, left:right]
     out = np.zeros((height, width, *array.shape[2:]), array.dtype)  # a sphere is mostly empty: memory untouched is free
     if beyond:
         out[:] = beyond
