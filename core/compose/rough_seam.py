@@ -48,8 +48,8 @@ class RoughSeam:
         return RoughSeam(tuple(small), tuple(views))
 
     def __call__(self, warp: Warp) -> float:
-        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out, and of
-        tears within a picture that are seen."""
+        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out, of
+        tears within a picture that are seen, and around holes."""
         seen = self.look(warp)
         if seen.overlap is None:
             return 0.0

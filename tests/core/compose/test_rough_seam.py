@@ -120,12 +120,12 @@ def test_what_neither_picture_can_see_counts_by_its_border(views: tuple[View, ..
     cut = RoughSeam.of(pictures, views, COARSE)
     shown = cut.look(far_away(views, COARSE)).shown
     alone, both = (
-        np.argwhere(cv2.erode(np.pad(one, 1).astype(np.uint8), np.ones((25, 25), np.uint8))[1:-1, 1:-1])
+        np.argwhere(cv2.erode(np.pad(one, 1).astype(np.uint8), np.ones((13, 13), np.uint8))[1:-1, 1:-1])
         for one in (shown[1] & ~shown[0], shown[1] & shown[0])
     )
-    for places, expected in ((alone, 12**2 - 10**2), (both, 0)):
+    for places, expected in ((alone, 10**2 - 8**2), (both, 0)):
         row, column = places[len(places) // 2]
         hidden = np.zeros(shown[0].shape, bool)
-        hidden[row - 5 : row + 5, column - 5 : column + 5] = True
+        hidden[row - 4 : row + 4, column - 4 : column + 4] = True
         monkeypatch.setattr(rough_seam, "occluded", lambda *_, hidden=hidden: hidden.copy())
         assert cut(far_away(views, COARSE)) == expected
