@@ -41,10 +41,10 @@ class SeamOptions:
     """Cells along a picture's longer side, about, in which the seam is found: what the eye takes for a step. A price
     per area against one per length also needs one size."""
 
-    rim_price: float = 0.01
+    rim_price: float = 0.04
     """Price of a pixel near the overlap's rim, on top: beyond it there is nothing to blend with."""
 
-    rim_width: int = 2
+    rim_width: int = 3
     """Pixels, or cells, that count as near."""
 
     hidden_price: float = 0.4
