@@ -171,7 +171,7 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
     unlike = _unlike(look)
     seam = _along_seam(look, unlike)
     places = sorted(
-        (*_seam_places(look, seam, shift), *_torn_places(look, shift), *_light_places(look, shift),
+        (*_seam_places(look, seam, shift), *_torn_places(look, unlike, shift), *_light_places(look, shift),
          *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2)
            for box in report["composition"]["holes"])),
         key=lambda place: -place.size,
@@ -266,25 +266,25 @@ def _seam_places(look: Look, steps: Plane, shift: tuple[int, int]) -> Iterator[P
         yield Place(look.box(part, shift), what, float((steps[part] - VERDICT.step).sum()))
 
 
-def _torn_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
-    """Where the map of the picture that is shown folds, or stretches it far more than elsewhere, and has detail that
-    shows it."""
-    folds, stretched = np.zeros(look.hidden.shape, bool), np.zeros(look.hidden.shape, bool)
+def _torn_places(look: Look, unlike: Plane, shift: tuple[int, int]) -> Iterator[Place]:
+    """Where the map of the picture that is shown folds or jumps, with detail that shows it, and the other picture does
+    not agree; and where it is stretched over a large part."""
+    torn, stretched = np.zeros(look.hidden.shape, bool), np.zeros(look.hidden.shape, bool)
     for number, one in enumerate(look.maps):
-        shown = (look.shows[number] if look.labels is None else look.labels == number) & _detailed(look.tones[number])
-        turns = turning(one)
-        folds |= turned_over(turns) & shown
+        shown = look.shows[number] if look.labels is None else look.labels == number
+        turns, detailed = turning(one), _detailed(look.tones[number])
         areas = np.zeros(shown.shape, np.float32)
         areas[:-1, :-1] = np.abs(cell_areas(one.x, one.y))
         counts = shown & (turns != NO_TURN)
         if counts.any():
-            stretched |= counts & (areas > VERDICT.stretch * np.median(areas[counts]))
-    square = look.side * look.side
+            large = counts & (areas > VERDICT.stretch * np.median(areas[counts]))
+            stretched |= large & detailed
+            torn |= (large | (turned_over(turns) & shown)) & detailed & (unlike > VERDICT.torn_step)
     for mask, share, what in (
-        (folds, VERDICT.fold_share, "the picture folds over: things may be torn or doubled"),
-        (stretched, VERDICT.stretch_share, "the picture is torn or smeared: depth is doubtful"),
+        (torn, VERDICT.torn_share, "the picture is torn or doubled at an outline: depth is doubtful"),
+        (stretched, VERDICT.stretch_share, "the picture is stretched: the focal length or depth is wrong"),
     ):
-        for part in _parts(mask, share * square):
+        for part in _parts(mask, share * look.side * look.side):
             yield Place(look.box(part, shift), what, float(part.sum()))
 
 
@@ -322,7 +322,9 @@ def _greyed(tones: Levels, taken: Levels, clipped: list[NDArray[np.bool_]]) -> N
     others = np.maximum.reduce([np.where(gone, np.float32(0), by) for gone, by in zip(clipped, changes, strict=True)])
     as_others = [(by <= VERDICT.restored * others) | (others == 0) for by in changes]
     dark = [now < VERDICT.greyed for now in cv2.split(tones)]
-    return np.logical_or.reduce([np.logical_and.reduce(one) for one in zip(clipped, dark, as_others, strict=True)])
+    parts = zip(clipped, dark, as_others, strict=True)
+    greyed: NDArray[np.bool_] = np.logical_or.reduce([np.logical_and.reduce(one) for one in parts])
+    return greyed
 
 
 def _parts(mask: NDArray[np.bool_], least: float, apart: float = 2.0) -> Iterator[NDArray[np.bool_]]:
