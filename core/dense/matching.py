@@ -213,8 +213,8 @@ def _at_rim(both: NDArray[np.bool_]) -> NDArray[np.bool_]:
     would speak against it."""
     side = 2 * round(RIM.width * min(both.shape)) + 1
     kernel = np.ones((side, side), np.uint8)
-    inner = cv2.erode(both.view(np.uint8), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    return inner == 0
+    rim: NDArray[np.bool_] = cv2.erode(both.view(np.uint8), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0) == 0
+    return rim
 
 
 def _range(a: NDArray[np.uint8], disparity: Plane, found: NDArray[np.bool_], count: int) -> tuple[int, int]:
