@@ -89,6 +89,12 @@ class MatchingOptions:
     """Gray levels, in a Sobel filter's units, along the row that a point has to have for what is found further away to
     count: in a sky anything is found."""
 
+    range_share: float = 0.05
+    """% of such points, at either end, that may lie beyond what is searched at full size: errors."""
+
+    range_margin_px: float = 8.0
+    """px that are searched beyond the others."""
+
     wide_share: float = 0.2
     """% of such points, at either end, that may lie further away than is searched at full size."""
 
@@ -170,7 +176,7 @@ class SmoothingOptions:
 class OutlinesOptions:
     """Putting edges of depth where the reference has an edge (`outlines`). Gray levels are 0 to 255."""
 
-    reach: int = 5
+    reach: int = 2
     """Nodes from a jump within which nodes are looked at: windows make near things wider by less."""
 
     jump_nodes: int = 5
