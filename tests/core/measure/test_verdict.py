@@ -71,6 +71,12 @@ def test_a_seam_that_is_seen_is_a_place_with_its_cause() -> None:
         assert what == f"a thing is cut by the border of the {name}"
 
 
+def test_what_nearly_touches_is_one_place() -> None:
+    for below, count in ((118, 1), (160, 2)):
+        both = differing(differing(look(), np.s_[100:112, 180:220]), np.s_[below : below + 12, 180:220])
+        assert len(judged(both).places) == count
+
+
 def test_places_are_told_in_pixels_of_the_panorama() -> None:
     small = judged(differing(look(), PATCH)).places[0].box
     large = judge(differing(look(step=3), PATCH), (10, -20), RIGHT).places[0].box
@@ -116,6 +122,8 @@ def test_light_that_is_lost_is_a_place() -> None:
         assert [what in place.what for place in found.places] == [True] and found.places[0].box == (250, 0, 150, 60)
         alike = replace(good, tones=(np.where(now == shown, now, good.tones[0]), now), taken=(good.taken[0], before))
         assert (judged(alike).rating == "good") == (what == "too bright"), "darker, as the other picture has it"
+        elsewhere = replace(good, tones=(now, good.tones[1]), taken=(before, good.taken[1]))
+        assert judged(elsewhere).rating == "good", "the reference is not shown there"
         white = replace(good, tones=(good.tones[0], before), taken=(good.taken[0], before))
         assert judged(white).rating == "good", "nothing was lost by us"
 
@@ -163,6 +171,22 @@ def test_a_panorama_is_looked_at_small(small_result: StitchResult) -> None:
     x, y = (np.rint(values[rows, columns]).astype(int) for values in (maps[0].x, maps[0].y))
     apart = np.abs(as_it_is.tones[0][rows, columns].astype(int) - small_result.pictures[0].view[y, x])
     assert np.median(apart) <= 1
+    dark = look_at(small_result.pictures, maps, [unchanged(3, 0.25)] * 2, hidden, np.zeros(maps[0].shape, np.int16))
+    assert np.array_equal(dark.taken[0], as_it_is.tones[0]) and dark.tones[0].max() < 0.6 * as_it_is.tones[0].max()
+
+
+def test_of_a_whole_sphere_only_what_the_pictures_cover_is_looked_at(small_pair: Pair, known: StitchOptions) -> None:
+    changed = small_pair.target.copy()
+    changed[40:140:8, 20:100] = 255
+    sphere = replace(known, projection="equirectangular", seam="none")
+    result = stitch((small_pair.reference, changed), sphere)
+    seen = look_at(
+        result.pictures, result.warp.maps, [one.exposure for one in result.decided], result.occluded, result.labels
+    )
+    here = [one.box for one in judge(seen, (0, 0), result.report).places]
+    told = [tuple(one["box"]) for one in result.report["verdict"]["places"]]
+    left, top = -result.spread[0], -result.spread[1]
+    assert left > 0 and here and told == [(x + left, y + top, width, height) for x, y, width, height in here]
 
 
 def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> None:
