@@ -83,9 +83,7 @@ class ComparedPicture:
             inside &= cv2.remap(self.shown, x, y, cv2.INTER_LINEAR) > 0.999
         return cv2.remap(picture, x, y, interpolation, borderMode=cv2.BORDER_REPLICATE), inside
 
-    def at_nodes(
-        self, picture: NDArray[np.float32], lines: EpipolarLines
-    ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    def at_nodes(self, picture: NDArray[Any], lines: EpipolarLines) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """The same at the nodes, where this is the reference."""
         left, top, width, height = lines.box
         if (width, height) != lines.shape[::-1] or self.levels.shape != self.full.shape:

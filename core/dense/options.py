@@ -170,8 +170,11 @@ class SmoothingOptions:
 class OutlinesOptions:
     """Putting edges of depth where the reference has an edge (`outlines`). Gray levels are 0 to 255."""
 
-    reach: int = 6
+    reach: int = 5
     """Nodes from a jump within which nodes are looked at: windows make near things wider by less."""
+
+    jump_nodes: int = 5
+    """Nodes of the side of the window in which moves jump."""
 
     jump_px: float = 2.0
     """px of the moves between a node and its neighbours from which on they jump."""
@@ -179,11 +182,8 @@ class OutlinesOptions:
     median_nodes: int = 5
     """Nodes of the side of the median's window that takes out specks; OpenCV has 3 or 5 for floats."""
 
-    side_share: float = 0.3
-    """Share of the spread of moves around a node that belongs to the nearest of them, and to the farthest."""
-
-    unfound: float = 1e-3
-    """What a node that was not found counts among them, relative to one that was."""
+    example: float = 0.05
+    """How surely a node has to be found at least to be an example for others."""
 
     max_levels: float = 24.0
     """Gray levels of difference at and above which all count alike."""

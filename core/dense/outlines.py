@@ -9,7 +9,7 @@ the target: it costs as much as a poor match.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -21,8 +21,8 @@ from .epipolar_lines import EpipolarLines, Places
 from .matching import ComparedPicture, comparable_levels, tone_curves
 from .options import OUTLINES
 
-# row and column indices
-Places2 = tuple[Places, Places]
+Indices = tuple[Places, Places]
+"""Rows and columns of nodes or cells (…)."""
 
 
 def at_outlines(
@@ -48,14 +48,16 @@ def at_outlines(
     (h, w) float32 array
     """
     rough = cv2.medianBlur(along, OUTLINES.median_nodes)
-    around = np.ones((2 * OUTLINES.reach + 1,) * 2, np.uint8)
-    near_jump = cv2.dilate((_spread(rough, np.ones((3, 3), np.uint8)) > OUTLINES.jump_px).view(np.uint8), around) > 0
+    near_jump = _near_jump(rough)
     if not near_jump.any():
         return along
-    near, far = _beside(rough, along, np.maximum(found, np.float32(OUTLINES.unfound)), around)
+    near, far = _beside(rough, along, found)
     compared = _Compared.of(lines, along, across, found, views)
-    places = _in_rows(np.nonzero(near_jump))
+    places = _in_rows(*np.nonzero(near_jump))
     own = compared.costs(along, across, places)
+    # a guess is no better than the surface behind
+    guessed = found[places] < OUTLINES.example
+    own[guessed] = np.maximum(own[guessed], compared.behind) + 2 * OUTLINES.least_gain
     better = []
     for other in (near, far):
         gain = np.zeros_like(along)
@@ -67,32 +69,29 @@ def at_outlines(
     return np.where(clearly, chosen, along)
 
 
-def _in_rows(places: Places2) -> Places2:
-    """Indices (…) as (m, row) indices, some of them twice: OpenCV's pictures have bounded sides."""
-    short = -places[0].size % OUTLINES.row
-    row, column = (np.concatenate([at, np.repeat(at[:1], short)]).reshape(-1, OUTLINES.row) for at in places)
+def _in_rows(row: Places, column: Places) -> Indices:
+    """Indices (n,) as (m, `OUTLINES.row`) indices, some of them twice: OpenCV's pictures have bounded sides."""
+    short = -row.size % OUTLINES.row
+    row, column = (np.append(at, np.repeat(at[:1], short)).reshape(-1, OUTLINES.row) for at in (row, column))
     return row, column
 
 
-def _spread(values: Plane, window: NDArray[np.uint8]) -> Plane:
-    """Largest minus smallest value (h, w) in a window around each."""
-    spread: Plane = cv2.dilate(values, window) - cv2.erode(values, window)
-    return spread
+def _near_jump(rough: Plane) -> NDArray[np.bool_]:
+    """The nodes (h, w) within reach of a jump of moves (h, w) px."""
+    few, around = (np.ones((side,) * 2, np.uint8) for side in (OUTLINES.jump_nodes, 2 * OUTLINES.reach + 1))
+    jumps = cv2.dilate(rough, few) - cv2.erode(rough, few) > OUTLINES.jump_px
+    near: NDArray[np.bool_] = cv2.dilate(jumps.view(np.uint8), around) > 0
+    return near
 
 
-def _beside(rough: Plane, along: Plane, weight: Plane, window: NDArray[np.uint8]) -> tuple[Plane, Plane]:
-    """The means (h, w), weighted, of the nearest and of the farthest of the moves (h, w) in a window; rough: the same
-    without specks."""
-    nearest, farthest = cv2.dilate(rough, window), cv2.erode(rough, window)
-    share = np.float32(OUTLINES.side_share) * (nearest - farthest)
-
-    def mean(those: NDArray[np.bool_], otherwise: Plane) -> Plane:
-        counted = weight * those
-        total = cv2.blur(counted, window.shape)
-        sums = cv2.blur(counted * along, window.shape)
-        return np.divide(sums, total, out=otherwise, where=total > np.float32(OUTLINES.unfound) / window.size)
-
-    return mean(along > nearest - share, nearest), mean(along < farthest + share, farthest)
+def _beside(rough: Plane, along: Plane, found: Plane) -> tuple[Plane, Plane]:
+    """The nearest and the farthest (h, w) of the moves (h, w) px that were found within reach; rough: the same
+    without specks. Where none was found the moves themselves."""
+    window = np.ones((2 * OUTLINES.reach + 1,) * 2, np.uint8)
+    example, none = found >= OUTLINES.example, np.finfo(np.float32).max
+    nearest = cv2.dilate(np.where(example, rough, -none), window)
+    farthest = cv2.erode(np.where(example, rough, none), window)
+    return np.where(nearest > -none, nearest, along), np.where(farthest < none, farthest, along)
 
 
 @dataclass(frozen=True)
@@ -122,18 +121,17 @@ class _Compared:
         x, y = lines.target(along, across, some)
         other, also_shown = views[1].sample(target, x, y)
         both = shown[some] & also_shown & (found[some] >= OUTLINES.sure)
-        curves = tone_curves(reference[some], other, both, 256) if both.any() else [np.arange(256, dtype=np.uint8)] * 3
-        target = np.dstack([curve[channel] for curve, channel in zip(curves, cv2.split(target), strict=True)])
+        if both.any():
+            curves = tone_curves(reference[some], other, both, 256)
+            target = np.dstack([curve[target[..., k]] for k, curve in enumerate(curves)])
         nearest = _nearest(lines, along[some], x, y, some, views[1].size)
         compared = _Compared(lines, views[1], reference.reshape(*along.shape, -1), target, nearest, np.inf)
         costs = compared.costs(along, across, some)[both]
         costs = costs[np.isfinite(costs)]
         usual = float(np.percentile(costs, OUTLINES.usual_percentile)) if costs.size else 0.0
-        return _Compared(
-            lines, views[1], compared.reference, target, nearest, max(OUTLINES.min_behind, OUTLINES.behind * usual)
-        )
+        return replace(compared, behind=max(OUTLINES.min_behind, OUTLINES.behind * usual))
 
-    def costs(self, along: Plane, across: Plane, places: Places2) -> NDArray[np.float32]:
+    def costs(self, along: Plane, across: Plane, places: Indices) -> NDArray[np.float32]:
         """Gray levels (…) by which the pictures differ at nodes with these row and column indices, after moves (h, w)
         px."""
         x, y = self.lines.target(along, across, places)
@@ -148,7 +146,7 @@ class _Compared:
 
 def _nearest(
     lines: EpipolarLines, along: NDArray[np.float32], x: NDArray[np.float32], y: NDArray[np.float32],
-    places: Places2, size: tuple[int, int],
+    places: Indices, size: tuple[int, int],
 ) -> Plane:  # fmt: skip
     """The largest inverse depth that falls on each cell of a picture of (W, H) px, of nodes with these row and column
     indices, their moves (…) and where they are seen, px x and y (…); −inf where none does."""
@@ -162,7 +160,7 @@ def _nearest(
     return nearest
 
 
-def _cells(x: NDArray[np.float32], y: NDArray[np.float32], shape: tuple[int, ...]) -> Places2:
+def _cells(x: NDArray[np.float32], y: NDArray[np.float32], shape: tuple[int, ...]) -> Indices:
     """Row and column indices (…) of the cells of the target at px x, y (…), at the border those of the border."""
     row, column = (
         np.clip(np.nan_to_num(at) * np.float32(1 / OUTLINES.cell_px), 0, side - 1).astype(np.intp)

@@ -22,7 +22,7 @@ from edf_stitch.synthetic_scenes.recipes import (
 ASKED_FOR = {
     "two_planes", "layered_cards", "corner_room", "street", "foliage", "relief", "tabletop", "portrait_pair",
     "zoom_pair", "forward", "sideways", "toe_in", "pure_rotation", "single_plane", "exposure_step", "hdr_interior",
-    "low_texture", "wide", "occluder",
+    "low_texture", "wide", "occluder", "thin_things",
 }  # fmt: skip
 SIZE = (640, 480)
 

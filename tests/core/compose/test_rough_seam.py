@@ -102,3 +102,11 @@ def test_a_seam_is_lost_where_both_pictures_are_busy(views: tuple[View, ...]) ->
 
     assert rough(views, leaves(0), leaves(1)) < 10
     assert rough(views, leaves(0), seen(views, 1, bands=False)) > 20
+
+
+def test_a_warp_is_looked_at_once_and_another_one_anew(views: tuple[View, ...]) -> None:
+    both = RoughSeam.of([picture_from_array(seen(views, number)) for number in (0, 1)], views, COARSE)
+    right, wrong = far_away(views, COARSE), far_away(views, COARSE, shift=25.0)
+    assert both.look(right) is both.look(right)
+    assert both(wrong) > 20
+    assert both(right) == 0

@@ -265,3 +265,55 @@ def test_it_looks_as_far_as_it_is_told() -> None:
     within = (np.abs(right) > 8.5) & (np.abs(right) < 12) & pair.visible(lines)
     assert within.sum() > 2000, "else there is nothing to seek"
     assert ((counts > 0) & (np.abs(along - right) < 1))[within].mean() > 0.4
+
+
+@pytest.mark.parametrize(("far_rows", "reach"), [(2, True), (20, False), (0, False)])
+def test_it_searches_further_where_a_few_points_are_found_further_away(far_rows: int, reach: bool) -> None:
+    """Not where many are: then something else is wrong. What is found in a plain part does not count."""
+    textured = np.random.default_rng(3).integers(0, 256, (100, 100)).astype(np.uint8)
+    disparity = np.full((100, 100), 3, np.float32)
+    disparity[:far_rows] = 27
+    found = np.ones(disparity.shape, bool)
+    least, count = matching._range(textured, disparity, found, 32)
+    assert (least, least + count) == ((-16, 32) if reach else (-16, 16))
+    assert matching._range(np.full_like(textured, 90), disparity, found, 32) == (-16, 32)
+    assert count % 16 == 0
+
+
+def test_beside_a_near_thing_the_background_goes_on() -> None:
+    """In what the target does not see: a card before a wall, on the side that the field's moves tell."""
+    random = np.random.default_rng(6)
+    wall, card = (cv2.GaussianBlur(random.normal(size=(150, 260)), (0, 0), 1.2) for _ in range(2))
+    wall, card = (np.clip(128 + 45 * v / v.std(), 0, 255).astype(np.uint8)[..., None] for v in (wall, card))
+    pair = scene("sideways")
+    near_px, columns = 12, slice(90, 130)
+    field = pair.field()
+    lines = pair.lines(field)
+    # the target is what the moves make of the wall, and of the card in front of it
+    base_x, base_y = lines.target(np.zeros(lines.shape, np.float32))
+    reference = wall[:, 30 : 30 + SIZE[0]].copy()
+    reference[:, columns] = card[:, columns]
+    moves = np.zeros(lines.shape, np.float32)
+    moves[:, columns] = near_px
+    target = np.full((SIZE[1], SIZE[0], 1), 128, np.uint8)
+    for some in (moves == 0, moves > 0):
+        x, y = (v + 0 for v in lines.target(moves))
+        painted = _painted(reference, x, y, some)
+        target = np.where(painted[1], painted[0], target)
+    along, counts = search(lines, field, *(ComparedPicture.of(p, None, 1.0) for p in (reference, target)), 1.0, REACH)
+    guessed = np.isclose(counts, MATCHING.hidden_confidence)
+    beside = guessed & (moves == 0) & np.isfinite(base_x + base_y)
+    assert beside[20:-20].sum() > 200
+    assert (np.abs(along[beside]) < 2).mean() > 0.8
+
+
+def _painted(picture: np.ndarray, x: np.ndarray, y: np.ndarray, some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Some of a picture (h, w, 1) where its pixels are seen, px x and y (h, w), and the mask of where that is."""
+    out, weight = np.zeros(picture.shape, np.float32), np.zeros(picture.shape, np.float32)
+    for down in np.linspace(-0.5, 0.5, 3):
+        for across in np.linspace(-0.5, 0.5, 3):
+            column, row = np.rint(x[some] + across).astype(int), np.rint(y[some] + down).astype(int)
+            inside = (column >= 0) & (row >= 0) & (column < out.shape[1]) & (row < out.shape[0])
+            np.add.at(out, (row[inside], column[inside]), picture[some][inside].astype(np.float32))
+            np.add.at(weight, (row[inside], column[inside]), np.float32(1))
+    return np.rint(out / np.maximum(weight, 1)).astype(np.uint8), weight > 0
