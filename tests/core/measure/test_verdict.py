@@ -14,7 +14,10 @@ from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
-RIGHT = {"measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []}}
+RIGHT = {
+    "measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []},
+    "options": {"projection": "auto"},
+}  # fmt: skip
 # Rows and columns across the seam, which runs down the middle (column 200).
 PATCH = np.s_[100:140, 180:220]
 
@@ -101,15 +104,22 @@ def test_a_map_that_folds_or_jumps_is_a_place_where_the_other_picture_does_not_a
     assert judged(elsewhere).rating == "good", "the reference is not shown there"
 
 
-def test_a_large_part_that_is_stretched_is_a_place_unless_it_is_bare() -> None:
+def test_a_large_part_that_is_bent_is_a_place_unless_the_frame_was_asked_for() -> None:
     good = look()
     x = good.maps[1].x.copy()
-    x[:, 350:] = 350 + 9 * (x[:, 350:] - 350)
-    wide = replace(good.maps[1], x=x, size=(4000, 300))
-    found = judged(replace(good, maps=(good.maps[0], wide)))
-    assert found.rating == "look" and "stretched" in found.places[0].what and found.places[0].box[0] >= 345
-    bare = np.full_like(good.tones[1], 128)
-    assert judged(replace(good, maps=(good.maps[0], wide), tones=(bare, bare))).rating == "good"
+    part = np.s_[100:220, 260:380]
+    x[part] += 0.8 * (good.maps[1].y[part] - 160)
+    bent = replace(good, maps=(good.maps[0], replace(good.maps[1], x=x)))
+    found = judged(bent)
+    assert found.rating == "look" and len(found.places) == 1 and "bent" in found.places[0].what
+    left, top, width, height = found.places[0].box
+    assert 240 <= left and left + width <= 400 and 80 <= top and top + height <= 240 and min(width, height) > 70
+    assert judge(bent, (0, 0), {**RIGHT, "options": {"projection": "perspective"}}).rating == "good"
+    elsewhere = replace(bent, maps=(bent.maps[1], bent.maps[0]))
+    assert judged(elsewhere).rating == "good", "the reference is not shown there"
+    small = good.maps[1].x.copy()
+    small[100:115, 300:315] += 0.8 * (good.maps[1].y[100:115, 300:315] - 107)
+    assert judged(replace(good, maps=(good.maps[0], replace(good.maps[1], x=small)))).rating == "good", "outlines"
 
 
 def test_light_that_is_lost_is_a_place() -> None:
