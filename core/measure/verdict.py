@@ -342,7 +342,9 @@ def _greyed(tones: Levels, taken: Levels, clipped: list[NDArray[np.bool_]]) -> N
     others = np.maximum.reduce([np.where(gone, np.float32(0), by) for gone, by in zip(clipped, changes, strict=True)])
     as_others = [(by <= VERDICT.restored * others) | (others == 0) for by in changes]
     dark = [now < VERDICT.greyed for now in cv2.split(tones)]
-    return np.logical_or.reduce([np.logical_and.reduce(one) for one in zip(clipped, dark, as_others, strict=True)])
+    parts = zip(clipped, dark, as_others, strict=True)
+    greyed: NDArray[np.bool_] = np.logical_or.reduce([np.logical_and.reduce(one) for one in parts])
+    return greyed
 
 
 def _parts(mask: NDArray[np.bool_], least: float, apart: float = 2.0) -> Iterator[NDArray[np.bool_]]:
