@@ -147,21 +147,24 @@ def _refills(cells: _Cells, share: float) -> list[_Refill]:
             if area < CUT_THINGS.min_cells or from_rim[box][number[box] == label].min() > CUT_THINGS.near * cells.side:
                 continue
             place = with_margin(box, round((CUT_THINGS.grown + CUT_THINGS.ring) * cells.side) + 2, both.shape)
-            thing = number[place] == label
-            one = _refill(cells, thing, place, mine[place], from_rim[place])
-            if one is not None and cells.seen[place][_zone(one, cells.side)].sum() > _least_gain(one):
+            around = dilated(number[place] == label, _px(CUT_THINGS.grown, cells.side))
+            part = around & dilated(mine[place], 1)  # small pictures end up to a cell early
+            if cells.seen[place][_zone(part, cells.side)].sum() <= _least_gain(part):
+                continue
+            one = _refill(cells, place, part, around, from_rim[place])
+            if one is not None:
                 out.append(one)
     return out
 
 
-def _zone(one: _Refill, side: float) -> NDArray[np.bool_]:
-    """Where (h, w), at its place, a refill is judged."""
-    return dilated(one.part, _px(CUT_THINGS.zone, side))
+def _zone(part: NDArray[np.bool_], side: float) -> NDArray[np.bool_]:
+    """Where (h, w) a refilled part (h, w) is judged."""
+    return dilated(part, _px(CUT_THINGS.zone, side))
 
 
-def _least_gain(one: _Refill) -> float:
-    """By how much less must be seen for a refill."""
-    return CUT_THINGS.least_gain + CUT_THINGS.gain_per_cell * float(one.part.sum())
+def _least_gain(part: NDArray[np.bool_]) -> float:
+    """By how much less must be seen for a part (h, w) to be refilled."""
+    return CUT_THINGS.least_gain + CUT_THINGS.gain_per_cell * float(part.sum())
 
 
 def _px(share: float, side: float) -> int:
@@ -170,13 +173,13 @@ def _px(share: float, side: float) -> int:
 
 
 def _refill(
-    cells: _Cells, thing: NDArray[np.bool_], place: Part, mine: NDArray[np.bool_], from_rim: Plane
+    cells: _Cells, place: Part, part: NDArray[np.bool_], thing: NDArray[np.bool_], from_rim: Plane
 ) -> _Refill | None:
-    """What lies behind a thing (h, w) at a place, by the farthest of what surrounds it; None where nothing tells."""
+    """What lies behind a part (h, w) of a place, by the farthest of what surrounds it and the thing (h, w) that it is
+    of; None where nothing tells."""
     grown = _px(CUT_THINGS.grown, cells.side)
     shown = cells.look.shown[0][place] | cells.look.shown[1][place]
-    part = dilated(thing, grown) & dilated(mine, 1)  # small pictures end up to a cell early
-    around = dilated(part, _px(CUT_THINGS.ring, cells.side)) & ~dilated(thing, grown) & shown & ~cells.bad[place]
+    around = dilated(part, _px(CUT_THINGS.ring, cells.side)) & ~thing & shown & ~cells.bad[place]
     if around.sum() < CUT_THINGS.least_ring:
         return None
     depth = cells.warp.inverse_depth[place]
@@ -272,7 +275,7 @@ def _own_cuts(look: Look) -> Plane:
 
 def _is_better(one: _Refill, before: _Cells, after: _Cells) -> bool:
     """Whether much less is seen around a refill than before, and at its worst place, too."""
-    zone = _zone(one, before.side)
+    zone = _zone(one.part, before.side)
     window = 2 * (_px(CUT_THINGS.window, before.side) // 2) + 1
     old, new = (float(cells.seen[one.place][zone].sum()) for cells in (before, after))
     most_old, most_new = (
@@ -280,4 +283,4 @@ def _is_better(one: _Refill, before: _Cells, after: _Cells) -> bool:
         for cells in (before, after)
     )
     hardly_seen = most_new < max(CUT_THINGS.hardly_seen, CUT_THINGS.less_at_worst * most_old)
-    return new < CUT_THINGS.much_less * old and old - new > _least_gain(one) and hardly_seen
+    return new < CUT_THINGS.much_less * old and old - new > _least_gain(one.part) and hardly_seen

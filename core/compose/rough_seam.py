@@ -19,7 +19,7 @@ from ..field.visibility import by_agreement, occluded
 from ..panorama.layers import Layer, layer_of
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture, picture_from_array
-from ..raster.arrays import dilated
+from ..raster.arrays import dilated, without_specks
 from ..raster.lazy import whole
 from ..raster.log_encoding import log_encode
 from ..raster.picture_map import PictureMap
@@ -48,8 +48,8 @@ class RoughSeam:
         return RoughSeam(tuple(small), tuple(views))
 
     def __call__(self, warp: Warp) -> float:
-        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out, and of
-        tears within a picture that are seen."""
+        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out, of
+        tears within a picture that are seen, and around holes."""
         seen = self.look(warp)
         if seen.overlap is None:
             return 0.0
@@ -64,7 +64,7 @@ class RoughSeam:
         for number, (picture, places) in enumerate(zip(self.pictures, seen.maps, strict=True)):
             own = log_encode(whole(picture.light)).mean(axis=2)
             torn += int(tears(own, places, seen.shown[number] & (seen.chosen == bool(number))).sum())
-        return float((seam & apart).sum()) / 2 + torn  # a pixel on either side of the seam
+        return float((seam & apart).sum()) / 2 + torn + _around_holes(seen)  # a pixel on either side of the seam
 
     def look(self, warp: Warp, forced: bool = False) -> Look:
         """Both small pictures on the canvas of a warp, and the seam between them; forced: whether what the added one
@@ -131,3 +131,9 @@ def map_to_small(picture_map: PictureMap, small: Picture) -> PictureMap:
         for values, old, new in zip((picture_map.x, picture_map.y), picture_map.size, (width, height), strict=True)
     )
     return PictureMap(x, y, (width, height))
+
+
+def _around_holes(seen: Look) -> int:
+    """px around what only the second picture could show, but cannot see either; specks are filled."""
+    holes = without_specks(seen.hidden & seen.shown[1] & ~seen.shown[0])
+    return int((dilated(holes, 1) & ~holes).sum())
