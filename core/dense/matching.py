@@ -219,18 +219,25 @@ def _inside(both: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _range(a: NDArray[np.uint8], disparity: Plane, found: NDArray[np.bool_], count: int) -> tuple[int, int]:
-    """The least disparity to be searched for and how many: `count` around 0, and as far beyond as the points of a
-    (h, w[, C]) with texture were found (h, w)."""
-    gradient = cv2.Sobel(cv2.blur(a, (3, 3)), cv2.CV_16S, 1, 0)
-    texture = np.abs(gradient).reshape(*found.shape, -1).max(axis=-1) >= MATCHING.wide_texture
-    values = disparity[found & texture]
-    share, ends = MATCHING.wide_share, np.zeros(2)
-    if (np.abs(values) > count / 2).mean() < MATCHING.max_wide_share if values.size else False:
-        ends = np.percentile(values, [share, 100 - share])
-    margin = MATCHING.reach_margin_px * (np.abs(ends) > count / 2)
-    low, high = 16 * -(-(np.array([-1, 1]) * ends + margin) // 16)
-    low, high = (int(np.clip(end, -(-count // 32) * 16, count)) for end in (low, high))
-    return -low, low + high
+    """The least disparity to be searched for and how many, a multiple of 16: as far as points of a (h, w[, C]) with
+    texture were found (h, w) at half the size. Beyond `count` around 0 only where these are few and most of them one
+    thing: errors are scattered."""
+    some, half = np.s_[::2, ::2], count / 2
+    gradient = cv2.Sobel(cv2.blur(np.ascontiguousarray(a[some]), (3, 3)), cv2.CV_16S, 1, 0)
+    texture = np.abs(gradient).reshape(*gradient.shape[:2], -1).max(axis=-1) >= MATCHING.wide_texture
+    values = disparity[some][found[some] & texture]
+    if not values.size:
+        return -16 * -(-count // 32), 32 * -(-count // 32)
+    outside = found[some] & (np.abs(disparity[some]) > half)
+    sizes = cv2.connectedComponentsWithStats(outside.view(np.uint8))[2][1:, cv2.CC_STAT_AREA]
+    few = (np.abs(values) > half).mean() < MATCHING.max_wide_share
+    few &= sizes.max(initial=0) > MATCHING.one_thing * outside.sum()
+    ends = []
+    for side in (-1, 1):
+        usual, wide = np.percentile(side * values, [100 - MATCHING.range_share, 100 - MATCHING.wide_share])
+        end, limit = (wide, count) if few and wide > half else (usual, 16 * -(-count // 32))
+        ends.append(int(np.clip(16 * -(-(end + MATCHING.range_margin_px) // 16), 16, limit)))
+    return -ends[0], sum(ends)
 
 
 def _matched(

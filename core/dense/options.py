@@ -89,11 +89,20 @@ class MatchingOptions:
     """Gray levels, in a Sobel filter's units, along the row that a point has to have for what is found further away to
     count: in a sky anything is found."""
 
+    range_share: float = 0.05
+    """% of such points, at either end, that may lie beyond what is searched at full size: errors."""
+
+    range_margin_px: float = 8.0
+    """px that are searched beyond the others."""
+
     wide_share: float = 0.2
     """% of such points, at either end, that may lie further away than is searched at full size."""
 
     max_wide_share: float = 0.05
     """Share of them, 0 to 1, from which on the geometry is doubted rather than the range."""
+
+    one_thing: float = 0.5
+    """Share of all that was found further away from which on a connected part of it is one thing that stands out."""
 
     hidden_jump_px: float = 2.0
     """px of a jump between surfaces from which on the nearer one hides something."""
@@ -170,7 +179,7 @@ class SmoothingOptions:
 class OutlinesOptions:
     """Putting edges of depth where the reference has an edge (`outlines`). Gray levels are 0 to 255."""
 
-    reach: int = 5
+    reach: int = 2
     """Nodes from a jump within which nodes are looked at: windows make near things wider by less."""
 
     jump_nodes: int = 5

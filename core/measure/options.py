@@ -146,8 +146,8 @@ class VerdictOptions:
     mostly: float = 0.3
     """Share of a place that one of the pictures cannot see, from which depth is the cause."""
 
-    stretch: float = 6.0
-    """Times the median area of the picture that a pixel of the panorama shows: the map jumps or is stretched there."""
+    jump: float = 6.0
+    """Times the median area of the picture that a pixel of the panorama shows: the map jumps there."""
 
     torn_step: float = 25.0
     """Levels by which the pictures differ where a fold or a jump is seen: at a true outline they agree."""
@@ -155,8 +155,14 @@ class VerdictOptions:
     torn_share: float = 4e-5
     """Of the longer side's square, torn so: good pictures, foliage among them, have up to 3e-5."""
 
-    stretch_share: float = 1.5e-3
-    """Of the longer side's square, stretched so: outlines have up to 5e-4, with a focal length far off it is 7e-3."""
+    smooth_share: float = 0.012
+    """Of the longer side: half the width over which a map is smoothed, outlines with it, to see where it bends."""
+
+    squeeze: float = 1.8
+    """Ratio of a map's singular values from which a picture is bent or stretched."""
+
+    bent_share: float = 0.01
+    """Of the panorama, squeezed so: pictures that are right have up to 0.006, those that are bent 0.03 and more."""
 
     edge: int = 40
     """Levels between the brightest and the darkest pixel near by, from which a fold is seen: none is on a bare wall."""

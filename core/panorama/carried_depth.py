@@ -175,9 +175,34 @@ def _filled(nearest: Plane) -> Plane:
         return np.zeros(nearest.shape, np.float32)
     part = with_margin(part, 1, nearest.shape)
     here: Plane = cv2.dilate(nearest[part], np.ones((2, 2), np.uint8), anchor=(1, 1))
-    here = _from_far(cv2.medianBlur(here, CARRY.speck_px), CARRY.halvings)
+    here = _from_far(_across_gaps(cv2.medianBlur(here, CARRY.speck_px)), CARRY.halvings)
     beyond = [(one.start, side - one.stop) for one, side in zip(part, nearest.shape, strict=True)]
     return np.pad(here, beyond, mode="edge")
+
+
+def _across_gaps(values: Plane) -> Plane:
+    """Values (H, W), those below 0 within narrow gaps replaced by the lesser of those at both ends of the gap, along
+    the row or the column, whichever is shorter: what slides away uncovers what lies behind."""
+    missing = np.nonzero(values < 0)
+    if not missing[0].size:
+        return values
+    out, shortest = values.copy(), np.full(missing[0].size, CARRY.widest_gap_px, np.int32)
+    for axis in (1, 0):
+        count = values.shape[axis]
+        places = np.arange(count, dtype=np.int32) if axis else np.arange(count, dtype=np.int32)[:, None]
+        known = values >= 0
+        before = np.maximum.accumulate(np.where(known, places, np.int32(-1)), axis=axis)[missing]
+        after = np.flip(np.minimum.accumulate(np.flip(np.where(known, places, np.int32(count)), axis), axis), axis)
+        after = after[missing]
+        length = after - before
+        nearer = np.flatnonzero((before >= 0) & (after < count) & (length < shortest))
+        row, column = (at[nearer] for at in missing)
+        shortest[nearer] = length[nearer]
+        ends = (
+            values[(row, end[nearer]) if axis else (end[nearer], column)] for end in (before, after)
+        )
+        out[row, column] = np.minimum(*ends)
+    return out
 
 
 def _from_far(values: Plane, halvings: int) -> Plane:

@@ -163,7 +163,7 @@ class OwnDepthOptions:
     rounds: int = 2
     """Times that a depth is looked up again where the last one leads: more change nothing on surfaces."""
 
-    same_share: float = 0.06
+    same_share: float = 0.03
     """Share of an inverse range by which two may differ and still be one surface's."""
 
     same_parallax: float = 5e-4
@@ -324,19 +324,22 @@ class CarryOptions:
     least_behind_px: int = 3
     """px, side of the square below which what the reference cannot see is rounding."""
 
+    widest_gap_px: int = 256
+    """px of a gap between two surfaces at most that is filled from the farther one."""
+
     rounds: int = 2
-    """px by which gaps are filled from their far side at each size."""
+    """px by which what is left open goes on from around at each size."""
 
     halvings: int = 6
-    """Times that the canvas is halved for gaps that are still there: up to 2 · 2⁶ px wide."""
+    """Times that the canvas is halved for what is still open: up to 2 · 2⁶ px wide."""
 
-    same_share: float = 0.06
+    same_share: float = 0.03
     """Share of d, with `same_px` px of parallax, by which a surface may differ from what was carried over."""
 
     same_px: float = 1.5
     """See `same_share`."""
 
-    behind_share: float = 0.1
+    behind_share: float = 0.05
     """Share of its inverse depth, with `behind_px` px of parallax, by which a surface hides what lies behind it."""
 
     behind_px: float = 2.0

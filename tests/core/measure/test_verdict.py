@@ -14,7 +14,10 @@ from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
-RIGHT = {"measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []}}
+RIGHT = {
+    "measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []},
+    "options": {"projection": "auto"},
+}  # fmt: skip
 # Rows and columns across the seam, which runs down the middle (column 200).
 PATCH = np.s_[100:140, 180:220]
 
@@ -71,6 +74,12 @@ def test_a_seam_that_is_seen_is_a_place_with_its_cause() -> None:
         assert what == f"a thing is cut by the border of the {name}"
 
 
+def test_what_nearly_touches_is_one_place() -> None:
+    for below, count in ((118, 1), (160, 2)):
+        both = differing(differing(look(), np.s_[100:112, 180:220]), np.s_[below : below + 12, 180:220])
+        assert len(judged(both).places) == count
+
+
 def test_places_are_told_in_pixels_of_the_panorama() -> None:
     small = judged(differing(look(), PATCH)).places[0].box
     large = judge(differing(look(step=3), PATCH), (10, -20), RIGHT).places[0].box
@@ -95,15 +104,22 @@ def test_a_map_that_folds_or_jumps_is_a_place_where_the_other_picture_does_not_a
     assert judged(elsewhere).rating == "good", "the reference is not shown there"
 
 
-def test_a_large_part_that_is_stretched_is_a_place_unless_it_is_bare() -> None:
+def test_a_large_part_that_is_bent_is_a_place_unless_the_frame_was_asked_for() -> None:
     good = look()
     x = good.maps[1].x.copy()
-    x[:, 350:] = 350 + 9 * (x[:, 350:] - 350)
-    wide = replace(good.maps[1], x=x, size=(4000, 300))
-    found = judged(replace(good, maps=(good.maps[0], wide)))
-    assert found.rating == "look" and "stretched" in found.places[0].what and found.places[0].box[0] >= 345
-    bare = np.full_like(good.tones[1], 128)
-    assert judged(replace(good, maps=(good.maps[0], wide), tones=(bare, bare))).rating == "good"
+    part = np.s_[100:220, 260:380]
+    x[part] += 0.8 * (good.maps[1].y[part] - 160)
+    bent = replace(good, maps=(good.maps[0], replace(good.maps[1], x=x)))
+    found = judged(bent)
+    assert found.rating == "look" and len(found.places) == 1 and "bent" in found.places[0].what
+    left, top, width, height = found.places[0].box
+    assert 240 <= left and left + width <= 400 and 80 <= top and top + height <= 240 and min(width, height) > 70
+    assert judge(bent, (0, 0), {**RIGHT, "options": {"projection": "perspective"}}).rating == "good"
+    elsewhere = replace(bent, maps=(bent.maps[1], bent.maps[0]))
+    assert judged(elsewhere).rating == "good", "the reference is not shown there"
+    small = good.maps[1].x.copy()
+    small[100:115, 300:315] += 0.8 * (good.maps[1].y[100:115, 300:315] - 107)
+    assert judged(replace(good, maps=(good.maps[0], replace(good.maps[1], x=small)))).rating == "good", "outlines"
 
 
 def test_light_that_is_lost_is_a_place() -> None:
@@ -116,6 +132,8 @@ def test_light_that_is_lost_is_a_place() -> None:
         assert [what in place.what for place in found.places] == [True] and found.places[0].box == (250, 0, 150, 60)
         alike = replace(good, tones=(np.where(now == shown, now, good.tones[0]), now), taken=(good.taken[0], before))
         assert (judged(alike).rating == "good") == (what == "too bright"), "darker, as the other picture has it"
+        elsewhere = replace(good, tones=(now, good.tones[1]), taken=(before, good.taken[1]))
+        assert judged(elsewhere).rating == "good", "the reference is not shown there"
         white = replace(good, tones=(good.tones[0], before), taken=(good.taken[0], before))
         assert judged(white).rating == "good", "nothing was lost by us"
 
@@ -163,6 +181,22 @@ def test_a_panorama_is_looked_at_small(small_result: StitchResult) -> None:
     x, y = (np.rint(values[rows, columns]).astype(int) for values in (maps[0].x, maps[0].y))
     apart = np.abs(as_it_is.tones[0][rows, columns].astype(int) - small_result.pictures[0].view[y, x])
     assert np.median(apart) <= 1
+    dark = look_at(small_result.pictures, maps, [unchanged(3, 0.25)] * 2, hidden, np.zeros(maps[0].shape, np.int16))
+    assert np.array_equal(dark.taken[0], as_it_is.tones[0]) and dark.tones[0].max() < 0.6 * as_it_is.tones[0].max()
+
+
+def test_of_a_whole_sphere_only_what_the_pictures_cover_is_looked_at(small_pair: Pair, known: StitchOptions) -> None:
+    changed = small_pair.target.copy()
+    changed[40:140:8, 20:100] = 255
+    sphere = replace(known, projection="equirectangular", seam="none")
+    result = stitch((small_pair.reference, changed), sphere)
+    seen = look_at(
+        result.pictures, result.warp.maps, [one.exposure for one in result.decided], result.occluded, result.labels
+    )
+    here = [one.box for one in judge(seen, (0, 0), result.report).places]
+    told = [tuple(one["box"]) for one in result.report["verdict"]["places"]]
+    left, top = -result.spread[0], -result.spread[1]
+    assert left > 0 and here and told == [(x + left, y + top, width, height) for x, y, width, height in here]
 
 
 def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> None:
