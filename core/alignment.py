@@ -41,6 +41,7 @@ from .pose.match_files import read_matches
 from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, StitchError, TooFewMatches
+from .system.memory import give_back
 from .system.progress import ReportProgress
 from .system.threads import in_order
 
@@ -264,6 +265,7 @@ def fit_and_warp(
             "dense", (len(frames), field, inliers, seen, cameras),
             lambda: _refined(field, edge, inliers, frames, pair),
         )  # fmt: skip
+        give_back()
 
     progress("warp", 0.0)
     # the field's own geometry: a rival knows no depth, so its views have none

@@ -125,7 +125,7 @@ def map_pictures(
     known = _Known(field, views, refined, continuation)
     if options.surface[0] == "reference":
         still = SlideChoice(0.0, (), "the reference's own plane has one viewpoint")
-        return Mapped(_settled(known.on(None), known, pictures), continuation, still)
+        return Mapped(known.on(None), continuation, still)
     progress("warp", 0.2)
     slide, sliding = _slide(known, pictures, lines, options, lambda share: progress("warp", 0.2 + 0.2 * share))
 

@@ -322,7 +322,7 @@ def compose(
     warp, occluded = whole.within(box), tuple(cut(one.hidden, box) for one in made.decided)
     labels = None if labels is None else cut(labels, box, -1)
     look = look_at(pictures, warp.maps, [one.exposure for one in made.decided], occluded, labels)
-    x, y = np.subtract(warp.canvas.offset, canvas.offset).tolist()
+    x, y = np.subtract(canvas.offset, warp.canvas.offset).tolist()
     report["verdict"] = judge(look, (x, y), report).entry
     progress("write", 0.5)
     return StitchResult(

@@ -258,6 +258,10 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         name="Opacity", description="How much the overlay covers", default=0.8, min=0.0, max=1.0, subtype="FACTOR",
         update=look_again,
     )
+    show_places: BoolProperty(
+        name="Places to Look At", description="Boxes around the places of the panorama that the verdict names",
+        default=True, update=look_again,
+    )
     show_matches: BoolProperty(
         name="Matches", description="Matches over the pictures, coloured by how far the stitch missed them",
         update=look_again,
@@ -286,7 +290,7 @@ LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35
 # What is no setting: what is stitched, what came of it, and how it is looked at.
 NO_SETTINGS = frozenset({"name", "reference", "target", "result", "matches", "matches_reference", "matches_target",
                          "match_index", "version", "exposure", "overlay", "overlay_opacity", "show_matches",
-                         "show_epipolar"})  # fmt: skip
+                         "show_epipolar", "show_places"})  # fmt: skip
 
 
 def names_of_settings(settings: Any) -> list[str]:

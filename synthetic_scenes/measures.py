@@ -151,7 +151,8 @@ def composition(result: StitchResult, truth: Truth) -> dict[str, float]:
     seam_visibility (NaN without a seam): see `metrics.appearance`.
     """
     floats = [picture.bits == 32 for picture in result.pictures]
-    made = composed(result.layers, result.warp, result.views, ON_REFERENCE, floats, None, lambda *_: None)
+    options = replace(ON_REFERENCE, exposure="reference")  # the truth's
+    made = composed(result.layers, result.warp, result.views, options, floats, None, lambda *_: None)
     panorama, (reference, target) = made.panorama, made.exposed
     average = averaged(reference, target, reference.alpha > 0)
     both = ((reference.alpha > 0.5) & (target.alpha > 0.5) & (panorama.alpha > 0.5)).astype(np.float32)

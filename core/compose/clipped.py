@@ -30,8 +30,8 @@ class ClippedLight:
     Attributes
     ----------
     factors : tuple of (n, n) float32 array or None
-        For each channel, by how much more light than was told there is where it is clipped, from 1 up, by the square
-        roots of the next channel's and the one after that's own light; None where too little is known.
+        For each channel, by how much more light than was told there is where it is clipped, by the square roots of the
+        next channel's and the one after that's own light; None where too little is known. Below 1 counts as 1.
     white : (h, w, C) float32 array or None
         What is clipped in all channels, at the middles of cells of the canvas; None where it is white.
     """
@@ -186,7 +186,7 @@ def _factors(sums: Array, counts: Array) -> NDArray[np.float32] | None:
     means = sums / np.maximum(counts, 1)
     logs = filled(means.astype(np.float32)[..., None], _known(counts))[..., 0]
     fine = cv2.resize(logs, None, fx=CLIPPED.fineness, fy=CLIPPED.fineness, interpolation=cv2.INTER_LINEAR)
-    factors: NDArray[np.float32] = np.exp(np.maximum(fine, 0))
+    factors: NDArray[np.float32] = np.exp(fine)
     return factors
 
 

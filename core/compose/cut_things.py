@@ -23,26 +23,46 @@ from ..panorama.warp import Warp
 from ..pictures.picture import Picture
 from ..raster.arrays import Part, Plane, dilated, with_margin
 from ..raster.distance import distance_inside, distance_to
-from ..raster.lazy import whole
+from ..raster.lazy import part_of
 from ..raster.log_encoding import log_encode
 from ..raster.pull_push import filled
-from .options import CUT_THINGS, SEAM
 from .rough_seam import Look, RoughSeam
+from .seam_options import CUT_THINGS, SEAM
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Cells:
     """What is looked at: a coarse warp, how both pictures look there, and px of a picture's longer side.
 
-    apart (H, W): tones by which they differ, blurred; bad (H, W): where that is much, or one of them cannot see.
+    bad (H, W): where they differ by much, or one of them cannot see; seen (H, W): what is seen of seams, those between
+    the pictures and those within each.
     """
 
     warp: Warp
-    views: Sequence[View]
+    rough: RoughSeam
     look: Look
     side: float
-    apart: Plane
     bad: NDArray[np.bool_]
+    seen: Plane
+
+    @staticmethod
+    def of(warp: Warp, rough: RoughSeam, side: float) -> _Cells:
+        """By how both look."""
+        look = rough.look(warp)
+        hidden = look.hidden if warp.behind is None else look.hidden | warp.behind
+        bad = hidden & look.shown[0] & look.shown[1]
+        if look.overlap is not None:
+            apart = cv2.blur(np.abs(look.overlap.difference).mean(axis=2), (3, 3))
+            bad[look.overlap.box] |= look.overlap.both & (apart > CUT_THINGS.min_difference)
+        close = np.ones((2 * round(CUT_THINGS.joined * side) + 1,) * 2, np.uint8)
+        bad = cv2.morphologyEx(bad.astype(np.uint8), cv2.MORPH_CLOSE, close) > 0
+        return _Cells(warp, rough, look, side, bad, _seam_seen(look) + _own_cuts(look))
+
+    def refilled(self, refills: Sequence[_Refill]) -> _Cells:
+        """The same with the depth of refills."""
+        if not refills:
+            return self
+        return _Cells.of(_refilled(self.warp, self.rough.views, refills), self.rough, self.side)
 
 
 @dataclass(frozen=True)
@@ -84,63 +104,34 @@ def without_cut_things(
     coarse, rough = every_nth(warp, step), rough or RoughSeam.of(pictures, views, focal / step)
     if not np.isfinite(coarse.inverse_depth).all():
         return warp
+    cells = _Cells.of(coarse, rough, longer / step)
     kept: list[_Refill] = []
-    look = rough.look(coarse)
     for deepest in CUT_THINGS.deepest:
-        if look.overlap is None:
-            return warp
-        cells = _cells(coarse, views, look, longer / step)
-        found = _better(cells, rough, deepest)
-        if found is not None:
-            kept, coarse, look = [*kept, *found.refills], found.warp, found.look
+        refills, cells = _better(cells, deepest)
+        kept += refills
     return _enlarged(warp, views, kept, step) if kept else warp
 
 
-@dataclass(frozen=True)
-class _Found:
-    """Refills, and the coarse warp with them, and how that looks."""
-
-    refills: list[_Refill]
-    warp: Warp
-    look: Look
-
-
-def _better(cells: _Cells, rough: RoughSeam, deepest: float) -> _Found | None:
-    """The refills within a share of the overlap's shorter side from its border with which less is seen."""
-    seen = _what_is_seen(cells.look)
-    refills = _refills(cells, seen, deepest)
-    if not refills:
-        return None
-    warp = _refilled(cells.warp, cells.views, refills)
-    after = rough.look(warp)
-    seen_after = _what_is_seen(after)
-    kept = [one for one in refills if _is_better(one, cells.side, seen, seen_after)]
+def _better(cells: _Cells, deepest: float) -> tuple[list[_Refill], _Cells]:
+    """The refills within a share of the overlap's shorter side from its border with which less is seen, and how all
+    looks with them."""
+    refills = _refills(cells, deepest)
+    after = cells.refilled(refills)
+    kept = [one for one in refills if _is_better(one, cells, after)]
     if kept and len(kept) < len(refills):
-        warp = _refilled(cells.warp, cells.views, kept)
-        after = rough.look(warp)
-        kept = kept if float(_what_is_seen(after).sum()) < float(seen.sum()) else []
-    return _Found(kept, warp, after) if kept else None
+        after = cells.refilled(kept)
+        kept = kept if float(after.seen.sum()) < float(cells.seen.sum()) else []
+    return (kept, after) if kept else ([], cells)
 
 
-def _cells(warp: Warp, views: Sequence[View], look: Look, side: float) -> _Cells:
-    """Where the pictures differ, or one cannot see."""
-    overlap = look.overlap
-    assert overlap is not None
-    apart = np.zeros(look.hidden.shape, np.float32)
-    apart[overlap.box] = cv2.blur(np.abs(overlap.difference).mean(axis=2), (3, 3)) * overlap.both
-    hidden = look.hidden if warp.behind is None else look.hidden | warp.behind
-    both = look.shown[0] & look.shown[1]
-    bad = (both & ((apart > CUT_THINGS.min_difference) | hidden)).astype(np.uint8)
-    close = np.ones((2 * round(CUT_THINGS.joined * side) + 1,) * 2, np.uint8)
-    return _Cells(warp, views, look, side, apart, cv2.morphologyEx(bad, cv2.MORPH_CLOSE, close) > 0)
-
-
-def _refills(cells: _Cells, seen: Plane, share: float) -> list[_Refill]:
+def _refills(cells: _Cells, share: float) -> list[_Refill]:
     """Depth for each thing at the border of either picture, beyond which the other goes on, around which something is
-    seen (H, W); share: of the overlap's shorter side from the border."""
+    seen; share: of the overlap's shorter side from the border."""
     out: list[_Refill] = []
     first, second = cells.look.shown
     both = first & second
+    if not both.any():
+        return out
     rows, columns = np.flatnonzero(both.any(axis=1)), np.flatnonzero(both.any(axis=0))
     deepest = share * min(np.ptp(rows), np.ptp(columns))
     for mine, other in ((first, second), (second, first)):
@@ -156,21 +147,24 @@ def _refills(cells: _Cells, seen: Plane, share: float) -> list[_Refill]:
             if area < CUT_THINGS.min_cells or from_rim[box][number[box] == label].min() > CUT_THINGS.near * cells.side:
                 continue
             place = with_margin(box, round((CUT_THINGS.grown + CUT_THINGS.ring) * cells.side) + 2, both.shape)
-            thing = number[place] == label
-            one = _refill(cells, thing, place, mine[place], from_rim[place])
-            if one is not None and seen[place][_zone(one, cells.side)].sum() > _least_gain(one):
+            around = dilated(number[place] == label, _px(CUT_THINGS.grown, cells.side))
+            part = around & dilated(mine[place], 1)  # small pictures end up to a cell early
+            if cells.seen[place][_zone(part, cells.side)].sum() <= _least_gain(part):
+                continue
+            one = _refill(cells, place, part, around, from_rim[place])
+            if one is not None:
                 out.append(one)
     return out
 
 
-def _zone(one: _Refill, side: float) -> NDArray[np.bool_]:
-    """Where (h, w), at its place, a refill is judged."""
-    return dilated(one.part, _px(CUT_THINGS.zone, side))
+def _zone(part: NDArray[np.bool_], side: float) -> NDArray[np.bool_]:
+    """Where (h, w) a refilled part (h, w) is judged."""
+    return dilated(part, _px(CUT_THINGS.zone, side))
 
 
-def _least_gain(one: _Refill) -> float:
-    """By how much less must be seen for a refill."""
-    return CUT_THINGS.least_gain + CUT_THINGS.gain_per_cell * float(one.part.sum())
+def _least_gain(part: NDArray[np.bool_]) -> float:
+    """By how much less must be seen for a part (h, w) to be refilled."""
+    return CUT_THINGS.least_gain + CUT_THINGS.gain_per_cell * float(part.sum())
 
 
 def _px(share: float, side: float) -> int:
@@ -179,13 +173,13 @@ def _px(share: float, side: float) -> int:
 
 
 def _refill(
-    cells: _Cells, thing: NDArray[np.bool_], place: Part, mine: NDArray[np.bool_], from_rim: Plane
+    cells: _Cells, place: Part, part: NDArray[np.bool_], thing: NDArray[np.bool_], from_rim: Plane
 ) -> _Refill | None:
-    """What lies behind a thing (h, w) at a place, by the farthest of what surrounds it; None where nothing tells."""
+    """What lies behind a part (h, w) of a place, by the farthest of what surrounds it and the thing (h, w) that it is
+    of; None where nothing tells."""
     grown = _px(CUT_THINGS.grown, cells.side)
     shown = cells.look.shown[0][place] | cells.look.shown[1][place]
-    part = dilated(thing, grown) & dilated(mine, 1)  # small pictures end up to a cell early
-    around = dilated(part, _px(CUT_THINGS.ring, cells.side)) & ~dilated(thing, grown) & shown & ~cells.bad[place]
+    around = dilated(part, _px(CUT_THINGS.ring, cells.side)) & ~thing & shown & ~cells.bad[place]
     if around.sum() < CUT_THINGS.least_ring:
         return None
     depth = cells.warp.inverse_depth[place]
@@ -202,8 +196,8 @@ def _one_px(cells: _Cells, place: Part, around: NDArray[np.bool_]) -> float:
     depth = cells.warp.inverse_depth[place]
     more = np.float32(1e-3)
     moved = 0.0
-    for number, view in enumerate(cells.views):
-        before, after = (seen_at(cells.warp, cells.views, number, place, d) for d in (depth, depth + more))
+    for number, view in enumerate(cells.rough.views):
+        before, after = (seen_at(cells.warp, cells.rough.views, number, place, d) for d in (depth, depth + more))
         away = np.hypot(*(b - a for a, b in zip(before, after, strict=True)))[around]
         moved += float(np.nanmedian(away)) / max(view.size) * cells.side
     return float(more) / max(moved, 1e-9)
@@ -239,11 +233,6 @@ def _enlarged(warp: Warp, views: Sequence[View], refills: Sequence[_Refill], ste
     return _refilled(warp, views, larger)
 
 
-def _what_is_seen(look: Look) -> Plane:
-    """What is seen of seams (H, W), those between the pictures and those within each."""
-    return _seam_seen(look) + _own_cuts(look)
-
-
 def _seam_seen(look: Look) -> Plane:
     """By how much (H, W) the pictures differ where the seam runs."""
     overlap = look.overlap
@@ -267,24 +256,31 @@ def _at_changes(labels: NDArray[np.bool_], shown: NDArray[np.bool_], tones: Plan
 def _own_cuts(look: Look) -> Plane:
     """Where (H, W) a picture is cut within itself: its map jumps, and it is shown on both sides."""
     out = np.zeros(look.chosen.shape, np.float32)
+    if look.overlap is None:
+        return out
+    box = with_margin(look.overlap.box, CUT_THINGS.margin_cells, out.shape)
+    within = out[box]
     for number, (layer, seen) in enumerate(zip(look.layers, look.maps, strict=True)):
-        tones = log_encode(whole(layer.light)).mean(axis=2)
-        mine = (look.chosen if number else ~look.chosen) & (layer.alpha > 0)
+        x, y, chosen = seen.x[box], seen.y[box], look.chosen[box]
+        mine = (chosen if number else ~chosen) & look.shown[number][box]
         for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
             with np.errstate(invalid="ignore"):
-                jumps = np.hypot(seen.x[here] - seen.x[there], seen.y[here] - seen.y[there]) > CUT_THINGS.jump_cells
-            out[here] += (mine[here] & mine[there] & jumps) * np.abs(tones[here] - tones[there])
+                jumps = np.hypot(x[here] - x[there], y[here] - y[there]) > CUT_THINGS.jump_cells
+            jumps &= mine[here] & mine[there]
+            if jumps.any():
+                tones = log_encode(part_of(layer.light, box)).mean(axis=2)
+                within[here] += jumps * np.abs(tones[here] - tones[there])
     return out
 
 
-def _is_better(one: _Refill, side: float, before: Plane, after: Plane) -> bool:
-    """Whether much less is seen (H, W) around a refill than before, and at its worst place, too."""
-    zone = _zone(one, side)
-    window = 2 * (_px(CUT_THINGS.window, side) // 2) + 1
-    old, new = (float(values[one.place][zone].sum()) for values in (before, after))
+def _is_better(one: _Refill, before: _Cells, after: _Cells) -> bool:
+    """Whether much less is seen around a refill than before, and at its worst place, too."""
+    zone = _zone(one.part, before.side)
+    window = 2 * (_px(CUT_THINGS.window, before.side) // 2) + 1
+    old, new = (float(cells.seen[one.place][zone].sum()) for cells in (before, after))
     most_old, most_new = (
-        float(cv2.boxFilter(values[one.place], -1, (window, window), normalize=False)[zone].max()) / window
-        for values in (before, after)
+        float(cv2.boxFilter(cells.seen[one.place], -1, (window, window), normalize=False)[zone].max()) / window
+        for cells in (before, after)
     )
     hardly_seen = most_new < max(CUT_THINGS.hardly_seen, CUT_THINGS.less_at_worst * most_old)
-    return new < CUT_THINGS.much_less * old and old - new > _least_gain(one) and hardly_seen
+    return new < CUT_THINGS.much_less * old and old - new > _least_gain(one.part) and hardly_seen

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import Box, Part, dilated, meet
+from ..raster.arrays import Box, Part, dilated, meet, strips
 from ..raster.lazy import AnyImage, LazyImage
 from ..raster.log_encoding import log_decode, log_encode
 from ..raster.pull_push import filled
@@ -47,7 +47,11 @@ def closed_holes(shows: NDArray[np.bool_], small: bool) -> tuple[NDArray[np.bool
     picked[0] = False  # what is shown
     largest_first = about[picked][np.argsort(-area[picked], kind="stable")].tolist()
     boxes = [(x, y, w, h) for x, y, w, h, _ in largest_first]
-    return picked[number] if count > 1 else np.zeros_like(shows), boxes
+    holes = np.zeros_like(shows)
+    if picked.any():
+        for rows in strips(holes.shape):  # NumPy makes eight bytes of each number
+            holes[rows] = picked[number[rows]]
+    return holes, boxes
 
 
 def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage) -> Layer:

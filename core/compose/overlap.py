@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import beside, bounds, dilated, shown_only, strips
+from ..raster.arrays import beside, bounds, dilated, shown_only, small_strips, strips
 from ..raster.log_encoding import log_encode
 from ..raster.robust import NORMAL_MEDIAN
 from ..system.threads import each
@@ -57,17 +57,22 @@ def overlap_of(before: Layer, layer: Layer, hidden: NDArray[np.bool_]) -> Overla
         tones -= log_encode(before.light[part])
         difference[rows] = shown_only(tones, both[rows])
 
-    each(put, strips(difference.shape))
+    each(put, small_strips(difference.shape))
     same = both & ~dilated(hidden[box] & both, OVERLAP.hidden_margin_px)
     return Overlap(box, both, difference, same & _alike(difference, same))
 
 
 def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Where (h, w) the difference is close to its median over what is `shown` (h, w)."""
-    places = np.flatnonzero(shown)
-    if not places.size:
+    count = np.count_nonzero(shown)
+    if not count:
         return shown
-    sample = difference.reshape(-1, difference.shape[2])[places[:: max(1, places.size // OVERLAP.sample_pixels)]]
+    every, before, samples = max(1, count // OVERLAP.sample_pixels), 0, []
+    for rows in strips(shown.shape):  # numbers of all pixels would be as large as two of three channels
+        places = np.flatnonzero(shown[rows])
+        samples.append(difference[rows].reshape(-1, difference.shape[2])[places[-before % every :: every]])
+        before += places.size
+    sample = np.concatenate(samples)
     middle = np.median(sample, axis=0)
     sigma = np.median(np.abs(sample - middle), axis=0) / NORMAL_MEDIAN
     most = np.maximum(OVERLAP.same_sigmas * sigma, OVERLAP.same_tone)
@@ -80,5 +85,5 @@ def _alike(difference: NDArray[np.float32], shown: NDArray[np.bool_]) -> NDArray
         within = [np.abs(blurred[..., k] - middle[k]) <= most[k] for k in range(len(most))]
         alike[rows] = np.logical_and.reduce(within)
 
-    each(put, strips(difference.shape))
+    each(put, small_strips(difference.shape))
     return alike

@@ -7,7 +7,8 @@ is not seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -18,24 +19,26 @@ from ..field.visibility import by_agreement, occluded
 from ..panorama.layers import Layer, layer_of
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture, picture_from_array
-from ..raster.arrays import dilated
+from ..raster.arrays import dilated, without_specks
 from ..raster.lazy import whole
 from ..raster.log_encoding import log_encode
 from ..raster.picture_map import PictureMap
 from ..raster.resizing import resized_points
-from .options import ROUGH_SEAM
 from .overlap import Overlap, overlap_of
 from .seam import find_seam, known_labels
 from .seam_costs import seam_costs
+from .seam_options import ROUGH_SEAM
 from .tears import contrast, tears
 
 
 @dataclass(frozen=True)
 class RoughSeam:
-    """Cuts a seam through two small pictures; pictures: these, the reference's first; views: of the full ones."""
+    """Cuts a seam through two small pictures; pictures: these, the reference's first; views: of the full ones; last:
+    the warp that was looked at before, and how it looks."""
 
     pictures: tuple[Picture, ...]
     views: tuple[View, ...]
+    last: list[tuple[Warp, Look]] = field(default_factory=list)
 
     @staticmethod
     def of(pictures: Sequence[Picture], views: Sequence[View], px_per_radian: float) -> RoughSeam:
@@ -45,8 +48,8 @@ class RoughSeam:
         return RoughSeam(tuple(small), tuple(views))
 
     def __call__(self, warp: Warp) -> float:
-        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out, and of
-        tears within a picture that are seen."""
+        """px of the seam, on the canvas of a warp, at which the pictures differ by more than blending evens out, of
+        tears within a picture that are seen, and around holes."""
         seen = self.look(warp)
         if seen.overlap is None:
             return 0.0
@@ -61,11 +64,20 @@ class RoughSeam:
         for number, (picture, places) in enumerate(zip(self.pictures, seen.maps, strict=True)):
             own = log_encode(whole(picture.light)).mean(axis=2)
             torn += int(tears(own, places, seen.shown[number] & (seen.chosen == bool(number))).sum())
-        return float((seam & apart).sum()) / 2 + torn  # a pixel on either side of the seam
+        return float((seam & apart).sum()) / 2 + torn + _around_holes(seen)  # a pixel on either side of the seam
 
     def look(self, warp: Warp, forced: bool = False) -> Look:
         """Both small pictures on the canvas of a warp, and the seam between them; forced: whether what the added one
         cannot see comes from the other at any price."""
+        if not forced and self.last and self.last[0][0] is warp:
+            return self.last[0][1]
+        found = self._looked(warp, forced)
+        if not forced:
+            self.last[:] = [(warp, found)]
+        return found
+
+    def _looked(self, warp: Warp, forced: bool) -> Look:
+        """See `look`."""
         maps = [map_to_small(one.arrays(), picture) for one, picture in zip(warp.maps, self.pictures, strict=True)]
         before, layer = (layer_of(picture, one) for picture, one in zip(self.pictures, maps, strict=True))
         hidden = occluded(maps[1], warp.nearness(self.views, 1))
@@ -83,7 +95,7 @@ class RoughSeam:
         return Look((before, layer), maps, hidden, overlap, chosen)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Look:
     """Two small pictures on a canvas; hidden, chosen (H, W): what the second cannot see, and where it is shown."""
 
@@ -93,7 +105,7 @@ class Look:
     overlap: Overlap | None
     chosen: NDArray[np.bool_]
 
-    @property
+    @cached_property
     def shown(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Where (H, W) each shows something."""
         first, second = self.layers
@@ -119,3 +131,9 @@ def map_to_small(picture_map: PictureMap, small: Picture) -> PictureMap:
         for values, old, new in zip((picture_map.x, picture_map.y), picture_map.size, (width, height), strict=True)
     )
     return PictureMap(x, y, (width, height))
+
+
+def _around_holes(seen: Look) -> int:
+    """px around what only the second picture could show, but cannot see either; specks are filled."""
+    holes = without_specks(seen.hidden & seen.shown[1] & ~seen.shown[0])
+    return int((dilated(holes, 1) & ~holes).sum())

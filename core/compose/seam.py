@@ -21,7 +21,8 @@ from ..raster.distance import distance_to_border
 from ..raster.lazy import AnyImage, Placed
 from ..system.threads import each, in_order
 from .min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
-from .options import OVERLAP, SEAM
+from .options import OVERLAP
+from .seam_options import SEAM
 
 if TYPE_CHECKING:
     from .seam_costs import SeamCosts

@@ -10,17 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import Part, Plane, beside, dilated, strips
+from ..raster.arrays import Part, Plane, beside, dilated, small_strips, strips
 from ..raster.lazy import AnyImage
 from ..raster.picture_map import PictureMap
 from ..system.threads import each
-from .options import OVERLAP, SEAM
+from .options import OVERLAP
+from .seam_options import SEAM
 
 if TYPE_CHECKING:
     from .overlap import Overlap
@@ -84,7 +85,7 @@ def seam_costs(
         difference, share = _in_cells(overlap, 1 << level)
         cost = _cost(difference, share > 0, _largest(risk, 1 << level))
         if moving is not None:
-            cost[means(np.abs(moving).astype(np.float32), 1 << level) > 0] = 1
+            cost[means(moving != 0, 1 << level) > 0] = 1
         levels.append(cost)
     return SeamCosts(overlap.box, tuple(levels), _price(overlap, difference, 1 << count, hidden, moving, behind, slide))
 
@@ -103,38 +104,49 @@ def _in_cells(overlap: Overlap, side: int) -> tuple[Plane, Plane]:
     """
     if side == 1:
         return overlap.difference, overlap.both.astype(np.float32)
-    share = means(overlap.both.astype(np.float32), side)
+    share = means(overlap.both, side)
     difference = means(overlap.difference, side)
     difference /= np.maximum(share, np.float32(1e-6))[..., None]
     return difference, share
 
 
-def means(values: Plane, side: int) -> Plane:
+def means(values: NDArray[Any], side: int) -> Plane:
     """Means over cells of side × side pixels of values (h, w[, C]); beyond the edges there is 0."""
     if side == 1:
-        return values
+        return values.astype(np.float32, copy=False)
     height, width = (-(-length // side) for length in values.shape[:2])
-    padded = _padded_to(values, side)
-    out: Plane = cv2.resize(padded, (width, height), interpolation=cv2.INTER_AREA)
-    return out.reshape(height, width, *values.shape[2:])
+    out = np.empty((height, width, *values.shape[2:]), np.float32)
+
+    def put(cells: slice) -> None:
+        part = _padded_rows(values, cells, side)
+        out[cells] = cv2.resize(part, (width, len(out[cells])), interpolation=cv2.INTER_AREA).reshape(out[cells].shape)
+
+    each(put, strips((height, width * side * side)))
+    return out
 
 
 def _largest(values: Plane, side: int) -> Plane:
     """The largest over cells of side × side pixels of values (h, w) ≥ 0."""
     if side == 1:
         return values
-    padded = _padded_to(values, side)
-    height, width = (length // side for length in padded.shape)
-    # rows first: along them memory lies in order
-    rows = padded.reshape(height, side, -1).max(axis=1)
-    out: Plane = rows.reshape(height, width, side).max(axis=2)
+    height, width = (-(-length // side) for length in values.shape)
+    out = np.empty((height, width), np.float32)
+
+    def put(cells: slice) -> None:
+        # rows first: along them memory lies in order
+        rows = _padded_rows(values, cells, side).reshape(-1, side, width * side).max(axis=1)
+        out[cells] = rows.reshape(-1, width, side).max(axis=2)
+
+    each(put, strips((height, width * side * side)))
     return out
 
 
-def _padded_to(values: Plane, side: int) -> Plane:
-    """Values (h, w[, C]) with zeros after them, so that both sides are multiples of `side`."""
-    after = [(-length) % side for length in values.shape[:2]]
-    return np.pad(values, [(0, after[0]), (0, after[1]), *[(0, 0)] * (values.ndim - 2)])
+def _padded_rows(values: NDArray[Any], cells: slice, side: int) -> Plane:
+    """The rows of some cells of side × side pixels of values (h, w[, C]), with zeros after them, so that all are whole.
+    """
+    part = values[cells.start * side : cells.stop * side].astype(np.float32, copy=False)
+    after = [(-length) % side for length in part.shape[:2]]
+    return np.pad(part, [(0, after[0]), (0, after[1]), *[(0, 0)] * (part.ndim - 2)])
 
 
 def _risk(picture_map: PictureMap, confidence: AnyImage | None, box: Part) -> Plane:
@@ -151,7 +163,7 @@ def _risk(picture_map: PictureMap, confidence: AnyImage | None, box: Part) -> Pl
         if confidence is not None:
             risk[rows] += 1 - confidence[part][here]
 
-    each(put, strips(risk.shape))
+    each(put, small_strips(risk.shape))
     return risk
 
 
@@ -175,7 +187,7 @@ def _cost(difference: Plane, both: NDArray[np.bool_], risk: Plane) -> Plane:
         part[rim[rows]] += np.float32(SEAM.rim_price)
         cost[rows] = np.minimum(part, np.float32(1), out=part)
 
-    each(put, strips(cost.shape))
+    each(put, small_strips(cost.shape))
     return cost
 
 
@@ -205,7 +217,7 @@ def _price(
     apart = _mean(np.abs(difference))
 
     def of(mask: NDArray[np.bool_] | NDArray[np.int8], tone: float, least: float) -> Plane:
-        return means(mask.astype(np.float32), side) * (np.float32(tone) * apart + np.float32(least))
+        return means(mask, side) * (np.float32(tone) * apart + np.float32(least))
 
     price = of(hidden[overlap.box] & overlap.both, SEAM.hidden_price, SEAM.least_hidden_price)
     if behind is not None:

@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import Plane
+from ..raster.arrays import Plane, larger_parts
 from ..raster.picture_map import PictureMap
 from ..raster.sampling import fetch
-from .options import TEARS
+from .seam_options import TEARS
 
 
 def tears(tones: Plane, seen: PictureMap, shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -28,7 +28,7 @@ def tears(tones: Plane, seen: PictureMap, shown: NDArray[np.bool_]) -> NDArray[n
     across = _torn_downwards(tones, busy, x.T, y.T, shown.T).T
     out[2:-1] |= down
     out[:, 2:-1] |= across
-    return out
+    return larger_parts(out, TEARS.least_px)
 
 
 def contrast(tones: Plane) -> Plane:

@@ -48,14 +48,16 @@ class Blocks:
 
     def radii(self, picture_map: CanvasMap) -> Array:
         """How far (N,) the middle of each block is from the middle of a picture, squared; 1 at its corners."""
-        block = EXPOSURE.block_px
+        block, middle = EXPOSURE.block_px, EXPOSURE.block_px // 2
         first, last = self.at.min(axis=0), self.at.max(axis=0)
-        top, left = (block * first).tolist()
-        height, width = (block * (last - first + 1)).tolist()
-        middles = np.s_[block // 2 :: block, block // 2 :: block]
-        squared = picture_map.within((left, top, width, height)).arrays().from_middle(middles)
+        left, width = block * int(first[1]), block * int(last[1] - first[1] + 1)
+        # a line at a time: all of the map at once would take as much memory as the overlap
+        lines = [
+            picture_map.within((left, block * row + middle, width, 1)).arrays().from_middle(np.s_[:, middle::block])
+            for row in range(int(first[0]), int(last[0]) + 1)
+        ]
         rows, columns = (self.at - first).T
-        radii: Array = squared[rows, columns].astype(np.float64)
+        radii: Array = np.concatenate(lines)[rows, columns].astype(np.float64)
         return radii
 
 

@@ -37,7 +37,7 @@ class ToneOptions:
     robust_log: float = 0.02
     """Differences of log light from which on they count less: noise of 8 bits in the middle tones."""
 
-    prior: float = 0.003
+    prior: float = 0.0003
     """Weight of no vignetting and no curve, beside all blocks: they are as good as unknown where little tells them."""
 
     min_improvement: float = 0.07

@@ -154,9 +154,9 @@ def search(
     least, count = _range(a, coarse_disparity, coarse_found, count)
     coarse_found &= (coarse_disparity >= least) & (coarse_disparity <= least + count)
     disparity, found = _matched(a, b, least, count)
-    doubtful = _at_rim(in_reference & in_target)
-    found &= ~(doubtful & (np.abs(disparity) > usual))
-    coarse_found &= ~(doubtful & (np.abs(coarse_disparity) > usual))
+    inside = _inside(in_reference & in_target)
+    found &= inside | (np.abs(disparity) <= usual)
+    coarse_found &= inside | (np.abs(coarse_disparity) <= usual)
     filled, hidden = hidden_gaps(disparity, found, arc_lengths.nearer)
     confidence = np.where(found, np.float32(1), coarse_found * np.float32(MATCHING.coarse_confidence))
     confidence[hidden] = MATCHING.hidden_confidence
@@ -208,13 +208,14 @@ def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
     return result
 
 
-def _at_rim(both: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """What (h, w) lies near the rim of what both pictures show: a match from far away has no neighbours there that
-    would speak against it."""
+def _inside(both: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What (h, w) of what both pictures show does not lie near its rim. Near it a match from far away has no neighbours
+    that would speak against it."""
     side = 2 * round(RIM.width * min(both.shape)) + 1
     kernel = np.ones((side, side), np.uint8)
-    rim: NDArray[np.bool_] = cv2.erode(both.view(np.uint8), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0) == 0
-    return rim
+    inner = cv2.erode(both.view(np.uint8), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    inside: NDArray[np.bool_] = inner > 0
+    return inside
 
 
 def _range(a: NDArray[np.uint8], disparity: Plane, found: NDArray[np.bool_], count: int) -> tuple[int, int]:

@@ -136,7 +136,8 @@ class _Compared:
         px."""
         x, y = self.lines.target(along, across, places)
         levels, shown = self.picture.sample(self.target, x, y)
-        difference = cv2.absdiff(self.reference[places], levels.reshape(*x.shape, -1))
+        # OpenCV leaves out the axis of a single channel
+        difference = cv2.absdiff(self.reference[places], levels.reshape(*x.shape, -1)).reshape(*x.shape, -1)
         cost = np.minimum(difference.mean(axis=-1, dtype=np.float32), np.float32(OUTLINES.max_levels))
         ahead = along[places] + np.float32(OUTLINES.same_px)
         depth = self.lines.inverse_depth[places] + ahead * self.lines.depth_per_px[places]

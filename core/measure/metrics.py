@@ -19,7 +19,7 @@ from ..panorama.layers import Layer
 from ..panorama.options import CANVAS
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture
-from ..raster.arrays import Array, Part, beside, bounds, strips
+from ..raster.arrays import Array, Part, beside, bounds, small_strips, strips
 from ..raster.colour import encode
 from ..raster.lazy import AnyImage
 from ..raster.log_encoding import log_encode
@@ -178,7 +178,7 @@ def appearance(
         similarities = [_similarity(stitched, part, smooth)[own][several[rows]] for part in others]
         return np.asarray(np.max(similarities, axis=0))
 
-    fidelity = np.concatenate(list(in_order(best, strips(several.shape))))
+    fidelity = np.concatenate(list(in_order(best, small_strips(several.shape))))
     seam = math.nan if labels is None else _seam_visibility(levels, labels[box], several)
     return {
         "source_fidelity_mean": float(fidelity.mean(dtype=np.float64)),
@@ -196,7 +196,7 @@ def _levels(light: AnyImage, box: Part, floats: bool) -> NDArray[Any]:
         part = light[rows.start + strip.start : rows.start + strip.stop, columns]
         out[strip] = np.float32(255) * log_encode(part) if floats else encode(part, 8)
 
-    each(put, strips(shape))
+    each(put, small_strips(shape))
     return out
 
 

@@ -131,10 +131,10 @@ class VerdictOptions:
     step: float = 30.0
     """Levels by which the pictures differ where a seam is seen: no good picture has more along as much of it."""
 
-    seam_share: float = 0.0045
-    """Of the longer side: length of a part of the seam that is seen. Good pictures have up to 0.003."""
+    seam_share: float = 0.006
+    """Of the longer side: length of a part of the seam that is seen. Good pictures have up to 0.004."""
 
-    seam_px: float = 2.5
+    seam_px: float = 3.0
     """px of the copy, the least length of such a part: what is smaller is noise of the resampling."""
 
     together_share: float = 0.008
@@ -146,14 +146,23 @@ class VerdictOptions:
     mostly: float = 0.3
     """Share of a place that one of the pictures cannot see, from which depth is the cause."""
 
-    fold_share: float = 1.8e-4
-    """Of the longer side's square, folded: foliage in good pictures has up to half of that."""
+    jump: float = 6.0
+    """Times the median area of the picture that a pixel of the panorama shows: the map jumps there."""
 
-    stretch: float = 6.0
-    """Times the median area of the picture that a pixel of the panorama shows: outlines without depth of their own."""
+    torn_step: float = 25.0
+    """Levels by which the pictures differ where a fold or a jump is seen: at a true outline they agree."""
 
-    stretch_share: float = 5e-5
-    """Of the longer side's square, stretched so: good pictures have up to a fifth of that."""
+    torn_share: float = 4e-5
+    """Of the longer side's square, torn so: good pictures, foliage among them, have up to 3e-5."""
+
+    smooth_share: float = 0.012
+    """Of the longer side: half the width over which a map is smoothed, outlines with it, to see where it bends."""
+
+    squeeze: float = 1.8
+    """Ratio of a map's singular values from which a picture is bent or stretched."""
+
+    bent_share: float = 0.01
+    """Of the panorama, squeezed so: pictures that are right have up to 0.006, those that are bent 0.03 and more."""
 
     edge: int = 40
     """Levels between the brightest and the darkest pixel near by, from which a fold is seen: none is on a bare wall."""

@@ -102,6 +102,10 @@ class Look:
         """Its longer side, px."""
         return max(self.hidden.shape)
 
+    def shown(self, number: int) -> NDArray[np.bool_]:
+        """Where (h, w) a picture is what is shown; without a seam, where it shows anything."""
+        return self.shows[number] if self.labels is None else self.labels == number
+
     def box(self, mask: NDArray[np.bool_], shift: tuple[int, int]) -> Box:
         """The box around a mask (h, w) in px of the panorama."""
         x, y, width, height = (self.step * int(v) for v in cv2.boundingRect(mask.astype(np.uint8)))
@@ -171,7 +175,9 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
     unlike = _unlike(look)
     seam = _along_seam(look, unlike)
     places = sorted(
-        (*_seam_places(look, seam, shift), *_torn_places(look, shift), *_light_places(look, shift),
+        (*_seam_places(look, seam, shift), *_torn_places(look, unlike, shift), *_light_places(look, shift),
+         # in a frame that was asked for, pictures are squeezed as that has it
+         *(_bent_places(look, shift) if report["options"]["projection"] == "auto" else ()),
          *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2)
            for box in report["composition"]["holes"])),
         key=lambda place: -place.size,
@@ -266,25 +272,39 @@ def _seam_places(look: Look, steps: Plane, shift: tuple[int, int]) -> Iterator[P
         yield Place(look.box(part, shift), what, float((steps[part] - VERDICT.step).sum()))
 
 
-def _torn_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
-    """Where the map of the picture that is shown folds, or stretches it far more than elsewhere, and has detail that
-    shows it."""
-    folds, stretched = np.zeros(look.hidden.shape, bool), np.zeros(look.hidden.shape, bool)
+def _torn_places(look: Look, unlike: Plane, shift: tuple[int, int]) -> Iterator[Place]:
+    """Where the map of the picture that is shown folds or jumps, with detail that shows it, and the other picture does
+    not agree."""
+    torn = np.zeros(look.hidden.shape, bool)
     for number, one in enumerate(look.maps):
-        shown = (look.shows[number] if look.labels is None else look.labels == number) & _detailed(look.tones[number])
-        turns = turning(one)
-        folds |= turned_over(turns) & shown
+        shown, turns = look.shown(number), turning(one)
         areas = np.zeros(shown.shape, np.float32)
         areas[:-1, :-1] = np.abs(cell_areas(one.x, one.y))
         counts = shown & (turns != NO_TURN)
         if counts.any():
-            stretched |= counts & (areas > VERDICT.stretch * np.median(areas[counts]))
-    square = look.side * look.side
-    for mask, share, what in (
-        (folds, VERDICT.fold_share, "the picture folds over: things may be torn or doubled"),
-        (stretched, VERDICT.stretch_share, "the picture is torn or smeared: depth is doubtful"),
-    ):
-        for part in _parts(mask, share * square):
+            large = counts & (areas > VERDICT.jump * np.median(areas[counts]))
+            broken = large | (turned_over(turns) & shown)
+            torn |= broken & _detailed(look.tones[number]) & (unlike > VERDICT.torn_step)
+    for part in _parts(torn, VERDICT.torn_share * look.side * look.side):
+        what = "the picture is torn or doubled at an outline: depth is doubtful"
+        yield Place(look.box(part, shift), what, float(part.sum()))
+
+
+def _bent_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
+    """Where a picture is sheared or squeezed over a larger part: what is straight bends, what is upright leans."""
+    side = 2 * max(4, round(VERDICT.smooth_share * look.side)) + 1
+    for number, one in enumerate(look.maps):
+        known = look.shown(number) & np.isfinite(one.x) & np.isfinite(one.y)
+        x, y = (cv2.blur(np.where(known, values, np.float32(0)), (side, side)) for values in (one.x, one.y))
+        (x_y, x_x), (y_y, y_x) = np.gradient(x), np.gradient(y)
+        # half the sum and half the difference of the singular values of the Jacobian
+        alike, unlike = np.hypot(x_x + y_y, y_x - x_y) / 2, np.hypot(x_x - y_y, y_x + x_y) / 2
+        bent = alike + unlike > VERDICT.squeeze * np.abs(alike - unlike)
+        window = np.ones((side + 2, side + 2), np.uint8)
+        inner = cv2.erode(known.astype(np.uint8), window, borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0
+        opened = cv2.morphologyEx((bent & inner).astype(np.uint8), cv2.MORPH_OPEN, window[: side // 2, : side // 2]) > 0
+        for part in _parts(opened, VERDICT.bent_share * opened.size):
+            what = "the picture is bent or stretched: depth or the focal length is doubtful"
             yield Place(look.box(part, shift), what, float(part.sum()))
 
 
@@ -298,7 +318,7 @@ def _detailed(tones: Levels) -> NDArray[np.bool_]:
 def _light_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
     """Where light is lost that the picture had, or clipped light got a colour."""
     for number, (tones, taken) in enumerate(zip(look.tones, look.taken, strict=True)):
-        shown = look.shows[number] if look.labels is None else look.labels == number
+        shown = look.shown(number)
         clipped = [before >= VERDICT.white for before in cv2.split(taken)]
         white = np.logical_and.reduce([now >= VERDICT.white for now in cv2.split(tones)])
         blown = shown & white & ~np.logical_and.reduce(clipped)
@@ -322,7 +342,9 @@ def _greyed(tones: Levels, taken: Levels, clipped: list[NDArray[np.bool_]]) -> N
     others = np.maximum.reduce([np.where(gone, np.float32(0), by) for gone, by in zip(clipped, changes, strict=True)])
     as_others = [(by <= VERDICT.restored * others) | (others == 0) for by in changes]
     dark = [now < VERDICT.greyed for now in cv2.split(tones)]
-    return np.logical_or.reduce([np.logical_and.reduce(one) for one in zip(clipped, dark, as_others, strict=True)])
+    parts = zip(clipped, dark, as_others, strict=True)
+    greyed: NDArray[np.bool_] = np.logical_or.reduce([np.logical_and.reduce(one) for one in parts])
+    return greyed
 
 
 def _parts(mask: NDArray[np.bool_], least: float, apart: float = 2.0) -> Iterator[NDArray[np.bool_]]:

@@ -244,7 +244,7 @@ class ChoiceOptions:
     hole_radius: float = 0.03
     """Radians from what is shown within which what is not shown, on all sides, is a hole."""
 
-    tie_px: float = 0.02
+    tie_px: float = 0.05
     """Cost by which candidates may differ and still be as good: the one that slides least is taken, since what moved or
     has no depth of its own is torn by a slide."""
 

@@ -12,15 +12,22 @@ from ..cameras.lens import distort
 from ..cameras.view import View
 from ..field.transfer import transfer
 from ..raster.arrays import Array, Plane, bounds
-from ..raster.lazy import AnyImage, Placed, whole
+from ..raster.lazy import AnyImage, LazyImage, Placed, whole
 from ..raster.picture_map import CanvasMap, PictureMap
 from .canvas import Canvas
 from .depth import Confidence
+from .reference_map import ReferenceMap
 from .warp import Warp
 
 
 def every_nth(warp: Warp, step: int) -> Warp:
-    """A warp of every `step`-th column and row of its canvas; all it has are arrays."""
+    """A warp of every `step`-th column and row of its canvas; all it has are arrays.
+
+    step 1: the warp itself, where it has no others.
+    """
+    lazy = (warp.depth, warp.lazy_confidence, warp.slide, *warp.maps)
+    if step == 1 and not any(isinstance(one, LazyImage | ReferenceMap) for one in lazy):
+        return warp
     first = step // 2
     here = (slice(first, None, step), slice(first, None, step))
     height, width = (len(range(first, side, step)) for side in (warp.canvas.height, warp.canvas.width))

@@ -94,10 +94,16 @@ class Warp:
         """
         left, top, width, height = box
         maps = tuple(one.within(box, in_place) for one in self.maps)
-        depth = Placed(self.depth, (-top, -left), (height, width), np.nan)
+        inside = left >= 0 and top >= 0 and left + width <= self.canvas.width and top + height <= self.canvas.height
+
+        def part(values: AnyImage, beyond: float) -> AnyImage:
+            if inside and isinstance(values, np.ndarray):
+                return cut(values, box)
+            return Placed(values, (-top, -left), (height, width), beyond)
+
+        depth = part(self.depth, np.nan)
         confidence, slide = (
-            None if values is None else Placed(values, (-top, -left), (height, width))
-            for values in (self.lazy_confidence, self.slide)
+            None if values is None else part(values, 0.0) for values in (self.lazy_confidence, self.slide)
         )
         behind, refilled, beside = (
             None if values is None else cut(values, box) for values in (self.behind, self.refilled, self.beside)

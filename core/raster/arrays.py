@@ -124,12 +124,12 @@ def without_specks(hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return opened > 0
 
 
-def larger_parts(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The connected parts of a mask (H, W) that have at least as many px as the smallest part that is no speck: strips
-    too, however narrow."""
+def larger_parts(mask: NDArray[np.bool_], least: int = MASKS.speck_side**2) -> NDArray[np.bool_]:
+    """The connected parts of a mask (H, W) that have at least so many px, by default as many as the smallest part that
+    is no speck: strips too, however narrow."""
     marked = np.ascontiguousarray(mask).view(np.uint8)
     _, number, about, _ = cv2.connectedComponentsWithStats(marked)
-    large = about[:, cv2.CC_STAT_AREA] >= MASKS.speck_side**2
+    large = about[:, cv2.CC_STAT_AREA] >= least
     large[0] = False
     parts: NDArray[np.bool_] = large[number]
     return parts
@@ -137,11 +137,13 @@ def larger_parts(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def cut(array: NDArray[Any], box: Box, beyond: float = 0.0) -> NDArray[Any]:
     """The part of an array (H, W, …) in a box (left, top, width, height); `beyond` where that reaches over its edges.
+
+    Where it does not, that is a view of the array: parts of what is as large as a canvas take no memory of their own.
     """
     left, top, width, height = box
     right, bottom = left + width, top + height
     if left >= 0 and top >= 0 and right <= array.shape[1] and bottom <= array.shape[0]:
-        return np.ascontiguousarray(array[top:bottom, left:right])
+        return array[top:bottom, left:right]
     out = np.zeros((height, width, *array.shape[2:]), array.dtype)  # a sphere is mostly empty: memory untouched is free
     if beyond:
         out[:] = beyond

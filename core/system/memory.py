@@ -25,3 +25,12 @@ def use_again() -> None:
         large = SYSTEM.large_bytes
         for name, value in ((_MMAP_THRESHOLD, large), (_TRIM_THRESHOLD, large), (_ARENA_MAX, 1)):
             libc.mallopt(name, value)
+
+
+def give_back() -> None:
+    """Gives back to the system what is free within the heap: after work whose arrays lie between others that stay."""
+    if sys.platform != "linux":
+        return
+    libc = ctypes.CDLL(None)
+    if hasattr(libc, "malloc_trim"):
+        libc.malloc_trim(0)

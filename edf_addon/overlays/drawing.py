@@ -14,7 +14,7 @@ from ..bridge import compat, ownership, result
 
 MATCH_RADIUS, LINE_WIDTH = 3.5, 1.6
 LINE, POINTER = (1.0, 0.85, 0.2, 0.95), (1.0, 1.0, 1.0, 0.9)
-FRAME = (1.0, 0.45, 0.1, 1.0)
+FRAME, PLACE = (1.0, 0.45, 0.1, 1.0), (1.0, 0.1, 0.5, 1.0)
 CHOSEN, WAITING = (1.0, 1.0, 1.0, 1.0), (0.2, 1.0, 0.9, 1.0)
 SHADE = (0.0, 0.0, 0.0, 0.55)
 PAINTED_OUT, FROM_TARGET = (0.9, 0.08, 0.05, 0.6), (1.0, 0.55, 0.1, 0.6)
@@ -108,6 +108,10 @@ def draw() -> None:
         _draw_cover(view, settings, image)
     elif view.picture != image:
         _draw_under_mask(view, view.picture, image, PAINTED_OUT)
+    if side == editor.PANORAMA and settings.show_places:
+        from . import overlay_geometry
+
+        _lines(view.at(overlay_geometry.places(editor.known(image)["report"])), PLACE, view)
     if side is not None:
         _draw_frame(view, settings, image if side == editor.PANORAMA else settings.result, side)
     if settings.show_matches and side is not None:

@@ -171,6 +171,16 @@ def segments(polyline: Array) -> NDArray[np.float32]:
     return np.stack([polyline[:-1], polyline[1:]], axis=1).reshape(-1, 2).astype(np.float32)
 
 
+def places(report: dict[str, Any]) -> NDArray[np.float32]:
+    """Line segments (8·N, 2) px around the places of a panorama at which its report's verdict says to look."""
+    sides = [np.zeros((0, 2), np.float32)]
+    for place in (report.get("verdict") or {}).get("places", ()):
+        x, y, width, height = place["box"]
+        corners = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]]) + (x - 0.5, y - 0.5)
+        sides.append(segments(corners))
+    return np.concatenate(sides)
+
+
 def nearest(points: Array, at: Array, within: float) -> int | None:
     """Index of the point (N, 2) nearest to `at` (2,), or None if none lies within that many px."""
     if not len(points):

@@ -18,6 +18,7 @@ WORST = 4.0
 # Share of the width that the labels of facts take.
 LABELS = 0.36
 OVERLAYS = (
+    Row("show_places"),
     Row("show_matches"),
     Row("show_epipolar"),
     Row("overlay", text="On Panorama"),

@@ -10,7 +10,16 @@ import pytest
 from edf_stitch.core.choices import RIVALS as ALL_RIVALS
 from edf_stitch.synthetic_scenes.recipes import RECIPES
 from edf_stitch.synthetic_scenes.stitches import WAYS as ALL_WAYS
-from edf_stitch.synthetic_scenes.thresholds import BEYOND, MODEL_RUNS, RIVALS, SUITE, Check, judge, medians
+from edf_stitch.synthetic_scenes.thresholds import (
+    BEYOND,
+    CUT_SCENES,
+    MODEL_RUNS,
+    RIVALS,
+    SUITE,
+    Check,
+    judge,
+    medians,
+)
 
 WAYS = ("known/strict", "known/slack", *RIVALS, "unknown/strict", "unknown/slack")
 FIGURES = {
@@ -100,6 +109,18 @@ def test_a_scenes_own_limits_beyond_the_overlap_flip_where_they_stand(scene: str
         for value, failed in ((limit, []), (math.nextafter(limit, math.inf), [(scene, "known/slack", measure)])):
             result["runs"]["known/slack"]["figures"][measure] = value if math.isfinite(limit) else 1e9
             assert failures(result) == (failed if math.isfinite(limit) else [])
+
+
+@pytest.mark.parametrize("scene", CUT_SCENES)
+def test_a_thing_that_a_border_cuts_is_whole_or_gone(scene: str) -> None:
+    assert scene in RECIPES
+    result = good(scene)
+    figures = result["runs"]["known/slack"]["figures"]
+    for half, failed in ((0.1, []), (math.nextafter(0.1, 1), ["things_half"]), (None, ["things_half"])):
+        figures |= {"things_half": half, "target_only_psnr_db": 20.0}
+        assert [measure for _, _, measure in failures(result)] == failed
+    figures["things_half"], figures["target_only_psnr_db"] = 0.0, None
+    assert [measure for _, _, measure in failures(result)] == ["target_only_psnr_db"]
 
 
 def test_a_scene_made_harder_has_no_limits_of_its_own() -> None:

@@ -48,6 +48,9 @@ def test_no_clipped_light_gets_darker_and_none_white() -> None:
         restored = matched.copy()
         table.restore(own, restored)
         assert (restored >= matched).all() and restored.max() <= np.float32(TONE.below_white)
+        bright = np.where(own >= 1, np.float32(0.98), matched)
+        table.restore(own, bright)
+        assert (bright >= np.where(own >= 1, np.float32(0.98), matched)).all()
 
 
 def test_too_little_that_is_clipped_tells_nothing() -> None:
@@ -78,6 +81,8 @@ def test_white_becomes_what_the_other_shows_around_there_if_that_has_it_unclippe
     assert np.array_equal(found.white_at(own[50:60, 7:40], (slice(50, 60), slice(7, 40))), white[50:60, 7:40])
     restored = matched.copy()
     found.restore(own, restored)
+    assert np.array_equal(restored, matched)
+    ClippedLight((np.full((8, 8), 1.5, np.float32),) * 3).restore(own, restored)
     assert np.array_equal(restored, matched), "no channel is left to tell a colour by"
     most = light.copy()
     most[:, : W // 2] = 1

@@ -117,6 +117,27 @@ def test_exposure_is_evened_out_unless_it_is_to_stay() -> None:
     assert np.array_equal(kept.pixels, second.pixels) and kept.alpha is second.alpha and found.exposure.blocks == 0
 
 
+def test_both_pictures_meet_at_one_exposure_and_frames_keep_to_it() -> None:
+    first, second, warp = pictures(gain=1.4)
+    options = replace(ON_REFERENCE, exposure="auto")
+
+    def made(*layers: Layer, decided: Any = None) -> Composition:
+        return composed(layers, warp, SIDEWAYS.views, options, FLOATS, None, lambda *_: None, decided)
+
+    found = made(first, second)
+    light, other = (one.exposure for one in found.decided)
+    assert found.decided[1].exposure_before is light and light.keeps_white and other.keeps_white
+    assert np.allclose(light.gain, 1.4**-0.35, rtol=0.01) and np.allclose(other.gain, 1.4**0.65, rtol=0.01)
+    both = (first.alpha > 0) & (second.alpha > 0) & ~found.decided[1].hidden
+    apart = np.abs(found.exposed[0].pixels - found.exposed[1].pixels)[both]
+    assert np.percentile(apart, 95) < 0.01
+    alone = (found.labels == 0) & ~both
+    assert np.percentile(np.abs(found.panorama.pixels - found.exposed[0].pixels)[alone], 90) < 0.01
+    dim = made(Layer(first.pixels / 2, first.alpha), Layer(second.pixels / 3, second.alpha), decided=found.decided)
+    assert np.allclose(dim.exposed[0].pixels, first.pixels / 2 * light.gain, atol=2e-3)
+    assert np.allclose(dim.exposed[1].pixels, second.pixels / 3 * other.gain, atol=2e-3)
+
+
 def test_the_stages_come_in_the_order_of_the_data() -> None:
     said: list[str] = []
     compose(*pictures(), said=said)

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.view import View, views_of
+from edf_stitch.core.compose import rough_seam
 from edf_stitch.core.compose.rough_seam import RoughSeam
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.projection import round_projection
@@ -102,3 +103,29 @@ def test_a_seam_is_lost_where_both_pictures_are_busy(views: tuple[View, ...]) ->
 
     assert rough(views, leaves(0), leaves(1)) < 10
     assert rough(views, leaves(0), seen(views, 1, bands=False)) > 20
+
+
+def test_a_warp_is_looked_at_once_and_another_one_anew(views: tuple[View, ...]) -> None:
+    both = RoughSeam.of([picture_from_array(seen(views, number)) for number in (0, 1)], views, COARSE)
+    right, wrong = far_away(views, COARSE), far_away(views, COARSE, shift=25.0)
+    assert both.look(right) is both.look(right)
+    assert both(wrong) > 20
+    assert both(right) == 0
+
+
+def test_what_neither_picture_can_see_counts_by_its_border(views: tuple[View, ...], monkeypatch: pytest.MonkeyPatch
+                                                           ) -> None:  # fmt: skip
+    """Hidden where the target alone shows something it is a hole; hidden where both do, the seam sees to it."""
+    pictures = [picture_from_array(seen(views, number)) for number in (0, 1)]
+    cut = RoughSeam.of(pictures, views, COARSE)
+    shown = cut.look(far_away(views, COARSE)).shown
+    alone, both = (
+        np.argwhere(cv2.erode(np.pad(one, 1).astype(np.uint8), np.ones((13, 13), np.uint8))[1:-1, 1:-1])
+        for one in (shown[1] & ~shown[0], shown[1] & shown[0])
+    )
+    for places, expected in ((alone, 10**2 - 8**2), (both, 0)):
+        row, column = places[len(places) // 2]
+        hidden = np.zeros(shown[0].shape, bool)
+        hidden[row - 4 : row + 4, column - 4 : column + 4] = True
+        monkeypatch.setattr(rough_seam, "occluded", lambda *_, hidden=hidden: hidden.copy())
+        assert cut(far_away(views, COARSE)) == expected

@@ -84,7 +84,7 @@ def test_nothing_unclipped_becomes_white(
     levels: list, gain: np.ndarray, lens: Vignetting, curve: Any, told: bool
 ) -> None:
     levels = np.array([[*levels, [255, 255, 249], [249, 249, 249], [249, 255, 240]]], np.uint8)
-    field = np.random.default_rng(0).random((2, 2, 3)).astype(np.float32)
+    field = np.ones((2, 2, 3), np.float32)
     table = ClippedLight((np.full((8, 8), 4.0, np.float32),) * 3, field) if told else None
     light = decode(levels)
     corner = PictureMap(*np.zeros((2, *levels.shape[:2]), np.float32), (W, H))

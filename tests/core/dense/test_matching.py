@@ -283,6 +283,30 @@ def test_it_searches_further_where_one_thing_is_found_further_away(far_rows: sli
     assert count % 16 == 0
 
 
+def test_at_the_rim_nothing_is_found_far_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    both = np.ones((120, 300), bool)
+    inside = matching._inside(both)
+    assert not inside[:, :6].any() and not inside[:6].any() and inside[7:-7, 7:-7].all()
+    pair = scene("sideways")
+    field = pair.field()
+    lines = pair.lines(field)
+
+    def everywhere(a: np.ndarray, *_: int) -> tuple[np.ndarray, np.ndarray]:
+        return np.full(a.shape[:2], 1.5 * REACH, np.float32), np.ones(a.shape[:2], bool)
+
+    def far() -> np.ndarray:
+        return search(lines, field, *pair.views(), 1.0, REACH)[1] > 0
+
+    monkeypatch.setattr(matching, "_matched_at_half", everywhere)
+    monkeypatch.setattr(matching, "_matched", everywhere)
+    found = far()
+    monkeypatch.setattr(matching, "_inside", np.ones_like)
+    all_found = far()
+    assert 0.3 < found.sum() / all_found.sum() < 0.8 and not (found & ~all_found).any()
+    first, last = np.flatnonzero(all_found.any(axis=0))[[0, -1]]
+    assert not found[:, : first + 3].any() and not found[:, last - 3 :].any()
+
+
 def test_beside_a_near_thing_the_background_goes_on() -> None:
     """In what the target does not see: a card before a wall, on the side that the field's moves tell."""
     random = np.random.default_rng(6)

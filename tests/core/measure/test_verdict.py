@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import cv2
 import numpy as np
+import pytest
 from edf_stitch.core.compose.exposure import unchanged
 from edf_stitch.core.measure.verdict import Look, Verdict, judge, look_at
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
-RIGHT = {"measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []}}
+RIGHT = {
+    "measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []},
+    "options": {"projection": "auto"},
+}  # fmt: skip
 # Rows and columns across the seam, which runs down the middle (column 200).
 PATCH = np.s_[100:140, 180:220]
 
@@ -69,26 +74,52 @@ def test_a_seam_that_is_seen_is_a_place_with_its_cause() -> None:
         assert what == f"a thing is cut by the border of the {name}"
 
 
+def test_what_nearly_touches_is_one_place() -> None:
+    for below, count in ((118, 1), (160, 2)):
+        both = differing(differing(look(), np.s_[100:112, 180:220]), np.s_[below : below + 12, 180:220])
+        assert len(judged(both).places) == count
+
+
 def test_places_are_told_in_pixels_of_the_panorama() -> None:
     small = judged(differing(look(), PATCH)).places[0].box
     large = judge(differing(look(step=3), PATCH), (10, -20), RIGHT).places[0].box
     assert large == (3 * small[0] + 10, 3 * small[1] - 20, 3 * small[2], 3 * small[3])
 
 
-def test_a_map_that_folds_or_tears_is_a_place() -> None:
+@pytest.mark.parametrize("change", [lambda x: 2 * 316 - x, lambda x: 316 + 9 * (x - 316)], ids=["folds", "jumps"])
+def test_a_map_that_folds_or_jumps_is_a_place_where_the_other_picture_does_not_agree(
+    change: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    part = np.s_[50:62, 310:322]
+    wrong = differing(look(), part)
+    x = wrong.maps[1].x.copy()
+    x[part] = change(x[part])
+    torn = replace(wrong, maps=(wrong.maps[0], replace(wrong.maps[1], x=x)))
+    found = judged(torn)
+    assert found.rating == "look" and len(found.places) == 1 and "torn" in found.places[0].what
+    left, top, width, height = found.places[0].box
+    assert 305 <= left and left + width <= 327 and 45 <= top and top + height <= 67
+    assert judged(wrong).rating == "good" == judged(replace(torn, tones=look().tones)).rating
+    elsewhere = replace(torn, maps=(torn.maps[1], torn.maps[0]))
+    assert judged(elsewhere).rating == "good", "the reference is not shown there"
+
+
+def test_a_large_part_that_is_bent_is_a_place_unless_the_frame_was_asked_for() -> None:
     good = look()
-    for what, change in (("folds over", lambda x: 2 * 320 - x), ("torn", lambda x: 320 + 9 * (x - 320))):
-        x = good.maps[1].x.copy()
-        x[50:70, 310:330] = change(x[50:70, 310:330])
-        found_in = replace(good, maps=(good.maps[0], replace(good.maps[1], x=x)))
-        found = judged(found_in)
-        assert found.rating == "look" and [what in place.what for place in found.places].count(True) == 1
-        left, top, width, height = next(place.box for place in found.places if what in place.what)
-        assert 305 <= left and left + width <= 335 and 45 <= top and top + height <= 75
-        elsewhere = replace(good, maps=(replace(good.maps[0], x=x), good.maps[1]))
-        assert judged(elsewhere).rating == "good", "the reference is not shown there"
-        bare = np.full_like(good.tones[1], 128)
-        assert judged(replace(found_in, tones=(bare, bare))).rating == "good", "nothing on a bare wall shows it"
+    x = good.maps[1].x.copy()
+    part = np.s_[100:220, 260:380]
+    x[part] += 0.8 * (good.maps[1].y[part] - 160)
+    bent = replace(good, maps=(good.maps[0], replace(good.maps[1], x=x)))
+    found = judged(bent)
+    assert found.rating == "look" and len(found.places) == 1 and "bent" in found.places[0].what
+    left, top, width, height = found.places[0].box
+    assert 240 <= left and left + width <= 400 and 80 <= top and top + height <= 240 and min(width, height) > 70
+    assert judge(bent, (0, 0), {**RIGHT, "options": {"projection": "perspective"}}).rating == "good"
+    elsewhere = replace(bent, maps=(bent.maps[1], bent.maps[0]))
+    assert judged(elsewhere).rating == "good", "the reference is not shown there"
+    small = good.maps[1].x.copy()
+    small[100:115, 300:315] += 0.8 * (good.maps[1].y[100:115, 300:315] - 107)
+    assert judged(replace(good, maps=(good.maps[0], replace(good.maps[1], x=small)))).rating == "good", "outlines"
 
 
 def test_light_that_is_lost_is_a_place() -> None:
@@ -101,6 +132,8 @@ def test_light_that_is_lost_is_a_place() -> None:
         assert [what in place.what for place in found.places] == [True] and found.places[0].box == (250, 0, 150, 60)
         alike = replace(good, tones=(np.where(now == shown, now, good.tones[0]), now), taken=(good.taken[0], before))
         assert (judged(alike).rating == "good") == (what == "too bright"), "darker, as the other picture has it"
+        elsewhere = replace(good, tones=(now, good.tones[1]), taken=(before, good.taken[1]))
+        assert judged(elsewhere).rating == "good", "the reference is not shown there"
         white = replace(good, tones=(good.tones[0], before), taken=(good.taken[0], before))
         assert judged(white).rating == "good", "nothing was lost by us"
 
@@ -148,6 +181,22 @@ def test_a_panorama_is_looked_at_small(small_result: StitchResult) -> None:
     x, y = (np.rint(values[rows, columns]).astype(int) for values in (maps[0].x, maps[0].y))
     apart = np.abs(as_it_is.tones[0][rows, columns].astype(int) - small_result.pictures[0].view[y, x])
     assert np.median(apart) <= 1
+    dark = look_at(small_result.pictures, maps, [unchanged(3, 0.25)] * 2, hidden, np.zeros(maps[0].shape, np.int16))
+    assert np.array_equal(dark.taken[0], as_it_is.tones[0]) and dark.tones[0].max() < 0.6 * as_it_is.tones[0].max()
+
+
+def test_of_a_whole_sphere_only_what_the_pictures_cover_is_looked_at(small_pair: Pair, known: StitchOptions) -> None:
+    changed = small_pair.target.copy()
+    changed[40:140:8, 20:100] = 255
+    sphere = replace(known, projection="equirectangular", seam="none")
+    result = stitch((small_pair.reference, changed), sphere)
+    seen = look_at(
+        result.pictures, result.warp.maps, [one.exposure for one in result.decided], result.occluded, result.labels
+    )
+    here = [one.box for one in judge(seen, (0, 0), result.report).places]
+    told = [tuple(one["box"]) for one in result.report["verdict"]["places"]]
+    left, top = -result.spread[0], -result.spread[1]
+    assert left > 0 and here and told == [(x + left, y + top, width, height) for x, y, width, height in here]
 
 
 def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> None:
@@ -163,5 +212,6 @@ def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> N
         for crop in ("full", (60, 10, 120, 150))
     )  # fmt: skip
     assert found["is"] == cropped["is"] == "look"
-    (x, y, wide, _), (x_too, y_too, *_) = (one["places"][0]["box"] for one in (found, cropped))
-    assert abs(x + wide / 2 - 120) <= 3 and abs(x - 60 - x_too) <= 2 and abs(y - 10 - y_too) <= 2
+    seams = [[one["box"] for one in told["places"] if "seam" in one["what"]] for told in (found, cropped)]
+    for (x, y, wide, high), left, top in ((seams[0][0], 120, 96), (seams[1][0], 120 - 60, 96 - 10)):
+        assert abs(x + wide / 2 - left) <= 2 and y <= top + 20 and top <= y + high, "where the changed rows are"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.raster.arrays import angle_of
+from edf_stitch.core.raster.arrays import angle_of, cut
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
@@ -24,3 +24,11 @@ def test_an_angle_has_the_same_bytes_from_call_to_call(kind: type) -> None:
 
 def test_an_angle_of_single_numbers_is_one() -> None:
     assert angle_of(np.float64(1), np.float64(-1)) == pytest.approx(0.75 * np.pi)
+
+
+def test_a_part_of_a_canvas_takes_no_memory_unless_it_reaches_over_the_edges() -> None:
+    canvas = np.arange(60.0).reshape(6, 10)
+    part = cut(canvas, (2, 1, 5, 4))
+    assert np.shares_memory(part, canvas) and (part == canvas[1:5, 2:7]).all()
+    wider = cut(canvas, (8, -1, 4, 3), beyond=-7)
+    assert (wider[1:, :2] == canvas[:2, 8:]).all() and (wider[0] == -7).all() and (wider[:, 2:] == -7).all()

@@ -41,6 +41,31 @@ def test_freed_memory_is_kept_for_the_next_array_of_any_thread() -> None:
     assert again < full + 20, "used again"
 
 
+GIVE_BACK = """
+import numpy as np
+from edf_stitch.core.system.memory import give_back, use_again
+def held():
+    return int(next(l.split()[1] for l in open("/proc/self/status") if l.startswith("VmRSS"))) // 1024
+use_again()
+work, stays = [], []
+for _ in range(50):
+    work.append(np.ones(4 << 20, np.uint8))
+    stays.append(np.ones(4 << 10, np.uint8))
+work.clear()
+free = held()
+give_back()
+print(free - held(), all((one == 1).all() for one in stays))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists() or sys.platform != "linux", reason="asks Linux")
+def test_what_is_free_between_what_stays_can_be_given_back() -> None:
+    done = subprocess.run([sys.executable, "-c", GIVE_BACK], capture_output=True, text=True, check=True)
+    given, kept = done.stdout.split()
+    assert int(given) > 150
+    assert kept == "True"
+
+
 def test_nothing_happens_where_there_is_no_glibc(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_library(_: object) -> None:
         raise AssertionError("asked for a C library")
@@ -48,3 +73,4 @@ def test_nothing_happens_where_there_is_no_glibc(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(sys, "platform", "darwin")
     monkeypatch.setattr(memory.ctypes, "CDLL", no_library)
     memory.use_again()
+    memory.give_back()

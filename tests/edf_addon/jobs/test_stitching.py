@@ -81,6 +81,7 @@ def test_a_script_gets_the_panorama(chosen, pixels_of):
     assert {tuple(image.size) for image in others.values()} == {tuple(panorama.size)}
     assert others["inverse depth"].is_float and others["heat"].name.startswith(".")
     assert "px in" in status.now.message and not status.now.failed and not modal.is_working()
+    assert kept["report"]["verdict"]["is"] == "good" and "look" not in status.now.message
 
 
 def test_the_same_again_from_what_the_panorama_keeps(chosen, pixels_of):

@@ -47,6 +47,16 @@ def distance(polyline: np.ndarray, point: np.ndarray) -> float:
     return float(np.linalg.norm(starts + share[:, None] * along - point, axis=1).min())
 
 
+def test_places_to_look_at_are_outlined_by_four_lines_each():
+    verdict = {"places": [{"box": [10, 20, 30, 40]}, {"box": [0, 0, 1, 1]}]}
+    ends = og.places({"verdict": verdict}).reshape(2, 4, 2, 2)
+    first = {tuple(map(tuple, line)) for line in ends[0].tolist()}
+    assert first == {((9.5, 19.5), (39.5, 19.5)), ((39.5, 19.5), (39.5, 59.5)), ((39.5, 59.5), (9.5, 59.5)),
+                     ((9.5, 59.5), (9.5, 19.5))}  # fmt: skip
+    assert ends[1].min() == -0.5 and ends[1].max() == 0.5, "all of a pixel"
+    assert og.places({}).shape == og.places({"verdict": None}).shape == (0, 2), "of an earlier release"
+
+
 def test_the_corners_of_a_picture_are_those_of_the_view():
     corners = np.array([[-0.5, -0.5], [SIZE[0] - 0.5, SIZE[1] - 0.5]])
     np.testing.assert_allclose(og.to_view(corners, SIZE), [[0, 1], [1, 0]])

@@ -171,7 +171,7 @@ def test_every_setting_is_in_some_panel(draw, stitched):
         settings.camera = source
         seen |= set(draw().props)
     missing = {one for one in properties.EDF_PG_settings.bl_rna.properties.keys()} - seen
-    assert missing == {"rna_type", "name", "result", "matches_reference", "matches_target", "version"}
+    assert missing == {"rna_type", "name", "result", "matches_reference", "matches_target", "version", "exposure"}
 
 
 def test_every_property_that_a_table_names_is_there(blender):
