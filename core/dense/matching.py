@@ -220,18 +220,14 @@ def _inside(both: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _range(a: NDArray[np.uint8], disparity: Plane, found: NDArray[np.bool_], count: int) -> tuple[int, int]:
     """The least disparity to be searched for and how many, a multiple of 16: as far as points of a (h, w[, C]) with
-    texture were found (h, w) at half the size. Beyond `count` around 0 only where these are few and most of them one
-    thing: errors are scattered."""
+    texture were found (h, w) at half the size. Beyond `count` around 0 only where these are few."""
     some, half = np.s_[::2, ::2], count / 2
     gradient = cv2.Sobel(cv2.blur(np.ascontiguousarray(a[some]), (3, 3)), cv2.CV_16S, 1, 0)
     texture = np.abs(gradient).reshape(*gradient.shape[:2], -1).max(axis=-1) >= MATCHING.wide_texture
     values = disparity[some][found[some] & texture]
     if not values.size:
         return -16 * -(-count // 32), 32 * -(-count // 32)
-    outside = found[some] & (np.abs(disparity[some]) > half)
-    sizes = cv2.connectedComponentsWithStats(outside.view(np.uint8))[2][1:, cv2.CC_STAT_AREA]
     few = (np.abs(values) > half).mean() < MATCHING.max_wide_share
-    few &= sizes.max(initial=0) > MATCHING.one_thing * outside.sum()
     ends = []
     for side in (-1, 1):
         usual, wide = np.percentile(side * values, [100 - MATCHING.range_share, 100 - MATCHING.wide_share])

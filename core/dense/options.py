@@ -101,9 +101,6 @@ class MatchingOptions:
     max_wide_share: float = 0.05
     """Share of them, 0 to 1, from which on the geometry is doubted rather than the range."""
 
-    one_thing: float = 0.5
-    """Share of all that was found further away from which on a connected part of it is one thing that stands out."""
-
     hidden_jump_px: float = 2.0
     """px of a jump between surfaces from which on the nearer one hides something."""
 

@@ -267,15 +267,12 @@ def test_it_looks_as_far_as_it_is_told() -> None:
     assert ((counts > 0) & (np.abs(along - right) < 1))[within].mean() > 0.4
 
 
-@pytest.mark.parametrize(("far_rows", "reach"), [
-    (slice(0, 4), True), (slice(0, 20), False), (slice(0, 100, 25), False), (slice(0, 0), False),
-])  # fmt: skip
-def test_it_searches_further_where_one_thing_is_found_further_away(far_rows: slice, reach: bool) -> None:
-    """Not where much is, or here and there: then something else is wrong. What is found in a plain part does not count.
-    """
+@pytest.mark.parametrize(("far_rows", "reach"), [(2, True), (20, False), (0, False)])
+def test_it_searches_further_where_a_few_points_are_found_further_away(far_rows: int, reach: bool) -> None:
+    """Not where many are: then something else is wrong. What is found in a plain part does not count."""
     textured = np.random.default_rng(3).integers(0, 256, (100, 100)).astype(np.uint8)
     disparity = np.full((100, 100), 3, np.float32)
-    disparity[far_rows] = 27
+    disparity[:far_rows] = 27
     found = np.ones(disparity.shape, bool)
     least, count = matching._range(textured, disparity, found, 32)
     assert (least, least + count) == ((-16, 32) if reach else (-16, 16))
