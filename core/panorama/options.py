@@ -181,9 +181,9 @@ class ChoiceOptions:
     seam_candidates: tuple[float, ...] = (0.0, 0.5, 1.0)
     """Slides at which a seam is cut and holes are counted, which takes longest; interpolated between."""
 
-    base_px_per_radian: float = 150.0
-    """Resolution of the coarse map, and of the pictures through which a seam is cut: twice as fine it takes three times
-    as long, and hardly any choice changes."""
+    base_px_per_radian: float = 250.0
+    """Resolution of the coarse map, and of the pictures through which a seam is cut: at 150 what a slide tears is not
+    seen, twice as fine it takes three times as long."""
 
     px_per_radian: float = 900.0
     """Resolution in whose px bends and seams are given: about that of a picture that fills a screen."""
@@ -244,11 +244,11 @@ class ChoiceOptions:
     hole_radius: float = 0.03
     """Radians from what is shown within which what is not shown, on all sides, is a hole."""
 
-    tie_px: float = 0.05
+    tie_px: float = 0.03
     """Cost by which candidates may differ and still be as good: the one that slides least is taken, since what moved or
     has no depth of its own is torn by a slide."""
 
-    tie_share: float = 0.05
+    tie_share: float = 0.03
     """The same as a share of the least cost; the larger counts."""
 
     cells: int = 90

@@ -165,8 +165,9 @@ def test_a_seam_that_runs_unseen_is_worth_it(by_hand: SimpleNamespace, monkeypat
 
     choice = choose()
     assert choice.s1 == 1
-    # px at 900 per radian, with those of slides between interpolated
-    assert np.allclose([one.seam_px for one in choice.costs], [60, 45, 30, 15, 0])
+    # with those of slides between interpolated
+    finer = CHOICE.px_per_radian / CHOICE.base_px_per_radian
+    assert np.allclose([one.seam_px for one in choice.costs], finer * np.array([10, 7.5, 5, 2.5, 0]))
     assert chosen_without(monkeypatch, "per_seam_px", choose) == 0
     assert choice_for(base, views, NONE, DOWN, lambda warp: 500 - 100 * slid(warp)).s1 == 0, "bad is bad"
 
@@ -201,8 +202,9 @@ def test_holes_between_the_pictures_count(by_hand: SimpleNamespace, monkeypatch:
     base, views = rig(by_hand, lambda heading, rise: np.full_like(heading, 0.05))
     torn = base.maps[1].arrays()
     # what only the target shows, with a hole that a slide closes
-    left = base.canvas.offset[0] + round(0.7 * CHOICE.base_px_per_radian)
-    torn.x[195:203, left : left + 6] = np.nan
+    px = CHOICE.base_px_per_radian
+    left, top = (start + round(at * px) for start, at in zip(base.canvas.offset, (0.7, -0.03), strict=True))
+    torn.x[top : top + round(0.053 * px), left : left + round(0.04 * px)] = np.nan
 
     def choose() -> SlideChoice:
         return choice_for(base, views, NONE, DOWN, steady)
