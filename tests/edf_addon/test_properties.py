@@ -138,6 +138,7 @@ def test_the_frame_is_moved_and_sized_in_degrees_and_the_reference_keeps_its_own
     bpy.ops.edf.reference_frame()
     options = engine_options.options_of(settings)
     assert (options["projection"], options["slide"], options["crop"]) == ("reference", 0.0, "full")
+    assert options["exposure"] == "reference"
     assert options["centre"] is None and options["fov"] is None
 
 

@@ -61,7 +61,7 @@ def test_a_script_gets_the_panorama(chosen, pixels_of):
     settings = chosen.settings
     settings.take_layers = settings.take_masks = settings.take_depth = True
     bpy.ops.edf.reference_frame()
-    settings.crop, settings.light = "REFERENCE", "REFERENCE"
+    settings.crop = "REFERENCE"
     settings.blend = "FEATHER"  # multi-band evens light out a little way into the part that only the reference shows
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     panorama = settings.result
