@@ -150,7 +150,7 @@ class EDF_OT_reset(bpy.types.Operator):  # noqa: N801
 
 
 class EDF_OT_reference_frame(bpy.types.Operator):  # noqa: N801
-    """Keep the reference's plane, place, light and every pixel of it, on a canvas that holds both pictures: for plates"""
+    """Keep the reference's plane, place and every pixel as it is, on a canvas that holds both pictures: for plates"""
 
     bl_idname = idnames.Operator.REFERENCE_FRAME
     bl_label = "Reference Frame"
