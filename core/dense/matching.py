@@ -23,7 +23,6 @@ from .epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
 from .epipolar_rows import EpipolarRows
 from .options import LINES, MATCHING
 from .rim_options import RIM
-from .row_gaps import hidden_gaps
 
 
 @dataclass(frozen=True)
@@ -157,10 +156,8 @@ def search(
     inside = _inside(in_reference & in_target)
     found &= inside | (np.abs(disparity) <= usual)
     coarse_found &= inside | (np.abs(coarse_disparity) <= usual)
-    filled, hidden = hidden_gaps(disparity, found, arc_lengths.nearer)
     confidence = np.where(found, np.float32(1), coarse_found * np.float32(MATCHING.coarse_confidence))
-    confidence[hidden] = MATCHING.hidden_confidence
-    disparity = np.where(found | hidden, filled, coarse_disparity)
+    disparity = np.where(found, disparity, coarse_disparity)
     return _on_nodes(lines, rows, arc_lengths, disparity, confidence * in_reference, in_target)
 
 
@@ -283,12 +280,6 @@ class ArcLengths:
     from an arbitrary point of the line."""
 
     px: Plane
-
-    @property
-    def nearer(self) -> float:
-        """Sign of the change of disparity towards larger d, along which arc lengths grow."""
-        step = np.diff(self.px[:: LINES.strip_rows], axis=1)
-        return -float(np.sign(np.median(step[np.isfinite(step)])))
 
     @staticmethod
     def of(e_prime: Array, target: Array, rows: EpipolarRows) -> ArcLengths:

@@ -101,18 +101,6 @@ class MatchingOptions:
     max_wide_share: float = 0.05
     """Share of them, 0 to 1, from which on the geometry is doubted rather than the range."""
 
-    hidden_jump_px: float = 2.0
-    """px of a jump between surfaces from which on the nearer one hides something."""
-
-    hidden_width: float = 1.3
-    """Width of a gap that it hides at most, in widths of the jump."""
-
-    hidden_rest_px: float = 3.0
-    """px of that width in addition."""
-
-    hidden_confidence: float = 0.5
-    """What is filled in there counts, relative to what is found."""
-
     speckle_side: float = 0.012
     """Side of the largest patch that is taken for an error, as a share of the side of the rows' picture."""
 

@@ -304,33 +304,6 @@ def test_at_the_rim_nothing_is_found_far_away(monkeypatch: pytest.MonkeyPatch) -
     assert not found[:, : first + 3].any() and not found[:, last - 3 :].any()
 
 
-def test_beside_a_near_thing_the_background_goes_on() -> None:
-    """In what the target does not see: a card before a wall, on the side that the field's moves tell."""
-    random = np.random.default_rng(6)
-    wall, card = (cv2.GaussianBlur(random.normal(size=(150, 260)), (0, 0), 1.2) for _ in range(2))
-    wall, card = (np.clip(128 + 45 * v / v.std(), 0, 255).astype(np.uint8)[..., None] for v in (wall, card))
-    pair = scene("sideways")
-    near_px, columns = 12, slice(90, 130)
-    field = pair.field()
-    lines = pair.lines(field)
-    # the target is what the moves make of the wall, and of the card in front of it
-    base_x, base_y = lines.target(np.zeros(lines.shape, np.float32))
-    reference = wall[:, 30 : 30 + SIZE[0]].copy()
-    reference[:, columns] = card[:, columns]
-    moves = np.zeros(lines.shape, np.float32)
-    moves[:, columns] = near_px
-    target = np.full((SIZE[1], SIZE[0], 1), 128, np.uint8)
-    for some in (moves == 0, moves > 0):
-        x, y = (v + 0 for v in lines.target(moves))
-        painted = _painted(reference, x, y, some)
-        target = np.where(painted[1], painted[0], target)
-    along, counts = search(lines, field, *(ComparedPicture.of(p, None, 1.0) for p in (reference, target)), 1.0, REACH)
-    guessed = np.isclose(counts, MATCHING.hidden_confidence)
-    beside = guessed & (moves == 0) & np.isfinite(base_x + base_y)
-    assert beside[20:-20].sum() > 200
-    assert (np.abs(along[beside]) < 2).mean() > 0.8
-
-
 def _painted(picture: np.ndarray, x: np.ndarray, y: np.ndarray, some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Some of a picture (h, w, 1) where its pixels are seen, px x and y (h, w), and the mask of where that is."""
     out, weight = np.zeros(picture.shape, np.float32), np.zeros(picture.shape, np.float32)
