@@ -209,13 +209,14 @@ def _slide(
     viewpoint = viewpoint_between(base, views)
     if viewpoint is None:
         return NO_WAY, None
+    if asked != "auto":
+        return SlideChoice(float(asked), (), "as asked for"), _Sliding(base, viewpoint.sliding(float(asked)))
     rough = RoughSeam.of(pictures, views, CHOICE.base_px_per_radian)
 
     def seam(warp: Warp) -> float:
         """px of a rough seam that is seen, without what a border cuts, as it will be (see `_settled`)."""
         return rough(without_cut_things(warp, views, pictures, rough) if known.continuation else warp)
 
-    choice = SlideChoice(float(asked), (), "as asked for") if asked != "auto" else choose_slide(
-        base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None, seam, progress
-    )
+    down = lines.down if lines.down_is_sure else None
+    choice = choose_slide(base, views, viewpoint, lines.each, down, seam, progress)
     return choice, _Sliding(base, viewpoint.sliding(choice.s1)) if choice.s1 else None

@@ -58,7 +58,7 @@ class StitchOptions:
         the way, "auto" chooses (docs/method.md).
     projection : str, default "auto"
         The surface that the panorama lies on, one of PROJECTIONS, or "pannini:D" with a distance D from 0 to 1.
-        "reference" keeps every pixel of the reference: nothing slides, and nothing is cropped by itself.
+        "reference" keeps every pixel of the reference in its place: nothing slides, and nothing is cropped by itself.
     level : str or (yaw, pitch, roll), default "auto"
         How the panorama is turned: upright ("auto"), as the reference ("none"), or by the reference camera's angles in
         degrees (see `levelling`).

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..panorama.layers import Layer
-from ..raster.arrays import Part, bounds, copied_where, for_each_channel, in_any_channel, within
+from ..raster.arrays import NEIGHBOURS, Part, bounds, copied_where, for_each_channel, in_any_channel, within
 from ..raster.distance import distance_inside, distance_to_border
 from ..raster.lazy import AnyImage, LazyImage, Retouched
 from ..raster.log_encoding import log_decode, log_encode
@@ -180,7 +180,7 @@ def seam_region(
     chosen (H, W): what comes from one side; shown (H, W): borders of what is not shown do not count.
     """
     borders = np.zeros(chosen.shape, bool)
-    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+    for here, there in NEIGHBOURS:
         borders[here] |= (chosen[here] != chosen[there]) & shown[here] & shown[there]
     box = bounds(borders)
     if box is None:

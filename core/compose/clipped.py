@@ -51,8 +51,8 @@ class ClippedLight:
             if not clipped.size:
                 continue
             colours, told = owns[clipped], lights[clipped, k]
-            weight = _clipped_by(colours[:, k])
-            weight *= 1 - _clipped_by(colours.min(axis=1))  # all channels: no colour is left
+            weight = clipped_by(colours[:, k])
+            weight *= 1 - clipped_by(colours.min(axis=1))  # all channels: no colour is left
             raised = told * factors.reshape(-1)[_cells(colours, k, len(factors))]
             np.minimum(raised, np.float32(TONE.below_white), out=raised)  # another channel may be unclipped
             lights[clipped, k] = told + weight * np.maximum(raised - told, 0)
@@ -160,9 +160,9 @@ class _White:
         return filled(means.astype(np.float32), _known(self._counts))
 
 
-def _clipped_by(light: Plane) -> Plane:
-    """How much light (N,) counts as clipped, 0 to 1."""
-    share = (light - np.float32(CLIPPED.begins)) * np.float32(1 / (EXPOSURE.clipped_light - CLIPPED.begins))
+def clipped_by(light: Plane, begins: float | np.float32 = CLIPPED.begins) -> Plane:
+    """How much light (…) counts as clipped, 0 to 1; begins: the light from which on it does."""
+    share = (light - np.float32(begins)) * np.float32(1 / (EXPOSURE.clipped_light - begins))
     np.clip(share, 0, 1, out=share)
     share *= share * (3 - 2 * share)
     return share

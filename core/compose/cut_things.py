@@ -21,7 +21,7 @@ from ..panorama.other_depth import every_nth, seen_at, with_depth
 from ..panorama.projection import focal_of
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture
-from ..raster.arrays import Part, Plane, dilated, with_margin
+from ..raster.arrays import NEIGHBOURS, Part, Plane, dilated, with_margin
 from ..raster.distance import distance_inside, distance_to
 from ..raster.lazy import part_of
 from ..raster.log_encoding import log_encode
@@ -247,7 +247,7 @@ def _seam_seen(look: Look) -> Plane:
 def _at_changes(labels: NDArray[np.bool_], shown: NDArray[np.bool_], tones: Plane) -> Plane:
     """The larger of two neighbours' tones (H, W) where their labels differ, summed over both directions."""
     out = np.zeros_like(tones)
-    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+    for here, there in NEIGHBOURS:
         edge = (labels[here] != labels[there]) & shown[here] & shown[there]
         out[here] += edge * np.maximum(tones[here], tones[there])
     return out
@@ -263,7 +263,7 @@ def _own_cuts(look: Look) -> Plane:
     for number, (layer, seen) in enumerate(zip(look.layers, look.maps, strict=True)):
         x, y, chosen = seen.x[box], seen.y[box], look.chosen[box]
         mine = (chosen if number else ~chosen) & look.shown[number][box]
-        for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        for here, there in NEIGHBOURS:
             with np.errstate(invalid="ignore"):
                 jumps = np.hypot(x[here] - x[there], y[here] - y[there]) > CUT_THINGS.jump_cells
             jumps &= mine[here] & mine[there]

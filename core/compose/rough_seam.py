@@ -66,17 +66,13 @@ class RoughSeam:
             torn += int(tears(own, places, seen.shown[number] & (seen.chosen == bool(number))).sum())
         return float((seam & apart).sum()) / 2 + torn + _around_holes(seen)  # a pixel on either side of the seam
 
-    def look(self, warp: Warp, forced: bool = False) -> Look:
-        """Both small pictures on the canvas of a warp, and the seam between them; forced: whether what the added one
-        cannot see comes from the other at any price."""
-        if not forced and self.last and self.last[0][0] is warp:
-            return self.last[0][1]
-        found = self._looked(warp, forced)
-        if not forced:
-            self.last[:] = [(warp, found)]
-        return found
+    def look(self, warp: Warp) -> Look:
+        """Both small pictures on the canvas of a warp, and the seam between them."""
+        if not self.last or self.last[0][0] is not warp:
+            self.last[:] = [(warp, self._looked(warp))]
+        return self.last[0][1]
 
-    def _looked(self, warp: Warp, forced: bool) -> Look:
+    def _looked(self, warp: Warp) -> Look:
         """See `look`."""
         maps = [map_to_small(one.arrays(), picture) for one, picture in zip(warp.maps, self.pictures, strict=True)]
         before, layer = (layer_of(picture, one) for picture, one in zip(self.pictures, maps, strict=True))
@@ -91,7 +87,7 @@ class RoughSeam:
         # as if exposure were matched already
         overlap.difference[overlap.both] -= np.median(overlap.difference[overlap.both], axis=0)
         costs = seam_costs(overlap, maps[1], warp.lazy_confidence, hidden, behind=warp.behind, slide=warp.slide)
-        chosen = find_seam(known_labels(before, layer, hidden=hidden if forced else None), costs)
+        chosen = find_seam(known_labels(before, layer), costs)
         return Look((before, layer), maps, hidden, overlap, chosen)
 
 

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import Part, Plane, beside, dilated, small_strips, strips
+from ..raster.arrays import Part, Plane, beside, eroded, small_strips, strips
 from ..raster.lazy import AnyImage
 from ..raster.picture_map import PictureMap
 from ..system.threads import each
@@ -193,7 +193,7 @@ def _cost(difference: Plane, both: NDArray[np.bool_], risk: Plane) -> Plane:
 
 def _rim(both: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Where (h, w) the overlap ends within some pixels or cells."""
-    return both & dilated(~np.pad(both, SEAM.rim_width), SEAM.rim_width)[(slice(SEAM.rim_width, -SEAM.rim_width),) * 2]
+    return both & ~eroded(both, SEAM.rim_width)
 
 
 def _mean(values: Plane) -> Plane:

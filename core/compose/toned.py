@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..raster.arrays import Part, Plane, for_each_channel, within
 from ..raster.lazy import AnyImage, LazyImage
 from ..raster.picture_map import CanvasMap
-from .clipped import ClippedLight
+from .clipped import ClippedLight, clipped_by
 from .options import EXPOSURE
 from .tone_options import TONE
 
@@ -196,13 +196,10 @@ def white_kept(
     start = near_white(gain)
     if own.max(initial=0) <= start:
         return
-    weight: Plane = reduce(cv2.min, cv2.split(own))
-    weight -= start
-    if weight.max() <= 0:
+    smallest: Plane = reduce(cv2.min, cv2.split(own))
+    if smallest.max() <= start:
         return
-    weight *= np.float32(1 / (EXPOSURE.clipped_light - start))
-    np.clip(weight, 0, 1, out=weight)
-    weight *= weight * (3 - 2 * weight)
+    weight = clipped_by(smallest, start)
     lacking = white - light
     np.maximum(lacking, 0, out=lacking)
     lacking *= for_each_channel(weight, own.shape[2])

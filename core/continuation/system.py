@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.projective import project
-from ..raster.arrays import Array, Part
+from ..raster.arrays import NEIGHBOURS, Array, Part
 from .banded import Equations, LeastSquares
 from .options import GRID, SYSTEM
 from .samples import Samples, Seen
 from .target_grid import TargetGrid
 
-# Nodes that lie beside each other, below one another and to the right, and three in a row.
-NEIGHBOURS = (np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])
+# Three nodes in a row, below one another and to the right.
 ROWS_OF_THREE = (np.s_[:-2, :], np.s_[1:-1, :], np.s_[2:, :]), (np.s_[:, :-2], np.s_[:, 1:-1], np.s_[:, 2:])
 
 
@@ -141,7 +140,7 @@ def _membrane(grid: TargetGrid, colours: Array, goes_on: Surroundings) -> tuple[
     and how much neighbours are tied (n,)."""
     point = grid.view.K @ grid.down
     parts, tied = [], []
-    for axis, (a, b) in enumerate(NEIGHBOURS):
+    for axis, (a, b) in enumerate(reversed(NEIGHBOURS)):
         s = (grid.sensitivity[a] + grid.sensitivity[b]) / 2
         mean = np.sqrt(grid.level_range[a] * grid.level_range[b])
         way = point[:2] - point[2] * grid.grid.points[a]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..cameras.lens import distort
 from ..cameras.matches import Matches
 from ..field.transfer import inverse_depths
-from ..raster.arrays import Array, Plane
+from ..raster.arrays import Array, Plane, eroded
 from ..system.threads import in_order
 from .epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
 from .epipolar_rows import EpipolarRows
@@ -208,11 +208,7 @@ def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
 def _inside(both: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """What (h, w) of what both pictures show does not lie near its rim. Near it a match from far away has no neighbours
     that would speak against it."""
-    side = 2 * round(RIM.width * min(both.shape)) + 1
-    kernel = np.ones((side, side), np.uint8)
-    inner = cv2.erode(both.view(np.uint8), kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    inside: NDArray[np.bool_] = inner > 0
-    return inside
+    return eroded(both, round(RIM.width * min(both.shape)))
 
 
 def _range(a: NDArray[np.uint8], disparity: Plane, found: NDArray[np.bool_], count: int) -> tuple[int, int]:

@@ -19,7 +19,7 @@ from ..panorama.layers import Layer
 from ..panorama.options import CANVAS
 from ..panorama.warp import Warp
 from ..pictures.picture import Picture
-from ..raster.arrays import Array, Part, beside, bounds, small_strips, strips
+from ..raster.arrays import NEIGHBOURS, Array, Part, beside, bounds, eroded, small_strips, strips
 from ..raster.colour import encode
 from ..raster.lazy import AnyImage
 from ..raster.log_encoding import log_encode
@@ -55,7 +55,7 @@ def ssim(a: NDArray[np.uint8], b: NDArray[np.uint8], mask: NDArray[np.bool_]) ->
     float
         NaN if no window fits.
     """
-    inner = cv2.erode(np.pad(mask.astype(np.uint8), 5), np.ones((11, 11), np.uint8))[5:-5, 5:-5] > 0
+    inner = eroded(mask, 5)
     if not inner.any():
         return float("nan")
 
@@ -216,7 +216,7 @@ def _seam_visibility(
     """See `appearance`; levels (h, w, C) of the panorama and of each layer; several (h, w): where more
     than one shows something."""
     excess = []
-    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+    for here, there in NEIGHBOURS:
         across = (labels[here] != labels[there]) & several[here] & several[there]
         steps = [part[here][across].astype(np.float32) - part[there][across] for part in levels]
         excess.append(np.min([np.abs(steps[0] - step).mean(axis=1) for step in steps[1:]], axis=0))

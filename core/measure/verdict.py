@@ -18,7 +18,7 @@ from ..cameras.sources import role
 from ..compose.rough_seam import map_to_small, small_picture
 from ..field.folding import NO_TURN, cell_areas, turned_over, turning
 from ..panorama.layers import layer_of
-from ..raster.arrays import Box, Plane, dilated
+from ..raster.arrays import NEIGHBOURS, Box, Plane, dilated, eroded
 from ..raster.colour import encode
 from ..raster.picture_map import CanvasMap, PictureMap
 from .options import VERDICT
@@ -246,7 +246,7 @@ def _along_seam(look: Look, unlike: Plane) -> Plane:
     if look.labels is None:
         return steps
     seam = np.zeros(steps.shape, bool)
-    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+    for here, there in NEIGHBOURS:
         changes = (look.labels[here] != look.labels[there]) & (look.labels[here] >= 0) & (look.labels[there] >= 0)
         seam[here] |= changes
         seam[there] |= changes
@@ -300,9 +300,8 @@ def _bent_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         # half the sum and half the difference of the singular values of the Jacobian
         alike, unlike = np.hypot(x_x + y_y, y_x - x_y) / 2, np.hypot(x_x - y_y, y_x + x_y) / 2
         bent = alike + unlike > VERDICT.squeeze * np.abs(alike - unlike)
-        window = np.ones((side + 2, side + 2), np.uint8)
-        inner = cv2.erode(known.astype(np.uint8), window, borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0
-        opened = cv2.morphologyEx((bent & inner).astype(np.uint8), cv2.MORPH_OPEN, window[: side // 2, : side // 2]) > 0
+        bent &= eroded(known, side // 2 + 1)
+        opened = cv2.morphologyEx(bent.astype(np.uint8), cv2.MORPH_OPEN, np.ones((side // 2,) * 2, np.uint8)) > 0
         for part in _parts(opened, VERDICT.bent_share * opened.size):
             what = "the picture is bent or stretched: depth or the focal length is doubtful"
             yield Place(look.box(part, shift), what, float(part.sum()))

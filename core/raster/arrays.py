@@ -17,6 +17,8 @@ Plane = NDArray[np.float32]
 Part: TypeAlias = tuple[slice, slice]
 # left, top, width, height in px
 Box = tuple[int, int, int, int]
+# Pixels of (H, W, …) and those beside them: to the right, then below.
+NEIGHBOURS = (np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])
 
 
 def angle_of(y: NDArray[Any], x: NDArray[Any]) -> NDArray[Any]:
@@ -158,6 +160,14 @@ def dilated(mask: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:
     side = 2 * margin + 1
     larger: NDArray[np.bool_] = cv2.dilate(mask.astype(np.uint8), np.ones((side, side), np.uint8)) > 0
     return larger
+
+
+def eroded(mask: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:
+    """A mask (H, W) with so many px less on every side, in a square window; beyond the edges there is nothing of it."""
+    window = np.ones((2 * margin + 1,) * 2, np.uint8)
+    inner = cv2.erode(mask.astype(np.uint8), window, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    smaller: NDArray[np.bool_] = inner > 0
+    return smaller
 
 
 def cut_in_place(array: NDArray[np.float32], box: Box) -> NDArray[np.float32]:

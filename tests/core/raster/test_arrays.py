@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.raster.arrays import angle_of, cut
+from edf_stitch.core.raster.arrays import angle_of, cut, eroded
+from hypothesis import given
+from hypothesis import strategies as st
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
@@ -32,3 +34,11 @@ def test_a_part_of_a_canvas_takes_no_memory_unless_it_reaches_over_the_edges() -
     assert np.shares_memory(part, canvas) and (part == canvas[1:5, 2:7]).all()
     wider = cut(canvas, (8, -1, 4, 3), beyond=-7)
     assert (wider[1:, :2] == canvas[:2, 8:]).all() and (wider[0] == -7).all() and (wider[:, 2:] == -7).all()
+
+
+@given(seed=st.integers(0, 2**16), margin=st.integers(0, 4))
+def test_a_mask_is_eroded_by_what_lies_outside_it_and_by_the_edges(seed: int, margin: int) -> None:
+    mask = np.random.default_rng(seed).random((9, 12)) < 0.9
+    padded = np.pad(mask, margin)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * margin + 1,) * 2)
+    assert np.array_equal(eroded(mask, margin), windows.all(axis=(2, 3)))
