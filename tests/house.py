@@ -16,7 +16,7 @@ ADDON = ROOT / "edf_addon"
 
 # Which rooms each may import, itself left out. Rooms stand in the order of the data.
 BELOW_POSE = ("system", "raster", "pictures", "cameras")
-BELOW_MEASURE = (*BELOW_POSE, "pose", "field", "dense", "continuation", "panorama", "compose")
+BELOW_MEASURE = (*BELOW_POSE, "pose", "rig", "field", "dense", "continuation", "panorama", "compose")
 TOP = ("choices", "options", "fields", "mapping", "alignment", "pipeline")
 MAY_IMPORT = {
     "system": (),
@@ -24,6 +24,7 @@ MAY_IMPORT = {
     "pictures": ("system", "raster"),
     "cameras": ("system", "raster", "pictures"),
     "pose": BELOW_POSE,
+    "rig": (*BELOW_POSE, "pose"),
     "field": ("system", "raster", "cameras"),
     "rivals": ("system", "raster", "cameras", "pose", "field"),
     "dense": (*BELOW_POSE, "field"),
