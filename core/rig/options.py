@@ -153,8 +153,10 @@ class AveragingOptions:
     # A pair agrees with the averaged rotations within so many degrees or σ.
     agrees_degrees: float = 2.0
     agrees_sigmas: float = 4.0
-    # σ beyond which a verified match that no pair explains costs no more, in the figure that compares starts.
-    unexplained_sigmas: float = 5.0
+    # Cauchy widths beyond which a verified match costs no more, in the figure that compares starts.
+    unexplained_widths: float = 5.0
+    # Iterations of refining the poses that were chosen.
+    pose_iterations: int = 6
 
 
 PAIRS = PairOptions()

@@ -56,14 +56,15 @@ class LensPrior:
 @dataclass(frozen=True, eq=False)
 class Together:
     """Pairs that were refined together: poses; lens; cost (log likelihood); information (P, n, n) of each pair's own
-    parameters; by_focal (P, n): how they change with the log of the factor; focal_information: of the log of the
-    factor, k1 and poses eliminated."""
+    parameters; by_focal (P, n), k1_by_focal: how they and k1 follow the log of the factor; focal_information: of the
+    log of the factor, k1 and poses eliminated."""
 
     poses: Poses
     lens: SharedLens
     cost: float
     information: Array
     by_focal: Array
+    k1_by_focal: float
     focal_information: float
 
 
@@ -92,11 +93,11 @@ def refine_together(
             if damping > 1e3:
                 break
     S = system.reduced(0.0)[0]
+    k1_by_focal = -float(S[0, 1] / S[1, 1]) if prior.free[1] else 0.0
     by_lens = -system.solved(0.0)[:, :, :2]
-    # with k1 eliminated, which only moves if it is free
-    focal = float(S[0, 0] - S[0, 1] ** 2 / S[1, 1] * prior.free[1])
-    by_focal = by_lens[:, :, 0] - by_lens[:, :, 1] * (S[0, 1] / S[1, 1] * prior.free[1])
-    return Together(poses, lens, cost, system.own, by_focal, focal)
+    by_focal = by_lens[:, :, 0] + by_lens[:, :, 1] * k1_by_focal
+    focal_information = float(S[0, 0] + S[0, 1] * k1_by_focal)
+    return Together(poses, lens, cost, system.own, by_focal, k1_by_focal, focal_information)
 
 
 class _Eliminated:
