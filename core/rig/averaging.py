@@ -12,7 +12,7 @@ from ..cameras.camera import Camera
 from ..cameras.rig import PictureMatches
 from ..raster.arrays import Array
 from .averaged import Averaged, PairGeometry, Verified
-from .candidates import Candidates, candidates, noise_of
+from .candidates import Candidates, at_other_lens, candidates, noise_of
 from .focal_starts import log_sigma
 from .graph import components, heaviest_component
 from .matched_rays import MatchedRays, SharedLens, matched_rays
@@ -26,12 +26,12 @@ from .turns import degrees_between, rotations
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """Candidates of the pairs, and the best of them refined together; held: whether the focal length is taken as
-    known from here on."""
+    """Candidates of the pairs, the best of them refined together, and what all that says of the log of the focal length
+    (1 / variance)."""
 
     found: Candidates
     together: Together
-    held: bool
+    focal_information: float
 
 
 def averaged(
@@ -74,18 +74,20 @@ def _fitted(matched: MatchedRays, start: SharedLens, prior: LensPrior, verified:
         return None
     together = _together(found, start, prior, verified.scale)
     if not any(prior.free):
-        return _Fitted(found, together, True)
+        return _Fitted(found, together, AVERAGING.held_information)
     turning = as_rotations(found, together, prior, start, verified.scale)
-    held = turning.share > PAIR_FIT.rotation_share
-    lens = turning.lens if held else together.lens
-    if not held and _near(lens, start):
-        return _Fitted(found, together, held)
+    rotate = turning.share > PAIR_FIT.rotation_share
+    lens = turning.lens if rotate else together.lens
+    evidence = PAIR_FIT.rotation_log_focal**-2 if rotate else AVERAGING.focal_evidence * together.focal_information
+    if not rotate and _near(lens, start):
+        return _Fitted(found, together, evidence)
     again = candidates(matched, lens, verified.scale, verified.seed)
     if not len(again.numbers):
-        return _Fitted(found, together, held)
-    if held:
+        return _Fitted(found, together, evidence)
+    if rotate:
         prior = LensPrior(prior.log_sigma, (False, False))
-    return _Fitted(again, _together(again, lens, prior, verified.scale), held)
+    together = _together(again, lens, prior, verified.scale)
+    return _Fitted(again, together, evidence if rotate else AVERAGING.focal_evidence * together.focal_information)
 
 
 def _near(lens: SharedLens, other: SharedLens) -> bool:
@@ -101,21 +103,34 @@ def _together(found: Candidates, lens: SharedLens, prior: LensPrior, scale: floa
 def _averaged(
     cameras: Sequence[Camera], verified: Verified, matched: MatchedRays, ends: NDArray[np.intp], fitted: _Fitted
 ) -> Averaged:
-    found, together = fitted.found, fitted.together
-    pairs = [(int(i), int(j)) for i, j in ends[found.numbers]]
-    counts = found.rays.counts
-    members = heaviest_component(len(cameras), pairs, counts.tolist())
-    kept = np.flatnonzero(np.isin(ends[found.numbers], members).all(axis=1))
-    links = _links(found, together, [pairs[k] for k in kept], members, kept)
-    known = AVERAGING.held_information
-    turned = average(links, known if fitted.held else AVERAGING.focal_evidence * together.focal_information)
-    lens = SharedLens(
-        together.lens.factor * float(np.exp(turned.log_focal)),
-        together.lens.k1 + together.k1_by_focal * turned.log_focal,
-    )
-    lens = matched.within_limits(lens)
+    """Average, and again with the new lens as long as closing loops moves the focal length: rotations of pairs follow
+    it linearly over some per cent only."""
+    by_pairs = fitted.together.lens
+    for _ in range(AVERAGING.lens_rounds):
+        found, together = fitted.found, fitted.together
+        pairs = [(int(i), int(j)) for i, j in ends[found.numbers]]
+        members = heaviest_component(len(cameras), pairs, found.rays.counts.tolist())
+        kept = np.flatnonzero(np.isin(ends[found.numbers], members).all(axis=1))
+        links = _links(found, together, [pairs[k] for k in kept], members, kept)
+        before = float(np.log(by_pairs.factor / together.lens.factor))
+        turned = average(links, fitted.focal_information, before)
+        lens = SharedLens(
+            together.lens.factor * float(np.exp(turned.log_focal)),
+            together.lens.k1 + together.k1_by_focal * turned.log_focal,
+        )
+        lens = matched.within_limits(lens)
+        if abs(turned.log_focal) < AVERAGING.same_log_focal:
+            break
+        fitted = _at_lens(matched, lens, fitted, verified.scale)
     chosen = _chosen(matched, found, kept, links, turned, lens, verified.scale)
     return _told(cameras, verified, matched, members, links, turned, lens, chosen)
+
+
+def _at_lens(matched: MatchedRays, lens: SharedLens, fitted: _Fitted, scale: float) -> _Fitted:
+    """The same with the focal length that closes loops; k1 follows it."""
+    found = at_other_lens(fitted.found, lens, scale)
+    prior = LensPrior(1.0, (False, matched.anything_free[1]))
+    return _Fitted(found, _together(found, lens, prior, scale), fitted.focal_information)
 
 
 def _links(

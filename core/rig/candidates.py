@@ -97,6 +97,11 @@ def candidates(matched: MatchedRays, lens: SharedLens, scale: float, seed: int) 
     return _refined(kept, inliers, rays, np.array(turned), starts, lens, scale)
 
 
+def at_other_lens(found: Candidates, lens: SharedLens, scale: float) -> Candidates:
+    """The same candidates refined at another lens, and judged and ordered anew."""
+    return _refined(found.numbers, found.inliers, found.rays, found.turned, list(found.poses), lens, scale)
+
+
 def _of_inliers(matched: MatchedRays, kept: NDArray[np.intp], inliers: NDArray[np.bool_]) -> MatchedRays:
     masks = [inliers[matched.starts[k] : matched.starts[k + 1]] for k in kept]
     return matched.of_pairs(kept).where(np.concatenate(masks))

@@ -89,6 +89,8 @@ class PairFitOptions:
     # Share of the matches that pure rotations must explain better before the focal length is taken from them: that of
     # poses without parallax is arbitrary.
     rotation_share: float = 0.3
+    # σ of the log of that focal length: the little parallax there is bends it.
+    rotation_log_focal: float = 0.01
     # GRIC by which a rotation must explain a pair better, matches that must say so, and how near it must be to the
     # averaged rotation.
     rotation_gric: float = 20.0
@@ -148,6 +150,9 @@ class AveragingOptions:
     most_switches: int = 200
     # The pairs' own evidence on f counts a quarter: errors of neighbouring matches go together.
     focal_evidence: float = 0.25
+    # A change of log f that needs no further round, and rounds at most.
+    same_log_focal: float = 0.005
+    lens_rounds: int = 4
     # Information on log f where it is held.
     held_information: float = 1e12
     # A pair agrees with the averaged rotations within so many degrees or σ.

@@ -74,7 +74,7 @@ class Rotations:
     off_degrees: Array
 
 
-def average(links: Links, focal_information: float) -> Rotations:
+def average(links: Links, focal_information: float, log_focal_before: float = 0.0) -> Rotations:
     """Average rotations robustly.
 
     Pairs that no triangle confirms start switched off; the rest is averaged with weights that fall off with misfit,
@@ -85,8 +85,8 @@ def average(links: Links, focal_information: float) -> Rotations:
     ----------
     links : Links
         That join all N pictures.
-    focal_information : float
-        On the log of the focal length, from the pairs.
+    focal_information, log_focal_before : float
+        What the pairs say of the change of the log of the focal length, and how surely (1 / variance).
 
     Returns
     -------
@@ -95,7 +95,7 @@ def average(links: Links, focal_information: float) -> Rotations:
     degrees = links.degrees
     choices = [R[cost < NEVER] for R, cost in zip(links.R, links.costs, strict=True)]
     used, closed = without_contradicted(links.count, links.pairs, triangles(links.pairs, choices, degrees), degrees)
-    problem = _Problem(links, focal_information)
+    problem = _Problem(links, focal_information, log_focal_before)
     state = _State(_along_tree(links, used, closed), np.zeros(len(links.pairs), np.intp), 0.0)
     state = problem.followed(state, used, AVERAGING.iterations, AVERAGING.widths)
     allowed = np.maximum(AVERAGING.back_degrees, AVERAGING.back_sigmas * degrees)
@@ -130,8 +130,8 @@ class _State:
 class _Problem:
     """The cost of rotations and of a common change of the log of the focal length, and steps that lower it."""
 
-    def __init__(self, links: Links, focal_information: float) -> None:
-        self.links, self.focal_information = links, focal_information
+    def __init__(self, links: Links, focal_information: float, log_focal_before: float) -> None:
+        self.links, self.focal_information, self.before = links, focal_information, log_focal_before
         self.weights = links.weights
         self.first, self.second = links.ends
         self.each = np.arange(len(links.pairs))
@@ -152,7 +152,7 @@ class _Problem:
         width = AVERAGING.widths[-1]
         robust = width**2 * np.log1p(_squares(off, self.weights) / width**2) / 2
         own = self.links.costs[self.each, state.choice]
-        return float((robust + own).sum()) + 0.5 * self.focal_information * state.log_focal**2
+        return float((robust + own).sum()) + 0.5 * self.focal_information * (state.log_focal - self.before) ** 2
 
     def chosen(self, state: _State, width: float) -> _State:
         """The candidates that fit best where the pictures stand now."""
@@ -192,7 +192,7 @@ class _Problem:
         np.add.at(A, (rows[:, :, None], rows[:, None, :]), weighted @ J)
         np.add.at(right, rows, -np.einsum("pij,pj->pi", weighted, off))
         A[-1, -1] += self.focal_information
-        right[-1] -= self.focal_information * state.log_focal
+        right[-1] -= self.focal_information * (state.log_focal - self.before)
         # the world turned under all pictures changes nothing: it is held
         world = state.R.reshape(-1, 3)
         A[:-1, :-1] += np.trace(A[:-1, :-1]) / (3 * count) ** 2 * (world @ world.T)
