@@ -132,10 +132,10 @@ def _solved(ratios: Sequence[_Ratio], count: int, channels: int, to_reference: b
             matrix[np.ix_(ends, ends)] += weight * np.array([[1, -1], [-1, 1]])
             right[ends] += weight * one.middle[k] * np.array([-1, 1])
         # one picture of each group is held; which one is of no consequence
-        free = np.setdiff1d(np.arange(count), [np.flatnonzero(group == one)[0] for one in range(groups)])
+        free = np.setdiff1d(np.arange(count), [np.flatnonzero(group == number)[0] for number in range(groups)])
         gains[free, k] = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
-    for one in range(groups):
-        own = group == one
+    for number in range(groups):
+        own = group == number
         gains[own] -= gains[0] if to_reference and own[0] else np.median(gains[own], axis=0)
     return gains
 
@@ -153,8 +153,8 @@ def _with_clipped(
             shown = np.logical_and.reduce([
                 (layers[k].alpha > OVERLAP.opaque_alpha) & ~hidden[k] for k in (number, other)
             ])  # fmt: skip
-            toned = [exposures[k].applied(layers[k], maps[k]).light for k in (number, other)]
-            told = clipped_light(layers[number].light, *toned, shown)
+            toned, reference = (exposures[k].applied(layers[k], maps[k]).light for k in (number, other))
+            told = clipped_light(layers[number].light, toned, reference, shown)
         out.append(replace(one, overexposed=share, clipped=told))
     return tuple(out)
 
