@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..alignment import Alignment, Frame, align
-from ..compose.composition import Decided, pooled_decision
+from ..compose.decided import Decided, pooled_decision
 from ..options import StitchOptions
 from ..output.outputs import json_bytes
 from ..pictures.picture import Picture

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..alignment import Alignment
     from ..cameras.camera import Camera
     from ..cameras.two_view import TwoView
-    from ..compose.composition import Decided
+    from ..compose.decided import Decided
     from ..dense.refine import Dense
     from ..options import StitchOptions
     from ..pictures.picture import Picture
