@@ -38,6 +38,12 @@ class CameraRequest:
     principal: tuple[float, ...] = ()
     cameras: str | Path | dict[str, Any] | None = None
 
+    @property
+    def of_two(self) -> bool:
+        """Whether a value is that of one of two pictures."""
+        focals = (self.focal_px, self.focal_mm, self.sensor_mm, self.focal35)
+        return any(len(values) == 2 for values in focals) or len(self.principal) == 4
+
     def __post_init__(self) -> None:
         ways = [self.focal_px, self.focal_mm, self.focal35, (self.cameras,) if self.cameras is not None else ()]
         if sum(bool(way) for way in ways) > 1:
