@@ -41,8 +41,8 @@ class Frame:
         """The same with some of the pictures, in the order of their numbers as given."""
         if list(numbers) == list(range(len(self.pictures))):
             return self
-        pictures, sizes = (tuple(each[number] for number in numbers) for each in (self.pictures, self.full_sizes))
-        return replace(self, pictures=pictures, full_sizes=sizes)
+        pictures = tuple(self.pictures[number] for number in numbers)
+        return replace(self, pictures=pictures, full_sizes=tuple(self.full_sizes[number] for number in numbers))
 
 
 def size_of(picture: Picture) -> tuple[int, int]:

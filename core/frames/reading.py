@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cameras.sources import role
+from ..cameras.sources import called
 from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_painted, without
 from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
@@ -97,8 +97,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
             continue
         mask, shown = masks[number], picture
         if mask is not None:
-            called = f"the {role(number)}" if len(pictures) == 2 else picture.name
-            shown = without(picture, read_mask(mask, size_of(picture), called))
+            shown = without(picture, read_mask(mask, size_of(picture), called(number, names)))
         worked_on.append(resized(shown, options.scale))
         sizes.append(size_of(picture))
     warnings = tuple(

@@ -153,7 +153,7 @@ def test_a_crop_is_chosen_only_where_something_may_be_lost() -> None:
     assert StitchOptions(projection="auto", field="rew", crop="auto").kept == "full"
 
 
-# --- more than two pictures --------------------------------------------------------------------------------------------
+# --- more than two pictures -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("asked", "words"), [
