@@ -166,8 +166,8 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_stitch)
     parser.add_argument(
         "pictures", metavar="PICTURE", type=Path, nargs="+",
-        help="files, folders, or patterns like IMG_*.jpg, which stand for all pictures in them but hidden ones, sorted as "
-        "people count; of two pictures the first is the reference",
+        help="files, folders, or patterns like IMG_*.jpg, which stand for all pictures in them but hidden ones, sorted "
+        "as people count; of two pictures the first is the reference",
     )  # fmt: skip
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="OUT", help=".png, .jpg, .tif (8 or 16 bit) or .exr (float)"
