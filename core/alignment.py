@@ -27,13 +27,13 @@ from .field.field import Field
 from .field.slack import SlackField
 from .field.strict import StrictField
 from .fields import fit_field
+from .frames.frame import Frame, size_of
 from .mapping import map_pictures
 from .options import StitchOptions
 from .panorama.choosing_slide import SlideChoice
 from .panorama.upright_edges import straight_edges
 from .panorama.warp import Warp
-from .pictures.masks import read_mask, read_painted, without
-from .pictures.picture import Picture, resized
+from .pictures.picture import Picture
 from .pose import features
 from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
@@ -81,38 +81,6 @@ class Alignment:
     dense: Dense | None = None
     continuation: Continuation | None = None
     slide: SlideChoice = SlideChoice(0.0, (), "")
-
-
-@dataclass(frozen=True)
-class Frame:
-    """The pictures of one panorama, made ready.
-
-    Attributes
-    ----------
-    pictures : tuple of Picture
-        The reference first, scaled, and without what is masked.
-    full_sizes : tuple of (W, H)
-        px of the pictures as they came.
-    painted : ndarray (H, W) int8 or None
-        What was painted over the panorama (see `masks.read_painted`).
-    """
-
-    pictures: tuple[Picture, ...]
-    full_sizes: tuple[tuple[int, int], ...]
-    painted: NDArray[np.int8] | None = None
-
-
-def prepare(pictures: Sequence[Picture], options: StitchOptions) -> Frame:
-    """A frame of full pictures in one colour space. Raises BadRequest or UnreadableImage about a mask."""
-    worked_on = []
-    for number, picture in enumerate(pictures):
-        mask = options.ignored(number)
-        shown = picture
-        if mask is not None:
-            shown = without(picture, read_mask(mask, size_of(picture), f"the {role(number)}"))
-        worked_on.append(resized(shown, options.scale))
-    painted = None if options.mask is None else read_painted(options.mask)
-    return Frame(tuple(worked_on), tuple(size_of(picture) for picture in pictures), painted)
 
 
 @dataclass(frozen=True)
@@ -289,12 +257,6 @@ def _refined(
     if not isinstance(field, (StrictField, SlackField)):
         return Dense(None, f"the field {field.name!r} is shown as it is")
     return refine(field, field.two_view, inliers, edge.pair(frames[0].pictures), cameras)
-
-
-def size_of(picture: Picture) -> tuple[int, int]:
-    """(W, H) px of a picture."""
-    height, width = picture.light.shape[:2]
-    return width, height
 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:

@@ -9,14 +9,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .alignment import Alignment, Frame, estimate_geometry, fit_and_warp, prepare
+from .alignment import Alignment, estimate_geometry, fit_and_warp
 from .cameras.camera import Camera
 from .cameras.edge import Edge
 from .cameras.matches import Matches
@@ -25,6 +24,8 @@ from .compose.composition import Composition, composed
 from .compose.crop import crop_box
 from .compose.decided import Decided
 from .field.field import Field
+from .frames.frame import Frame
+from .frames.reading import Source, read_frame
 from .measure.fallback import first_usable
 from .measure.metrics import appearance
 from .measure.report import make_report
@@ -34,15 +35,11 @@ from .panorama.canvas import Canvas
 from .panorama.layers import Layer, layer_of
 from .panorama.warp import Warp
 from .pictures.masks import has_shape, painted_over
-from .pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
+from .pictures.picture import Picture
 from .raster.arrays import Box, box_of, common, cut
 from .raster.resizing import resized_points
-from .system.errors import BadRequest, NoOverlap
+from .system.errors import BadRequest
 from .system.progress import Progress
-from .system.threads import in_order
-
-# What can be stitched: a file's name, an array, or a Picture that was read already.
-Source = str | Path | NDArray[Any] | Picture
 
 
 @dataclass(frozen=True)
@@ -219,45 +216,6 @@ def stitch(
     return first_usable(made, options)
 
 
-def check_count(count: int) -> None:
-    """Refuses (BadRequest) as many pictures as cannot be stitched."""
-    if count < 2:
-        raise BadRequest("one picture alone makes no panorama: give two that were taken from different places")
-    if count > 2:
-        raise BadRequest(f"{count} pictures given: two at a time for now; stitch them pair by pair")
-
-
-def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
-    """Reads the pictures of one panorama and brings them into one colour space.
-
-    Parameters
-    ----------
-    sources : sequence of (str, Path, ndarray or Picture)
-        The first is the reference.
-    options : StitchOptions
-        Their scale and masks.
-
-    Returns
-    -------
-    Frame
-
-    Raises
-    ------
-    UnreadableImage
-        A file is no picture, or damaged.
-    BadRequest
-        A wrong number of pictures, or a mask that does not fit.
-    NoOverlap
-        The same picture twice.
-    """
-    check_count(len(sources))
-    pictures = in_same_colour_space(list(in_order(_picture, sources)))
-    views = [picture.view for picture in pictures]
-    if any(np.array_equal(one, other) for one, other in combinations(views, 2)):
-        raise NoOverlap("the two pictures are the same picture: choose two photographs taken from different places")
-    return prepare(pictures, options)
-
-
 def compose(
     frame: Frame, alignment: Alignment, options: StitchOptions, progress: Stopwatch,
     decided: Sequence[Decided] | None = None, keep: bool = False,
@@ -349,13 +307,6 @@ class Stopwatch:
             self.seconds[self._stage] = self.seconds.get(self._stage, 0.0) + now - self._since
         self._stage, self._since = stage, now
         self._progress(stage, fraction)
-
-
-def _picture(source: Source) -> Picture:
-    """A picture, read where it is not one yet."""
-    if isinstance(source, Picture):
-        return source
-    return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
 
 
 def _on_canvas(painted: NDArray[np.int8], canvas: Canvas, place: Box) -> NDArray[np.int8]:

@@ -12,12 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment import Alignment, Frame, align
+from ..alignment import Alignment, align
 from ..compose.decided import Decided, pooled_decision
+from ..frames.frame import Frame
+from ..frames.reading import read_frame
 from ..options import StitchOptions
 from ..output.outputs import json_bytes
 from ..pictures.picture import Picture
-from ..pipeline import StitchResult, Stopwatch, compose, read_frame, stitch
+from ..pipeline import StitchResult, Stopwatch, compose, stitch
 from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage
 from ..system.progress import Progress
 from .list import BatchItem

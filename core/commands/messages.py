@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
+
+from .options import MESSAGES
 
 
 def say(line: str) -> None:
@@ -16,6 +18,12 @@ def say(line: str) -> None:
         tqdm.write(line, file=sys.stderr)
     else:
         print(line, file=sys.stderr, flush=True)
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Names in words: the first ones and the last of many."""
+    most = MESSAGES.max_names
+    return ", ".join(names) if len(names) <= most else ", ".join([*names[: most - 1], "…", names[-1]])
 
 
 def print_summary(report: dict[str, Any], seconds: dict[str, float]) -> None:

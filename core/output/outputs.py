@@ -24,6 +24,7 @@ from ..raster.colour import decode
 from ..raster.lazy import whole
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
+from .camera_file import camera_table
 from .match_table import match_file
 
 # Versions of the layers' folder and of the warp's file (docs/formats.md).
@@ -53,12 +54,15 @@ class OutputRequest:
         A folder.
     warp : Path, optional
         .npz.
+    cameras : Path, optional
+        .json.
     """
 
     panorama: Path
     report: Path | None = None
     layers: Path | None = None
     warp: Path | None = None
+    cameras: Path | None = None
 
     @property
     def timing(self) -> Path | None:
@@ -97,7 +101,10 @@ def check(
     output_bits((8,), request.panorama.suffix)
     if request.warp is not None and request.warp.suffix.lower() != ".npz":
         raise BadRequest(f"the warp is written as .npz, not {request.warp.suffix or 'a file of no kind'}")
-    named = (request.panorama, request.report, request.timing, request.matches, request.warp)
+    if request.cameras is not None and len(set(pictures)) < len(pictures):
+        twice = next(name for number, name in enumerate(pictures) if name in pictures[:number])
+        raise BadRequest(f"cameras are written by name, and two pictures are called {twice}: rename one of them")
+    named = (request.panorama, request.report, request.timing, request.matches, request.warp, request.cameras)
     single = [path for path in named if path is not None]
     files.check(*single)
     if request.layers is not None:
@@ -176,6 +183,8 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
         _add_layers(result, request.layers, files)
     if request.warp is not None:
         files.add(request.warp, warp_bytes(result))
+    if request.cameras is not None:
+        files.add(request.cameras, json_bytes(camera_table(result)))
     if request.report is not None and request.timing is not None and request.matches is not None:
         add_report(result, [*result.warnings, *warnings], request.report, request.matches, request.timing, files)
     return warnings

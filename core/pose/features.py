@@ -129,9 +129,14 @@ def match(a: Features, b: Features, ratio: float = FEATURES.ratio) -> Matches:
     Matches
         In px of the full pictures, each pair of places (to 0.1 px) once; `scale` is the larger one of a and b.
     """
-    scale = max(a.scale, b.scale)
+    which = match_index(a, b, ratio)
+    return Matches(a.points[which[:, 0]], b.points[which[:, 1]], max(a.scale, b.scale))
+
+
+def match_index(a: Features, b: Features, ratio: float = FEATURES.ratio) -> NDArray[np.intp]:
+    """Which features match (M, 2): numbers into a and b; see `match`."""
     if len(a.points) < 2 or len(b.points) < 2:
-        return Matches(np.empty((0, 2)), np.empty((0, 2)), scale)
+        return np.empty((0, 2), np.intp)
     nearest, nearest_score, second = (np.empty(len(a.points), t) for t in (np.intp, np.float32, np.float32))
     back_score = np.full(len(b.points), -2, np.float32)
     back = np.zeros(len(b.points), np.intp)
@@ -160,7 +165,7 @@ def match(a: Features, b: Features, ratio: float = FEATURES.ratio) -> Matches:
     # one place may carry several orientations, hence several identical matches
     _, first = np.unique(np.round(np.hstack([x, y]), 1), axis=0, return_index=True)
     first.sort()
-    return Matches(x[first], y[first], scale)
+    return np.column_stack([keep, nearest[keep]])[first]
 
 
 def _products(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
