@@ -165,9 +165,10 @@ def bundle(
         done += 1
         bases = tangents(solution.rays)
         normal = normal_equations(problem, solution, structure, seen, settings, prior, bases)
+        scale = _scale_direction(structure, solution)
         before = cost
         for _ in range(BUNDLE.tries):
-            step = _solved(structure, normal, damping)
+            step = _solved(structure, normal, scale, damping)
             moved = _moved(problem, solution, structure, bases, *step)
             moved_seen = reproject(problem, moved, structure.chosen)
             moved_cost = _cost(problem, moved, structure, moved_seen, settings, prior)
@@ -272,8 +273,23 @@ def schur_complement(structure: Structure, normal: Normal, inverses: Array) -> t
     return structure.reduced(whole), structure.reduced(gradient)
 
 
-def _solved(structure: Structure, normal: Normal, damping: float) -> tuple[Array, Array]:
-    """Steps of the cameras' unknowns (C,) and of the points (P, 3)."""
+def _scale_direction(structure: Structure, solution: Solution) -> Array:
+    """How all places grow together (C,), a unit vector; 0 where they cannot.
+
+    No observation tells the scale, but priors of ρ would be cheaper the larger it is.
+    """
+    columns = structure.columns[:, 3:6]
+    free = columns >= 0
+    growth = np.zeros(structure.unknowns)
+    held = solution.centres[~free[:, 0]]
+    if len(held) and np.ptp(held, axis=0).max() == 0:
+        growth[columns[free]] = (solution.centres - held[0])[free]
+    length = float(np.linalg.norm(growth))
+    return growth / length if length else growth
+
+
+def _solved(structure: Structure, normal: Normal, scale: Array, damping: float) -> tuple[Array, Array]:
+    """Steps of the cameras' unknowns (C,) and of the points (P, 3); none along `scale` (C,)."""
     diagonal = np.einsum("pii->pi", normal.points)
     damped = normal.points + (damping * diagonal + 1e-12)[:, :, None] * np.eye(3)
     inverses = np.linalg.inv(damped)
@@ -281,7 +297,9 @@ def _solved(structure: Structure, normal: Normal, damping: float) -> tuple[Array
     left = normal.cameras - fill
     size = len(left)
     left[np.diag_indices(size)] += damping * np.diag(normal.cameras)
-    left[np.diag_indices(size)] += BUNDLE.regular * np.trace(left) / max(size, 1)
+    usual = np.trace(left) / max(size, 1)
+    left[np.diag_indices(size)] += BUNDLE.regular * usual
+    left += BUNDLE.scale_stiffness * usual * np.outer(scale, scale)
     step = np.linalg.solve(left, gradient_fill - normal.gradient)
     by_camera = (structure.chooser @ step).reshape(-1, CAMERA)[structure.picture]
     pulled = structure.summed_by_point(np.matmul(normal.between, by_camera[:, :, None])[:, :, 0])

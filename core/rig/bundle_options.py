@@ -96,9 +96,11 @@ class BundleOptions:
     damping_up: float = 8.0
     least_damping: float = 1e-9
     tries: int = 8
-    # Most that log f changes in a step, and what keeps the free scale regular, in units of the mean diagonal.
+    # Most that log f changes in a step.
     most_log_focal: float = 0.2
+    # What keeps the equations regular, and stiffness that keeps the scale, in units of their mean diagonal.
     regular: float = 1e-9
+    scale_stiffness: float = 1e3
 
 
 @dataclass(frozen=True)
