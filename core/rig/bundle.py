@@ -7,6 +7,7 @@ columns. Reference: Triggs et al., Bundle Adjustment: A Modern Synthesis, 1999.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,9 @@ from .reprojection import CAMERA, Reprojection, derivatives, reproject, tangents
 from .solution import Problem, Solution, free_lens_parameters, lens_priors, lens_values
 from .tracks import Index, pairs_within
 from .turns import rotations
+
+# Called often by long work; ends it by raising.
+Tick = Callable[[], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +142,9 @@ def _columns(problem: Problem, settings: Settings, reference: int) -> Index:
 
 
 def bundle(
-    problem: Problem, solution: Solution, settings: Settings, reference: int, prior: DepthPrior | None = None
-) -> Bundled:
+    problem: Problem, solution: Solution, settings: Settings, reference: int, prior: DepthPrior | None = None,
+    tick: Tick = lambda: None,
+) -> Bundled:  # fmt: skip
     """Minimise the robust cost of all observations that are used.
 
     Parameters
@@ -152,6 +157,8 @@ def bundle(
         The picture whose pose is held, unless poses are given.
     prior : DepthPrior, optional
         Draws ρ; without one, points without parallax are held by the damping alone.
+    tick : callable
+        Called at every iteration; ends the work by raising.
 
     Returns
     -------
@@ -163,9 +170,10 @@ def bundle(
     damping, done = BUNDLE.damping, 0
     while done < settings.iterations and len(structure.chosen):
         done += 1
+        tick()
         bases = tangents(solution.rays)
         normal = normal_equations(problem, solution, structure, seen, settings, prior, bases)
-        scale = _scale_direction(structure, solution)
+        scale = scale_direction(structure, solution)
         before = cost
         for _ in range(BUNDLE.tries):
             step = _solved(structure, normal, scale, damping)
@@ -273,7 +281,7 @@ def schur_complement(structure: Structure, normal: Normal, inverses: Array) -> t
     return structure.reduced(whole), structure.reduced(gradient)
 
 
-def _scale_direction(structure: Structure, solution: Solution) -> Array:
+def scale_direction(structure: Structure, solution: Solution) -> Array:
     """How all places grow together (C,), a unit vector; 0 where they cannot.
 
     No observation tells the scale, but priors of ρ would be cheaper the larger it is.
