@@ -87,6 +87,8 @@ class BundleOptions:
     # thousands of observations do not outweigh a prior as independent ones would.
     k1_sigma: float = 0.05
     prior_noise_px: float = 1.0
+    # Iterations that undo a distortion.
+    undistorting: int = 8
     # Residual px of what lies behind a camera, and the third coordinate of |r| = 1 from which a point is before it.
     behind_px: float = 1e3
     least_ahead: float = 1e-3

@@ -125,10 +125,10 @@ def _behind(solution: Solution) -> float:
     return float((ranges < 0).mean()) if len(ranges) else 0.0
 
 
-def start(problem: Problem, R: Array, focal: Array, k1: Array, principal: Array) -> Solution:
-    """Where the bundle begins before places are known: no points, all places the origin."""
+def start(problem: Problem, R: Array, lens: Array) -> Solution:
+    """Where the bundle begins before places are known, lens (L, LENS): no points, all places the origin."""
     points, observations = len(problem.tracks), len(problem.tracks.point)
     ahead = np.tile([0.0, 0, 1], (points, 1))
     nowhere = np.zeros((problem.pictures, 3))
     none = np.zeros(points, bool)
-    return Solution(R, nowhere, focal, k1, principal, ahead, np.zeros(points), none, np.ones(observations, bool))
+    return Solution(R, nowhere, lens, ahead, np.zeros(points), none, np.ones(observations, bool))

@@ -22,6 +22,7 @@ from .options import PAIRS
 from .pairs import verified as verify
 from .polishing import Polished
 from .reprojection import lengths_of_errors
+from .solution import lens_of
 from .solving import Solved, solve
 from .turns import degrees_between
 from .uncertainty import deviations
@@ -129,14 +130,10 @@ def _rig(
 
 def _camera(camera: Camera, found: Polished, picture: int) -> Camera:
     """As estimated; what was given stays to the last bit."""
-    lens = int(found.problem.lenses.of[picture])
-    free = found.problem.lenses.free[lens]
-    solution = found.solution
-    K = camera.scaled(float(solution.focal[lens]) / camera.focal) if free[0] else camera.K.copy()
-    if free[2]:
-        K[:2, 2] = solution.principal[lens]
-    given = camera.distortion.any()
-    distortion = np.array([solution.k1[lens], 0, 0, 0, 0]) if free[1] and not given else camera.distortion
+    log_factor, k1, *shift = found.solution.lens[found.problem.lenses.of[picture]]
+    K = camera.scaled(float(np.exp(log_factor)))
+    K[:2, 2] += shift
+    distortion = camera.distortion if camera.distortion.any() else np.array([k1, 0, 0, 0, 0])
     return replace(camera, K=K, distortion=distortion)
 
 
@@ -180,8 +177,8 @@ def _guesses(found: Sequence[Solved]) -> tuple[FocalGuess, ...]:
     guesses: list[FocalGuess] = []
     for solved in found:
         solution = solved.found.solution
-        lens = int(solved.found.problem.lenses.of[0])
-        guess = FocalGuess(float(solution.focal[lens]), float(solution.k1[lens]), solved.cost)
+        lens = lens_of(solved.found.problem, solution, np.zeros(1, np.intp))
+        guess = FocalGuess(float(lens.focal[0]), float(lens.k1[0]), solved.cost)
         near = any(abs(np.log(guess.focal / other.focal)) < JUDGE.same_log_focal for other in guesses)
         if solved.cost <= found[0].cost * (1 + JUDGE.possible) and not near:
             guesses.append(guess)

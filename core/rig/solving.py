@@ -17,7 +17,7 @@ from .bundle import Tick
 from .bundle_options import BUNDLE, JUDGE
 from .matched_rays import SharedLens
 from .polishing import Polished, start
-from .solution import Problem, lenses_of
+from .solution import LENS, Problem, lenses_of
 from .stations import polish_best, proposed, same_places
 from .tracks import build_tracks, fitting_pairs
 
@@ -25,12 +25,14 @@ from .tracks import build_tracks, fitting_pairs
 @dataclass(frozen=True, eq=False)
 class Solved:
     """A hypothesis at its end: averaged rotations; pairs whose matches became tracks; the bundle's result; cost: px² a
-    verified match, what hypotheses are compared by."""
+    verified match, what hypotheses are compared by; moved: the most that the bundle changed the log of a focal length.
+    """
 
     averaged: Averaged
     pairs: list[PairGeometry]
     found: Polished
     cost: float
+    moved: float
 
 
 def solve(
@@ -48,9 +50,7 @@ def solve(
         if rotated is None or len(rotated.members) < 2:
             break
         solved = _bundled(cameras, points, verified, rotated, tick)
-        lenses = solved.found.problem.lenses
-        before = np.array([rotated.cameras[rotated.members[k]].focal for k in _first_of(lenses.of)])
-        if np.abs(np.log(solved.found.solution.focal / before)).max() < JUDGE.most_log_focal:
+        if solved.moved < JUDGE.most_log_focal:
             break
         tick()
         known, shared = _cameras_of(cameras, rotated, solved.found)
@@ -69,19 +69,17 @@ def _bundled(
     lenses = lenses_of(own)
     place = np.arange(len(members))
     problem = Problem(tracks, lenses, verified.scale, rotated.noise_px, place, held)
-    by_pairs = [rotated.cameras[members[k]] for k in _first_of(lenses.of)]
-    begun = start(
-        problem,
-        rotated.R[list(members)],
-        np.array([camera.focal for camera in by_pairs]),
-        np.array([camera.distortion[0] for camera in by_pairs]),
-        np.array([camera.K[:2, 2] for camera in by_pairs]),
-    )
+    by_pairs = [rotated.cameras[members[k]] for k in lenses.first]
+    lens = np.zeros((len(lenses), LENS))
+    lens[:, 0] = np.log([camera.focal for camera in by_pairs] / lenses.focal[lenses.first])
+    lens[:, 1] = [camera.distortion[0] for camera in by_pairs]
+    lens[~lenses.free] = 0
     given = _Given(own, held)
-    begun = replace(begun, R=given.turned(begun.R))
+    begun = start(problem, given.turned(rotated.R[list(members)]), lens)
     stations = proposed(pairs, members) or ([tuple(range(len(members)))] if rotated.one_place else [])
     found = polish_best(problem, begun, stations, same_places(pairs, members), given.moved, tick)
-    return Solved(rotated, pairs, found, _judged(found, pairs, verified))
+    moved = float(np.abs(found.solution.lens[:, 0] - lens[:, 0]).max())
+    return Solved(rotated, pairs, found, _judged(found, pairs, verified), moved)
 
 
 class _Given:
@@ -115,22 +113,18 @@ class _Given:
         return moved
 
 
-def _first_of(lens: NDArray[np.intp]) -> list[int]:
-    """The first picture of every lens."""
-    return [int(np.flatnonzero(lens == number)[0]) for number in range(int(lens.max()) + 1)]
-
-
 def _cameras_of(cameras: Sequence[Camera], rotated: Averaged, found: Polished) -> tuple[list[Camera], SharedLens]:
     """All pictures' cameras with the bundle's focal lengths, and its k1; those of pictures left out move as the others'
     do in the middle."""
     solution, lenses = found.solution, found.problem.lenses
-    usual = float(np.exp(np.median(np.log(solution.focal) - lenses.log_focal)))
-    known = [camera if camera.fixed else replace(camera, K=camera.scaled(usual)) for camera in cameras]
-    for k, member in enumerate(rotated.members):
-        factor = float(solution.focal[lenses.of[k]]) / cameras[member].focal
-        known[member] = replace(cameras[member], K=cameras[member].scaled(factor))
+    factors = np.full(len(cameras), np.exp(np.median(solution.lens[:, 0])))
+    factors[list(rotated.members)] = np.exp(solution.lens[lenses.of, 0])
+    known = [
+        camera if camera.fixed else replace(camera, K=camera.scaled(float(factor)))
+        for camera, factor in zip(cameras, factors, strict=True)
+    ]
     free = lenses.free[:, 1]
-    return known, SharedLens(1.0, float(np.median(solution.k1[free])) if free.any() else 0.0)
+    return known, SharedLens(1.0, float(np.median(solution.lens[free, 1])) if free.any() else 0.0)
 
 
 def _judged(found: Polished, pairs: Sequence[PairGeometry], verified: Verified) -> float:
