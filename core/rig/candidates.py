@@ -176,7 +176,8 @@ def _frames(pairs: Array) -> Array:
     """Right-handed frames (S, 3, 3), as columns, of two unit vectors each (S, 2, 3)."""
     middle, across = pairs.sum(axis=1), np.cross(pairs[:, 0], pairs[:, 1])
     frame = np.stack([middle, across, np.cross(middle, across)], axis=2)
-    return frame / np.maximum(np.linalg.norm(frame, axis=1, keepdims=True), 1e-12)
+    unit: Array = frame / np.maximum(np.linalg.norm(frame, axis=1, keepdims=True), 1e-12)
+    return unit
 
 
 def fit_rotation(a: Array, b: Array, R: Array, width: float, rounds: int) -> Array:
@@ -187,9 +188,7 @@ def fit_rotation(a: Array, b: Array, R: Array, width: float, rounds: int) -> Arr
     return R
 
 
-def _facing(
-    rays: MatchedRays, residual: Array, poses: Poses, lens: SharedLens, width: float
-) -> tuple[Array, Poses]:
+def _facing(rays: MatchedRays, residual: Array, poses: Poses, lens: SharedLens, width: float) -> tuple[Array, Poses]:
     """What points behind the cameras cost (P,), px², and t with the sign that has fewer: parallax along the epipolar
     line is of one sign in front."""
     seen = rays.through(lens)

@@ -107,9 +107,8 @@ class MatchedRays:
     def through(self, lens: SharedLens) -> Rays:
         """The matches without the lens's distortion."""
         factor, k1 = self._of_rows(lens)
-        a, b = (
-            homogeneous(_unbent(points / f[:, None], k)) for points, f, k in zip((self.x, self.y), factor, k1, strict=True)
-        )
+        sides = zip((self.x, self.y), factor, k1, strict=True)
+        a, b = (homogeneous(_unbent(points / f[:, None], k)) for points, f, k in sides)
         return Rays(a, b, self.focal * factor)
 
     def derivatives(self, lens: SharedLens, rays: Rays) -> Array:
@@ -122,7 +121,8 @@ class MatchedRays:
 
     def within_limits(self, lens: SharedLens) -> SharedLens:
         """The lens with a k1 that folds nowhere inside a picture: r + k1 r³ turns back at 2/3 √(1 / (3 |k1|))."""
-        most = max(float((bend * (points**2).sum(axis=1)).max()) for points, bend in zip((self.x, self.y), self.bends, strict=True))
+        sides = zip((self.x, self.y), self.bends, strict=True)
+        most = max(float((bend * (points**2).sum(axis=1)).max()) for points, bend in sides)
         least = -PAIR_FIT.fold_share * 4 * lens.factor**2 / (27 * max(most, 1e-12))
         return SharedLens(lens.factor, float(np.clip(lens.k1, max(least, -PAIR_FIT.most_k1), PAIR_FIT.most_k1)))
 
@@ -138,7 +138,8 @@ def _unbent(raw: Array, k1: Array) -> Array:
     ideal = radius.copy()
     for _ in range(6):
         ideal -= (ideal * (1 + k1 * ideal**2) - radius) / np.maximum(1 + 3 * k1 * ideal**2, 0.05)
-    return raw * (ideal / np.maximum(radius, 1e-12))[:, None]
+    unbent: Array = raw * (ideal / np.maximum(radius, 1e-12))[:, None]
+    return unbent
 
 
 def matched_rays(

@@ -30,11 +30,13 @@ class Poses:
 class PairModel(Protocol):
     """What a fit needs of a model: `freedom` parameters a pair, and the shared log factor and k1 after them."""
 
-    rays: MatchedRays
-    freedom: int
+    @property
+    def rays(self) -> MatchedRays:
+        """The matches."""
 
-    def squares(self, poses: Poses, lens: SharedLens) -> Array:
-        """Squared residuals (O,), px²."""
+    @property
+    def freedom(self) -> int:
+        """Parameters of each pair."""
 
     def equations(self, poses: Poses, lens: SharedLens, shared: bool) -> tuple[Array, Array]:
         """Normal matrices and gradients of every pair, px²; with the shared parameters or without."""
@@ -108,7 +110,7 @@ class _Sampson:
             (self.back_slope * self.back_line[:, :2]).sum(axis=1), (self.slope * self.line[:, :2]).sum(axis=1)
         )  # fmt: skip
         self.length = np.sqrt(self.shares[0] + self.shares[1] + 1e-30)
-        self.residual = (rays.b * self.line).sum(axis=1) / self.length
+        self.residual: Array = (rays.b * self.line).sum(axis=1) / self.length
         self.ratio = self.residual / self.length**2
 
     def by_matrix(self) -> Array:
@@ -118,14 +120,15 @@ class _Sampson:
         self.first = first
         out = first[:, :, None] * self.a[:, None, :]
         out[:, :, :2] -= (self.ratio[:, None] * self.b)[:, :, None] * self.back_slope[:, None, :]
-        return out.reshape(-1, 9)
+        entries: Array = out.reshape(-1, 9)
+        return entries
 
     def by_lens(self, matched: MatchedRays, radial: Array) -> Array:
         """Derivatives (O, 2) by log factor and k1; radial: `MatchedRays.derivatives`. After `by_matrix`."""
         by_a = np.einsum("oij,oi->oj", self.E[:, :, :2], self.first)
         by_b = self.line[:, :2] / self.length[:, None]
         by_b = by_b - self.ratio[:, None] * np.einsum("oij,oj->oi", self.E[:, :2, :2], self.back_slope)
-        out = (by_a * self.a[:, :2]).sum(axis=1)[:, None] * radial[0]
+        out: Array = (by_a * self.a[:, :2]).sum(axis=1)[:, None] * radial[0]
         out += (by_b * self.b[:, :2]).sum(axis=1)[:, None] * radial[1]
         # px are px of a longer focal length
         out[:, 0] += self.ratio * (matched.zooms[0] * self.shares[0] + matched.zooms[1] * self.shares[1])
@@ -181,9 +184,7 @@ def cauchy_costs(rays: MatchedRays, squares: Array, width: float) -> Array:
     return rays.sums(0.5 * width**2 * np.log1p(squares / width**2))
 
 
-def normal_equations(
-    columns: Array, weight: Array, residual: Array, starts: NDArray[np.intp]
-) -> tuple[Array, Array]:
+def normal_equations(columns: Array, weight: Array, residual: Array, starts: NDArray[np.intp]) -> tuple[Array, Array]:
     """Jᵀ W J (P, n, n) and Jᵀ W r (P, n) of each pair's rows of J (O, n)."""
     weighted = columns * weight[:, None]
     count, n = len(starts) - 1, columns.shape[1]

@@ -1,4 +1,4 @@
-"""Whether pure rotations explain pairs, by Torr's criterion (GRIC): a pose always fits better, and so has to by more."""
+"""Whether pure rotations explain pairs, by Torr's criterion (GRIC): a pose always fits better, and has to by much."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def gric_of_rotations(rays: MatchedRays, squares: Array, noise: float) -> Array:
 
 def _gric(rays: MatchedRays, squares: Array, noise: float, codimension: int, parameters: int) -> Array:
     fit = rays.sums(np.minimum(squares / noise**2, 2.0 * codimension))
-    return fit + (4 - codimension) * rays.counts * np.log(4) + parameters * np.log(4 * rays.counts)
+    out: Array = fit + (4 - codimension) * rays.counts * np.log(4) + parameters * np.log(4 * rays.counts)
+    return out
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,9 @@ class AllRotations:
     lens: SharedLens
 
 
-def as_rotations(found: Candidates, together: Together, prior: LensPrior, start: SharedLens, scale: float) -> AllRotations:
+def as_rotations(
+    found: Candidates, together: Together, prior: LensPrior, start: SharedLens, scale: float
+) -> AllRotations:
     """Fit all pairs as pure rotations with a shared lens: from the poses' focal length, the start's, and what was known
     before."""
     rays, width = found.rays, PAIR_FIT.cauchy_px * scale
@@ -69,9 +72,7 @@ class PairRotations:
     parallax: Array
 
 
-def each_as_rotation(
-    rays: MatchedRays, turned: Array, lens: SharedLens, squares: Array, noise: float
-) -> PairRotations:
+def each_as_rotation(rays: MatchedRays, turned: Array, lens: SharedLens, squares: Array, noise: float) -> PairRotations:
     """Fit each pair as a pure rotation, from `turned` (P, 3, 3) on; squares (O,): of its pose's Sampson distances."""
     model = RotationModel(rays, 3 * noise)
     poses = refine_each(model, Poses(turned, np.zeros((len(rays), 3))), lens, PAIR_FIT.rotation_iterations)
