@@ -48,7 +48,7 @@ class SphereField:
             return ()
         return (
             "the scene is too near and deep for the points that were found: half of them lie more than "
-            f"{self.leave_one_out_px:.1f} px from where the others say: take more pictures, from places closer together",
+            f"{self.leave_one_out_px:.1f} px from where the others say; take more pictures, closer together",
         )
 
     def at(self, rays: Array) -> Array:
