@@ -166,9 +166,10 @@ def _empty_map(places: Array, size: tuple[int, int], canvas: Canvas, grid: Grid)
     if part is None:
         left, top, right, bottom = 0, 0, 0, 0
     else:
-        # the picture ends somewhere between its last node and the next
+        # the picture ends somewhere between its last node and the next, and its corner may lie between two rows
+        margin = 2 * grid.step
         ends = [
-            (int(axis[some.start] + offset) - grid.step, int(axis[some.stop - 1] + offset) + grid.step + 1)
+            (int(axis[some.start] + offset) - margin, int(axis[some.stop - 1] + offset) + margin + 1)
             for axis, some, offset in zip((grid.xs, grid.ys), part[::-1], canvas.offset, strict=True)
         ]
         sides = canvas.width, canvas.height
