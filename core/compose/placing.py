@@ -70,16 +70,14 @@ class Placing:
             return 0.0
         rows, columns = box
         step = _step((rows.stop - rows.start) * (columns.stop - columns.start))
+        lines = [(slice(row, row + 1), columns) for row in range(rows.start, rows.stop, step)]
+        shown, d = (
+            np.concatenate([np.asarray(values[line])[:, ::step] for line in lines])
+            for values in (layer.alpha, self.warp.depth)
+        )
         canvas = self.warp.canvas
-        total, count = 0.0, 0
-        for row in range(rows.start, rows.stop, step):
-            line = slice(row, row + 1), slice(columns.start, columns.stop)
-            shown = layer.alpha[line][:, ::step] > 0
-            if shown.any():
-                d = np.asarray(self.warp.depth[line])[:, ::step]
-                off = self._off(number, canvas.xs[columns][::step], canvas.ys[line[0]], d)
-                total, count = total + float(off[shown].sum(dtype=float)), count + int(shown.sum())
-        return total / max(count, 1)
+        off = self._off(number, canvas.xs[columns][::step], canvas.ys[rows][::step], d)
+        return float(off[shown > 0].mean()) if (shown > 0).any() else 0.0
 
 
 def adding_order(placing: Placing, layers: Sequence[Layer]) -> list[int]:
