@@ -34,13 +34,6 @@ class GraphExposureOptions:
 class PlacingOptions:
     """By how much pictures are expected to be misplaced, and what that is worth (`placing`)."""
 
-    unknown_deviation: float = 0.1
-    """Standard deviation of inverse range, as a share of its typical size, where the field tells none: about what
-    leaving out each of its points in turn shows on photographs."""
-
-    typical_percentile: float = 75.0
-    """Percentile of inverse range that counts as typical: what lies nearer is what is misplaced."""
-
     samples: int = 10_000
     """Pixels of a picture that the order is decided by: more take time and change nothing."""
 
