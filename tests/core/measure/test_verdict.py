@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.compose.exposure import unchanged
-from edf_stitch.core.measure.verdict import Look, Verdict, judge, look_at
+from edf_stitch.core.measure.look import Look, look_at
+from edf_stitch.core.measure.verdict import Verdict, judge
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.synthetic_scenes.two_planes import Pair
