@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from ..raster.options import GRID
 from ..raster.picture_map import CanvasMap, PictureMap
 from ..system.errors import BadRequest, NoOverlap
 from ..system.threads import each
-from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
+from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach, shown_by
 from .continued_depth import ContinuedDepth
 from .depth import Confidence, Depth, Nearness
 from .options import WARP
@@ -159,9 +159,11 @@ def build_warp(
     sizes = [view.size for view in further]
     if projection is None:
         reference: Box = (0, 0, *camera.size)
-        reach, cropped = expected_reach([_in_plane(outline) for outline in outlines], camera.size, sizes)
+        reach, cropped = expected_reach([in_plane(outline) for outline in outlines], camera.size, sizes)
     else:
-        reference, reach, cropped = round_reach(projection, planes, outlines, [view.camera for view in views])
+        own = homogeneous(undistort(border(camera.size), camera))
+        shows = [shown_by(plane, view.camera) for plane, view in zip((np.eye(3), *planes), views, strict=True)]
+        reference, reach, cropped = round_reach(projection, (own, *outlines), shows, camera)
     plane = Canvas(0, 0, (0, 0), projection=projection)
 
     def pictures_at(grid: Grid) -> list[Array]:
@@ -241,23 +243,19 @@ def build_map(
         if isinstance(own, PictureMap) and here.places is not None:
             own.x[part], own.y[part] = here.places[..., 0], here.places[..., 1]
         for number, (view, out) in enumerate(zip(views[1:], maps, strict=True), 1):
-            x, y = transfer(view, canvas.project_rows(view.H_inf, xs, ys[start:stop], camera), here.depth)
+            infinite = canvas.project_rows(view.H_inf, xs, ys[start:stop], camera)
             beside = []
             if values.shift is not None and values.picture == number:
                 beside.append([grid.to_pixels(values.shift[..., k], *strip) for k in (0, 1)])
             if refined is not None and here.sideways is not None and refined.picture == number:
                 beside.append([here.sideways[..., 0], here.sideways[..., 1]])
-            for across, down in beside:
-                if here.share is not None:
-                    across, down = here.share * across, here.share * down
-                x += across
-                y += down
-                if hold:
-                    held_beside[part, :, 0] += across
-                    held_beside[part, :, 1] += down
-            if view.camera.distortion.any():
-                x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
-            out.x[part], out.y[part] = x, y
+            if here.share is not None:
+                beside = [[here.share * along for along in one] for one in beside]
+            if hold:
+                for one in beside:
+                    held_beside[part, :, 0] += one[0]
+                    held_beside[part, :, 1] += one[1]
+            out.x[part], out.y[part] = raw_pixels(view, infinite, here.depth, beside)
 
     # depth that is worked out again where it is read takes the larger strips of `Depth`
     each(put, small_strips(shape) if held.size else strips(shape))
@@ -265,6 +263,20 @@ def build_map(
     return Warp(
         canvas, (own, *maps), held if held.size else depth, confidence, beside=held_beside if hold else None
     )
+
+
+def raw_pixels(
+    view: View, infinite: list[Array], depth: Array, beside: Sequence[Sequence[NDArray[Any]]] = ()
+) -> tuple[Array, Array]:
+    """Raw px x, y (h, w) of a picture at canvas points that were brought to infinity (see `transfer`) and their inverse
+    depth (h, w); beside: pairs of (h, w), px by which it is seen beside its epipolar lines."""
+    x, y = transfer(view, infinite, depth)
+    for across, down in beside:
+        x += across
+        y += down
+    if view.camera.distortion.any():
+        x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
+    return x, y
 
 
 def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> FieldValues:
@@ -310,7 +322,7 @@ def _outline(H_plane: Array, view: View, continuation: Continuation | None) -> A
     return homogeneous(ideal) @ np.linalg.inv(H_plane).T
 
 
-def _in_plane(points: Array) -> Array:
+def in_plane(points: Array) -> Array:
     """Reference pixels (N, 2) of canvas points (N, 3), NaN behind the reference camera."""
     points = points.copy()
     points[~ahead_of_camera(*points.T)] = np.nan

@@ -1,0 +1,212 @@
+"""The maps of N pictures, from one field of inverse range on the sphere (docs/method.md, 6).
+
+As in `warp`, only d and slack are interpolated between the nodes of a grid, and H_inf p + d e' is evaluated at every
+pixel. A picture's map is known in the box of the canvas that shows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.camera import Camera
+from ..cameras.lens import distort, undistort
+from ..cameras.projective import ahead_of_camera, homogeneous, inverse_intrinsics
+from ..cameras.view import View
+from ..field.sphere_field import SphereField
+from ..raster.arrays import Array, Box, bounds, small_strips
+from ..raster.grid import Grid
+from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap, falls_inside
+from ..system.threads import each
+from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
+from .options import RIG_WARP
+from .projection import Projection
+from .reference_map import ReferenceMap
+from .warp import Warp, in_plane, raw_pixels, trimmed
+
+
+@dataclass(frozen=True, eq=False)
+class RigValues:
+    """A field on the sphere at the nodes of a grid over a canvas.
+
+    inverse_depth (rows, columns): of canvas points p, d(r) · |K⁻¹ p|; places: raw px (rows, columns, 2) of each
+    picture, NaN behind its camera; slacks: px (rows, columns, 2) of each, None without; both in the pictures' order.
+    """
+
+    inverse_depth: Array
+    places: tuple[Array, ...]
+    slacks: tuple[Array | None, ...]
+
+    @staticmethod
+    def over(field: SphereField, views: Sequence[View], canvas: Canvas, grid: Grid) -> RigValues:
+        """A field's values at a grid's nodes."""
+        camera = views[0].camera
+        rays, length = canvas.rays_at(views[0].K, grid.xs, grid.ys, camera)
+        depth = field.at(rays) * length
+        places, slacks = [], []
+        for number, view in enumerate(views):
+            infinite = canvas.project_rows(view.H_inf, grid.xs, grid.ys, camera)
+            slack = field.slack(number, rays) if number or canvas.projection is not None else None
+            slacks.append(slack)
+            beside = [] if slack is None else [(slack[..., 0], slack[..., 1])]
+            places.append(np.stack(raw_pixels(view, infinite, depth, beside), axis=-1))
+        return RigValues(depth, tuple(places), tuple(slacks))
+
+
+def build_rig_warp(field: SphereField, views: Sequence[View], projection: Projection | None = None) -> Warp:
+    """Lay out a canvas that holds all pictures, and map them onto it.
+
+    Parameters
+    ----------
+    field : SphereField
+    views : sequence of View
+        Of all pictures, the viewpoint's first.
+    projection : Projection, optional
+        Of a round panorama; by default the panorama lies in the plane of the viewpoint's picture, pixel for pixel.
+
+    Returns
+    -------
+    Warp
+
+    Raises
+    ------
+    NoOverlap, OutputTooLarge, BadRequest
+        See `build_warp`.
+    """
+    camera, sizes = views[0].camera, [view.size for view in views]
+    plane = Canvas(0, 0, (0, 0), projection=projection)
+    outlines = [outline_of(field, view) @ views[0].K.T for view in views]
+    reference: Box = (0, 0, *camera.size)
+    if projection is None:
+        reach, cropped = expected_reach([in_plane(one) for one in outlines[1:]], camera.size, sizes[1:])
+    else:
+        shows = [_shows(field, views, number) for number in range(len(views))]
+        reference, reach, cropped = round_reach(projection, outlines, shows, camera)
+
+    def pictures_at(grid: Grid) -> Sequence[Array]:
+        return RigValues.over(field, views, plane, grid).places
+
+    canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
+    return trimmed(build_rig_map(field, views, replace(canvas, cropped=canvas.cropped or cropped)))
+
+
+def build_rig_map(field: SphereField, views: Sequence[View], canvas: Canvas) -> Warp:
+    """Map all pictures onto a given canvas, strip by strip.
+
+    Parameters
+    ----------
+    field : SphereField
+    views : sequence of View
+        Of all pictures, the viewpoint's first.
+    canvas : Canvas
+
+    Returns
+    -------
+    Warp
+    """
+    left, top = -canvas.offset[0], -canvas.offset[1]
+    shape = canvas.height, canvas.width
+    grid = Grid.over(left, top, canvas.width, canvas.height, RIG_WARP.nodes)
+    values = RigValues.over(field, views, canvas, grid)
+    maps: list[CanvasMap] = [
+        _empty_map(places, view.size, canvas, grid) for places, view in zip(values.places, views, strict=True)
+    ]
+    if canvas.projection is None:
+        maps[0] = ReferenceMap(canvas, views[0].camera)
+    depth = np.empty(shape, np.float32)
+
+    def put(part: slice) -> None:
+        start, stop = part.start, part.stop
+        depth[part] = grid.to_pixels(values.inverse_depth, left, top + start, canvas.width, stop - start)
+        strip = _Strip(canvas, views[0].camera, grid, start, depth[part])
+        for view, slack, one in zip(views, values.slacks, maps, strict=True):
+            if isinstance(one, BoxedMap):
+                strip.put(one, view, slack)
+
+    each(put, small_strips(shape))
+    return Warp(canvas, tuple(maps), depth)
+
+
+@dataclass(frozen=True, eq=False)
+class _Strip:
+    """Rows of a canvas from `start` on, of which inverse depth (h, W) is known; grid: the nodes of a field; camera: the
+    viewpoint's picture's."""
+
+    canvas: Canvas
+    camera: Camera
+    grid: Grid
+    start: int
+    depth: NDArray[np.float32]
+
+    def put(self, one: BoxedMap, view: View, slack: Array | None) -> None:
+        """Writes where a picture is seen in these rows into its map; slack (rows, columns, 2): px at the nodes."""
+        canvas, (left, top, width, height) = self.canvas, one.box
+        low, high = max(self.start, top), min(self.start + len(self.depth), top + height)
+        if low >= high or not width:
+            return
+        columns = slice(left, left + width)
+        beside = []
+        if slack is not None:
+            strip = (left - canvas.offset[0], low - canvas.offset[1], width, high - low)
+            beside.append([self.grid.to_pixels(slack[..., k], *strip) for k in (0, 1)])
+        infinite = canvas.project_rows(view.H_inf, canvas.xs[columns], canvas.ys[low:high], self.camera)
+        # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
+        depth = self.depth[low - self.start : high - self.start, columns].astype(np.float64)
+        rows = slice(low - top, high - top)
+        one.inner.x[rows], one.inner.y[rows] = raw_pixels(view, infinite, depth, beside)
+
+
+def _empty_map(places: Array, size: tuple[int, int], canvas: Canvas, grid: Grid) -> BoxedMap:
+    """A map to be filled in, in the box of the canvas that may show a picture of (W, H) px, by where it is seen at the
+    nodes."""
+    part = bounds(falls_inside(places[..., 0], places[..., 1], size))
+    if part is None:
+        left, top, right, bottom = 0, 0, 0, 0
+    else:
+        # the picture ends somewhere between its last node and the next
+        ends = [
+            (int(axis[some.start] + offset) - grid.step, int(axis[some.stop - 1] + offset) + grid.step + 1)
+            for axis, some, offset in zip((grid.xs, grid.ys), part[::-1], canvas.offset, strict=True)
+        ]
+        sides = canvas.width, canvas.height
+        (left, right), (top, bottom) = (
+            (max(0, low), min(side, high)) for (low, high), side in zip(ends, sides, strict=True)
+        )
+    shape = max(0, bottom - top), max(0, right - left)
+    inner = PictureMap(np.empty(shape, np.float32), np.empty(shape, np.float32), size)
+    return BoxedMap(inner, (left, top), (canvas.height, canvas.width))
+
+
+def outline_of(field: SphereField, view: View) -> Array:
+    """Unit rays (N, 3) from the viewpoint to what a picture shows along its border, in order."""
+    seen = homogeneous(undistort(border(view.size), view.camera)) @ inverse_intrinsics(view.K).T
+    seen /= np.linalg.norm(seen, axis=1, keepdims=True)
+    rays = seen @ view.R
+    # |s b − t| = 1 / d for the range s from the picture's camera: 1 / s is what its place moves the ray by
+    along, offset = seen @ view.t, float(view.t @ view.t)
+    for _ in range(RIG_WARP.outline_steps):
+        d = np.maximum(field.at(rays), 0.0)
+        share = d * along + np.sqrt(np.maximum(1 + d**2 * (along**2 - offset), 0))
+        inverse = d / np.maximum(share, RIG_WARP.least_share)
+        rays = (seen - inverse[:, None] * view.t) @ view.R
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    return rays
+
+
+def _shows(field: SphereField, views: Sequence[View], number: int) -> Callable[[Array], bool]:
+    """Whether picture `number` shows a canvas point (3,)."""
+    view, to_ray = views[number], inverse_intrinsics(views[0].K)
+
+    def shown(point: Array) -> bool:
+        ray = to_ray @ point
+        length = float(np.linalg.norm(ray))
+        a, b, c = view.H_inf @ point + float(field.at(ray[None] / length)[0]) * length * view.e_prime
+        if not ahead_of_camera(a, b, c):
+            return False
+        x, y = distort(np.array([a / c, b / c]), view.camera)
+        return bool(falls_inside(x, y, view.size))
+
+    return shown
