@@ -21,8 +21,9 @@ from .cameras.edge import Edge
 from .cameras.matches import Matches
 from .cameras.rig import Rig
 from .cameras.view import View
-from .compose.composition import Composition, Decided, composed
+from .compose.composition import Composition, composed
 from .compose.crop import crop_box
+from .compose.decided import Decided
 from .field.field import Field
 from .frames.frame import Frame
 from .frames.reading import Source, read_frame

@@ -26,7 +26,7 @@ from .projectivity import independent_fundamental, projectivity
 if TYPE_CHECKING:
     from ..alignment import Alignment
     from ..cameras.camera import Camera
-    from ..compose.composition import Decided
+    from ..compose.decided import Decided
     from ..dense.refine import Dense
     from ..options import StitchOptions
     from ..panorama.choosing_slide import SlideChoice

@@ -27,7 +27,7 @@ from .rig_figures import map_errors, residuals, scale_kind, shares, weak_links
 
 if TYPE_CHECKING:
     from ..alignment import Alignment
-    from ..compose.composition import Decided
+    from ..compose.decided import Decided
     from ..options import StitchOptions
     from ..pictures.picture import Picture
 
