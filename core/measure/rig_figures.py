@@ -50,10 +50,12 @@ def weak_links(rig: Rig) -> list[RigEdge]:
     """Edges with few matches, without which the rig would fall apart or hang by still fewer."""
     if not rig.edges:
         return []
-    i, j, inliers = (np.array(part) for part in zip(*((e.i, e.j, e.inliers) for e in rig.edges), strict=True))
+    # int32 is what SciPy's graphs take
+    i, j = np.array([(edge.i, edge.j) for edge in rig.edges], np.int32).T
+    lengths = [1 / max(edge.inliers, 1) for edge in rig.edges]
     # the tree of the strongest edges holds the weakest ones that cannot be done without
-    strengths = coo_array((1 / np.maximum(inliers, 1), (i, j)), (len(rig), len(rig))).tocsr()
-    kept = set(zip(*(part.tolist() for part in minimum_spanning_tree(strengths).nonzero()), strict=True))
+    tree = minimum_spanning_tree(coo_array((lengths, (i, j)), (len(rig), len(rig))).tocsr())
+    kept = set(zip(*(part.tolist() for part in tree.nonzero()), strict=True))
     return [edge for edge in rig.edges if edge.inliers < RIG.weak_inliers and (edge.i, edge.j) in kept]
 
 
@@ -85,5 +87,5 @@ def _stations(rig: Rig) -> list[tuple[int, int]]:
 
 def _parts(tied: Sequence[tuple[int, int]], count: int) -> int:
     """In how many parts a graph falls."""
-    i, j = np.array(tied, np.intp).reshape(-1, 2).T
+    i, j = np.array(tied, np.int32).reshape(-1, 2).T
     return int(connected_components(coo_array((np.ones(len(i)), (i, j)), (count, count)), directed=False)[0])

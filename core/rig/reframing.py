@@ -118,8 +118,10 @@ def best_connected(rig: Rig) -> int:
     """The number of the picture from which all others are reached over the strongest edges: an edge is as long as one
     over the number of its inliers, and the sum of the ways to all others is the shortest."""
     count = len(rig)
-    i, j, length = (np.array(column) for column in zip(*((e.i, e.j, 1 / e.inliers) for e in rig.edges), strict=True))
-    ways = dijkstra(coo_array((length, (i, j)), (count, count)).tocsr(), directed=False)
+    # int32 is what SciPy's graphs take
+    i, j = np.array([(edge.i, edge.j) for edge in rig.edges], np.int32).T
+    lengths = [1 / edge.inliers for edge in rig.edges]
+    ways = dijkstra(coo_array((lengths, (i, j)), (count, count)).tocsr(), directed=False)
     return int(np.argmin(ways.sum(axis=1)))
 
 

@@ -23,7 +23,7 @@ STAGES: dict[str, float] = {
     "blend": 0.04,
     "write": 0.08,
 }
-# The same of more than two pictures.
+# The same of more than two pictures. Seams and blends take turns, picture by picture: both are told as seam.
 STAGES_OF_MANY: dict[str, float] = {
     "read": 0.03,
     "features": 0.12,
@@ -34,10 +34,10 @@ STAGES_OF_MANY: dict[str, float] = {
     "warp": 0.08,
     "occlusion": 0.03,
     "exposure": 0.03,
-    "seam": 0.08,
-    "blend": 0.08,
+    "seam": 0.16,
     "write": 0.06,
 }
+TOLD_AS = {"blend": "seam"}
 
 
 @dataclass(frozen=True)
@@ -57,5 +57,6 @@ class Progress:
             raise Cancelled()
         if self.report is not None:
             names = list(self.stages)
+            stage = stage if stage in names else TOLD_AS.get(stage, stage)
             done = sum(self.stages[name] for name in names[: names.index(stage)])
             self.report(stage, min(1.0, round(done + self.stages[stage] * fraction, 6)))
