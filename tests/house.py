@@ -24,7 +24,7 @@ MAY_IMPORT = {
     "pictures": ("system", "raster"),
     "cameras": ("system", "raster", "pictures"),
     "pose": BELOW_POSE,
-    "rig": (*BELOW_POSE, "pose"),
+    "rig": (*BELOW_POSE, "pose", "choices"),
     "field": ("system", "raster", "cameras"),
     "rivals": ("system", "raster", "cameras", "pose", "field"),
     "dense": (*BELOW_POSE, "field"),

@@ -25,12 +25,15 @@ class Frame:
         What was painted over the panorama (see `masks.read_painted`).
     warnings : tuple of str
         About what was given, in plain words.
+    shown_by : tuple of int
+        Of each picture that was given the number of the one here that is used for it: copies are used once.
     """
 
     pictures: tuple[Picture, ...]
     full_sizes: tuple[tuple[int, int], ...]
     painted: NDArray[np.int8] | None = None
     warnings: tuple[str, ...] = ()
+    shown_by: tuple[int, ...] = ()
 
     @property
     def names(self) -> list[str]:
@@ -38,7 +41,7 @@ class Frame:
         return [picture.name for picture in self.pictures]
 
     def only(self, numbers: Sequence[int]) -> Frame:
-        """The same with some of the pictures, in the order of their numbers as given."""
+        """The same with some of the pictures, in the order of these numbers."""
         if list(numbers) == list(range(len(self.pictures))):
             return self
         pictures = tuple(self.pictures[number] for number in numbers)

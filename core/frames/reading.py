@@ -91,8 +91,12 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         About a mask.
     """
     copies, names = copies or {}, [picture.name for picture in pictures]
-    masks, worked_on, sizes = options.ignored_in(names), [], []
+    masks = options.ignored_in(names)
+    worked_on: list[Picture] = []
+    sizes: list[tuple[int, int]] = []
+    shown_by: list[int] = []
     for number, picture in enumerate(pictures):
+        shown_by.append(shown_by[copies[number]] if number in copies else len(worked_on))
         if number in copies:
             continue
         mask, shown = masks[number], picture
@@ -104,7 +108,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         f"{names[number]} is the same picture as {names[first]}: it is used once" for number, first in copies.items()
     )
     painted = None if options.mask is None else read_painted(options.mask)
-    return Frame(tuple(worked_on), tuple(sizes), painted, warnings)
+    return Frame(tuple(worked_on), tuple(sizes), painted, warnings, tuple(shown_by))
 
 
 def _picture(source: Source) -> Picture:

@@ -22,6 +22,7 @@ from ..pipeline import StitchResult
 from ..raster.arrays import cut
 from ..raster.colour import decode
 from ..raster.lazy import whole
+from ..raster.picture_map import BoxedMap
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
 from .camera_file import camera_table
@@ -110,11 +111,22 @@ def check(
     if request.layers is not None:
         names = layer_files(pictures, (".png", ".exr"))
         files.check_folder(request.layers, names)
-        _refuse_other_files(request.layers, layer_files(pictures, (".png", ".exr"), seam, inpainted, slides))
+        _refuse_other_files(request.layers, _possible_files(pictures, seam, inpainted, slides))
         taken = {(request.layers / name).resolve() for name in names}
         for path in single:
             if path.resolve() in taken:
                 raise BadRequest(f"{path}: named for two outputs, a layer is one; give each its own name")
+
+
+def _possible_files(pictures: Sequence[str], seam: bool, inpainted: bool, slides: bool) -> list[str]:
+    """Files that a folder of layers may hold: of more than two pictures any may come first, or be left out."""
+    exact = layer_files(pictures, (".png", ".exr"), seam, inpainted, slides)
+    if len(pictures) == 2:
+        return exact
+    return exact + [
+        layer_stem(number, name) + suffix for number in range(len(pictures)) for name in pictures
+        for suffix in (".png", ".exr")
+    ]  # fmt: skip
 
 
 def _refuse_other_files(folder: Path, names: Sequence[str]) -> None:
@@ -201,7 +213,9 @@ def add_report(
 
 def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
     """Stages everything of a layers' folder."""
-    place = result.spread
+    place, names = result.spread, [picture.name for picture in result.pictures]
+    if result.rig is not None:
+        _refuse_other_files(folder, layer_files(names, (".png", ".exr")))
     for number, (picture, layer) in enumerate(zip(result.pictures, result.layers, strict=True)):
         _add_layer(files, folder, layer_stem(number, picture.name), layer.within(place), result)
     asked = result.report["options"]
@@ -216,12 +230,13 @@ def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
     if result.labels is not None:
         labels = cut(result.labels, place, -1)
         masks[LABELS] = _label_bytes(labels, len(result.pictures))
-        masks[SEAM] = _mask_bytes(labels > 0, result.panorama.alpha > 0)
+        if result.rig is None:
+            masks[SEAM] = _mask_bytes(labels > 0, result.panorama.alpha > 0)
     for name, data in masks.items():
         files.add_to_folder(folder, f"{name}.png", data)
     about = {
         "format": LAYERS_FORMAT, "size": [result.canvas.width, result.canvas.height],
-        "names": [picture.name for picture in result.pictures], "projection": result.report["canvas"]["projection"],
+        "names": names, "projection": result.report["canvas"]["projection"],
     }  # fmt: skip
     files.add_to_folder(folder, CANVAS, json_bytes(about))
 
@@ -287,10 +302,10 @@ def warp_bytes(result: StitchResult) -> bytes:
     }  # fmt: skip
     for number, one in enumerate(warp.maps):
         if number or canvas.projection is not None:  # in a flat panorama the reference is only shifted, by `offset`
-            picture_map = one.arrays()
+            known = one.inner if isinstance(one, BoxedMap) else one.arrays()
+            box = one.box if isinstance(one, BoxedMap) else (0, 0, canvas.width, canvas.height)
             arrays |= {
-                f"map_x_{number:02d}": picture_map.x, f"map_y_{number:02d}": picture_map.y,
-                f"box_{number:02d}": np.array([0, 0, canvas.width, canvas.height]),
+                f"map_x_{number:02d}": known.x, f"map_y_{number:02d}": known.y, f"box_{number:02d}": np.array(box),
             }  # fmt: skip
     projection = canvas.projection
     if projection is not None:

@@ -43,9 +43,9 @@ class Matched:
 def content_key(picture: Picture) -> bytes:
     """A digest of what a picture shows: sorted by it, pictures have one order however they were given."""
     digest = blake2b(f"{picture.view.shape}".encode(), digest_size=20)
-    digest.update(np.ascontiguousarray(picture.view))
+    digest.update(np.ascontiguousarray(picture.view).data)
     if picture.alpha is not None:
-        digest.update(np.ascontiguousarray(picture.alpha))
+        digest.update(np.ascontiguousarray(picture.alpha).data)
     return digest.digest()
 
 

@@ -1,4 +1,4 @@
-"""The geometry of each pair of a rig, as the rig has it: what is used of two pictures wherever pairs are asked about."""
+"""Each pair of a rig with its matches and the rig's own geometry, for whatever asks about two pictures."""
 
 from __future__ import annotations
 

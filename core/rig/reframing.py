@@ -10,8 +10,62 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from ..cameras.rig import Rig, RigEdge
+from ..cameras.rig import Registration, Rig, RigEdge
+from ..choices import CENTRE
+from ..pictures.naming import number_of
 from ..raster.arrays import Array
+from ..system.errors import BadRequest, NoOverlap
+
+
+def seen_from(
+    registration: Registration, viewpoint: int | str | None, names: Sequence[str], shown_by: Sequence[int]
+) -> Registration:
+    """The same rig in the frame of the viewpoint, which comes first; the others stay in the order of their numbers.
+
+    Parameters
+    ----------
+    registration : Registration
+        Its pictures ascending.
+    viewpoint : int, str or None
+        A picture's number among those that were given, from 1, its name, or CENTRE; None is the first.
+    names : sequence of str
+        Of all pictures.
+    shown_by : sequence of int
+        Of each picture that was given, its number among these.
+
+    Returns
+    -------
+    Registration
+
+    Raises
+    ------
+    BadRequest
+        There is no such picture.
+    NoOverlap
+        It is not in the rig.
+    """
+    numbers = registration.numbers
+    if viewpoint is None:
+        return registration
+    if viewpoint == CENTRE and CENTRE not in names:
+        asked = numbers[best_connected(registration.rig)]
+    elif isinstance(viewpoint, int):
+        if viewpoint > len(shown_by):
+            raise BadRequest(f"the viewpoint is picture {viewpoint}, and only {len(shown_by)} are given")
+        asked = shown_by[viewpoint - 1]
+    else:
+        asked = number_of(str(viewpoint), names, "--viewpoint")
+    if asked not in numbers:
+        raise NoOverlap(
+            f"{names[asked]} cannot be the viewpoint, since it does not connect with the others: "
+            f"{registration.left_out[asked]}; choose another one, or --viewpoint centre"
+        )
+    order = sorted(range(len(numbers)), key=lambda place: (numbers[place] != asked, place))
+    if order[0] == 0:
+        return registration
+    return replace(
+        registration, rig=reordered(registration.rig, order), numbers=tuple(numbers[place] for place in order)
+    )
 
 
 def reordered(rig: Rig, order: Sequence[int]) -> Rig:
@@ -64,8 +118,10 @@ def best_connected(rig: Rig) -> int:
     """The number of the picture from which all others are reached over the strongest edges: an edge is as long as one
     over the number of its inliers, and the sum of the ways to all others is the shortest."""
     count = len(rig)
-    i, j, length = (np.array(column) for column in zip(*((e.i, e.j, 1 / e.inliers) for e in rig.edges), strict=True))
-    ways = dijkstra(coo_array((length, (i, j)), (count, count)).tocsr(), directed=False)
+    # int32 is what SciPy's graphs take
+    i, j = np.array([(edge.i, edge.j) for edge in rig.edges], np.int32).T
+    lengths = [1 / edge.inliers for edge in rig.edges]
+    ways = dijkstra(coo_array((lengths, (i, j)), (count, count)).tocsr(), directed=False)
     return int(np.argmin(ways.sum(axis=1)))
 
 
