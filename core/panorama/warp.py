@@ -296,6 +296,8 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     across, down = width + 2 * margin, height + 2 * margin
     share = min(WARP.max_node_factor, max(1.0, across * down / (2 * width * height)))
     step = WARP.node_share * grid.step * focal_of(canvas.projection.K) / canvas.projection.focal
+    # a power of two: canvases of one stitch are of similar size, and so share these nodes (see `Remembered`)
+    step = 2.0 ** np.floor(np.log2(step))
     flat = Grid.over(-margin, -margin, across, down, int(min(share * GRID.nodes, across * down / step**2)))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)
