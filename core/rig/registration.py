@@ -13,7 +13,7 @@ from ..cameras.rig import FocalGuess, Observations, PictureMatches, Registration
 from ..raster.arrays import Array
 from ..raster.robust import sigma_of_lengths
 from ..system.errors import NoOverlap
-from ..system.progress import Progress
+from ..system.progress import Progress, ReportProgress
 from .averaged import PairGeometry, Verified
 from .bundle_options import JUDGE
 from .focal_starts import starts
@@ -34,7 +34,7 @@ def register(
     matches: Sequence[PictureMatches],
     scale: float = 1.0,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: ReportProgress = Progress(),
 ) -> Registration:
     """Find the cameras of all pictures that connect, in the frame of the first of them.
 
@@ -52,7 +52,7 @@ def register(
         px by which thresholds are multiplied: full pixels per pixel of the picture that features were found in.
     seed : int
         Of every random choice.
-    progress : Progress, optional
+    progress : callable
         Told of the stage "geometry"; raises `Cancelled` when it was asked to.
 
     Returns
@@ -64,11 +64,10 @@ def register(
     NoOverlap
         If no two pictures connect.
     """
-    progress = progress or Progress()
     ideal = [undistort(p, camera) if camera.distortion.any() else p for p, camera in zip(points, cameras, strict=True)]
     plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
     verified = verify(ideal, matches, scale, seed)
-    progress("geometry")
+    progress("geometry", 0.0)
     lenses = starts(plain, ideal, verified)
     found = []
     for k, lens in enumerate(lenses):
