@@ -36,7 +36,8 @@ def neighbours_of(tracks: Tracks, measured: NDArray[np.bool_], pictures: int) ->
         mine = chosen[tracks.picture[chosen] == j]
         if len(mine) < CONTINUITY.least_points or (kind[mine] == kind[mine[0]]).all():
             continue
-        gaps, near = cKDTree(tracks.pixels[mine]).query(tracks.pixels[mine], k=min(CONTINUITY.neighbours + 1, len(mine)))
+        pixels = tracks.pixels[mine]
+        gaps, near = cKDTree(pixels).query(pixels, k=min(CONTINUITY.neighbours + 1, len(mine)))
         u, v = np.repeat(mine, near.shape[1] - 1), mine[near[:, 1:].ravel()]
         other = np.flatnonzero(kind[u] != kind[v])
         other = other[np.argsort(gaps[:, 1:].ravel()[other], kind="stable")[: CONTINUITY.most]]
