@@ -127,8 +127,8 @@ class _FromTree:
 
 
 def _without_false(problem: _Problem, found: Triangles) -> _FromTree:
-    """Averaged rotations. Where some pairs disagree, those that no triangle confirms are left out one at a time: a false
-    one in the first tree would have sound ones dropped for it."""
+    """Averaged rotations. Where some pairs disagree, those that no triangle confirms are left out one at a time: a
+    false one in the first tree would have sound ones dropped for it."""
     links = problem.links
     given = np.ones(len(links.pairs), bool)
     best = _from_tree(problem, found, given)
