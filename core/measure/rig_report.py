@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..cameras.rig import Rig
 from ..compose.inpaint import closed_holes
+from ..field.sphere_field import SphereField
 from ..panorama.canvas import Canvas
 from .exposure_entry import exposure_entry, exposure_warnings
 from .options import RIG, WARNING
@@ -54,7 +55,7 @@ def make_rig_report(
         In plain words, for the user.
     """
     rig, field, warp = alignment.rig, alignment.field, alignment.warp
-    assert rig is not None
+    assert rig is not None and isinstance(field, SphereField)
     names = [picture.name for picture in pictures]
     holes, folds = sum(one.holes for one in decided), max(one.folds for one in decided)
     error = map_errors(warp, alignment.edges)
