@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .cameras.rig import Rig
 from .cameras.view import View
 from .compose.cut_things import without_cut_things
 from .compose.rough_seam import RoughSeam
@@ -21,6 +22,7 @@ from .field.field import Field
 from .field.refined_depth import RefinedDepth
 from .field.remembered import Remembered
 from .field.slack import SlackField
+from .field.sphere_field import SphereField
 from .field.strict import StrictField
 from .options import StitchOptions
 from .panorama.choosing_slide import NO_WAY, SlideChoice, choose_slide
@@ -28,6 +30,7 @@ from .panorama.framing import FrameRequest, frame_for
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
+from .panorama.rig_warp import build_rig_warp
 from .panorama.slid_warp import slid_warp
 from .panorama.upright_edges import StraightEdges, straight_edges
 from .panorama.viewpoint import Viewpoint, viewpoint_between
@@ -135,10 +138,7 @@ def map_pictures(
         return slid_warp(sliding.base, views, sliding.viewpoint, projection)
 
     progress("warp", 0.4)
-    kind, distance = options.surface
-    asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
-    edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
-    frame = frame_for(asked, views, edges, down, coarsely)
+    frame = _frame(lines, options, coarsely)
     progress("warp", 0.5)
     if sliding is None:
         warp = known.on(frame)
@@ -148,6 +148,51 @@ def map_pictures(
         base = known.base(lines.down, focal_of(views[0].K), cache)
         warp = slid_warp(base, views, sliding.viewpoint, frame)
     return Mapped(_settled(warp, known, pictures), continuation, slide)
+
+
+def map_rig(
+    rig: Rig, field: SphereField, pictures: Sequence[Picture], options: StitchOptions, progress: ReportProgress
+) -> Mapped:
+    """Choose a frame, and map N pictures onto the canvas, seen from the first one's place.
+
+    Parameters
+    ----------
+    rig : Rig
+    field : SphereField
+        Fitted to its points.
+    pictures : sequence of Picture
+        In the rig's order.
+    options : StitchOptions
+        Projection, level, centre and fov.
+    progress : callable
+        progress(stage, share of that stage that is done).
+
+    Returns
+    -------
+    Mapped
+
+    Raises
+    ------
+    NoOverlap, OutputTooLarge, BadRequest
+        There is no canvas for it (see `build_rig_warp`).
+    """
+    views = rig.views
+    progress("warp", 0.0)
+    if options.surface[0] == "reference":
+        still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
+        return Mapped(build_rig_warp(field, views), None, still)
+    frame = _frame(AllEdges(pictures, views), options, lambda projection: build_rig_warp(field, views, projection))
+    progress("warp", 0.5)
+    still = SlideChoice(0.0, (), "the pictures are seen from one place")
+    return Mapped(build_rig_warp(field, views, frame), None, still)
+
+
+def _frame(lines: AllEdges, options: StitchOptions, warp_on: Callable[[Projection], Warp]) -> Projection:
+    """The frame that is asked for; warp_on: coarse maps of all pictures on a projection."""
+    kind, distance = options.surface
+    asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
+    edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
+    return frame_for(asked, lines.views, edges, down, warp_on)
 
 
 def _settled(warp: Warp, known: _Known, pictures: Sequence[Picture]) -> Warp:

@@ -109,7 +109,7 @@ def composed(
     if len(layers) == 2:
         order, panorama = [0, 1], Panorama(warp, exposed, options)
     else:
-        placing = Placing.of(warp, views)
+        placing = Placing(warp, views)
         order, panorama = adding_order(placing, layers), SetPanorama(warp, exposed, options, placing)
     panorama.begin(order[0], found[order[0]])
     for step, number in enumerate(order[1:]):

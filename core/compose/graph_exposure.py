@@ -124,16 +124,20 @@ def _solved(ratios: Sequence[_Ratio], count: int, channels: int, to_reference: b
     first, second = (np.array([getattr(one, name) for one in ratios], np.intp) for name in ("i", "j"))
     links = coo_matrix((np.ones(len(ratios)), (first, second)), shape=(count, count))
     groups, group = connected_components(links, directed=False)
-    gains = np.zeros((count, channels))
-    for k in range(channels):
-        matrix, right = np.zeros((count, count)), np.zeros(count)
-        for one in ratios:
-            weight, ends = one.blocks / one.spread[k] ** 2, [one.i, one.j]
-            matrix[np.ix_(ends, ends)] += weight * np.array([[1, -1], [-1, 1]])
-            right[ends] += weight * one.middle[k] * np.array([-1, 1])
-        # one picture of each group is held; which one is of no consequence
-        free = np.setdiff1d(np.arange(count), [np.flatnonzero(group == number)[0] for number in range(groups)])
-        gains[free, k] = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
+    # one picture of each group is held; which one is of no consequence
+    free = np.setdiff1d(np.arange(count), [np.flatnonzero(group == number)[0] for number in range(groups)])
+    gains, trust = np.zeros((count, channels)), np.ones(len(ratios))
+    for scale in (*GRAPH_EXPOSURE.outlier_logs, None):
+        for k in range(channels):
+            matrix, right = np.zeros((count, count)), np.zeros(count)
+            for one, share in zip(ratios, trust, strict=True):
+                weight, ends = share * one.blocks / one.spread[k] ** 2, [one.i, one.j]
+                matrix[np.ix_(ends, ends)] += weight * np.array([[1, -1], [-1, 1]])
+                right[ends] += weight * one.middle[k] * np.array([-1, 1])
+            gains[free, k] = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
+        if scale is not None:
+            left = [np.abs(gains[one.i] - gains[one.j] + one.middle).mean() for one in ratios]
+            trust = 1 / (1 + (np.array(left) / scale) ** 2) ** 2
     for number in range(groups):
         own = group == number
         gains[own] -= gains[0] if to_reference and own[0] else np.median(gains[own], axis=0)

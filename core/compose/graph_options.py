@@ -19,6 +19,10 @@ class GraphExposureOptions:
     max_gain: float = 64.0
     """Factor (six stops) between two pictures beyond which it is no exposure: of 8 bits hardly anything is left."""
 
+    outlier_logs: tuple[float, ...] = (2.0, 1.0, 0.5, 0.25)
+    """Logarithms of light, round after round, from which on an overlap that contradicts the others counts less: what it
+    shows is not the same thing twice. The last is more than a ring of overlaps fails to close by."""
+
     blocks_of_overlap: int = 1500
     """Blocks of an overlap that vignetting is fitted on, at most."""
 
@@ -30,15 +34,8 @@ class GraphExposureOptions:
 class PlacingOptions:
     """By how much pictures are expected to be misplaced, and what that is worth (`placing`)."""
 
-    unknown_deviation: float = 0.1
-    """Standard deviation of inverse range, as a share of its typical size, where the field tells none: about what
-    leaving out each of its points in turn shows on photographs."""
-
-    typical_percentile: float = 75.0
-    """Percentile of inverse range that counts as typical: what lies nearer is what is misplaced."""
-
-    samples: int = 40_000
-    """Pixels of the canvas that the order is decided by: more take time and change nothing."""
+    samples: int = 10_000
+    """Pixels of a picture that the order is decided by: more take time and change nothing."""
 
     price: float = 0.3
     """Price of showing what is misplaced by one px more, from corner to corner of the overlap, for each pixel of its

@@ -130,7 +130,7 @@ class SetPanorama(Panorama):
         added = Added(
             layer, [], window.map(warp.maps[number]), window, warp.canvas, window.plane(found.hidden),
             window.plane(found.hidden_by_depth), None, confidence, None, self._painted(number, window, painted),
-            off - window.plane(self._misplaced), count, self._options,
+            None if warp.deviation is None else off - window.plane(self._misplaced), count, self._options,
         )  # fmt: skip
         before = Layer(window.plane(self._light), window.plane(self._alpha))
         step = add(before, added, found, *taken_over, progress)

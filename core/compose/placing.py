@@ -25,30 +25,19 @@ from .graph_options import PLACING
 
 @dataclass(frozen=True)
 class Placing:
-    """Says how far pictures are misplaced; deviation: of inverse range."""
+    """Says how far pictures are misplaced; with a deviation of 1 where the warp knows none, which tells the order."""
 
     warp: Warp
     views: Sequence[View]
-    deviation: float
-
-    @staticmethod
-    def of(warp: Warp, views: Sequence[View]) -> Placing:
-        """With a deviation in proportion to what inverse range typically is."""
-        height, width = warp.canvas.height, warp.canvas.width
-        step = _step(height * width)
-        rows = [warp.depth[row : row + 1, 0:width][:, ::step] for row in range(0, height, step)]
-        sample = np.abs(np.concatenate(rows))
-        known = sample[np.isfinite(sample)]
-        typical = float(np.percentile(known, PLACING.typical_percentile)) if known.size else 0.0
-        return Placing(warp, views, PLACING.unknown_deviation * typical)
 
     def at(self, number: int, part: Part) -> Plane:
         """Expected misplacement (h, w) of a picture in rows and columns of the canvas, px."""
-        canvas = self.warp.canvas
-        return self._off(number, canvas.xs[part[1]], canvas.ys[part[0]], np.asarray(self.warp.depth[part]))
+        canvas, warp = self.warp.canvas, self.warp
+        off = self._off(number, canvas.xs[part[1]], canvas.ys[part[0]], np.asarray(warp.depth[part]))
+        return off if warp.deviation is None else off * warp.deviation[part]
 
     def _off(self, number: int, xs: Array, ys: Array, d: Plane) -> Plane:
-        """The same at columns xs and lines ys, px of the canvas's plane, with inverse range (h, w)."""
+        """The same at columns xs and lines ys, px of the plane, where inverse range (h, w) is wrong by 1."""
         canvas, view = self.warp.canvas, self.views[number]
         focal = self.views[0].K[0, 0] if canvas.projection is None else canvas.projection.focal
         rays = np.stack(
@@ -60,7 +49,7 @@ class Placing:
         towards = rays - np.nan_to_num(d)[..., None] * beside
         towards /= np.maximum(np.linalg.norm(towards, axis=-1, keepdims=True), np.float32(1e-6))
         across = beside - towards * (towards * beside).sum(axis=-1, keepdims=True)
-        off: Plane = np.linalg.norm(across, axis=-1) * np.float32(focal * self.deviation)
+        off: Plane = np.linalg.norm(across, axis=-1) * np.float32(focal)
         return off
 
     def mean(self, number: int, layer: Layer) -> float:
@@ -70,16 +59,14 @@ class Placing:
             return 0.0
         rows, columns = box
         step = _step((rows.stop - rows.start) * (columns.stop - columns.start))
-        canvas = self.warp.canvas
-        total, count = 0.0, 0
-        for row in range(rows.start, rows.stop, step):
-            line = slice(row, row + 1), slice(columns.start, columns.stop)
-            shown = layer.alpha[line][:, ::step] > 0
-            if shown.any():
-                d = np.asarray(self.warp.depth[line])[:, ::step]
-                off = self._off(number, canvas.xs[columns][::step], canvas.ys[line[0]], d)
-                total, count = total + float(off[shown].sum(dtype=float)), count + int(shown.sum())
-        return total / max(count, 1)
+        lines = [(slice(row, row + 1), columns) for row in range(rows.start, rows.stop, step)]
+        canvas, warp = self.warp.canvas, self.warp
+        shown, d, deviation = (
+            np.ones((), np.float32) if values is None else np.concatenate([np.asarray(values[line])[:, ::step] for line in lines])
+            for values in (layer.alpha, warp.depth, warp.deviation)
+        )
+        off = self._off(number, canvas.xs[columns][::step], canvas.ys[rows][::step], d) * deviation
+        return float(off[shown > 0].mean()) if (shown > 0).any() else 0.0
 
 
 def adding_order(placing: Placing, layers: Sequence[Layer]) -> list[int]:

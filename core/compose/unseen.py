@@ -44,11 +44,12 @@ def unseen_by_each(layers: Sequence[Layer], warp: Warp, views: Sequence[View]) -
         window = Window.whole(warp.canvas)
         return [Unseen(behind, behind), _unseen(window, warp, 1, warp.nearness(views, 1), shown)]
     count = np.zeros(nothing.shape, np.int16)
-    for layer in layers:
-        count += layer.alpha > 0
+    windows = [window_of(warp.canvas, layer.alpha > 0, WINDOW.seam_margin_px) for layer in layers]
+    for layer, part in zip(layers, windows, strict=True):
+        for there, _ in [] if part is None else part.parts:
+            count[there] += layer.alpha[there] > 0
     found = []
-    for number, layer in enumerate(layers):
-        part = window_of(warp.canvas, layer.alpha > 0, WINDOW.seam_margin_px)
+    for number, (layer, part) in enumerate(zip(layers, windows, strict=True)):
         if part is None:
             found.append(Unseen(nothing, nothing))
             continue
@@ -90,6 +91,8 @@ def _last_of_each_pixel_shown(
     found: Sequence[Unseen], layers: Sequence[Layer], count: NDArray[np.int16]
 ) -> list[Unseen]:
     """The same without what is hidden from all pictures that show it; count (H, W): how many do."""
+    if not any(one.hidden.any() for one in found):
+        return list(found)
     seen = np.zeros(count.shape, bool)
     for one, layer in zip(found, layers, strict=True):
         seen |= (layer.alpha > 0) & ~one.hidden

@@ -210,8 +210,7 @@ def _told(
     first, second = links.ends
     between = turned.R[second] @ np.swapaxes(turned.R[first], 1, 2)
     off = degrees_between(chosen.poses.R, between)
-    allowed = np.maximum(AVERAGING.agrees_degrees, AVERAGING.agrees_sigmas * links.degrees)
-    agrees = off < allowed
+    agrees = off < links.allowed_degrees
     R = np.full((len(cameras), 3, 3), np.nan)
     R[list(members)] = turned.R
     near = degrees_between(chosen.turning.R, between) < PAIR_FIT.rotation_degrees
@@ -219,7 +218,7 @@ def _told(
     enough = (counts >= PAIR_FIT.rotation_matches) & (chosen.turning.gain > PAIR_FIT.rotation_gric)
     rotates = near & enough
     pairs = tuple(
-        _pair(verified, chosen, k, (members[first[k]], members[second[k]]), float(off[k]), bool(rotates[k]), int(counts[k]))
+        _pair(verified, chosen, k, (members[first[k]], members[second[k]]), float(off[k]), bool(rotates[k]))
         for k in np.flatnonzero(agrees)
     )
     connected = components(len(cameras), [(pair.i, pair.j) for pair in pairs])[0]
@@ -238,7 +237,7 @@ def _told(
 
 
 def _pair(
-    verified: Verified, chosen: _Chosen, k: int, ends: tuple[int, int], off: float, rotates: bool, count: int
+    verified: Verified, chosen: _Chosen, k: int, ends: tuple[int, int], off: float, rotates: bool
 ) -> PairGeometry:
     number = int(chosen.numbers[k])
     match: PictureMatches = verified.pairs[number]
@@ -250,7 +249,7 @@ def _pair(
     return PairGeometry(
         match.i, match.j, match.index[chosen.inliers[k]], verified.found[number], len(match), R, t, information,
         noise_of(np.sqrt(squares[chosen.inliers[k]]), verified.scale), float(chosen.turning.parallax[k]),
-        float(chosen.turning.gain[k]) / count, rotates, off,
+        float(chosen.turning.gain[k]) / int(chosen.inliers[k].sum()), rotates, off,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ columns. Reference: Triggs et al., Bundle Adjustment: A Modern Synthesis, 1999.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,9 +15,12 @@ import numpy as np
 from ..raster.arrays import Array
 from .bundle_options import BUNDLE
 from .reprojection import CAMERA, Reprojection, derivatives, reproject, tangents
-from .solution import Problem, Solution, free_lens_parameters, lens_priors, lens_values
+from .solution import Problem, Solution
 from .tracks import Index, pairs_within
 from .turns import rotations
+
+# Called often by long work; ends it by raising.
+Tick = Callable[[], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +134,7 @@ def _columns(problem: Problem, settings: Settings, reference: int) -> Index:
                 columns[j, 3:6] = count + 3 * places[place] + np.arange(3)
         count += 3 * len(places)
     if settings.lenses:
-        free = free_lens_parameters(problem.lenses)
+        free = problem.lenses.free
         numbers = np.full(free.shape, -1)
         numbers[free] = count + np.arange(int(free.sum()))
         columns[:, 6:] = numbers[problem.lenses.of]
@@ -138,8 +142,9 @@ def _columns(problem: Problem, settings: Settings, reference: int) -> Index:
 
 
 def bundle(
-    problem: Problem, solution: Solution, settings: Settings, reference: int, prior: DepthPrior | None = None
-) -> Bundled:
+    problem: Problem, solution: Solution, settings: Settings, reference: int, prior: DepthPrior | None = None,
+    tick: Tick = lambda: None,
+) -> Bundled:  # fmt: skip
     """Minimise the robust cost of all observations that are used.
 
     Parameters
@@ -152,6 +157,8 @@ def bundle(
         The picture whose pose is held, unless poses are given.
     prior : DepthPrior, optional
         Draws ρ; without one, points without parallax are held by the damping alone.
+    tick : callable
+        Called at every iteration; ends the work by raising.
 
     Returns
     -------
@@ -163,9 +170,10 @@ def bundle(
     damping, done = BUNDLE.damping, 0
     while done < settings.iterations and len(structure.chosen):
         done += 1
+        tick()
         bases = tangents(solution.rays)
         normal = normal_equations(problem, solution, structure, seen, settings, prior, bases)
-        scale = _scale_direction(structure, solution)
+        scale = scale_direction(structure, solution)
         before = cost
         for _ in range(BUNDLE.tries):
             step = _solved(structure, normal, scale, damping)
@@ -194,8 +202,7 @@ def _cost(
 ) -> float:  # fmt: skip
     kernel = settings.kernel_px * problem.scale
     cost = float(robust_cost(np.linalg.norm(seen.errors, axis=1), kernel).sum())
-    mean, weight = lens_priors(problem.lenses, problem.scale)
-    cost += float((weight * (lens_values(solution) - mean) ** 2).sum())
+    cost += float((problem.lenses.weights(problem.scale) * solution.lens**2).sum())
     if prior is not None and settings.depths:
         off = (solution.inverse_ranges - prior.mean) / prior.sigma
         cost += (BUNDLE.prior_noise_px * problem.scale) ** 2 * float(np.log1p(off[structure.points] ** 2).sum())
@@ -234,18 +241,12 @@ def normal_equations(
         whole[block, block] = rows.T @ rows
         gradient[block] = rows.T @ errors[mine].ravel()
     cameras, gradient = structure.reduced(whole), structure.reduced(gradient)
-    mean, weight = lens_priors(problem.lenses, problem.scale)
-    unknown = _lens_unknowns(problem, structure)
+    weight = problem.lenses.weights(problem.scale)
+    unknown = structure.columns[problem.lenses.first, 6:]
     free = unknown >= 0
     cameras[unknown[free], unknown[free]] += weight[free]
-    gradient[unknown[free]] += (weight * (lens_values(solution) - mean))[free]
+    gradient[unknown[free]] += (weight * solution.lens)[free]
     return Normal(cameras, gradient, points, point_gradients, _products(point, camera))
-
-
-def _lens_unknowns(problem: Problem, structure: Structure) -> Index:
-    """The unknowns (L, 4) of every lens."""
-    first = np.array([int(np.flatnonzero(problem.lenses.of == lens)[0]) for lens in range(len(problem.lenses))])
-    return structure.columns[first, 6:]
 
 
 def _products(left: Array, right: Array) -> Array:
@@ -273,7 +274,7 @@ def schur_complement(structure: Structure, normal: Normal, inverses: Array) -> t
     return structure.reduced(whole), structure.reduced(gradient)
 
 
-def _scale_direction(structure: Structure, solution: Solution) -> Array:
+def scale_direction(structure: Structure, solution: Solution) -> Array:
     """How all places grow together (C,), a unit vector; 0 where they cannot.
 
     No observation tells the scale, but priors of ρ would be cheaper the larger it is.
@@ -311,8 +312,8 @@ def _moved(
     problem: Problem, solution: Solution, structure: Structure, bases: Array, step: Array, points: Array
 ) -> Solution:
     by_camera = (structure.chooser @ step).reshape(-1, CAMERA)
-    first = np.array([int(np.flatnonzero(problem.lenses.of == lens)[0]) for lens in range(len(problem.lenses))])
-    lenses = by_camera[first, 6:]
+    lens = by_camera[problem.lenses.first, 6:]
+    lens[:, 0] = np.clip(lens[:, 0], -BUNDLE.most_log_focal, BUNDLE.most_log_focal)
     chosen = structure.points
     rays, inverse_ranges = solution.rays.copy(), solution.inverse_ranges.copy()
     moved = rays[chosen] + np.matmul(bases[chosen], points[:, :2, None])[:, :, 0]
@@ -323,9 +324,7 @@ def _moved(
         solution,
         R=rotations(by_camera[:, :3]) @ solution.R,
         centres=solution.centres + by_camera[:, 3:6],
-        focal=solution.focal * np.exp(np.clip(lenses[:, 0], -BUNDLE.most_log_focal, BUNDLE.most_log_focal)),
-        k1=solution.k1 + lenses[:, 1],
-        principal=solution.principal + lenses[:, 2:],
+        lens=solution.lens + lens,
         rays=rays,
         inverse_ranges=inverse_ranges,
     )

@@ -87,6 +87,8 @@ class BundleOptions:
     # thousands of observations do not outweigh a prior as independent ones would.
     k1_sigma: float = 0.05
     prior_noise_px: float = 1.0
+    # Iterations that undo a distortion.
+    undistorting: int = 8
     # Residual px of what lies behind a camera, and the third coordinate of |r| = 1 from which a point is before it.
     behind_px: float = 1e3
     least_ahead: float = 1e-3
@@ -145,15 +147,16 @@ class JudgeOptions:
     passes: int = 3
     # Kernel widths squared of a match that no track took: as if it were 5 kernels off.
     missed_kernels: float = 25.0
-    # Relative cost within which hypotheses are reported as possible.
+    # Relative cost within which hypotheses are reported as possible, and log f within which two are the same.
     possible: float = 0.05
+    same_log_focal: float = 0.002
     # Points of three pictures from which a pair's baseline is measured, and its parallax in σ from which it has any.
     three_view_points: int = 10
     parallax_sigmas: float = 3.0
     # Inliers below which a link that no loop checks is called ambiguous.
     weak_link: int = 40
-    # Share of points behind (ρ < 0) that raises the alarm for stations.
-    behind_share: float = 0.05
+    # px: where costs are weighed against numbers of parameters, noise is never taken to be less.
+    least_noise_px: float = 0.1
 
 
 TRACKS = TrackOptions()

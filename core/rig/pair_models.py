@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..cameras.projective import skew
 from ..raster.arrays import Array
 from .matched_rays import MatchedRays, Rays, SharedLens
-from .turns import rotations
+from .turns import dot, rotations
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +30,13 @@ class Poses:
 class PairModel(Protocol):
     """What a fit needs of a model: `freedom` parameters a pair, and the shared log factor and k1 after them."""
 
-    rays: MatchedRays
-    freedom: int
+    @property
+    def rays(self) -> MatchedRays:
+        """The matches."""
 
-    def squares(self, poses: Poses, lens: SharedLens) -> Array:
-        """Squared residuals (O,), px²."""
+    @property
+    def freedom(self) -> int:
+        """Parameters of each pair."""
 
     def equations(self, poses: Poses, lens: SharedLens, shared: bool) -> tuple[Array, Array]:
         """Normal matrices and gradients of every pair, px²; with the shared parameters or without."""
@@ -105,10 +107,10 @@ class _Sampson:
         self.slope = self.line[:, :2] / rays.focal[1][:, None] ** 2
         self.back_slope = self.back_line[:, :2] / rays.focal[0][:, None] ** 2
         self.shares = (
-            (self.back_slope * self.back_line[:, :2]).sum(axis=1), (self.slope * self.line[:, :2]).sum(axis=1)
+            dot(self.back_slope, self.back_line[:, :2]), dot(self.slope, self.line[:, :2])
         )  # fmt: skip
         self.length = np.sqrt(self.shares[0] + self.shares[1] + 1e-30)
-        self.residual = (rays.b * self.line).sum(axis=1) / self.length
+        self.residual: Array = dot(rays.b, self.line) / self.length
         self.ratio = self.residual / self.length**2
 
     def by_matrix(self) -> Array:
@@ -118,15 +120,16 @@ class _Sampson:
         self.first = first
         out = first[:, :, None] * self.a[:, None, :]
         out[:, :, :2] -= (self.ratio[:, None] * self.b)[:, :, None] * self.back_slope[:, None, :]
-        return out.reshape(-1, 9)
+        entries: Array = out.reshape(-1, 9)
+        return entries
 
     def by_lens(self, matched: MatchedRays, radial: Array) -> Array:
         """Derivatives (O, 2) by log factor and k1; radial: `MatchedRays.derivatives`. After `by_matrix`."""
         by_a = np.einsum("oij,oi->oj", self.E[:, :, :2], self.first)
         by_b = self.line[:, :2] / self.length[:, None]
         by_b = by_b - self.ratio[:, None] * np.einsum("oij,oj->oi", self.E[:, :2, :2], self.back_slope)
-        out = (by_a * self.a[:, :2]).sum(axis=1)[:, None] * radial[0]
-        out += (by_b * self.b[:, :2]).sum(axis=1)[:, None] * radial[1]
+        out: Array = dot(by_a, self.a[:, :2])[:, None] * radial[0]
+        out += dot(by_b, self.b[:, :2])[:, None] * radial[1]
         # px are px of a longer focal length
         out[:, 0] += self.ratio * (matched.zooms[0] * self.shares[0] + matched.zooms[1] * self.shares[1])
         return out
@@ -151,8 +154,8 @@ class RotationModel:
 
     def squares(self, poses: Poses, lens: SharedLens) -> Array:
         """Squared distances (O,), px²: of two coordinates."""
-        squares: Array = (self.vectors(poses, lens)[0] ** 2).sum(axis=1)
-        return squares
+        residual = self.vectors(poses, lens)[0]
+        return dot(residual, residual)
 
     def costs(self, poses: Poses, lens: SharedLens) -> Array:
         """Cauchy costs (P,), px²."""
@@ -167,7 +170,7 @@ class RotationModel:
             others = (SharedLens(lens.factor * np.exp(step), lens.k1), SharedLens(lens.factor, lens.k1 + step))
             by_lens = [(self.vectors(poses, other)[0] - residual) / step for other in others]
             columns = np.concatenate([columns, np.stack(by_lens, axis=2)], axis=2)
-        weight = 1 / (1 + (residual**2).sum(axis=1) / self.cauchy**2)
+        weight = 1 / (1 + dot(residual, residual) / self.cauchy**2)
         flat = columns.reshape(-1, columns.shape[2])
         return normal_equations(flat, np.repeat(weight, 3), residual.ravel(), 3 * self.rays.starts)
 
@@ -181,9 +184,7 @@ def cauchy_costs(rays: MatchedRays, squares: Array, width: float) -> Array:
     return rays.sums(0.5 * width**2 * np.log1p(squares / width**2))
 
 
-def normal_equations(
-    columns: Array, weight: Array, residual: Array, starts: NDArray[np.intp]
-) -> tuple[Array, Array]:
+def normal_equations(columns: Array, weight: Array, residual: Array, starts: NDArray[np.intp]) -> tuple[Array, Array]:
     """Jᵀ W J (P, n, n) and Jᵀ W r (P, n) of each pair's rows of J (O, n)."""
     weighted = columns * weight[:, None]
     count, n = len(starts) - 1, columns.shape[1]

@@ -129,7 +129,8 @@ class _Eliminated:
         if len(free):
             kept = np.ix_(free, free)
             q[free] = -np.linalg.solve(S[kept] + damping * np.diag(np.diag(S[kept])), gradient[free])
-        return np.clip(q, -PAIR_FIT.most_lens_step, PAIR_FIT.most_lens_step)
+        step: Array = np.clip(q, -PAIR_FIT.most_lens_step, PAIR_FIT.most_lens_step)
+        return step
 
     def pose_steps(self, q: Array, damping: float) -> Array:
         """Steps (P, n) of the pairs after that step of the lens."""
@@ -148,4 +149,5 @@ def _vector(lens: SharedLens) -> Array:
 
 def _short(steps: Array) -> Array:
     length = np.linalg.norm(steps, axis=1, keepdims=True)
-    return steps * np.minimum(1, PAIR_FIT.most_pose_step / np.maximum(length, 1e-12))
+    short: Array = steps * np.minimum(1, PAIR_FIT.most_pose_step / np.maximum(length, 1e-12))
+    return short

@@ -49,37 +49,43 @@ def _likeness(features: Sequence[Features]) -> Array:
     words = _words(np.concatenate([_thinned(v, max(1, PAIRS.sample // len(voters))) for v in voters]))
     vectors = np.zeros((len(voters), words.size))
     for row, descriptors in zip(vectors, voters, strict=True):
-        nearest = _nearest(descriptors, words)
-        off = np.zeros(words.shape)
-        np.add.at(off, nearest, descriptors - words[nearest])
+        total, size = _summed(descriptors, _nearest(descriptors, words))
+        off = total - words * size[:, None]
         # each word counts alike however often it occurs: repeated structure would drown the rest
         off /= np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-12)
         row[:] = off.ravel()
     vectors /= np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
-    return vectors @ vectors.T
+    likeness: Array = vectors @ vectors.T
+    return likeness
 
 
 def _words(descriptors: NDArray[np.float32]) -> Array:
     """Centres of the descriptors' clusters, by Lloyd's iteration from starts that no order of pictures changes."""
     ordered = descriptors[np.lexsort(descriptors.T[::-1])]
-    words = ordered[np.linspace(0, len(ordered) - 1, PAIRS.words).astype(int)].astype(np.float64)
+    words: Array = ordered[np.linspace(0, len(ordered) - 1, PAIRS.words).astype(int)].astype(np.float64)
     for _ in range(PAIRS.word_rounds):
-        nearest = _nearest(ordered, words)
-        total = np.zeros(words.shape)
-        np.add.at(total, nearest, ordered)
-        size = np.bincount(nearest, minlength=len(words))
+        total, size = _summed(ordered, _nearest(ordered, words))
         words[size > 0] = total[size > 0] / size[size > 0, None]
     return words
 
 
+def _summed(descriptors: Array | NDArray[np.float32], word: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Sums of the descriptors (words, 128) of each word, and how many they are."""
+    of_word = np.zeros((PAIRS.words, len(word)))
+    of_word[word, np.arange(len(word))] = 1
+    return of_word @ descriptors, of_word.sum(axis=1)
+
+
 def _nearest(descriptors: NDArray[np.float32], words: Array) -> NDArray[np.intp]:
-    return np.argmax(descriptors @ words.T - (words**2).sum(axis=1) / 2, axis=1)
+    nearest: NDArray[np.intp] = np.argmax(descriptors @ words.T - (words**2).sum(axis=1) / 2, axis=1)
+    return nearest
 
 
 def _thinned(descriptors: NDArray[np.float32], most: int) -> NDArray[np.float32]:
     if len(descriptors) <= most:
         return descriptors
-    return descriptors[np.linspace(0, len(descriptors) - 1, most).astype(int)]
+    few: NDArray[np.float32] = descriptors[np.linspace(0, len(descriptors) - 1, most).astype(int)]
+    return few
 
 
 def verified(points: Sequence[Array], matches: Iterable[PictureMatches], scale: float, seed: int) -> Verified:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,14 +9,11 @@ from scipy.spatial import cKDTree
 
 from ..raster.arrays import Array
 from ..raster.robust import sigma_of_lengths
-from .bundle import Bundled, DepthPrior, Settings, bundle, robust_cost
+from .bundle import Bundled, DepthPrior, Settings, Tick, bundle, robust_cost
 from .bundle_options import BUNDLE, JUDGE, POLISHING
 from .reprojection import lengths_of_errors
 from .solution import Problem, Solution
 from .triangulation import triangulate
-
-# Called between rounds with how much is done: reports, and ends the work by an exception.
-Step = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,23 +30,21 @@ class Polished:
     prior: DepthPrior | None
 
 
-def polish(problem: Problem, solution: Solution, step: Step) -> Polished:
+def polish(problem: Problem, solution: Solution, tick: Tick) -> Polished:
     """All of it, from rotations and places on; points are triangulated here."""
     reference = _middle(solution)
     solution = _points_anew(problem, solution.seen_from(reference).rescaled())
     prior = depth_prior(solution)
     wide = Settings(BUNDLE.first_kernel_px, POLISHING.first_iterations, POLISHING.first_tolerance, lenses=False)
-    solution = bundle(problem, solution, wide, reference, prior).solution
+    solution = bundle(problem, solution, wide, reference, prior, tick).solution
     last = np.inf
-    rounds = list(zip(POLISHING.iterations, POLISHING.tolerances, strict=True))
-    for k, (iterations, tolerance) in enumerate(rounds):
-        step(k / len(rounds))
+    for k, (iterations, tolerance) in enumerate(zip(POLISHING.iterations, POLISHING.tolerances, strict=True)):
         if k < POLISHING.revived_rounds:
             solution = _revived(problem, solution)
         solution = solution.rescaled()
         prior = depth_prior(solution)
         settings = Settings(iterations=iterations, tolerance=tolerance)
-        bundled = bundle(problem, solution, settings, reference, prior)
+        bundled = bundle(problem, solution, settings, reference, prior, tick)
         solution, pruned = _pruned(problem, bundled, POLISHING.prune_sigmas)
         settled = pruned < POLISHING.settled_pruned * len(bundled.chosen)
         if k >= POLISHING.settled_round and settled and bundled.cost > (1 - POLISHING.settled_cost) * last:
@@ -60,14 +54,13 @@ def polish(problem: Problem, solution: Solution, step: Step) -> Polished:
     return Polished(problem, solution, total_cost(problem, solution), _behind(solution), False, depth_prior(solution))
 
 
-def polish_rotations(problem: Problem, solution: Solution, step: Step) -> Polished:
+def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polished:
     """The same for pictures that were all taken from one place: every point is at infinity."""
     solution = replace(solution, centres=np.zeros_like(solution.centres)).seen_from(0)
     solution = _points_anew(problem, solution)
-    for k, kernel in enumerate(POLISHING.rotation_kernels_px):
-        step(k / len(POLISHING.rotation_kernels_px))
+    for kernel in POLISHING.rotation_kernels_px:
         settings = Settings(kernel, POLISHING.rotation_iterations, POLISHING.rotation_tolerance, depths=False)
-        bundled = bundle(problem, solution, settings, 0)
+        bundled = bundle(problem, solution, settings, 0, None, tick)
         solution, _ = _pruned(problem, bundled, POLISHING.rotation_prune_sigmas)
     return Polished(problem, solution, total_cost(problem, solution), 0.0, True, None)
 
@@ -132,10 +125,10 @@ def _behind(solution: Solution) -> float:
     return float((ranges < 0).mean()) if len(ranges) else 0.0
 
 
-def start(problem: Problem, R: Array, focal: Array, k1: Array, principal: Array) -> Solution:
-    """Where the bundle begins before places are known: no points, all places the origin."""
+def start(problem: Problem, R: Array, lens: Array) -> Solution:
+    """Where the bundle begins before places are known, lens (L, LENS): no points, all places the origin."""
     points, observations = len(problem.tracks), len(problem.tracks.point)
     ahead = np.tile([0.0, 0, 1], (points, 1))
     nowhere = np.zeros((problem.pictures, 3))
     none = np.zeros(points, bool)
-    return Solution(R, nowhere, focal, k1, principal, ahead, np.zeros(points), none, np.ones(observations, bool))
+    return Solution(R, nowhere, lens, ahead, np.zeros(points), none, np.ones(observations, bool))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..raster.arrays import Array
 from .bundle_options import POSITIONS
 from .continuity import Blocks, Neighbours, equal_depths, equal_logs, neighbours_of
-from .solution import Problem, Solution, bearings
+from .solution import Problem, Solution, bearings, lens_of
 from .tracks import Index, pairs_within
 
 
@@ -63,7 +63,7 @@ class _Positioning:
         tracks = problem.tracks
         self.tracks, self.count, self.same = tracks, problem.pictures, same
         self.w: Array = np.einsum("oji,oj->oi", solution.R[tracks.picture], bearings(problem, solution))
-        self.focal = solution.focal[problem.lenses.of[tracks.picture]]
+        self.focal = lens_of(problem, solution, tracks.picture).focal
         self.sigma = problem.noise_px
         self.weight = np.ones(len(tracks.point))
         self.inside = pairs_within(tracks.point)

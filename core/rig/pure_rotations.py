@@ -1,4 +1,4 @@
-"""Whether pure rotations explain pairs, by Torr's criterion (GRIC): a pose always fits better, and so has to by more."""
+"""Whether pure rotations explain pairs, by Torr's criterion (GRIC): a pose always fits better, and has to by much."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def gric_of_rotations(rays: MatchedRays, squares: Array, noise: float) -> Array:
 
 def _gric(rays: MatchedRays, squares: Array, noise: float, codimension: int, parameters: int) -> Array:
     fit = rays.sums(np.minimum(squares / noise**2, 2.0 * codimension))
-    return fit + (4 - codimension) * rays.counts * np.log(4) + parameters * np.log(4 * rays.counts)
+    out: Array = fit + (4 - codimension) * rays.counts * np.log(4) + parameters * np.log(4 * rays.counts)
+    return out
 
 
 @dataclass(frozen=True)
@@ -38,24 +39,28 @@ class AllRotations:
     lens: SharedLens
 
 
-def as_rotations(found: Candidates, together: Together, prior: LensPrior, start: SharedLens, scale: float) -> AllRotations:
+def as_rotations(
+    found: Candidates, together: Together, prior: LensPrior, start: SharedLens, scale: float
+) -> AllRotations:
     """Fit all pairs as pure rotations with a shared lens: from the poses' focal length, the start's, and what was known
     before."""
-    rays, width = found.rays, PAIR_FIT.cauchy_px * scale
+    rays, width = found.rays.thinned(PAIR_FIT.rotation_test_matches), PAIR_FIT.cauchy_px * scale
     residual = EpipolarModel(rays, width).residuals(together.poses, together.lens)
     noise = noise_of(residual, scale)
     of_poses = gric_of_poses(rays, residual**2, noise)
     model = RotationModel(rays, width)
     poses = Poses(found.turned, np.zeros((len(rays), 3)))
-    best: AllRotations | None = None
+    tried: list[float] = []
+    best = AllRotations(0.0, together.lens)
     for factor in (together.lens.factor, start.factor, 1.0):
-        lens = SharedLens(factor)
-        fitted = refine_together(model, poses, lens, prior, noise, PAIR_FIT.rotation_iterations)
+        if any(abs(np.log(factor / other)) < PAIR_FIT.rotation_same_focal for other in tried):
+            continue
+        tried.append(factor)
+        fitted = refine_together(model, poses, SharedLens(factor), prior, noise, PAIR_FIT.rotation_iterations)
         better = gric_of_rotations(rays, model.squares(fitted.poses, fitted.lens), noise) < of_poses
-        share = float(rays.counts[better].sum() / rays.counts.sum())
-        if best is None or share > best.share:
+        share = float(found.rays.counts[better].sum() / found.rays.counts.sum())
+        if share > best.share:
             best = AllRotations(share, fitted.lens)
-    assert best is not None
     return best
 
 
@@ -69,9 +74,7 @@ class PairRotations:
     parallax: Array
 
 
-def each_as_rotation(
-    rays: MatchedRays, turned: Array, lens: SharedLens, squares: Array, noise: float
-) -> PairRotations:
+def each_as_rotation(rays: MatchedRays, turned: Array, lens: SharedLens, squares: Array, noise: float) -> PairRotations:
     """Fit each pair as a pure rotation, from `turned` (P, 3, 3) on; squares (O,): of its pose's Sampson distances."""
     model = RotationModel(rays, 3 * noise)
     poses = refine_each(model, Poses(turned, np.zeros((len(rays), 3))), lens, PAIR_FIT.rotation_iterations)

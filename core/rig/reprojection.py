@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..raster.arrays import Array
 from .bundle_options import BUNDLE
-from .solution import Problem, Solution, fold_of, stretch_of
+from .solution import LensOfPictures, Problem, Solution, bending_of, fold_of, lens_of, stretch_of
 from .tracks import Index
 
 # Parameters of a camera: rotation vector, place, log f, k1, principal point.
@@ -29,17 +29,16 @@ class Reprojection:
 
 
 def reproject(problem: Problem, solution: Solution, chosen: Index) -> Reprojection:
-    tracks, lenses = problem.tracks, problem.lenses
+    tracks = problem.tracks
     picture, point = tracks.picture[chosen], tracks.point[chosen]
-    lens = lenses.of[picture]
+    lens = lens_of(problem, solution, picture)
     away = solution.rays[point] - solution.inverse_ranges[point][:, None] * solution.centres[picture]
     q = np.matmul(solution.R[picture], away[:, :, None])[:, :, 0]
     behind = q[:, 2] <= BUNDLE.least_ahead
     ideal = q[:, :2] / np.where(behind, 1.0, q[:, 2])[:, None]
-    focal = solution.focal[lens] * stretch_of(ideal, solution.k1[lens])
-    errors = focal[:, None] * ideal
-    errors[:, 1] *= lenses.aspect[lens]
-    errors += solution.principal[lens] - tracks.pixels[chosen]
+    errors = (lens.focal * stretch_of(ideal, lens.k1))[:, None] * ideal
+    errors[:, 1] *= lens.aspect
+    errors += lens.principal - tracks.pixels[chosen]
     errors[behind] = BUNDLE.behind_px
     return Reprojection(chosen, errors, q, ideal, behind)
 
@@ -69,18 +68,16 @@ def derivatives(problem: Problem, solution: Solution, seen: Reprojection, bases:
     """
     tracks = problem.tracks
     picture, point = tracks.picture[seen.chosen], tracks.point[seen.chosen]
-    lens = problem.lenses.of[picture]
-    by_q = _by_direction(solution.focal[lens], problem.lenses.aspect[lens], solution.k1[lens], seen)
+    lens = lens_of(problem, solution, picture)
+    by_q = _by_direction(lens, seen)
     by_world = np.matmul(by_q, solution.R[picture])
     camera = np.empty((len(picture), 2, CAMERA))
     camera[:, :, :3] = np.cross(seen.q[:, None, :], by_q)
     camera[:, :, 3:6] = -solution.inverse_ranges[point][:, None, None] * by_world
-    aspect = problem.lenses.aspect[lens]
-    for row, along in ((0, seen.ideal[:, 0]), (1, aspect * seen.ideal[:, 1])):
-        camera[:, row, 6] = solution.focal[lens] * stretch_of(seen.ideal, solution.k1[lens]) * along
-        r2 = (seen.ideal**2).sum(axis=1)
-        k1 = solution.k1[lens]
-        camera[:, row, 7] = solution.focal[lens] * np.where(k1 < 0, np.minimum(r2, fold_of(k1)), r2) * along
+    along = lens.focal[:, None] * seen.ideal
+    along[:, 1] *= lens.aspect
+    camera[:, :, 6] = stretch_of(seen.ideal, lens.k1)[:, None] * along
+    camera[:, :, 7] = bending_of(seen.ideal, lens.k1)[:, None] * along
     camera[:, :, 8:] = np.eye(2)
     by_point = np.empty((len(picture), 2, 3))
     by_point[:, :, :2] = np.matmul(by_world, bases[point])
@@ -88,17 +85,17 @@ def derivatives(problem: Problem, solution: Solution, seen: Reprojection, bases:
     return camera, by_point
 
 
-def _by_direction(focal: Array, aspect: Array, k1: Array, seen: Reprojection) -> Array:
+def _by_direction(lens: LensOfPictures, seen: Reprojection) -> Array:
     """Of the errors by q (O, 2, 3)."""
     x, y = seen.ideal.T
     depth = np.where(seen.behind, 1.0, seen.q[:, 2])
-    stretch = stretch_of(seen.ideal, k1)
-    bend = 2 * np.where((k1 < 0) & (x * x + y * y > fold_of(k1)), 0.0, k1)
+    stretch = stretch_of(seen.ideal, lens.k1)
+    bend = 2 * np.where((lens.k1 < 0) & (x * x + y * y > fold_of(lens.k1)), 0.0, lens.k1)
     by_q = np.empty((len(x), 2, 3))
     by_q[:, 0, 0] = stretch + bend * x * x
     by_q[:, 0, 1] = bend * x * y
-    by_q[:, 1, 0] = aspect * bend * x * y
-    by_q[:, 1, 1] = aspect * (stretch + bend * y * y)
-    by_q[:, :, :2] *= (focal / depth)[:, None, None]
+    by_q[:, 1, 0] = lens.aspect * bend * x * y
+    by_q[:, 1, 1] = lens.aspect * (stretch + bend * y * y)
+    by_q[:, :, :2] *= (lens.focal / depth)[:, None, None]
     by_q[:, :, 2] = -(by_q[:, :, 0] * x[:, None] + by_q[:, :, 1] * y[:, None])
     return by_q

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
-from .graph import Pair, strongest_tree, walk
+from .graph import Pair, is_bridge, strongest_tree, walk
 from .options import AVERAGING
 from .triplets import triangles, without_contradicted
 from .turns import degrees_between, rotation_vectors, rotations
@@ -41,19 +42,25 @@ class Links:
         both = np.array(self.pairs, np.intp)
         return both[:, 0], both[:, 1]
 
-    @property
+    @cached_property
     def degrees(self) -> Array:
         """Standard deviation (P,) of each pair's rotation, a mean over its axes."""
         ridge = 1e-6 * np.trace(self.information, axis1=1, axis2=2)[:, None, None] * np.eye(3)
         spread = np.linalg.inv(self.information + ridge)
-        return np.degrees(np.sqrt(np.trace(spread, axis1=1, axis2=2) / 3))
+        degrees: Array = np.degrees(np.sqrt(np.trace(spread, axis1=1, axis2=2) / 3))
+        return degrees
 
-    @property
+    @cached_property
     def weights(self) -> Array:
         """Information (P, 3, 3) with what rotations err beyond it."""
         ridge = 1e-6 * np.trace(self.information, axis1=1, axis2=2)[:, None, None] * np.eye(3)
         spread = np.linalg.inv(self.information + ridge)
         return np.linalg.inv(spread + np.radians(AVERAGING.systematic_degrees) ** 2 * np.eye(3))
+
+    @cached_property
+    def allowed_degrees(self) -> Array:
+        """By how much each pair (P,) may be off and still agrees."""
+        return np.maximum(AVERAGING.agrees_degrees, AVERAGING.agrees_sigmas * self.degrees)
 
     def several(self) -> NDArray[np.bool_]:
         """Which pairs have more than one candidate."""
@@ -77,9 +84,9 @@ class Rotations:
 def average(links: Links, focal_information: float, log_focal_before: float = 0.0) -> Rotations:
     """Average rotations robustly.
 
-    Pairs that no triangle confirms start switched off; the rest is averaged with weights that fall off with misfit,
-    from a wide scale to a sharp one. Pairs come back where they agree after all. Then single candidates are switched as
-    long as that lowers the cost of the whole: this closes loops that no triangle checks.
+    Pairs that triangles contradict start switched off; the rest is averaged with weights that fall off with misfit,
+    from a wide scale to a sharp one. Pairs come back where they agree after all. Then single pairs are left out, and
+    single candidates switched, as long as that lowers the cost of the whole: this closes loops that no triangle checks.
 
     Parameters
     ----------
@@ -96,15 +103,46 @@ def average(links: Links, focal_information: float, log_focal_before: float = 0.
     choices = [R[cost < NEVER] for R, cost in zip(links.R, links.costs, strict=True)]
     used, closed = without_contradicted(links.count, links.pairs, triangles(links.pairs, choices, degrees), degrees)
     problem = _Problem(links, focal_information, log_focal_before)
+    state, used = _without_false(problem, used, closed)
+    state = _switched(problem, state, used)
+    return Rotations(state.R, state.choice, state.log_focal, used, problem.cost(state), problem.off_degrees(state))
+
+
+def _without_false(
+    problem: _Problem, used: NDArray[np.bool_], closed: NDArray[np.intp]
+) -> tuple[_State, NDArray[np.bool_]]:
+    """Averaged rotations, and which pairs take part. Where some disagree, those that no triangle confirms are left out
+    one at a time: a false one in the first tree would have sound ones dropped for it."""
+    links = problem.links
+    state, taking_part = _from_tree(problem, used, closed)
+    cost = problem.cost(state)
+    while (problem.off_degrees(state) > links.allowed_degrees).any():
+        better = None
+        kept = [links.pairs[k] for k in np.flatnonzero(used)]
+        for k in np.flatnonzero(used & (closed == 0)):
+            if is_bridge(links.count, kept, links.pairs[k]):
+                continue
+            without = used.copy()
+            without[k] = False
+            tried, with_back = _from_tree(problem, without, closed)
+            if problem.cost(tried) < cost - AVERAGING.switch_gain:
+                cost, better = problem.cost(tried), (tried, with_back, without)
+        if better is None:
+            break
+        state, taking_part, used = better
+    return state, taking_part
+
+
+def _from_tree(
+    problem: _Problem, used: NDArray[np.bool_], closed: NDArray[np.intp]
+) -> tuple[_State, NDArray[np.bool_]]:
+    """Averaged from the tree of the most trusted pairs on; which pairs take part at the end."""
+    links = problem.links
     state = _State(_along_tree(links, used, closed), np.zeros(len(links.pairs), np.intp), 0.0)
     state = problem.followed(state, used, AVERAGING.iterations, AVERAGING.widths)
-    allowed = np.maximum(AVERAGING.back_degrees, AVERAGING.back_sigmas * degrees)
-    used = used | (problem.off_degrees(state) < allowed)
-    state = problem.followed(state, used, AVERAGING.again_iterations, AVERAGING.widths[-1:])
-    state = _switched(problem, state, used)
-    return Rotations(
-        state.R, state.choice, state.log_focal, used, problem.cost(state), problem.off_degrees(state)
-    )
+    back = np.maximum(AVERAGING.back_degrees, AVERAGING.back_sigmas * links.degrees)
+    used = used | (problem.off_degrees(state) < back)
+    return problem.followed(state, used, AVERAGING.again_iterations, AVERAGING.widths[-1:]), used
 
 
 def _along_tree(links: Links, used: NDArray[np.bool_], closed: NDArray[np.intp]) -> Array:

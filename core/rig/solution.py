@@ -13,52 +13,63 @@ from ..raster.arrays import Array
 from .bundle_options import BUNDLE
 from .tracks import Index, Tracks
 
+# What is solved for of a lens: log of a factor on the believed focal lengths, k1, shift of the principal point in px.
+LENS = 4
+
 
 @dataclass(frozen=True, eq=False)
 class Lenses:
     """Lenses that pictures were taken with, as they were believed before matching.
 
-    of (N,): the lens of each picture; aspect (L,): fy / fx; log_focal, log_sigma (L,): log of px and its standard
-    deviation; principal (L, 2), principal_sigma (L,): px; free (L, 3): whether focal length, k1 and principal point may
-    change.
+    of (N,): the lens of each picture; focal, aspect (N,), principal (N, 2): believed of each picture, px, fy / fx;
+    sigma (L, LENS): standard deviations of what is solved for, whose mean is 0; free (L, LENS): what may change.
     """
 
     of: Index
+    focal: Array
     aspect: Array
-    log_focal: Array
-    log_sigma: Array
     principal: Array
-    principal_sigma: Array
+    sigma: Array
     free: NDArray[np.bool_]
 
     def __len__(self) -> int:
-        return len(self.aspect)
+        return len(self.sigma)
+
+    @property
+    def first(self) -> Index:
+        """The first picture of each lens (L,)."""
+        return np.unique(self.of, return_index=True)[1]
+
+    def weights(self, scale: float) -> Array:
+        """Of the priors (L, LENS) in a cost of px²; 0 where nothing is free."""
+        noise = BUNDLE.prior_noise_px * scale
+        weights: Array = np.where(self.free, noise**2 / np.where(self.free, self.sigma, 1) ** 2, 0)
+        return weights
 
 
 def lenses_of(cameras: Sequence[Camera]) -> Lenses:
-    """Cameras of which all the same is believed took their pictures with one lens.
+    """Cameras of which all the same is believed took their pictures with one lens. A picture of another size may have
+    been cropped, which moves its principal point.
 
-    Of a camera whose whole K is given, distortion is too: points are then free of it.
+    Of a camera whose whole K is given, distortion is too: its points are free of it.
     """
-    keys = [_key(camera) for camera in cameras]
-    first = {key: keys.index(key) for key in keys}
-    number = {key: k for k, key in enumerate(first)}
-    typical = [cameras[k] for k in first.values()]
-    sigma = np.array([camera.log_sigma for camera in typical])
-    principal_sigma = np.array([camera.principal_sigma * max(camera.size) for camera in typical])
+    keys = [(c.K.tobytes(), c.size, c.source, c.log_sigma, c.principal_sigma) for c in cameras]
+    first = [k for k, key in enumerate(keys) if keys.index(key) == k]
+    of = [first.index(keys.index(key)) for key in keys]
+    sigma = [_sigma_of(cameras[k]) for k in first]
     return Lenses(
-        np.array([number[key] for key in keys]),
-        np.array([camera.K[1, 1] / camera.K[0, 0] for camera in typical]),
-        np.log([camera.focal for camera in typical]),
-        sigma,
-        np.array([camera.K[:2, 2] for camera in typical]),
-        principal_sigma,
-        np.column_stack([sigma > 0, (sigma > 0) | (principal_sigma > 0), principal_sigma > 0]),
+        np.array(of),
+        np.array([camera.focal for camera in cameras]),
+        np.array([camera.K[1, 1] / camera.K[0, 0] for camera in cameras]),
+        np.array([camera.K[:2, 2] for camera in cameras]),
+        np.array(sigma),
+        np.array(sigma) > 0,
     )
 
 
-def _key(camera: Camera) -> tuple[object, ...]:
-    return (camera.K.tobytes(), camera.size, camera.source, camera.log_sigma, camera.distortion.tobytes())
+def _sigma_of(camera: Camera) -> tuple[float, ...]:
+    shift = camera.principal_sigma * max(camera.size)
+    return camera.log_sigma, BUNDLE.k1_sigma if camera.log_sigma or shift else 0.0, shift, shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,15 +104,13 @@ class Problem:
 class Solution:
     """Cameras and points: picture j sees point p at K_j (R_j (r_p − ρ_p c_j)).
 
-    R (N, 3, 3); centres (N, 3); focal, k1 (L,), principal (L, 2): of each lens, px; rays (P, 3), inverse_ranges (P,):
-    of points; solved (P,): which points have any; used (O,): observations that are not left out.
+    R (N, 3, 3); centres (N, 3); lens (L, LENS): changes of each; rays (P, 3), inverse_ranges (P,): of points; solved
+    (P,): which points have any; used (O,): observations that are not left out.
     """
 
     R: Array
     centres: Array
-    focal: Array
-    k1: Array
-    principal: Array
+    lens: Array
     rays: Array
     inverse_ranges: Array
     solved: NDArray[np.bool_]
@@ -134,54 +143,53 @@ class Solution:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class LensOfPictures:
+    """For each of some pictures: focal, aspect, k1 (M,), principal (M, 2)."""
+
+    focal: Array
+    aspect: Array
+    k1: Array
+    principal: Array
+
+
+def lens_of(problem: Problem, solution: Solution, picture: Index) -> LensOfPictures:
+    """The lenses of pictures (M,), as solved."""
+    lenses = problem.lenses
+    change = solution.lens[lenses.of[picture]]
+    return LensOfPictures(
+        lenses.focal[picture] * np.exp(change[:, 0]), lenses.aspect[picture], change[:, 1],
+        lenses.principal[picture] + change[:, 2:],
+    )  # fmt: skip
+
+
 def bearings(problem: Problem, solution: Solution) -> Array:
     """Unit directions (O, 3) of all observations in the frames of their pictures' cameras."""
-    tracks = problem.tracks
-    lens = problem.lenses.of[tracks.picture]
-    focal = solution.focal[lens][:, None] * np.column_stack([np.ones(len(lens)), problem.lenses.aspect[lens]])
-    return directions(tracks.pixels, focal, solution.principal[lens], solution.k1[lens])
-
-
-def directions(pixels: Array, focal: Array, principal: Array, k1: Array) -> Array:
-    """Unit directions (O, 3) of pixels (O, 2); focal, principal (O, 2) px, k1 (O,)."""
-    raw = (pixels - principal) / focal
+    lens = lens_of(problem, solution, problem.tracks.picture)
+    raw = (problem.tracks.pixels - lens.principal) / lens.focal[:, None]
+    raw[:, 1] /= lens.aspect
     ideal = raw.copy()
-    for _ in range(8):
-        ideal = raw / stretch_of(ideal, k1)[:, None]
+    for _ in range(BUNDLE.undistorting):
+        ideal = raw / stretch_of(ideal, lens.k1)[:, None]
     rays = np.column_stack([ideal, np.ones(len(ideal))])
     unit: Array = rays / np.linalg.norm(rays, axis=1, keepdims=True)
     return unit
 
 
 def stretch_of(ideal: Array, k1: Array) -> Array:
-    """1 + k1 r² (O,) of ideal normalised points (O, 2); held where the lens would fold, beyond r² = 1 / (3 |k1|)."""
-    r2 = (ideal**2).sum(axis=-1)
-    stretch: Array = 1 + k1 * np.where(k1 < 0, np.minimum(r2, fold_of(k1)), r2)
+    """1 + k1 r² (O,) of ideal normalised points (O, 2); held where the lens would fold."""
+    stretch: Array = 1 + k1 * bending_of(ideal, k1)
     return stretch
+
+
+def bending_of(ideal: Array, k1: Array) -> Array:
+    """r² (O,), no more than where the lens folds."""
+    r2 = (ideal**2).sum(axis=-1)
+    bending: Array = np.where(k1 < 0, np.minimum(r2, fold_of(k1)), r2)
+    return bending
 
 
 def fold_of(k1: Array) -> Array:
     """r² where a lens with k1 < 0 folds."""
     limit: Array = 1 / (3 * np.maximum(np.abs(k1), 1e-12))
     return limit
-
-
-def free_lens_parameters(lenses: Lenses) -> NDArray[np.bool_]:
-    """Which of log f, k1 and the two coordinates of the principal point may change (L, 4)."""
-    return lenses.free[:, [0, 1, 2, 2]]
-
-
-def lens_priors(lenses: Lenses, scale: float) -> tuple[Array, Array]:
-    """Means and weights (L, 4) of log f, k1 and principal point in a cost of px²; weight 0 where nothing is free."""
-    mean = np.column_stack([lenses.log_focal, np.zeros(len(lenses)), lenses.principal])
-    sigma = np.column_stack(
-        [lenses.log_sigma, np.full(len(lenses), BUNDLE.k1_sigma), lenses.principal_sigma, lenses.principal_sigma]
-    )
-    free = free_lens_parameters(lenses)
-    weight = np.where(free, (BUNDLE.prior_noise_px * scale) ** 2 / np.where(free, sigma, 1) ** 2, 0)
-    return mean, weight
-
-
-def lens_values(solution: Solution) -> Array:
-    """log f, k1 and principal point (L, 4)."""
-    return np.column_stack([np.log(solution.focal), solution.k1, solution.principal])

@@ -46,10 +46,10 @@ def pairs_within(point: Index) -> tuple[Index, Index]:
 
 
 def fitting_pairs(pairs: Sequence[PairGeometry]) -> list[PairGeometry]:
-    """Those that the averaged rotations agree with, in the order of their strength; all if none does."""
+    """Those that the averaged rotations agree with, the strongest first; all if none does."""
     limit = TRACKS.most_degrees
     fitting = [pair for pair in pairs if pair.off_degrees < max(limit, TRACKS.most_sigmas * pair.degrees)]
-    return sorted(fitting or pairs, key=lambda pair: (-len(pair.index), pair.i, pair.j))
+    return sorted(fitting or pairs, key=lambda pair: -len(pair.index))
 
 
 def build_tracks(pairs: Sequence[PairGeometry], points: Sequence[Array], members: Sequence[int]) -> Tracks:

@@ -47,7 +47,7 @@ def _best(solution: Solution, picture: Index, point: Index, starts: Index, seen:
         np.maximum.reduceat(_off(solution, picture, r[point], d[point], seen), starts)
         for r, d in ((rays, depth), (far, np.zeros(len(far))))
     )
-    at_infinity = ~np.isfinite(depth) | (depth < 0) | (worst_far <= worst)
+    at_infinity = (depth < 0) | (worst_far <= worst)
     return np.where(at_infinity[:, None], far, rays), np.where(at_infinity, 0.0, depth)
 
 
@@ -64,9 +64,7 @@ def _linear(solution: Solution, picture: Index, starts: Index, seen: Array) -> t
     least = vectors[:, :, 0]
     mean = np.add.reduceat(world, starts, axis=0)
     least *= np.where((least[:, :3] * mean).sum(axis=1) < 0, -1, 1)[:, None]
-    lengths = np.linalg.norm(least[:, :3], axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        least = least / lengths[:, None]
+    least /= np.maximum(np.linalg.norm(least[:, :3], axis=1, keepdims=True), 1e-12)  # (0, 1) is the origin itself
     return least[:, :3], least[:, 3]
 
 
