@@ -30,7 +30,7 @@ from .field.sphere_field import SphereField, fit_sphere_field
 from .field.strict import StrictField
 from .fields import fit_field
 from .frames.frame import Frame, size_of
-from .mapping import map_pictures
+from .mapping import map_pictures, map_rig
 from .options import StitchOptions
 from .panorama.choosing_slide import SlideChoice
 from .panorama.upright_edges import straight_edges
@@ -41,6 +41,7 @@ from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
 from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
+from .rig.from_pictures import matched_pictures, registered
 from .rig.given import given_matches
 from .rig.left_out import check_connected
 from .rig.pair_edges import edges_of
@@ -200,8 +201,6 @@ def _of_many(
     progress: ReportProgress,
 ) -> Geometry:  # fmt: skip
     """The geometry of more than two pictures; of two of them, if no more connect."""
-    from .rig.from_pictures import matched_pictures, registered
-
     pictures, cache = frame.pictures, Cache(options.cache)
     if options.matches is None:
         matched = matched_pictures(pictures, options.preview, cache, progress)
@@ -303,8 +302,6 @@ def _many_mapped(
     geometry: Geometry, rig: Rig, frame: Frame, options: StitchOptions, progress: ReportProgress
 ) -> Alignment:
     """The second half of `align` for the pictures of a rig."""
-    from .mapping import map_rig
-
     progress("field", 0.0)
     slack = options.field == "slack"
     field = Cache(options.cache).remember("sphere", (rig, slack), lambda: fit_sphere_field(rig, slack))

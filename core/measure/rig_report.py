@@ -70,7 +70,7 @@ def make_rig_report(
         },
         "rig": _rig_entry(rig, names),
         "field": {
-            "kind": options.field, "smoothing": field.smoothing, "centres": field.centres,
+            "kind": options.field, "smoothing": field.depth.smoothing, "centres": len(field.depth.inner.centres),
             "leave_one_out_px": field.leave_one_out_px,
             "negative_share": float((rig.inverse_ranges < 0).mean()) if len(rig.inverse_ranges) else 0.0,
             "dense": {"used": False, "why": "more than two pictures have the smooth field, for now"},

@@ -75,9 +75,7 @@ def registered(
     cameras = tuple(cameras[number] for number in order)
 
     def found() -> _Kept:
-        one = register(
-            cameras, inner.points, inner.matches, inner.scale, seed, lambda share: progress("geometry", share)
-        )
+        one = register(cameras, inner.points, inner.matches, inner.scale, seed, progress)
         return _Kept(one.rig, one.numbers, tuple(one.left_out.items()), one.warnings)
 
     progress("geometry", 0.0)
