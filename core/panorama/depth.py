@@ -32,6 +32,19 @@ class OnCanvas(LazyImage):
 
 
 @dataclass(frozen=True, eq=False)
+class AtNodes(OnCanvas):
+    """Values (H, W) between those at the nodes of a grid."""
+
+    grid: Grid
+    nodes: Array
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        (rows, columns), (x, y) = within(part, self.shape), self.canvas.offset
+        size = columns.stop - columns.start, rows.stop - rows.start
+        return self.grid.to_pixels(self.nodes, columns.start - x, rows.start - y, *size)
+
+
+@dataclass(frozen=True, eq=False)
 class Strip:
     """Inverse depth (h, W) of whole rows of a canvas.
 

@@ -55,6 +55,9 @@ class RigWarpOptions:
     nodes: int = 60_000
     """Nodes of a grid over the canvas: N pictures together hold more than two."""
 
+    deviation_nodes: int = 4_000
+    """The same of the grid that the deviation of inverse range is worked out on: it changes slowly."""
+
     outline_steps: int = 4
     """Steps by which the ray that shows a picture's border is found: each looks its range up where the last one ended.
     """

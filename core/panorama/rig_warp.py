@@ -22,6 +22,7 @@ from ..raster.grid import Grid
 from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap, falls_inside
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
+from .depth import AtNodes
 from .options import RIG_WARP
 from .projection import Projection
 from .reference_map import ReferenceMap
@@ -127,7 +128,15 @@ def build_rig_map(field: SphereField, views: Sequence[View], canvas: Canvas) -> 
                 strip.put(one, view, slack)
 
     each(put, small_strips(shape))
-    return Warp(canvas, tuple(maps), depth)
+    return Warp(canvas, tuple(maps), depth, deviation=_deviation(field, views, canvas))
+
+
+def _deviation(field: SphereField, views: Sequence[View], canvas: Canvas) -> AtNodes:
+    """The standard deviation (H, W) of inverse depth on a canvas."""
+    camera, (left, top) = views[0].camera, canvas.offset
+    grid = Grid.over(-left, -top, canvas.width, canvas.height, RIG_WARP.deviation_nodes)
+    rays, length = canvas.rays_at(views[0].K, grid.xs, grid.ys, camera)
+    return AtNodes(canvas, camera, grid, field.deviation(rays) * length)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,6 +65,8 @@ class Warp:
     beside : (H, W, 3) float32 array or None
         px x and y (before the lens) by which picture 1 is seen beside its epipolar lines, and confidence; only where it
         was asked for, with all of depth.
+    deviation : (H, W) image or None
+        Standard deviation of inverse depth, of more than two pictures.
     """
 
     canvas: Canvas
@@ -76,6 +78,7 @@ class Warp:
     viewpoint: Viewpoint | None = None
     refilled: NDArray[np.bool_] | None = None
     beside: NDArray[np.float32] | None = None
+    deviation: AnyImage | None = None
 
     @property
     def inverse_depth(self) -> NDArray[np.float32]:
@@ -102,14 +105,15 @@ class Warp:
             return Placed(values, (-top, -left), (height, width), beyond)
 
         depth = part(self.depth, np.nan)
-        confidence, slide = (
-            None if values is None else part(values, 0.0) for values in (self.lazy_confidence, self.slide)
+        confidence, slide, deviation = (
+            None if values is None else part(values, 0.0)
+            for values in (self.lazy_confidence, self.slide, self.deviation)
         )
         behind, refilled, beside = (
             None if values is None else cut(values, box) for values in (self.behind, self.refilled, self.beside)
         )
         canvas = self.canvas.within(box)
-        return Warp(canvas, maps, depth, confidence, slide, behind, self.viewpoint, refilled, beside)
+        return Warp(canvas, maps, depth, confidence, slide, behind, self.viewpoint, refilled, beside, deviation)
 
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
@@ -292,6 +296,8 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     across, down = width + 2 * margin, height + 2 * margin
     share = min(WARP.max_node_factor, max(1.0, across * down / (2 * width * height)))
     step = WARP.node_share * grid.step * focal_of(canvas.projection.K) / canvas.projection.focal
+    # a power of two: canvases of one stitch are of similar size, and so share these nodes (see `Remembered`)
+    step = 2.0 ** np.floor(np.log2(step))
     flat = Grid.over(-margin, -margin, across, down, int(min(share * GRID.nodes, across * down / step**2)))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)

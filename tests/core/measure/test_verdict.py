@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.compose.exposure import unchanged
-from edf_stitch.core.measure.verdict import Look, Verdict, judge, look_at
+from edf_stitch.core.measure.look import Look, look_at
+from edf_stitch.core.measure.verdict import Verdict, judge
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.synthetic_scenes.two_planes import Pair
@@ -215,3 +216,60 @@ def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> N
     seams = [[one["box"] for one in told["places"] if "seam" in one["what"]] for told in (found, cropped)]
     for (x, y, wide, high), left, top in ((seams[0][0], 120, 96), (seams[1][0], 120 - 60, 96 - 10)):
         assert abs(x + wide / 2 - left) <= 2 and y <= top + 20 and top <= y + high, "where the changed rows are"
+
+
+# --- more than two pictures -------------------------------------------------------------------------------------------
+
+SURE = {
+    **RIGHT, "pictures": [{"name": name} for name in ("a.png", "b.png", "c.png")], "left_out": [],
+    "rig": {"scale": "measured", "focal_guesses": []}, "field": {"leave_one_out_px": 0.4},
+}  # fmt: skip
+
+
+def look_of_three() -> Look:
+    """As `look`, with a third picture from column 300 on."""
+    good = look()
+    labels = good.labels.copy()
+    labels[:, 300:] = 2
+    three = {name: (*getattr(good, name), getattr(good, name)[0]) for name in ("maps", "tones", "taken", "shows")}
+    return replace(good, labels=labels, **three)
+
+
+def test_of_three_pictures_only_those_that_meet_are_compared() -> None:
+    good = look_of_three()
+    assert judge(good, (0, 0), SURE).rating == "good"
+    stripes = np.where(np.arange(300) % 8 < 4, 110, 0).astype(np.uint8)[100:140, None, None]
+    tones = good.tones[2].copy()
+    tones[100:140, 180:220] += stripes
+    away = replace(good, tones=(*good.tones[:2], tones))
+    assert judge(away, (0, 0), SURE).rating == "good", "the third is not shown at the seam of the first two"
+    tones = good.tones[2].copy()
+    tones[100:140, 280:320] += stripes
+    found = judge(replace(good, tones=(*good.tones[:2], tones)), (0, 0), SURE)
+    assert found.rating == "look" and "--ignore NAME=MASK" in found.what_to_do
+    x, y, width, height = found.places[0].box
+    assert 296 <= x and x + width <= 304 and 98 <= y and y + height <= 142
+
+
+def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:
+    good = look_of_three()
+    tones, shows = good.tones[2].copy(), good.shows[2].copy()
+    tones[100:140, 280:320] += np.where(np.arange(300) % 8 < 4, 110, 0).astype(np.uint8)[100:140, None, None]
+    shows[:, :297] = False
+    cut = replace(good, tones=(*good.tones[:2], tones), shows=(*good.shows[:2], shows))
+    assert judge(cut, (0, 0), SURE).places[0].what == "a thing is cut by the border of c.png"
+
+
+@pytest.mark.parametrize(("changes", "why", "advice"), [
+    ({"left_out": [{"name": "d.png", "why": ""}]}, "d.png connects with no others", "take more pictures"),
+    ({"rig": {"scale": "none", "focal_guesses": []}}, "how far apart", "take more pictures"),
+    ({"rig": {"scale": "measured", "focal_guesses": [{}, {}]}}, "focal length is not sure", "--focal35"),
+    ({"field": {"leave_one_out_px": 2.5}}, "too near and deep", "take more pictures"),
+])  # fmt: skip
+def test_what_is_doubtful_about_the_cameras_is_said(changes: dict, why: str, advice: str) -> None:
+    found = judge(look_of_three(), (0, 0), {**SURE, **changes})
+    assert found.rating == "look" and why in found.because and advice in found.what_to_do and not found.places
+
+
+def test_without_a_seam_nothing_is_compared_and_nothing_crashes() -> None:
+    assert judge(replace(look_of_three(), labels=None), (0, 0), SURE).rating == "good"
