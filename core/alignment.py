@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,11 @@ from .continuation.continuation import Continuation
 from .dense.refine import Dense, refine
 from .field.field import Field
 from .field.slack import SlackField
+from .field.sphere_field import SphereField, fit_sphere_field
 from .field.strict import StrictField
 from .fields import fit_field
 from .frames.frame import Frame, size_of
-from .mapping import map_pictures
+from .mapping import map_pictures, map_rig
 from .options import StitchOptions
 from .panorama.choosing_slide import SlideChoice
 from .panorama.upright_edges import straight_edges
@@ -40,6 +41,7 @@ from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
 from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
+from .rig.from_pictures import matched_pictures, registered
 from .rig.given import given_matches
 from .rig.left_out import check_connected
 from .rig.pair_edges import edges_of
@@ -49,9 +51,6 @@ from .system.errors import BadRequest, NoOverlap, StitchError, TooFewMatches
 from .system.memory import give_back
 from .system.progress import ReportProgress
 from .system.threads import in_order
-
-if TYPE_CHECKING:
-    from .field.sphere_field import SphereField
 
 
 @dataclass(frozen=True)
@@ -95,6 +94,12 @@ class Alignment:
     slide: SlideChoice = SlideChoice(0.0, (), "")
     rig: Rig | None = None
     left_out: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def pair_field(self) -> Field:
+        """The displacement field of a pair."""
+        assert not isinstance(self.field, SphereField)
+        return self.field
 
 
 @dataclass(frozen=True)
@@ -196,8 +201,6 @@ def _of_many(
     progress: ReportProgress,
 ) -> Geometry:  # fmt: skip
     """The geometry of more than two pictures; of two of them, if no more connect."""
-    from .rig.from_pictures import matched_pictures, registered
-
     pictures, cache = frame.pictures, Cache(options.cache)
     if options.matches is None:
         matched = matched_pictures(pictures, options.preview, cache, progress)
@@ -299,15 +302,9 @@ def _many_mapped(
     geometry: Geometry, rig: Rig, frame: Frame, options: StitchOptions, progress: ReportProgress
 ) -> Alignment:
     """The second half of `align` for the pictures of a rig."""
-    from .field.sphere_field import fit_sphere_field
-    from .mapping import map_rig
-
     progress("field", 0.0)
-    field = Cache(options.cache).remember(
-        "sphere", (rig, options.seed), lambda: fit_sphere_field(rig, options.seed)
-    )
-    if options.field == "strict":
-        field = replace(field, slacks=(None,) * len(rig))
+    slack = options.field == "slack"
+    field = Cache(options.cache).remember("sphere", (rig, slack), lambda: fit_sphere_field(rig, slack))
     progress("warp", 0.0)
     mapped = map_rig(rig, field, frame.pictures, options, progress)
     warnings = (*geometry.warnings, *field.warnings)

@@ -150,9 +150,6 @@ class StitchOptions:
             return
         unfit = {
             f"the field {self.field!r}": (self.field not in ROUND_FIELDS, f"choose from: {', '.join(ROUND_FIELDS)}"),
-            "the projection reference": (
-                self.projection == "reference", "choose --projection perspective, or another, and --viewpoint NAME"
-            ),
             "a painted mask": (self.mask is not None, "name what is not to be shown by --ignore NAME=MASK"),
             "the fade to infinity": (self.fade == "infinity", "choose --fade continue"),
             "a value for either of two cameras": (

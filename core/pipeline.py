@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from .compose.composition import Composition, composed
 from .compose.crop import crop_box
 from .compose.decided import Decided
 from .field.field import Field
+from .field.sphere_field import SphereField
 from .frames.frame import Frame
 from .frames.reading import Source, read_frame
 from .measure.fallback import first_usable
@@ -43,9 +44,6 @@ from .raster.arrays import Box, box_of, common, cut
 from .raster.resizing import resized_points
 from .system.errors import BadRequest
 from .system.progress import STAGES, STAGES_OF_MANY, Progress
-
-if TYPE_CHECKING:
-    from .field.sphere_field import SphereField
 
 
 @dataclass(frozen=True)
@@ -127,6 +125,12 @@ class StitchResult:
         return self.panorama.alpha.astype(np.float32)
 
     @property
+    def pair_field(self) -> Field:
+        """The displacement field of a pair."""
+        assert not isinstance(self.field, SphereField)
+        return self.field
+
+    @property
     def full_matches(self) -> Matches:
         """All matches of a pair, before any was left out, in px of the full pictures."""
         return self.matches_of(self.edges[0])
@@ -151,7 +155,7 @@ class StitchResult:
     def used_of(self, edge: Edge) -> NDArray[np.bool_]:
         """The same of one of its edges; of more than two pictures, which are points of the rig."""
         inliers = edge.two_view.inliers
-        if self.rig is not None:
+        if isinstance(self.field, SphereField):
             return inliers
         used = np.zeros(len(inliers), bool)
         used[np.flatnonzero(inliers)[self.field.fit.inliers_used]] = True

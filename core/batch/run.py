@@ -314,14 +314,14 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
     quick = replace(options, crop="full", measure=False)
     decided = pooled_decision([
         compose(
-            read_frame(item.pair(number), options), alignment, quick, meter.stopwatch(CLIP.frame_weight), keep=True
+            read_frame(item.files(number), options), alignment, quick, meter.stopwatch(CLIP.frame_weight), keep=True
         ).decided
         for number in used
     ])
     reports = [unit for unit in job.todo if unit.frame is None]
     crop = options.crop
     if reports or crop == "inscribed":
-        frame = read_frame(item.pair(first), options)
+        frame = read_frame(item.files(first), options)
         result = compose(frame, alignment, options, meter.stopwatch(CLIP.frame_weight), decided)
         if crop == "inscribed":  # one frame decides for all: the frames of a clip have one size
             whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
@@ -339,7 +339,7 @@ def _readable(item: BatchItem, options: StitchOptions, progress: Stopwatch) -> d
     for at, number in enumerate(item.aligned_on):
         progress("read", at / len(item.aligned_on))
         try:
-            frame = _without_light(read_frame(item.pair(number), options))
+            frame = _without_light(read_frame(item.files(number), options))
         except StitchError as trouble:  # reported when it is the frame's turn
             troubles.append(trouble)
             continue

@@ -68,7 +68,7 @@ def make_report(
     warnings : list of str
         In plain words, for the user.
     """
-    cameras, edge, field = alignment.cameras, alignment.edges[0], alignment.field
+    cameras, edge, field = alignment.cameras, alignment.edges[0], alignment.pair_field
     matches, two_view, further = edge.matches, edge.two_view, decided[edge.j]
     holes = sum(one.holes for one in decided)
     measured = _measured(options, pictures, alignment) | {"folds": max(one.folds for one in decided)} | appearance
@@ -128,7 +128,7 @@ def _measured(
 ) -> dict[str, float]:
     """The figures of an alignment, NaN where undefined; expensive ones only if options.measure asks for them."""
     cameras, edge = alignment.cameras, alignment.edges[0]
-    field, warp, two_view = alignment.field, alignment.warp, edge.two_view
+    field, warp, two_view = alignment.pair_field, alignment.warp, edge.two_view
     inliers = edge.matches.subset(two_view.inliers)
     # Matches and pixels are compared in the reference's own frame, where only one of the two pictures is resampled.
     flat = warp
@@ -161,7 +161,7 @@ def _measured(
 
 
 def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
-    two_view, field, warp = alignment.edges[0].two_view, alignment.field, alignment.warp
+    two_view, field, warp = alignment.edges[0].two_view, alignment.pair_field, alignment.warp
     out = []
     if field.fit.negative_share > WARNING.behind_infinity_share:
         out.append(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..cameras.rig import Rig
 from ..compose.inpaint import closed_holes
+from ..field.sphere_field import SphereField
 from ..panorama.canvas import Canvas
 from .exposure_entry import exposure_entry, exposure_warnings
 from .options import RIG, WARNING
@@ -54,7 +55,7 @@ def make_rig_report(
         In plain words, for the user.
     """
     rig, field, warp = alignment.rig, alignment.field, alignment.warp
-    assert rig is not None
+    assert rig is not None and isinstance(field, SphereField)
     names = [picture.name for picture in pictures]
     holes, folds = sum(one.holes for one in decided), max(one.folds for one in decided)
     error = map_errors(warp, alignment.edges)
@@ -69,7 +70,7 @@ def make_rig_report(
         },
         "rig": _rig_entry(rig, names),
         "field": {
-            "kind": options.field, "smoothing": field.smoothing, "centres": field.centres,
+            "kind": options.field, "smoothing": field.depth.smoothing, "centres": len(field.depth.inner.centres),
             "leave_one_out_px": field.leave_one_out_px,
             "negative_share": float((rig.inverse_ranges < 0).mean()) if len(rig.inverse_ranges) else 0.0,
             "dense": {"used": False, "why": "more than two pictures have the smooth field, for now"},

@@ -27,6 +27,7 @@ from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
 from .camera_file import camera_table
 from .match_table import match_file
+from .rig_page import rig_page
 
 # Versions of the layers' folder and of the warp's file (docs/formats.md).
 LAYERS_FORMAT, WARP_FORMAT = 2, 2
@@ -50,7 +51,7 @@ class OutputRequest:
     panorama : Path
         Its suffix says the format.
     report : Path, optional
-        .json; matches and seconds go beside it.
+        .json; matches and seconds go beside it, and of more than two pictures a page.
     layers : Path, optional
         A folder.
     warp : Path, optional
@@ -71,9 +72,19 @@ class OutputRequest:
         return None if self.report is None else self.report.with_name(self.report.stem + ".timing.json")
 
     @property
+    def page(self) -> Path | None:
+        """The page about more than two pictures lies beside the report."""
+        return None if self.report is None else page_beside(self.report)
+
+    @property
     def matches(self) -> Path | None:
         """The matches lie beside the report, in the form that --matches takes."""
         return None if self.report is None else self.report.with_name(self.report.stem + ".matches.csv")
+
+
+def page_beside(report: Path) -> Path:
+    """Where the page about more than two pictures lies."""
+    return report.with_suffix(".html")
 
 
 def check(
@@ -106,7 +117,8 @@ def check(
         twice = next(name for number, name in enumerate(pictures) if name in pictures[:number])
         raise BadRequest(f"cameras are written by name, and two pictures are called {twice}: rename one of them")
     named = (request.panorama, request.report, request.timing, request.matches, request.warp, request.cameras)
-    single = [path for path in named if path is not None]
+    page = request.page if len(pictures) > 2 else None
+    single = [path for path in (*named, page) if path is not None]
     files.check(*single)
     if request.layers is not None:
         names = layer_files(pictures, (".png", ".exr"))
@@ -123,7 +135,7 @@ def _possible_files(pictures: Sequence[str], seam: bool, inpainted: bool, slides
     exact = layer_files(pictures, (".png", ".exr"), seam, inpainted, slides)
     if len(pictures) == 2:
         return exact
-    return exact + [
+    return [*exact, f"{SEAM}.png"] + [
         layer_stem(number, name) + suffix for number in range(len(pictures)) for name in pictures
         for suffix in (".png", ".exr")
     ]  # fmt: skip
@@ -156,7 +168,7 @@ def layer_files(
     the files that only a stitch with a seam, with filled holes, or with a viewpoint that may slide has."""
     out = [layer_stem(number, name) + suffix for number, name in enumerate(pictures) for suffix in suffixes]
     masks = [_occluded(number) for number in range(0 if slides else 1, len(pictures))] + [CONFIDENCE]
-    masks += [LABELS, SEAM] if seam else []
+    masks += [LABELS, SEAM][: 2 if len(pictures) == 2 else 1] if seam else []
     masks += [INPAINTED] if inpainted else []
     return out + [f"{mask}.png" for mask in masks] + [CANVAS]
 
@@ -205,10 +217,13 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
 def add_report(
     result: StitchResult, warnings: list[str], report: Path, matches: Path, timing: Path, files: OutputFiles
 ) -> None:
-    """Stages the report, with these warnings in place of its own; the matches; and the seconds."""
+    """Stages the report, with these warnings in place of its own; the matches; the seconds; and of more than two
+    pictures the page."""
     files.add(report, json_bytes({**result.report, "warnings": warnings}))
     files.add(matches, match_file(result))
     files.add(timing, json_bytes({"seconds": result.seconds}))
+    if result.rig is not None:
+        files.add(page_beside(report), rig_page(result).encode(errors="replace"))
 
 
 def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:

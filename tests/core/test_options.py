@@ -158,7 +158,6 @@ def test_a_crop_is_chosen_only_where_something_may_be_lost() -> None:
 
 @pytest.mark.parametrize(("asked", "words"), [
     ({"field": "homography"}, "'homography' is for two pictures only, and 3 are given: choose from: slack, strict"),
-    ({"projection": "reference", "slide": 0.0}, "projection reference .* --viewpoint NAME"),
     ({"mask": Path("m.png")}, "painted mask .* --ignore NAME=MASK"),
     ({"fade": "infinity"}, "fade to infinity .* --fade continue"),
     ({"camera": CameraRequest(focal_px=(900, 950))}, "one for all pictures, or each its own by --cameras"),
