@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..alignment import Alignment, Frame, align
-from ..compose.decided import Decided, pooled_decision
+from ..compose.decided import Decided
+from ..compose.pooling import pooled_decision
 from ..options import StitchOptions
 from ..output.outputs import json_bytes
 from ..pictures.picture import Picture

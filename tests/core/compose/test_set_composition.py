@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from edf_stitch.core.compose.composition import Composition
-from edf_stitch.core.compose.decided import pooled_decision
+from edf_stitch.core.compose.pooling import pooled_decision
 from edf_stitch.core.compose.wraparound import rolled
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.warp import Warp
