@@ -53,7 +53,7 @@ def register(
         px by which thresholds are multiplied: full pixels per pixel of the picture that features were found in.
     seed : int
         Of every random choice.
-    progress : callable, optional
+    progress : callable
         Told of the stage "geometry"; raises `Cancelled` when it was asked to.
     names : sequence of str, optional
         What pictures are called where it is said why one is left out; by default their numbers from 1.
