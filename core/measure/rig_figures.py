@@ -68,8 +68,9 @@ def map_errors(warp: Warp, edges: Sequence[Edge]) -> Array:
         if len(inliers):
             first, second = (warp.maps[number].arrays() for number in (edge.i, edge.j))
             found.append(np.linalg.norm(second.between(shown_at(first, inliers.x)) - inliers.y, axis=1))
-    errors: Array = np.concatenate([np.zeros(0), *found])
-    return errors[np.isfinite(errors)]
+    errors = np.concatenate([np.zeros(0), *found])
+    finite: Array = errors[np.isfinite(errors)]
+    return finite
 
 
 def shares(labels: NDArray[np.int16] | None, shows: Sequence[NDArray[np.bool_]]) -> list[float]:

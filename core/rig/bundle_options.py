@@ -153,8 +153,6 @@ class JudgeOptions:
     # Points of three pictures from which a pair's baseline is measured, and its parallax in σ from which it has any.
     three_view_points: int = 10
     parallax_sigmas: float = 3.0
-    # Inliers below which a link that no loop checks is called ambiguous.
-    weak_link: int = 40
     # px: where costs are weighed against numbers of parameters, noise is never taken to be less.
     least_noise_px: float = 0.1
 
