@@ -15,7 +15,7 @@ from .matched_rays import MatchedRays, Rays, SharedLens
 from .options import CANDIDATES, PAIR_FIT
 from .pair_models import EpipolarModel, Poses, cauchy_costs
 from .pair_refinement import refine_each
-from .turns import degrees_between
+from .turns import degrees_between, dot
 
 # Directions of a baseline all around, opposite ones left out: of a cube's faces, edges and corners.
 _CUBE = np.array(
@@ -70,7 +70,7 @@ def candidates(matched: MatchedRays, lens: SharedLens, scale: float, seed: int) 
     Candidates
         Of the pairs that some pose explains.
     """
-    seen = matched.through(lens)
+    seen = matched.undistorted(lens)
     numbers, turned, starts = [], [], []
     inliers = np.zeros(len(seen.a), bool)
     for k in range(len(matched)):
@@ -191,13 +191,13 @@ def fit_rotation(a: Array, b: Array, R: Array, width: float, rounds: int) -> Arr
 def _facing(rays: MatchedRays, residual: Array, poses: Poses, lens: SharedLens, width: float) -> tuple[Array, Poses]:
     """What points behind the cameras cost (P,), px², and t with the sign that has fewer: parallax along the epipolar
     line is of one sign in front."""
-    seen = rays.through(lens)
+    seen = rays.undistorted(lens)
     a, b = seen.unit()
     turned = np.einsum("oij,oj->oi", poses.R[rays.owner], a)
     t = poses.t[rays.owner]
-    along = t - (t * turned).sum(axis=1)[:, None] * turned
+    along = t - dot(t, turned)[:, None] * turned
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
-    parallax = seen.focal[1] / np.sqrt(2) * ((b - turned) * along).sum(axis=1)
+    parallax = seen.focal[1] / np.sqrt(2) * dot(b - turned, along)
     weight = 1 / (1 + (residual / width) ** 2)
     cost = [
         rays.sums(weight * 0.5 * width**2 * np.log1p((np.minimum(sign * parallax, 0) / width) ** 2)) for sign in (1, -1)

@@ -37,7 +37,7 @@ def starts(cameras: Sequence[Camera], points: Sequence[Array], verified: Verifie
     if sigma <= LADDER.known_sigma or not verified.pairs:
         return [SharedLens()]
     matched, _ = matched_rays(cameras, points, verified)
-    few = _thinned(matched.of_pairs(np.arange(min(len(matched), LADDER.pairs))))
+    few = matched.of_pairs(np.arange(min(len(matched), LADDER.pairs))).thinned(LADDER.matches)
     factors = np.geomspace(*LADDER.factors, LADDER.rungs)
     cost = np.array([_cost(few, SharedLens(float(factor)), verified) for factor in factors])
     cost += 0.5 * (np.log(factors) / sigma) ** 2
@@ -59,17 +59,9 @@ def log_sigma(cameras: Sequence[Camera]) -> float:
     return min((camera.log_sigma for camera in cameras if not camera.fixed), default=0.0)
 
 
-def _thinned(matched: MatchedRays) -> MatchedRays:
-    """At most so many matches of each pair, evenly."""
-    keep = np.zeros(len(matched.owner), bool)
-    for start, end in zip(matched.starts[:-1], matched.starts[1:], strict=True):
-        keep[np.linspace(start, end - 1, min(end - start, LADDER.matches)).astype(int)] = True
-    return matched.where(keep)
-
-
 def _cost(matched: MatchedRays, lens: SharedLens, verified: Verified) -> float:
     """Robust cost of the poses that RANSAC finds with this focal length, log likelihood."""
-    seen = matched.through(lens)
+    seen = matched.undistorted(lens)
     x, y = (ray[:, :2] * focal[:, None] for ray, focal in zip((seen.a, seen.b), seen.focal, strict=True))
     options = {
         "max_epipolar_error": CANDIDATES.inlier_px * verified.scale,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..raster.arrays import Array
 from .averaged import Verified
 from .options import PAIR_FIT
 from .pairs import first_is
+from .turns import dot
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,8 @@ class MatchedRays:
     zooms: Array
     bends: Array
     starts: NDArray[np.intp]
+    # what `undistorted` found last: refining poses asks for it again and again
+    _last: list[tuple[SharedLens, Rays]] = field(default_factory=list, repr=False)
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -93,6 +96,13 @@ class MatchedRays:
         rows = [np.arange(self.starts[k], self.starts[k + 1]) for k in numbers]
         return self._rows(np.concatenate(rows), np.array([len(row) for row in rows]))
 
+    def thinned(self, most: int) -> MatchedRays:
+        """At most so many matches of each pair, evenly."""
+        keep = np.zeros(len(self.owner), bool)
+        for start, end in zip(self.starts[:-1], self.starts[1:], strict=True):
+            keep[np.linspace(start, end - 1, min(end - start, most)).astype(int)] = True
+        return self.where(keep)
+
     def _rows(self, rows: NDArray[np.intp], counts: Array | NDArray[np.intp]) -> MatchedRays:
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
         return MatchedRays(
@@ -104,17 +114,20 @@ class MatchedRays:
         """Whether some focal length, and some k1, is not given."""
         return bool(self.zooms.any()), bool(self.bends.any())
 
-    def through(self, lens: SharedLens) -> Rays:
+    def undistorted(self, lens: SharedLens) -> Rays:
         """The matches without the lens's distortion."""
+        if self._last and self._last[0][0] == lens:
+            return self._last[0][1]
         factor, k1 = self._of_rows(lens)
         sides = zip((self.x, self.y), factor, k1, strict=True)
         a, b = (homogeneous(_unbent(points / f[:, None], k)) for points, f, k in sides)
-        return Rays(a, b, self.focal * factor)
+        self._last[:] = [(lens, Rays(a, b, self.focal * factor))]
+        return self._last[0][1]
 
     def derivatives(self, lens: SharedLens, rays: Rays) -> Array:
         """What a step of log factor and of k1 multiplies a and b (…, 2) with: (2 pictures, O, 2 parameters)."""
         _, k1 = self._of_rows(lens)
-        r2 = np.stack([(ray[:, :2] ** 2).sum(axis=1) for ray in (rays.a, rays.b)])
+        r2 = np.stack([dot(ray[:, :2], ray[:, :2]) for ray in (rays.a, rays.b)])
         by = np.stack([self.zooms * (1 + k1 * r2), self.bends * r2], axis=-1)
         out: Array = -by / np.maximum(1 + 3 * k1 * r2, 0.05)[..., None]
         return out
@@ -122,7 +135,7 @@ class MatchedRays:
     def within_limits(self, lens: SharedLens) -> SharedLens:
         """The lens with a k1 that folds nowhere inside a picture: r + k1 r³ turns back at 2/3 √(1 / (3 |k1|))."""
         sides = zip((self.x, self.y), self.bends, strict=True)
-        most = max(float((bend * (points**2).sum(axis=1)).max()) for points, bend in sides)
+        most = max(float((bend * dot(points, points)).max()) for points, bend in sides)
         least = -PAIR_FIT.fold_share * 4 * lens.factor**2 / (27 * max(most, 1e-12))
         return SharedLens(lens.factor, float(np.clip(lens.k1, max(least, -PAIR_FIT.most_k1), PAIR_FIT.most_k1)))
 
@@ -134,10 +147,11 @@ def _unbent(raw: Array, k1: Array) -> Array:
     """Undo r → r (1 + k1 r²) on (O, 2) by Newton's iteration: from r itself it comes nearer from one side only."""
     if not k1.any():
         return raw
-    radius = np.sqrt((raw**2).sum(axis=1))
+    radius = np.sqrt(dot(raw, raw))
     ideal = radius.copy()
-    for _ in range(6):
-        ideal -= (ideal * (1 + k1 * ideal**2) - radius) / np.maximum(1 + 3 * k1 * ideal**2, 0.05)
+    for _ in range(PAIR_FIT.lens_iterations):
+        bend = k1 * ideal * ideal
+        ideal -= (ideal * (1 + bend) - radius) / np.maximum(1 + 3 * bend, 0.05)
     unbent: Array = raw * (ideal / np.maximum(radius, 1e-12))[:, None]
     return unbent
 

@@ -76,6 +76,8 @@ class PairFitOptions:
     most_k1: float = 0.3
     # Share of the k1 at which the lens would fold inside a picture that it may reach.
     fold_share: float = 0.9
+    # Rounds of Newton's method that take the distortion off a ray.
+    lens_iterations: int = 5
     # Steps at most: of log f and k1, and of a pose (rad).
     most_lens_step: float = 0.1
     most_pose_step: float = 0.2
@@ -89,6 +91,9 @@ class PairFitOptions:
     # Share of the matches that pure rotations must explain better before the focal length is taken from them: that of
     # poses without parallax is arbitrary.
     rotation_share: float = 0.3
+    # Matches of each pair that take part in that test, and a change of log f that is not worth another start.
+    rotation_test_matches: int = 150
+    rotation_same_focal: float = 0.05
     # σ of the log of that focal length: the little parallax there is bends it.
     rotation_log_focal: float = 0.01
     # GRIC by which a rotation must explain a pair better, matches that must say so, and how near it must be to the

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..cameras.projective import skew
 from ..raster.arrays import Array
 from .matched_rays import MatchedRays, Rays, SharedLens
-from .turns import rotations
+from .turns import dot, rotations
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class PairModel(Protocol):
     def equations(self, poses: Poses, lens: SharedLens, shared: bool) -> tuple[Array, Array]:
         """Normal matrices and gradients of every pair, px²; with the shared parameters or without."""
 
-    def moved(self, poses: Poses, steps: Array) -> Poses:
+    def stepped(self, poses: Poses, steps: Array) -> Poses:
         """The poses after steps (P, freedom)."""
 
     def costs(self, poses: Poses, lens: SharedLens) -> Array:
@@ -58,7 +58,7 @@ class EpipolarModel:
 
     def residuals(self, poses: Poses, lens: SharedLens) -> Array:
         """Signed distances (O,), px."""
-        seen = self.rays.through(lens)
+        seen = self.rays.undistorted(lens)
         return _Sampson(seen, (skew(poses.t) @ poses.R)[self.rays.owner]).residual
 
     def squares(self, poses: Poses, lens: SharedLens) -> Array:
@@ -72,7 +72,7 @@ class EpipolarModel:
 
     def equations(self, poses: Poses, lens: SharedLens, shared: bool) -> tuple[Array, Array]:
         """Normal matrices and gradients of every pair, px²."""
-        seen = self.rays.through(lens)
+        seen = self.rays.undistorted(lens)
         sampson = _Sampson(seen, (skew(poses.t) @ poses.R)[self.rays.owner])
         columns = sampson.by_matrix()
         if shared:
@@ -90,7 +90,7 @@ class EpipolarModel:
         back = np.swapaxes(chain, 1, 2)
         return back @ H @ chain, np.einsum("pij,pj->pi", back, g)
 
-    def moved(self, poses: Poses, steps: Array) -> Poses:
+    def stepped(self, poses: Poses, steps: Array) -> Poses:
         """The poses after steps (P, 5)."""
         t = poses.t + np.einsum("pij,pj->pi", tangents(poses.t), steps[:, 3:5])
         return Poses(rotations(steps[:, :3]) @ poses.R, t / np.linalg.norm(t, axis=1, keepdims=True))
@@ -107,10 +107,10 @@ class _Sampson:
         self.slope = self.line[:, :2] / rays.focal[1][:, None] ** 2
         self.back_slope = self.back_line[:, :2] / rays.focal[0][:, None] ** 2
         self.shares = (
-            (self.back_slope * self.back_line[:, :2]).sum(axis=1), (self.slope * self.line[:, :2]).sum(axis=1)
+            dot(self.back_slope, self.back_line[:, :2]), dot(self.slope, self.line[:, :2])
         )  # fmt: skip
         self.length = np.sqrt(self.shares[0] + self.shares[1] + 1e-30)
-        self.residual: Array = (rays.b * self.line).sum(axis=1) / self.length
+        self.residual: Array = dot(rays.b, self.line) / self.length
         self.ratio = self.residual / self.length**2
 
     def by_matrix(self) -> Array:
@@ -128,8 +128,8 @@ class _Sampson:
         by_a = np.einsum("oij,oi->oj", self.E[:, :, :2], self.first)
         by_b = self.line[:, :2] / self.length[:, None]
         by_b = by_b - self.ratio[:, None] * np.einsum("oij,oj->oi", self.E[:, :2, :2], self.back_slope)
-        out: Array = (by_a * self.a[:, :2]).sum(axis=1)[:, None] * radial[0]
-        out += (by_b * self.b[:, :2]).sum(axis=1)[:, None] * radial[1]
+        out: Array = dot(by_a, self.a[:, :2])[:, None] * radial[0]
+        out += dot(by_b, self.b[:, :2])[:, None] * radial[1]
         # px are px of a longer focal length
         out[:, 0] += self.ratio * (matched.zooms[0] * self.shares[0] + matched.zooms[1] * self.shares[1])
         return out
@@ -146,7 +146,7 @@ class RotationModel:
 
     def vectors(self, poses: Poses, lens: SharedLens) -> tuple[Array, Array, Array]:
         """Residuals (O, 3) in px, the turned rays (O, 3), and px a radian over √2 (O,): both pictures err."""
-        seen = self.rays.through(lens)
+        seen = self.rays.undistorted(lens)
         a, b = seen.unit()
         turned = np.einsum("oij,oj->oi", poses.R[self.rays.owner], a)
         scale = seen.focal[1] / np.sqrt(2)
@@ -154,8 +154,8 @@ class RotationModel:
 
     def squares(self, poses: Poses, lens: SharedLens) -> Array:
         """Squared distances (O,), px²: of two coordinates."""
-        squares: Array = (self.vectors(poses, lens)[0] ** 2).sum(axis=1)
-        return squares
+        residual = self.vectors(poses, lens)[0]
+        return dot(residual, residual)
 
     def costs(self, poses: Poses, lens: SharedLens) -> Array:
         """Cauchy costs (P,), px²."""
@@ -170,11 +170,11 @@ class RotationModel:
             others = (SharedLens(lens.factor * np.exp(step), lens.k1), SharedLens(lens.factor, lens.k1 + step))
             by_lens = [(self.vectors(poses, other)[0] - residual) / step for other in others]
             columns = np.concatenate([columns, np.stack(by_lens, axis=2)], axis=2)
-        weight = 1 / (1 + (residual**2).sum(axis=1) / self.cauchy**2)
+        weight = 1 / (1 + dot(residual, residual) / self.cauchy**2)
         flat = columns.reshape(-1, columns.shape[2])
         return normal_equations(flat, np.repeat(weight, 3), residual.ravel(), 3 * self.rays.starts)
 
-    def moved(self, poses: Poses, steps: Array) -> Poses:
+    def stepped(self, poses: Poses, steps: Array) -> Poses:
         """The poses after steps (P, 3)."""
         return Poses(rotations(steps) @ poses.R, poses.t)
 

@@ -44,21 +44,23 @@ def as_rotations(
 ) -> AllRotations:
     """Fit all pairs as pure rotations with a shared lens: from the poses' focal length, the start's, and what was known
     before."""
-    rays, width = found.rays, PAIR_FIT.cauchy_px * scale
+    rays, width = found.rays.thinned(PAIR_FIT.rotation_test_matches), PAIR_FIT.cauchy_px * scale
     residual = EpipolarModel(rays, width).residuals(together.poses, together.lens)
     noise = noise_of(residual, scale)
     of_poses = gric_of_poses(rays, residual**2, noise)
     model = RotationModel(rays, width)
     poses = Poses(found.turned, np.zeros((len(rays), 3)))
-    best: AllRotations | None = None
+    tried: list[float] = []
+    best = AllRotations(0.0, together.lens)
     for factor in (together.lens.factor, start.factor, 1.0):
-        lens = SharedLens(factor)
-        fitted = refine_together(model, poses, lens, prior, noise, PAIR_FIT.rotation_iterations)
+        if any(abs(np.log(factor / other)) < PAIR_FIT.rotation_same_focal for other in tried):
+            continue
+        tried.append(factor)
+        fitted = refine_together(model, poses, SharedLens(factor), prior, noise, PAIR_FIT.rotation_iterations)
         better = gric_of_rotations(rays, model.squares(fitted.poses, fitted.lens), noise) < of_poses
-        share = float(rays.counts[better].sum() / rays.counts.sum())
-        if best is None or share > best.share:
+        share = float(found.rays.counts[better].sum() / found.rays.counts.sum())
+        if share > best.share:
             best = AllRotations(share, fitted.lens)
-    assert best is not None
     return best
 
 
