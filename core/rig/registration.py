@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -75,8 +76,7 @@ def register(
     lenses = starts(plain, ideal, verified)
     found = []
     for k, lens in enumerate(lenses):
-        share = k / len(lenses)
-        solved = solve(plain, ideal, verified, lens, lambda share=share: progress("geometry", share))
+        solved = solve(plain, ideal, verified, lens, partial(progress, "geometry", k / len(lenses)))
         if solved is not None:
             found.append(solved)
     if not found:
