@@ -30,7 +30,8 @@ from .panorama.framing import FrameRequest, frame_for
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
-from .panorama.rig_warp import build_rig_warp
+from .panorama.rig_viewpoint import RigViewpoint, rig_viewpoint
+from .panorama.rig_warp import build_rig_warp, outline_of
 from .panorama.slid_warp import slid_warp
 from .panorama.upright_edges import StraightEdges, straight_edges
 from .panorama.viewpoint import Viewpoint, viewpoint_between
@@ -181,10 +182,26 @@ def map_rig(
     if options.surface[0] == "reference":
         still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
         return Mapped(build_rig_warp(field, views), None, still)
-    frame = _frame(AllEdges(pictures, views), options, lambda projection: build_rig_warp(field, views, projection))
+    lines = AllEdges(pictures, views)
+    slide, viewpoint = _rig_slide(field, lines, options)
+    progress("warp", 0.2)
+    frame = _frame(lines, options, lambda projection: build_rig_warp(field, views, projection, viewpoint))
     progress("warp", 0.5)
-    still = SlideChoice(0.0, (), "the pictures are seen from one place")
-    return Mapped(build_rig_warp(field, views, frame), None, still)
+    return Mapped(build_rig_warp(field, views, frame, viewpoint), None, slide)
+
+
+def _rig_slide(
+    field: SphereField, lines: AllEdges, options: StitchOptions
+) -> tuple[SlideChoice, RigViewpoint | None]:
+    """How far the viewpoint slides among the places of N pictures, as asked for; None where it stays."""
+    if options.slide in ("auto", 0):
+        return SlideChoice(0.0, (), "the pictures are seen from one place"), None
+    if not any(view.t.any() for view in lines.views):
+        return SlideChoice(0.0, (), "the pictures were taken from one place"), None
+    s1 = float(options.slide)
+    outlines = [outline_of(field, view) for view in lines.views]
+    viewpoint = rig_viewpoint(lines.views, outlines, upright(lines.down)).sliding(s1)
+    return SlideChoice(s1, (), "as asked for"), viewpoint
 
 
 def _frame(lines: AllEdges, options: StitchOptions, warp_on: Callable[[Projection], Warp]) -> Projection:
