@@ -39,6 +39,9 @@ class RigSlideOptions:
     least_half: float = 1e-3
     """Radians of half a picture's width at least: what is divided by."""
 
+    looks: int = 360
+    """Headings at which it is looked whether a point is seen more than once."""
+
     nodes: int = 60_000
     """Nodes all over the sphere at which inverse range is known from the first place, to be carried over."""
 

@@ -69,6 +69,27 @@ class RigViewpoint:
         return moved / length[..., None], inverse_depth / length
 
 
+    def shows_twice(self, directions: Array, inverse_depth: Array) -> NDArray[np.bool_]:
+        """Which points q / d (…) the panorama shows more than once: those that several headings look at, each from its
+        own place."""
+        own = directions @ self.rotation
+        reach = np.linalg.norm(directions, axis=-1)
+        times = np.zeros(inverse_depth.shape, int)
+        step = max(1, len(self.places) // RIG_SLIDE.looks)
+        headings = np.arange(0, len(self.places) + 1, step) * (2 * np.pi / len(self.places)) - np.pi
+        places = self.s1 * self.places[np.arange(0, len(self.places) + 1, step) % len(self.places)] @ self.rotation
+        before = None
+        for heading, place in zip(headings, places, strict=True):
+            x, z = (own[..., k] - inverse_depth * place[k] for k in (0, 2))
+            # how far to the right of the heading the point lies; only what is ahead of it counts
+            beside = x * np.cos(heading) - z * np.sin(heading)
+            ahead = x * np.sin(heading) + z * np.cos(heading) > RIG_SLIDE.least_range * reach
+            if before is not None:
+                times += ahead & (before > 0) & (beside <= 0)
+            before = beside
+        return times > 1
+
+
 @dataclass(frozen=True, eq=False)
 class CarriedDepth:
     """Inverse range from a viewpoint that slides, by a field that is known from the first picture's place.
