@@ -14,15 +14,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..cameras.projective import inverse_intrinsics
 from ..cameras.view import View
 from ..panorama.layers import Layer
 from ..panorama.warp import Warp
-from ..raster.arrays import Array, Part, Plane, bounds
+from ..raster.arrays import Array, Part, Plane
 from ..raster.lazy import AnyImage
 from .graph_options import PLACING
+from .window import Window
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class Placing:
     warp: Warp
     views: Sequence[View]
 
-    def at(self, number: int, part: Part) -> Plane:
-        """Expected misplacement (h, w) of a picture in rows and columns of the canvas, px."""
+    def at(self, number: int, part: Part, step: int = 1) -> Plane:
+        """Expected misplacement (h, w) of a picture in rows and columns of the canvas, every so many px, in px."""
         canvas, warp = self.warp.canvas, self.warp
-        off = self._off(number, canvas.xs[part[1]], canvas.ys[part[0]], np.asarray(warp.depth[part]))
-        return off if warp.deviation is None else off * warp.deviation[part]
+        off = self._off(number, canvas.xs[part[1]][::step], canvas.ys[part[0]][::step], _every(step, warp.depth, part))
+        return off if warp.deviation is None else off * _every(step, warp.deviation, part)
 
     def _off(self, number: int, xs: Array, ys: Array, d: Plane) -> Plane:
         """The same at columns xs and lines ys, px of the plane, where inverse range (h, w) is wrong by 1."""
@@ -54,32 +54,32 @@ class Placing:
         off: Plane = np.linalg.norm(across, axis=-1) * np.float32(focal)
         return off
 
-    def mean(self, number: int, layer: Layer) -> float:
-        """Mean over what a picture shows; 0 if it shows nothing."""
-        box = bounds(layer.alpha > 0)
-        if box is None:
-            return 0.0
-        rows, columns = box
-        step = _step((rows.stop - rows.start) * (columns.stop - columns.start))
-        canvas, warp = self.warp.canvas, self.warp
-
-        def sampled(values: AnyImage | NDArray[np.bool_]) -> Plane:
-            lines = [np.asarray(values[row : row + 1, columns]) for row in range(rows.start, rows.stop, step)]
-            return np.concatenate(lines)[:, ::step]
-
-        shown = sampled(layer.alpha) > 0
-        off = self._off(number, canvas.xs[columns][::step], canvas.ys[rows][::step], sampled(warp.depth))
-        if warp.deviation is not None:
-            off *= sampled(warp.deviation)
+    def mean(self, number: int, layer: Layer, window: Window) -> float:
+        """Mean over what a picture shows, which lies in a window."""
+        step = max(1, int(np.sqrt(window.shape[0] * window.shape[1] / PLACING.samples)))
+        off, shown = (
+            np.concatenate([values.ravel() for values in some])
+            for some in zip(
+                *((self.at(number, there, step), layer.alpha[there][::step, ::step] > 0) for there, _ in window.parts),
+                strict=True,
+            )
+        )
         return float(off[shown].mean()) if shown.any() else 0.0
 
 
-def adding_order(placing: Placing, layers: Sequence[Layer]) -> list[int]:
-    """Numbers of the pictures, the one that is placed best first; of equal ones the one that comes first."""
-    means = [placing.mean(number, layer) for number, layer in enumerate(layers)]
-    return sorted(range(len(layers)), key=lambda number: (means[number], number))
+def adding_order(placing: Placing, layers: Sequence[Layer], windows: Sequence[Window | None]) -> list[int]:
+    """Numbers of the pictures that show something in windows, the one that is placed best first; of equal ones the one
+    that comes first."""
+    means = {
+        number: placing.mean(number, layer, window)
+        for number, (layer, window) in enumerate(zip(layers, windows, strict=True)) if window is not None
+    }
+    return sorted(means, key=lambda number: (means[number], number))
 
 
-def _step(pixels: int) -> int:
-    """Every how many pixels are looked at along each side of so many."""
-    return max(1, int(np.sqrt(pixels / PLACING.samples)))
+def _every(step: int, values: AnyImage, part: Part) -> Plane:
+    """Values of rows and columns, every so many px; lines in between are not read."""
+    rows, columns = part
+    return np.concatenate([np.asarray(values[row : row + 1, columns]) for row in range(rows.start, rows.stop, step)])[
+        :, ::step
+    ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from edf_stitch.core.compose.placing import Placing, adding_order
-from edf_stitch.core.panorama.layers import Layer
+from edf_stitch.core.compose.window import window_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -38,9 +38,16 @@ def test_the_nearest_to_the_viewpoint_comes_first() -> None:
     views = views_at([[0, size, 0] for size in away])
     layers = layers_of([wall()] * 7)
     for deviation in (None, 0.01):
-        assert adding_order(Placing(warp_of(deviation=deviation), views), layers) == [1, 5, 3, 6, 0, 4, 2]
-    empty = Layer(layers[2].light, np.zeros((HEIGHT, WIDTH), bool))
-    assert Placing(warp_of(), views).mean(2, empty) == 0
+        placing = Placing(warp_of(deviation=deviation), views)
+        windows = [window_of(CANVAS, layer.alpha) for layer in layers]
+        assert adding_order(placing, layers, windows) == [1, 5, 3, 6, 0, 4, 2]
+        assert adding_order(placing, layers, [*windows[:3], None, *windows[4:]]) == [1, 5, 6, 0, 4, 2]
+
+
+def test_what_is_looked_at_more_coarsely_is_the_same() -> None:
+    placing = Placing(warp_of(depth=0.2, deviation=0.01), views_at([[0.3, 0.2, 0.1]]))
+    part = slice(100, 203), slice(50, 333)
+    assert np.allclose(placing.at(0, part, 8), placing.at(0, part)[::8, ::8], rtol=1e-5)
 
 
 def test_a_step_towards_what_is_seen_misplaces_nothing() -> None:

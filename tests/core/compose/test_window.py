@@ -22,8 +22,10 @@ FLAT = replace(CANVAS, projection=None)
 @given(st.integers(0, WIDTH - 1), st.integers(1, WIDTH - 1), st.integers(0, 60))
 def test_a_window_holds_what_is_shown_and_no_more_than_a_margin(first: int, width: int, margin: int) -> None:
     shows = shown((first, width))
-    window = window_of(CANVAS, shows, margin)
-    assert window is not None and window.spread(window.plane(shows)).sum() == shows.sum()
+    tight = window_of(CANVAS, shows)
+    assert tight is not None and tight.plane(shows).all() and tight.box == (first, 110, width, 140)
+    window = tight.with_margin(margin)
+    assert window.spread(window.plane(shows)).sum() == shows.sum()
     left, top, across, down = window.box
     assert 0 <= left < WIDTH and (top, down) == (max(0, 110 - margin), 140 + 2 * min(margin, 110))
     assert across == (width + 2 * margin if WIDTH - width > 2 * margin else WIDTH)
@@ -32,10 +34,12 @@ def test_a_window_holds_what_is_shown_and_no_more_than_a_margin(first: int, widt
 def test_a_canvas_that_ends_is_not_wrapped() -> None:
     shows = shown((WIDTH - 50, 100))
     for canvas in (FLAT, CANVAS.within((0, 0, WIDTH - 1, HEIGHT))):
-        window = window_of(canvas, shows[:, : canvas.width], 10)
-        assert window is not None and window.box[0] == 0 and window.box[2] == canvas.width
+        tight = window_of(canvas, shows[:, : canvas.width])
+        assert tight is not None
+        window = tight.with_margin(10)
+        assert window.box[0] == 0 and window.box[2] == canvas.width
         assert len(window.parts) == 1 and not goes_round(canvas)
-    assert goes_round(CANVAS) and window_of(CANVAS, np.zeros_like(shows), 10) is None
+    assert goes_round(CANVAS) and window_of(CANVAS, np.zeros_like(shows)) is None
 
 
 @pytest.mark.parametrize("box", [(100, 20, 300, 90), (WIDTH - 130, 20, 300, 90), (0, 0, WIDTH, HEIGHT)])
