@@ -46,6 +46,12 @@ def scale_kind(rig: Rig) -> str:
     return "none"
 
 
+def focal_spread(rig: Rig) -> float:
+    """By which share the guesses of the focal length that explain the pictures almost alike differ at most."""
+    focals = [guess.focal for guess in rig.guesses]
+    return max(focals) / min(focals) - 1 if focals else 0.0
+
+
 def weak_links(rig: Rig) -> list[RigEdge]:
     """Edges with few matches, without which the rig would fall apart or hang by still fewer."""
     if not rig.edges:

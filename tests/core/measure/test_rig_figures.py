@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.rig import Rig, RigEdge
-from edf_stitch.core.measure.rig_figures import residuals, scale_kind, shares, weak_links
+from edf_stitch.core.cameras.rig import FocalGuess, Rig, RigEdge
+from edf_stitch.core.measure.rig_figures import focal_spread, residuals, scale_kind, shares, weak_links
 
 from ..rig.known_rigs import known_rig
 
@@ -51,6 +51,13 @@ def test_a_weak_link_is_one_that_something_hangs_by() -> None:
     assert [(edge.i, edge.j) for edge in weak_links(rig)] == [(1, 2)]
     assert not weak_links(with_edges((0, 1, 900, "measured"), (1, 2, 300, "measured"), (0, 2, 20, "measured"), count=3))
     assert not weak_links(replace(rig, edges=()))
+
+
+def test_guesses_of_the_focal_length_are_compared() -> None:
+    rig, _ = known_rig()
+    assert focal_spread(rig) == 0
+    guesses = tuple(FocalGuess(focal, 0.0, 1.0) for focal in (471.0, 480.0, 475.0))
+    assert focal_spread(replace(rig, guesses=guesses)) == pytest.approx(480 / 471 - 1)
 
 
 def test_shares_add_up() -> None:
