@@ -14,12 +14,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cameras.projective import inverse_intrinsics
 from ..cameras.view import View
 from ..panorama.layers import Layer
 from ..panorama.warp import Warp
 from ..raster.arrays import Array, Part, Plane, bounds
+from ..raster.lazy import AnyImage
 from .graph_options import PLACING
 
 
@@ -59,14 +61,17 @@ class Placing:
             return 0.0
         rows, columns = box
         step = _step((rows.stop - rows.start) * (columns.stop - columns.start))
-        lines = [(slice(row, row + 1), columns) for row in range(rows.start, rows.stop, step)]
         canvas, warp = self.warp.canvas, self.warp
-        shown, d, deviation = (
-            np.ones((), np.float32) if values is None else np.concatenate([np.asarray(values[line])[:, ::step] for line in lines])
-            for values in (layer.alpha, warp.depth, warp.deviation)
-        )
-        off = self._off(number, canvas.xs[columns][::step], canvas.ys[rows][::step], d) * deviation
-        return float(off[shown > 0].mean()) if (shown > 0).any() else 0.0
+
+        def sampled(values: AnyImage | NDArray[np.bool_]) -> Plane:
+            lines = [np.asarray(values[row : row + 1, columns]) for row in range(rows.start, rows.stop, step)]
+            return np.concatenate(lines)[:, ::step]
+
+        shown = sampled(layer.alpha) > 0
+        off = self._off(number, canvas.xs[columns][::step], canvas.ys[rows][::step], sampled(warp.depth))
+        if warp.deviation is not None:
+            off *= sampled(warp.deviation)
+        return float(off[shown].mean()) if shown.any() else 0.0
 
 
 def adding_order(placing: Placing, layers: Sequence[Layer]) -> list[int]:

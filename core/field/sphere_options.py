@@ -123,6 +123,9 @@ class SphereSlackOptions:
     smoothing_decades: tuple[float, float] = (-5.0, 0.0)
     """Powers of ten between which leave-one-out looks for the best λ, by halves."""
 
+    min_gain: float = 0.03
+    """Share by which slack has to lower the mean square of the leave-one-out errors: less is chance."""
+
     max_px: float = 12.0
     """px that slack may move a pixel at most."""
 

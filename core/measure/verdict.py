@@ -22,15 +22,28 @@ from .options import RIG, VERDICT
 
 GOOD, LOOK, NOT_USABLE = "good", "look", "not usable"
 
+PAINT = (
+    "paint over these places which picture is shown there (--mask), or leave them out (--ignore-ref, --ignore-target)"
+)
+LEAVE_OUT = "leave what is wrong there out of the picture that has it (--ignore NAME=MASK)"
+DARKER = "make the panorama darker by some stops (--exposure=-1)"
+CLIPPED = (
+    "make the panorama brighter (--exposure=1), so that this light is white again; the next time expose for the "
+    "brightest part, or merge bracketed pictures into one EXR"
+)
+FOCAL = "give the focal length (--focal35, --focal-px) if it is known, or keep the reference's place (--slide 0)"
+FILL = "fill holes (--holes inpaint)"
+
 
 @dataclass(frozen=True)
 class Place:
     """Where (left, top, width, height in px of the panorama) to look, and at what; size: how much of it is wrong, in
-    px of the small copy."""
+    px of the small copy; help: what would help."""
 
     box: Box
     what: str
     size: float
+    help: str = PAINT
 
 
 @dataclass(frozen=True)
@@ -84,7 +97,7 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
          *_torn_places(look, pairs, shift), *_light_places(look, shift),
          # in a frame that was asked for, pictures are squeezed as that has it
          *(_bent_places(look, shift) if report["options"]["projection"] == "auto" else ()),
-         *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2)
+         *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2, FILL)
            for box in report["composition"]["holes"])),
         key=lambda place: -place.size,
     )  # fmt: skip
@@ -97,14 +110,10 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
     doubts = dict(_doubts(report))
     if not places and not doubts:
         return Verdict(GOOD, "the pictures agree where the seam changes from one to the other", "")
-    kinds = list(dict.fromkeys([*doubts, *(place.what for place in places)]))
-    advice = (
-        "paint over these places which picture is shown there (--mask), or leave them out (--ignore-ref, "
-        "--ignore-target)" if len(look.shows) == 2 else
-        "leave what is wrong there out of the picture that has it (--ignore NAME=MASK)"
-    )  # fmt: skip
-    what_to_do = "; ".join([*([advice] if places else []), *dict.fromkeys(doubts.values())])
-    return Verdict(LOOK, "; ".join(kinds), what_to_do, tuple(places[: VERDICT.most_places]))
+    kinds = dict.fromkeys([*doubts, *(place.what for place in places)])
+    many = len(look.shows) > 2
+    helps = dict.fromkeys([*(LEAVE_OUT if many and one.help == PAINT else one.help for one in places), *doubts.values()])
+    return Verdict(LOOK, "; ".join(kinds), "; ".join(helps), tuple(places[: VERDICT.most_places]))
 
 
 def _doubts(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -260,11 +269,12 @@ def _bent_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         # half the sum and half the difference of the singular values of the Jacobian
         alike, unlike = np.hypot(x_x + y_y, y_x - x_y) / 2, np.hypot(x_x - y_y, y_x + x_y) / 2
         bent = alike + unlike > VERDICT.squeeze * np.abs(alike - unlike)
-        bent &= eroded(known, side // 2 + 1)
+        # of a blank sky or wall nobody sees how it is mapped
+        bent &= eroded(known, side // 2 + 1) & dilated(_detailed(look.tones[number]), side // 2)
         opened = cv2.morphologyEx(bent.astype(np.uint8), cv2.MORPH_OPEN, np.ones((side // 2,) * 2, np.uint8)) > 0
         for part in _parts(opened, VERDICT.bent_share * opened.size):
             what = "the picture is bent or stretched: depth or the focal length is doubtful"
-            yield Place(look.box(part, shift), what, float(part.sum()))
+            yield Place(look.box(part, shift), what, float(part.sum()), FOCAL)
 
 
 def _detailed(tones: Levels) -> NDArray[np.bool_]:
@@ -288,12 +298,12 @@ def _light_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         apart = np.abs(look.tones[other][both].astype(int) - tones[both]).max(axis=1)
         if both.sum() >= VERDICT.compared_px and np.median(apart) <= VERDICT.cast:
             greyed[:] = False  # darker, but as the other picture has it
-        for mask, share, what in (
-            (blown, VERDICT.blown_share, "light is blown here that the picture has"),
-            (greyed, VERDICT.greyed_share, "light that was too bright for the picture got a cast or a step"),
+        for mask, share, what, help_ in (
+            (blown, VERDICT.blown_share, "light is blown here that the picture has", DARKER),
+            (greyed, VERDICT.greyed_share, "light that was too bright for the picture got a cast or a step", CLIPPED),
         ):
             if mask.sum() > share * mask.size:
-                yield Place(look.box(max(_parts(mask, 1), key=np.sum), shift), what, float(mask.sum()))
+                yield Place(look.box(max(_parts(mask, 1), key=np.sum), shift), what, float(mask.sum()), help_)
 
 
 def _greyed(tones: Levels, taken: Levels, clipped: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:

@@ -123,7 +123,7 @@ def _averaged(
             break
         fitted = _at_lens(matched, lens, fitted, verified.scale)
     chosen = _chosen(matched, found, kept, links, turned, lens, verified.scale)
-    return _told(cameras, verified, matched, members, links, turned, lens, chosen)
+    return _summary(cameras, verified, matched, members, links, turned, lens, chosen)
 
 
 def _at_lens(matched: MatchedRays, lens: SharedLens, fitted: _Fitted, scale: float) -> _Fitted:
@@ -202,7 +202,7 @@ def _chosen(
     return _Chosen(numbers, of_each, poses, information, squares, noise, turning)
 
 
-def _told(
+def _summary(
     cameras: Sequence[Camera], verified: Verified, matched: MatchedRays, members: Sequence[int], links: Links,
     turned: Rotations, lens: SharedLens, chosen: _Chosen,
 ) -> Averaged:  # fmt: skip

@@ -42,7 +42,11 @@ def projection_of(rig: Rig, kind: str, rotation: np.ndarray, focal: float = 140.
 
 @pytest.fixture(scope="module")
 def ring() -> Rig:
-    return rig_of(AROUND, noise_px=0.2)
+    """With a picture that is bent by up to two px."""
+    rig = rig_of(AROUND, noise_px=0.2)
+    seen = rig.observations
+    bend = 2 * np.sin(seen.pixels / 60) * (seen.picture == 3)[:, None]
+    return replace(rig, observations=replace(seen, pixels=seen.pixels + bend))
 
 
 @pytest.fixture(scope="module")
