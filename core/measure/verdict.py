@@ -111,8 +111,8 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
     if not places and not doubts:
         return Verdict(GOOD, "the pictures agree where the seam changes from one to the other", "")
     kinds = dict.fromkeys([*doubts, *(place.what for place in places)])
-    many = len(look.shows) > 2
-    helps = dict.fromkeys([*(LEAVE_OUT if many and one.help == PAINT else one.help for one in places), *doubts.values()])
+    of_places = [LEAVE_OUT if one.help == PAINT and len(look.shows) > 2 else one.help for one in places]
+    helps = dict.fromkeys([*of_places, *doubts.values()])
     return Verdict(LOOK, "; ".join(kinds), "; ".join(helps), tuple(places[: VERDICT.most_places]))
 
 
