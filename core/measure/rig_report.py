@@ -61,7 +61,7 @@ def make_rig_report(
     error = map_errors(warp, alignment.edges)
     report = {
         "schema": SCHEMA,
-        "pictures": _pictures(pictures, rig, decided, shares(labels, [one.inside() for one in warp.maps])),
+        "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum()))),
         "left_out": left_out_entry(alignment.left_out),
         "options": options_entry(options, alignment) | {"viewpoint": options.viewpoint},
         "matches": {
