@@ -18,7 +18,7 @@ from ..cameras.sources import called
 from ..field.folding import NO_TURN, cell_areas, turned_over, turning
 from ..raster.arrays import NEIGHBOURS, Box, Plane, dilated, eroded
 from .look import Levels, Look
-from .options import VERDICT
+from .options import RIG, VERDICT
 
 GOOD, LOOK, NOT_USABLE = "good", "look", "not usable"
 
@@ -102,15 +102,17 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
         key=lambda place: -place.size,
     )  # fmt: skip
     missed = (report["measured"]["alignment_p95_px"] or 0.0) / (look.side * look.step)
-    cause = _cause(look, pairs, missed, report["measured"]["folds"] or 0.0)
+    # of many pictures one may be folded where it is not shown
+    folded = 0.0 if "rig" in report else report["measured"]["folds"] or 0.0
+    cause = _cause(look, pairs, missed, folded)
     if cause:
         return Verdict(NOT_USABLE, *cause, tuple(places[: VERDICT.most_places]))
     doubts = dict(_doubts(report))
     if not places and not doubts:
         return Verdict(GOOD, "the pictures agree where the seam changes from one to the other", "")
     kinds = dict.fromkeys([*doubts, *(place.what for place in places)])
-    many = len(look.shows) > 2
-    helps = dict.fromkeys([*(LEAVE_OUT if many and one.help == PAINT else one.help for one in places), *doubts.values()])
+    of_places = [LEAVE_OUT if one.help == PAINT and len(look.shows) > 2 else one.help for one in places]
+    helps = dict.fromkeys([*of_places, *doubts.values()])
     return Verdict(LOOK, "; ".join(kinds), "; ".join(helps), tuple(places[: VERDICT.most_places]))
 
 
@@ -126,7 +128,9 @@ def _doubts(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "how far apart some pictures were taken is not known", more
     if (report["field"]["leave_one_out_px"] or 0.0) > VERDICT.deep_px:
         yield "the scene is too near and deep for the points that were found", more
-    if len(report["rig"]["focal_guesses"]) > 1:
+    if (report["measured"]["folds"] or 0.0) > VERDICT.folded:
+        yield f"the map folds over in {report['measured']['folds']:.0%} of a picture: depth is doubtful there", more
+    if report["rig"]["focal_spread"] > RIG.same_focal:
         yield "the focal length is not sure", "give the focal length (--focal35, --focal-px)"
 
 
@@ -134,8 +138,8 @@ def _cause(look: Look, pairs: Sequence[_Pair], missed: float, folded: float) -> 
     """Why a panorama is not usable, and what to do; None where it is. missed: share of the longer side."""
     if folded > VERDICT.folded:
         return (
-            f"{'the target' if len(look.shows) == 2 else 'a picture'} would be folded in {folded:.0%} of what it "
-            "shows: it is mirrored, or another place that looks alike",
+            f"the target would be folded in {folded:.0%} of what it shows: it is mirrored, or another place that looks "
+            "alike",
             "check that neither picture is mirrored and that both show the same things; else give matches by hand "
             "(--matches)",
         )

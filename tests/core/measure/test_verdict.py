@@ -230,7 +230,7 @@ def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> N
 
 SURE = {
     **RIGHT, "pictures": [{"name": name} for name in ("a.png", "b.png", "c.png")], "left_out": [],
-    "rig": {"scale": "measured", "focal_guesses": []}, "field": {"leave_one_out_px": 0.4},
+    "rig": {"scale": "measured", "focal_spread": 0.002}, "field": {"leave_one_out_px": 0.4},
 }  # fmt: skip
 
 
@@ -270,8 +270,9 @@ def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:
 
 @pytest.mark.parametrize(("changes", "why", "advice"), [
     ({"left_out": [{"name": "d.png", "why": ""}]}, "d.png connects with no others", "take more pictures"),
-    ({"rig": {"scale": "none", "focal_guesses": []}}, "how far apart", "take more pictures"),
-    ({"rig": {"scale": "measured", "focal_guesses": [{}, {}]}}, "focal length is not sure", "--focal35"),
+    ({"rig": {"scale": "none", "focal_spread": 0.0}}, "how far apart", "take more pictures"),
+    ({"rig": {"scale": "measured", "focal_spread": 0.03}}, "focal length is not sure", "--focal35"),
+    ({"measured": {"alignment_p95_px": 1.0, "folds": 0.2}}, "folds over in 20%", "take more pictures"),
     ({"field": {"leave_one_out_px": 2.5}}, "too near and deep", "take more pictures"),
 ])  # fmt: skip
 def test_what_is_doubtful_about_the_cameras_is_said(changes: dict, why: str, advice: str) -> None:
