@@ -155,8 +155,9 @@ class JudgeOptions:
     # Relative cost within which hypotheses are reported as possible, and log f within which two are the same.
     possible: float = 0.05
     same_log_focal: float = 0.002
-    # Points of three pictures from which a pair's baseline is measured, and its parallax in σ from which it has any.
-    three_view_points: int = 10
+    # Points that three pictures see from which the lengths between them are in a measured proportion, and parallax of a
+    # pair in σ from which it has a baseline at all.
+    three_view_points: int = 4
     parallax_sigmas: float = 3.0
     # Inliers below which a link that no loop checks is called ambiguous.
     weak_link: int = 40
