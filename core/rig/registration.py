@@ -16,9 +16,9 @@ from ..raster.robust import sigma_of_lengths
 from ..system.errors import NoOverlap
 from ..system.progress import Progress
 from .averaged import Verified
+from .averaging import hypotheses
 from .baselines import baselines
 from .bundle_options import JUDGE
-from .focal_starts import starts
 from .graph import components, is_bridge
 from .options import PAIRS
 from .pairs import verified as verify
@@ -71,10 +71,10 @@ def register(
     plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
     verified = verify(ideal, matches, scale, seed)
     progress("geometry")
-    lenses = starts(plain, ideal, verified)
+    averages = hypotheses(plain, ideal, verified)
     found = []
-    for k, lens in enumerate(lenses):
-        solved = solve(plain, ideal, verified, lens, partial(progress, "geometry", k / len(lenses)))
+    for k, rotated in enumerate(averages):
+        solved = solve(plain, ideal, verified, rotated, partial(progress, "geometry", k / len(averages)))
         if solved is not None:
             found.append(solved)
     if not found:

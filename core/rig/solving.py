@@ -36,15 +36,14 @@ class Solved:
 
 
 def solve(
-    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, lens: SharedLens, tick: Tick
+    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, rotated: Averaged | None, tick: Tick
 ) -> Solved | None:
-    """Follow a hypothesis to its end; None if it connects no two pictures.
+    """Follow a hypothesis, its averaged rotations, to its end; None if it connects no two pictures.
 
     Where the bundle moves the focal length much, pairs are estimated again with the bundle's: an error of some per cent
     turns every pair by degrees, and the tracks were chosen by that.
     """
     tick()
-    rotated = averaged(cameras, points, verified, lens)
     solved = None
     for _ in range(JUDGE.passes):
         if rotated is None or len(rotated.members) < 2:

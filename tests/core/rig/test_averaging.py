@@ -8,7 +8,7 @@ from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.rig import PictureMatches
 from edf_stitch.core.rig.averaged import Averaged
-from edf_stitch.core.rig.averaging import averaged
+from edf_stitch.core.rig.averaging import averaged, hypotheses
 from edf_stitch.core.rig.focal_starts import starts
 from edf_stitch.core.rig.matched_rays import SharedLens
 from edf_stitch.core.rig.pairs import verified
@@ -211,6 +211,16 @@ def test_an_unknown_focal_length_is_found(factor):
     best = min(found, key=lambda each: each.cost)
     assert best.cameras[0].focal == pytest.approx(rig.focal, rel=0.01)
     assert errors(best, rig).max() < 0.3
+
+
+def test_starts_that_end_alike_are_one_hypothesis():
+    rig = make_rig("street", 1, points=3000, pictures=5)
+    cameras = cameras_of(rig, 0.8, 0.4)
+    agreed = verified(rig.points, rig.matches, 1.0, 0)
+    found = hypotheses(cameras, rig.points, agreed)
+    assert 1 <= len(found) < len(starts(cameras, rig.points, agreed))
+    assert found[0].cost == min(each.cost for each in found)
+    assert found[0].cameras[0].focal == pytest.approx(rig.focal, rel=0.01)
 
 
 def test_cost_tells_a_right_start_from_a_wrong_one(ring, of_ring):
