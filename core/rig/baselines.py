@@ -29,7 +29,7 @@ def baselines(pairs: Sequence[PairGeometry], members: Sequence[int], found: Poli
 
 
 def _rigid_groups(found: Polished) -> list[set[int]]:
-    """Pictures between which all lengths are in one proportion: triples, joined where they have two pictures in common."""
+    """Pictures between which all lengths are in one proportion: triples, joined where they share two pictures."""
     seen = _seen(found)
     count = len(seen)
     if count == 2:
