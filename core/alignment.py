@@ -216,7 +216,7 @@ def _of_many(
         pair = estimate_geometry([frame.only(found.numbers)], replace(options, viewpoint=None), progress)
         return replace(pair, warnings=(*warnings, *pair.warnings), numbers=found.numbers, left_out=left_out)
     edges = edges_of(found.rig, matched, found.numbers)
-    return Geometry(found.rig.cameras, edges, (*warnings, *found.warnings), found.numbers, found.rig, left_out)
+    return Geometry(found.rig.cameras, edges, warnings, found.numbers, found.rig, left_out)
 
 
 def _estimated(ideal: Matches, cameras: tuple[Camera, ...], seed: int, pictures: Sequence[Picture]) -> TwoView:

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..alignment import Alignment, align
-from ..compose.decided import Decided, pooled_decision
+from ..compose.decided import Decided
+from ..compose.pooling import pooled_decision
 from ..frames.frame import Frame
 from ..frames.reading import read_frame
 from ..options import StitchOptions

@@ -26,6 +26,7 @@ from .inpaint import closed_holes, inpainted
 from .options import EXPOSURE
 from .placing import Placing, adding_order
 from .unseen import Unseen, unseen_by_each
+from .window import window_of
 
 
 @dataclass(frozen=True)
@@ -87,10 +88,11 @@ def composed(
     -------
     Composition
     """
+    windows = [] if len(layers) == 2 else [window_of(warp.canvas, layer.alpha > 0) for layer in layers]
     progress("occlusion", 0.0)
     unseen = (
         [Unseen(one.hidden, one.hidden_by_depth, one.folds) for one in decided] if decided
-        else unseen_by_each(layers, warp, views)
+        else unseen_by_each(layers, warp, views, windows)
     )  # fmt: skip
     progress("exposure", 0.0)
     fetched: list[Layer] = []
@@ -110,8 +112,9 @@ def composed(
         order, panorama = [0, 1], Panorama(warp, exposed, options)
     else:
         placing = Placing(warp, views)
-        order, panorama = adding_order(placing, layers), SetPanorama(warp, exposed, options, placing)
-    panorama.begin(order[0], found[order[0]])
+        order, panorama = adding_order(placing, layers, windows), SetPanorama(warp, exposed, options, placing, windows)
+    if order:
+        panorama.begin(order[0], found[order[0]])
     for step, number in enumerate(order[1:]):
 
         def report(stage: str, share: float, before: int = step) -> None:

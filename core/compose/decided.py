@@ -1,18 +1,17 @@
-"""What is decided about a picture before pixels are mixed, and what the frames of a clip share of it."""
+"""What is decided about a picture before pixels are mixed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .exposure import Exposure, pooled
-from .seam import find_seam
-from .seam_costs import SeamCosts, averaged_costs
-from .window import Window
-from .wraparound import rolled
+if TYPE_CHECKING:
+    from .exposure import Exposure
+    from .seam_costs import SeamCosts
+    from .window import Window
 
 
 @dataclass(frozen=True)
@@ -51,34 +50,3 @@ class Decided:
     roll: int = 0
     holes: int = 0
     folds: float = 0.0
-
-
-def pooled_decision(decisions: Sequence[Sequence[Decided]]) -> tuple[Decided, ...]:
-    """One decision about each picture for several frames of the same cameras.
-
-    Parameters
-    ----------
-    decisions : sequence of sequences of Decided
-        Of each frame, about each picture, made with `keep`.
-
-    Returns
-    -------
-    tuple of Decided
-        The median of the exposures, and the seam that is cheapest on average over the frames.
-    """
-    return tuple(_pooled(about_one) for about_one in zip(*decisions, strict=True))
-
-
-def _pooled(decisions: Sequence[Decided]) -> Decided:
-    """The same about one picture, by the frames that overlap in the same box."""
-    first = replace(decisions[0], exposure=pooled([one.exposure for one in decisions]))
-    if first.known is None or first.costs is None:
-        return first
-    alike = [
-        one.costs for one in decisions
-        if one.costs is not None
-        and (one.costs.box, one.roll, one.window) == (first.costs.box, first.roll, first.window)
-    ]  # fmt: skip
-    costs = averaged_costs(alike)
-    chosen = rolled(find_seam(first.known, costs), -first.roll)
-    return replace(first, costs=costs, chosen=chosen)

@@ -37,6 +37,9 @@ class PlacingOptions:
     samples: int = 10_000
     """Pixels of a picture that the order is decided by: more take time and change nothing."""
 
+    step_px: int = 8
+    """px from one place to the next at which that is worked out for labels: it changes slowly."""
+
     price: float = 0.3
     """Price of showing what is misplaced by one px more, from corner to corner of the overlap, for each pixel of its
     diagonal. Borders between opposite tones cost 1 a pixel."""

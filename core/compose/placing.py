@@ -19,8 +19,10 @@ from ..cameras.projective import inverse_intrinsics
 from ..cameras.view import View
 from ..panorama.layers import Layer
 from ..panorama.warp import Warp
-from ..raster.arrays import Array, Part, Plane, bounds
+from ..raster.arrays import Array, Part, Plane
+from ..raster.lazy import AnyImage
 from .graph_options import PLACING
+from .window import Window
 
 
 @dataclass(frozen=True)
@@ -30,11 +32,11 @@ class Placing:
     warp: Warp
     views: Sequence[View]
 
-    def at(self, number: int, part: Part) -> Plane:
-        """Expected misplacement (h, w) of a picture in rows and columns of the canvas, px."""
+    def at(self, number: int, part: Part, step: int = 1) -> Plane:
+        """Expected misplacement (h, w) of a picture in rows and columns of the canvas, every so many px, in px."""
         canvas, warp = self.warp.canvas, self.warp
-        off = self._off(number, canvas.xs[part[1]], canvas.ys[part[0]], np.asarray(warp.depth[part]))
-        return off if warp.deviation is None else off * warp.deviation[part]
+        off = self._off(number, canvas.xs[part[1]][::step], canvas.ys[part[0]][::step], _every(step, warp.depth, part))
+        return off if warp.deviation is None else off * _every(step, warp.deviation, part)
 
     def _off(self, number: int, xs: Array, ys: Array, d: Plane) -> Plane:
         """The same at columns xs and lines ys, px of the plane, where inverse range (h, w) is wrong by 1."""
@@ -52,29 +54,32 @@ class Placing:
         off: Plane = np.linalg.norm(across, axis=-1) * np.float32(focal)
         return off
 
-    def mean(self, number: int, layer: Layer) -> float:
-        """Mean over what a picture shows; 0 if it shows nothing."""
-        box = bounds(layer.alpha > 0)
-        if box is None:
-            return 0.0
-        rows, columns = box
-        step = _step((rows.stop - rows.start) * (columns.stop - columns.start))
-        lines = [(slice(row, row + 1), columns) for row in range(rows.start, rows.stop, step)]
-        canvas, warp = self.warp.canvas, self.warp
-        shown, d, deviation = (
-            np.ones((), np.float32) if values is None else np.concatenate([np.asarray(values[line])[:, ::step] for line in lines])
-            for values in (layer.alpha, warp.depth, warp.deviation)
+    def mean(self, number: int, layer: Layer, window: Window) -> float:
+        """Mean over what a picture shows, which lies in a window."""
+        step = max(1, int(np.sqrt(window.shape[0] * window.shape[1] / PLACING.samples)))
+        off, shown = (
+            np.concatenate([values.ravel() for values in some])
+            for some in zip(
+                *((self.at(number, there, step), layer.alpha[there][::step, ::step] > 0) for there, _ in window.parts),
+                strict=True,
+            )
         )
-        off = self._off(number, canvas.xs[columns][::step], canvas.ys[rows][::step], d) * deviation
-        return float(off[shown > 0].mean()) if (shown > 0).any() else 0.0
+        return float(off[shown].mean()) if shown.any() else 0.0
 
 
-def adding_order(placing: Placing, layers: Sequence[Layer]) -> list[int]:
-    """Numbers of the pictures, the one that is placed best first; of equal ones the one that comes first."""
-    means = [placing.mean(number, layer) for number, layer in enumerate(layers)]
-    return sorted(range(len(layers)), key=lambda number: (means[number], number))
+def adding_order(placing: Placing, layers: Sequence[Layer], windows: Sequence[Window | None]) -> list[int]:
+    """Numbers of the pictures that show something in windows, the one that is placed best first; of equal ones the one
+    that comes first."""
+    means = {
+        number: placing.mean(number, layer, window)
+        for number, (layer, window) in enumerate(zip(layers, windows, strict=True)) if window is not None
+    }
+    return sorted(means, key=lambda number: (means[number], number))
 
 
-def _step(pixels: int) -> int:
-    """Every how many pixels are looked at along each side of so many."""
-    return max(1, int(np.sqrt(pixels / PLACING.samples)))
+def _every(step: int, values: AnyImage, part: Part) -> Plane:
+    """Values of rows and columns, every so many px; lines in between are not read."""
+    rows, columns = part
+    return np.concatenate([np.asarray(values[row : row + 1, columns]) for row in range(rows.start, rows.stop, step)])[
+        :, ::step
+    ]

@@ -15,7 +15,7 @@ from ..panorama.layers import Layer
 from ..panorama.warp import Warp
 from ..raster.lazy import AnyImage
 from .graph_options import WINDOW
-from .window import Window, window_of
+from .window import Window
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,10 @@ class Unseen:
     folds: float = 0.0
 
 
-def unseen_by_each(layers: Sequence[Layer], warp: Warp, views: Sequence[View]) -> list[Unseen]:
-    """What each picture cannot see.
+def unseen_by_each(
+    layers: Sequence[Layer], warp: Warp, views: Sequence[View], windows: Sequence[Window | None]
+) -> list[Unseen]:
+    """What each picture cannot see; windows: where they show anything, of more than two.
 
     Of a pair, the reference cannot see what is `behind`, and all else is judged beside it. Of a larger set, the depth
     order counts only where dense refinement knows it: a smooth field through sparse points hides what is seen. What no
@@ -44,15 +46,15 @@ def unseen_by_each(layers: Sequence[Layer], warp: Warp, views: Sequence[View]) -
         window = Window.whole(warp.canvas)
         return [Unseen(behind, behind), _unseen(window, warp, 1, warp.nearness(views, 1), shown)]
     count = np.zeros(nothing.shape, np.int16)
-    windows = [window_of(warp.canvas, layer.alpha > 0, WINDOW.seam_margin_px) for layer in layers]
     for layer, part in zip(layers, windows, strict=True):
         for there, _ in [] if part is None else part.parts:
             count[there] += layer.alpha[there] > 0
     found = []
-    for number, (layer, part) in enumerate(zip(layers, windows, strict=True)):
-        if part is None:
+    for number, (layer, tight) in enumerate(zip(layers, windows, strict=True)):
+        if tight is None:
             found.append(Unseen(nothing, nothing))
             continue
+        part = tight.with_margin(WINDOW.seam_margin_px)
         others: NDArray[np.bool_] = part.plane(count) > (part.plane(layer.alpha) > 0)
         nearness = None if warp.lazy_confidence is None else part.image(warp.nearness(views, number))
         one = _unseen(part, warp, number, nearness, others)

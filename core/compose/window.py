@@ -6,7 +6,7 @@ put back.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,18 +27,21 @@ class Window:
     Attributes
     ----------
     box : Box
-        left, top, width, height, px; from the canvas's last column it goes on with the first.
+        left, top, width, height, px; it may go on with the first column after the last.
     size : (int, int)
         (W, H) of the canvas.
+    round : bool
+        Whether the canvas goes round, so that its last column lies beside its first.
     """
 
     box: Box
     size: tuple[int, int]
+    round: bool = False
 
     @staticmethod
     def whole(canvas: Canvas) -> Window:
         """All of a canvas."""
-        return Window((0, 0, canvas.width, canvas.height), (canvas.width, canvas.height))
+        return Window((0, 0, canvas.width, canvas.height), (canvas.width, canvas.height), goes_round(canvas))
 
     @property
     def is_whole(self) -> bool:
@@ -111,29 +114,37 @@ class Window:
         self.put(values, out)
         return out
 
-    def full_circle(self) -> bool:
-        """Whether it holds all columns of the canvas."""
-        return self.box[2] == self.size[0]
+    def with_margin(self, margin: int) -> Window:
+        """The same with so many px more on every side: all columns where it goes round, none beyond the edges else."""
+        (left, top, width, height), (across, down) = self.box, self.size
+        first, last = max(0, top - margin), min(down, top + height + margin)
+        if not self.round:
+            begin, end = max(0, left - margin), min(across, left + width + margin)
+        elif width + 2 * margin < across:
+            begin = (left - margin) % across
+            end = begin + width + 2 * margin
+        else:
+            begin, end = 0, across
+        return replace(self, box=(begin, first, end - begin, last - first))
 
 
-def window_of(canvas: Canvas, shows: NDArray[np.bool_], margin: int) -> Window | None:
-    """The smallest window that holds what a picture shows (H, W), and a margin (px); None if it shows nothing."""
-    rows, columns = np.flatnonzero(shows.any(axis=1)), np.flatnonzero(shows.any(axis=0))
+def window_of(canvas: Canvas, shows: NDArray[np.bool_]) -> Window | None:
+    """The smallest window that holds what a picture shows (H, W); None if it shows nothing."""
+    rows = np.flatnonzero(shows.any(axis=1))
     if not rows.size:
         return None
-    width, height = canvas.width, canvas.height
-    top, bottom = max(0, int(rows[0]) - margin), min(height, int(rows[-1]) + 1 + margin)
-    left, right = max(0, int(columns[0]) - margin), min(width, int(columns[-1]) + 1 + margin)
+    top, bottom = int(rows[0]), int(rows[-1]) + 1
+    columns = np.flatnonzero(shows[top:bottom].any(axis=0))
+    left, right = int(columns[0]), int(columns[-1]) + 1
     if goes_round(canvas):
         # what is left out is the widest gap between columns that show something
-        gaps = np.diff(columns, append=columns[0] + width) - 1
+        gaps = np.diff(columns, append=columns[0] + canvas.width) - 1
         widest = int(np.argmax(gaps))
-        gap = int(gaps[widest])
-        left, right = 0, width
-        if gap > 2 * margin:
-            left = (int(columns[(widest + 1) % len(columns)]) - margin) % width
-            right = left + width - gap + 2 * margin
-    return Window((left, top, right - left, bottom - top), (width, height))
+        left = int(columns[(widest + 1) % len(columns)])
+        right = left + canvas.width - int(gaps[widest])
+        if left and right == left + canvas.width:
+            left, right = 0, canvas.width
+    return Window((left, top, right - left, bottom - top), (canvas.width, canvas.height), goes_round(canvas))
 
 
 def goes_round(canvas: Canvas) -> bool:

@@ -56,6 +56,9 @@ class RigOptions:
     matches_looked_up: int = 300
     """Matches of each pair that are looked up in the maps: their median and 95th percentile are what is asked for."""
 
+    same_focal: float = 0.01
+    """Share by which guesses of the focal length may differ and still be one: nobody sees the difference."""
+
     most_named: int = 4
     """Pairs that a warning names."""
 

@@ -15,6 +15,7 @@ from ..cameras.projective import project
 from ..cameras.rig import Rig, RigEdge
 from ..panorama.warp import Warp
 from ..raster.arrays import Array
+from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap
 from .metrics import shown_at
 from .options import RIG
 
@@ -46,6 +47,12 @@ def scale_kind(rig: Rig) -> str:
     return "none"
 
 
+def focal_spread(rig: Rig) -> float:
+    """By which share the guesses of the focal length that explain the pictures almost alike differ at most."""
+    focals = [guess.focal for guess in rig.guesses]
+    return max(focals) / min(focals) - 1 if focals else 0.0
+
+
 def weak_links(rig: Rig) -> list[RigEdge]:
     """Edges with few matches, without which the rig would fall apart or hang by still fewer."""
     if not rig.edges:
@@ -66,19 +73,27 @@ def map_errors(warp: Warp, edges: Sequence[Edge]) -> Array:
     for edge in edges:
         inliers = edge.matches.subset(edge.two_view.inliers).thinned(RIG.matches_looked_up)
         if len(inliers):
-            first, second = (warp.maps[number].arrays() for number in (edge.i, edge.j))
-            found.append(np.linalg.norm(second.between(shown_at(first, inliers.x)) - inliers.y, axis=1))
-    errors: Array = np.concatenate([np.zeros(0), *found])
-    return errors[np.isfinite(errors)]
+            (first, corner), (second, other) = (_known_part(warp.maps[number]) for number in (edge.i, edge.j))
+            at = shown_at(first, inliers.x) + corner - other
+            found.append(np.linalg.norm(second.between(at) - inliers.y, axis=1))
+    errors = np.concatenate([np.zeros(0), *found])
+    finite: Array = errors[np.isfinite(errors)]
+    return finite
 
 
-def shares(labels: NDArray[np.int16] | None, shows: Sequence[NDArray[np.bool_]]) -> list[float]:
-    """The share of the panorama that comes from each picture; without labels, that shows it."""
-    if labels is not None:
-        counts = np.bincount(labels[labels >= 0].ravel(), minlength=len(shows))
-        return [float(count / max(1, counts.sum())) for count in counts]
-    total = np.logical_or.reduce(shows).sum()
-    return [float(one.sum() / max(1, total)) for one in shows]
+def shares(labels: NDArray[np.int16] | None, maps: Sequence[CanvasMap], shown: int) -> list[float]:
+    """The share of a panorama of `shown` px that comes from each picture; without labels, that shows it."""
+    if labels is None:
+        return [float(one.inside().sum() / max(1, shown)) for one in maps]
+    counts = np.bincount(labels[labels >= 0].ravel(), minlength=len(maps))
+    return [float(count / max(1, counts.sum())) for count in counts]
+
+
+def _known_part(one: CanvasMap) -> tuple[PictureMap, Array]:
+    """A map where it is known, and the canvas px (2,) of its first pixel."""
+    if isinstance(one, BoxedMap):
+        return one.inner, np.array(one.corner, np.float64)
+    return one.arrays(), np.zeros(2)
 
 
 def _stations(rig: Rig) -> list[tuple[int, int]]:

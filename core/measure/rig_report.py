@@ -24,7 +24,7 @@ from .report import (
     plain,
     slide_entry,
 )
-from .rig_figures import map_errors, residuals, scale_kind, shares, weak_links
+from .rig_figures import focal_spread, map_errors, residuals, scale_kind, shares, weak_links
 
 if TYPE_CHECKING:
     from ..alignment import Alignment
@@ -61,7 +61,7 @@ def make_rig_report(
     error = map_errors(warp, alignment.edges)
     report = {
         "schema": SCHEMA,
-        "pictures": _pictures(pictures, rig, decided, shares(labels, [one.inside() for one in warp.maps])),
+        "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum()))),
         "left_out": left_out_entry(alignment.left_out),
         "options": options_entry(options, alignment) | {"viewpoint": options.viewpoint},
         "matches": {
@@ -140,6 +140,7 @@ def _rig_entry(rig: Rig, names: Sequence[str]) -> dict[str, Any]:
         "focal_guesses": [
             {"focal_px": guess.focal, "k1": guess.k1, "cost": guess.cost} for guess in rig.guesses
         ],
+        "focal_spread": focal_spread(rig),
     }  # fmt: skip
 
 
@@ -161,7 +162,7 @@ def _rig_warnings(rig: Rig, names: Sequence[str]) -> list[str]:
             f"how far apart some pictures were taken is {how} ({pairs}), since no three of them show the same things: "
             "take more pictures between them, so that each thing is in three"
         )
-    if len(rig.guesses) > 1:
+    if focal_spread(rig) > RIG.same_focal:
         listed = ", ".join(f"{guess.focal:.0f} px" for guess in rig.guesses)
         out.append(
             f"the focal length is not sure: {listed} explain the pictures almost alike, and the first is used; give it "

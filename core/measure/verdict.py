@@ -18,19 +18,32 @@ from ..cameras.sources import called
 from ..field.folding import NO_TURN, cell_areas, turned_over, turning
 from ..raster.arrays import NEIGHBOURS, Box, Plane, dilated, eroded
 from .look import Levels, Look
-from .options import VERDICT
+from .options import RIG, VERDICT
 
 GOOD, LOOK, NOT_USABLE = "good", "look", "not usable"
+
+PAINT = (
+    "paint over these places which picture is shown there (--mask), or leave them out (--ignore-ref, --ignore-target)"
+)
+LEAVE_OUT = "leave what is wrong there out of the picture that has it (--ignore NAME=MASK)"
+DARKER = "make the panorama darker by some stops (--exposure=-1)"
+CLIPPED = (
+    "make the panorama brighter (--exposure=1), so that this light is white again; the next time expose for the "
+    "brightest part, or merge bracketed pictures into one EXR"
+)
+FOCAL = "give the focal length (--focal35, --focal-px) if it is known, or keep the reference's place (--slide 0)"
+FILL = "fill holes (--holes inpaint)"
 
 
 @dataclass(frozen=True)
 class Place:
     """Where (left, top, width, height in px of the panorama) to look, and at what; size: how much of it is wrong, in
-    px of the small copy."""
+    px of the small copy; help: what would help."""
 
     box: Box
     what: str
     size: float
+    help: str = PAINT
 
 
 @dataclass(frozen=True)
@@ -84,25 +97,23 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
          *_torn_places(look, pairs, shift), *_light_places(look, shift),
          # in a frame that was asked for, pictures are squeezed as that has it
          *(_bent_places(look, shift) if report["options"]["projection"] == "auto" else ()),
-         *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2)
+         *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2, FILL)
            for box in report["composition"]["holes"])),
         key=lambda place: -place.size,
     )  # fmt: skip
     missed = (report["measured"]["alignment_p95_px"] or 0.0) / (look.side * look.step)
-    cause = _cause(look, pairs, missed, report["measured"]["folds"] or 0.0)
+    # of many pictures one may be folded where it is not shown
+    folded = 0.0 if "rig" in report else report["measured"]["folds"] or 0.0
+    cause = _cause(look, pairs, missed, folded)
     if cause:
         return Verdict(NOT_USABLE, *cause, tuple(places[: VERDICT.most_places]))
     doubts = dict(_doubts(report))
     if not places and not doubts:
         return Verdict(GOOD, "the pictures agree where the seam changes from one to the other", "")
-    kinds = list(dict.fromkeys([*doubts, *(place.what for place in places)]))
-    advice = (
-        "paint over these places which picture is shown there (--mask), or leave them out (--ignore-ref, "
-        "--ignore-target)" if len(look.shows) == 2 else
-        "leave what is wrong there out of the picture that has it (--ignore NAME=MASK)"
-    )  # fmt: skip
-    what_to_do = "; ".join([*([advice] if places else []), *dict.fromkeys(doubts.values())])
-    return Verdict(LOOK, "; ".join(kinds), what_to_do, tuple(places[: VERDICT.most_places]))
+    kinds = dict.fromkeys([*doubts, *(place.what for place in places)])
+    of_places = [LEAVE_OUT if one.help == PAINT and len(look.shows) > 2 else one.help for one in places]
+    helps = dict.fromkeys([*of_places, *doubts.values()])
+    return Verdict(LOOK, "; ".join(kinds), "; ".join(helps), tuple(places[: VERDICT.most_places]))
 
 
 def _doubts(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -117,7 +128,9 @@ def _doubts(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "how far apart some pictures were taken is not known", more
     if (report["field"]["leave_one_out_px"] or 0.0) > VERDICT.deep_px:
         yield "the scene is too near and deep for the points that were found", more
-    if len(report["rig"]["focal_guesses"]) > 1:
+    if (report["measured"]["folds"] or 0.0) > VERDICT.folded:
+        yield f"the map folds over in {report['measured']['folds']:.0%} of a picture: depth is doubtful there", more
+    if report["rig"]["focal_spread"] > RIG.same_focal:
         yield "the focal length is not sure", "give the focal length (--focal35, --focal-px)"
 
 
@@ -125,8 +138,8 @@ def _cause(look: Look, pairs: Sequence[_Pair], missed: float, folded: float) -> 
     """Why a panorama is not usable, and what to do; None where it is. missed: share of the longer side."""
     if folded > VERDICT.folded:
         return (
-            f"{'the target' if len(look.shows) == 2 else 'a picture'} would be folded in {folded:.0%} of what it "
-            "shows: it is mirrored, or another place that looks alike",
+            f"the target would be folded in {folded:.0%} of what it shows: it is mirrored, or another place that looks "
+            "alike",
             "check that neither picture is mirrored and that both show the same things; else give matches by hand "
             "(--matches)",
         )
@@ -256,11 +269,12 @@ def _bent_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         # half the sum and half the difference of the singular values of the Jacobian
         alike, unlike = np.hypot(x_x + y_y, y_x - x_y) / 2, np.hypot(x_x - y_y, y_x + x_y) / 2
         bent = alike + unlike > VERDICT.squeeze * np.abs(alike - unlike)
-        bent &= eroded(known, side // 2 + 1)
+        # of a blank sky or wall nobody sees how it is mapped
+        bent &= eroded(known, side // 2 + 1) & dilated(_detailed(look.tones[number]), side // 2)
         opened = cv2.morphologyEx(bent.astype(np.uint8), cv2.MORPH_OPEN, np.ones((side // 2,) * 2, np.uint8)) > 0
         for part in _parts(opened, VERDICT.bent_share * opened.size):
             what = "the picture is bent or stretched: depth or the focal length is doubtful"
-            yield Place(look.box(part, shift), what, float(part.sum()))
+            yield Place(look.box(part, shift), what, float(part.sum()), FOCAL)
 
 
 def _detailed(tones: Levels) -> NDArray[np.bool_]:
@@ -284,12 +298,12 @@ def _light_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         apart = np.abs(look.tones[other][both].astype(int) - tones[both]).max(axis=1)
         if both.sum() >= VERDICT.compared_px and np.median(apart) <= VERDICT.cast:
             greyed[:] = False  # darker, but as the other picture has it
-        for mask, share, what in (
-            (blown, VERDICT.blown_share, "light is blown here that the picture has"),
-            (greyed, VERDICT.greyed_share, "light that was too bright for the picture got a cast or a step"),
+        for mask, share, what, help_ in (
+            (blown, VERDICT.blown_share, "light is blown here that the picture has", DARKER),
+            (greyed, VERDICT.greyed_share, "light that was too bright for the picture got a cast or a step", CLIPPED),
         ):
             if mask.sum() > share * mask.size:
-                yield Place(look.box(max(_parts(mask, 1), key=np.sum), shift), what, float(mask.sum()))
+                yield Place(look.box(max(_parts(mask, 1), key=np.sum), shift), what, float(mask.sum()), help_)
 
 
 def _greyed(tones: Levels, taken: Levels, clipped: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:

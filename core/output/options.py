@@ -36,10 +36,10 @@ class GraphOptions:
     thumbnail_px: int = 110
     """px along the longer side of a thumbnail: sixty of them still fit on a page."""
 
-    apart: float = 1.1
-    """Distance of two thumbnails at least, in units of the longer side."""
+    apart: float = 1.55
+    """Distance of two thumbnails at least, in units of the longer side: the line between them has to be seen."""
 
-    px_per_radian: float = 200.0
+    px_per_radian: float = 260.0
     """px by which two pictures stand apart that look one radian apart: a full turn is as wide as the page."""
 
     rounds: int = 60

@@ -16,7 +16,6 @@ from ..raster.arrays import Array
 from ..raster.resizing import resized_points
 from .options import EDGES
 
-
 # What was found in pictures that are still held: the focal length asks for it, and so do level and frame.
 _found: WeakKeyDictionary[Picture, tuple[Array, Array]] = WeakKeyDictionary()
 

@@ -13,7 +13,7 @@ from ..cameras.rig import PictureMatches
 from ..raster.arrays import Array
 from .averaged import Averaged, PairGeometry, Verified
 from .candidates import Candidates, at_other_lens, candidates, noise_of
-from .focal_starts import log_sigma
+from .focal_starts import log_sigma, starts
 from .graph import components, heaviest_component
 from .matched_rays import MatchedRays, SharedLens, matched_rays
 from .options import AVERAGING, CANDIDATES, PAIR_FIT
@@ -32,6 +32,41 @@ class _Fitted:
     found: Candidates
     together: Together
     focal_information: float
+
+
+def hypotheses(cameras: Sequence[Camera], points: Sequence[Array], verified: Verified) -> list[Averaged]:
+    """Average from every start that is worth it (`focal_starts.starts`).
+
+    Parameters
+    ----------
+    cameras, points, verified
+        As for `averaged`.
+
+    Returns
+    -------
+    list of Averaged
+        The cheapest first. Of those that end at the same lens and rotations only one.
+    """
+    found = [averaged(cameras, points, verified, start) for start in starts(cameras, points, verified)]
+    distinct: list[Averaged] = []
+    for each in sorted((each for each in found if each is not None), key=lambda each: each.cost):
+        if not any(_alike(each, other) for other in distinct):
+            distinct.append(each)
+    return distinct
+
+
+def _alike(first: Averaged, second: Averaged) -> bool:
+    """Whether a bundle would lead both to the same end."""
+    if first.members != second.members:
+        return False
+    zoom = [np.log(a.focal / b.focal) for a, b in zip(first.cameras, second.cameras, strict=True)]
+    bend = [a.distortion[0] - b.distortion[0] for a, b in zip(first.cameras, second.cameras, strict=True)]
+    R = [each.R[list(first.members)] @ each.R[first.members[0]].T for each in (first, second)]
+    return bool(
+        np.abs(zoom).max() < AVERAGING.alike_log_focal
+        and np.abs(bend).max() < AVERAGING.alike_k1
+        and degrees_between(*R).max() < AVERAGING.alike_degrees
+    )
 
 
 def averaged(
@@ -123,7 +158,7 @@ def _averaged(
             break
         fitted = _at_lens(matched, lens, fitted, verified.scale)
     chosen = _chosen(matched, found, kept, links, turned, lens, verified.scale)
-    return _told(cameras, verified, matched, members, links, turned, lens, chosen)
+    return _summary(cameras, verified, matched, members, links, turned, lens, chosen)
 
 
 def _at_lens(matched: MatchedRays, lens: SharedLens, fitted: _Fitted, scale: float) -> _Fitted:
@@ -202,7 +237,7 @@ def _chosen(
     return _Chosen(numbers, of_each, poses, information, squares, noise, turning)
 
 
-def _told(
+def _summary(
     cameras: Sequence[Camera], verified: Verified, matched: MatchedRays, members: Sequence[int], links: Links,
     turned: Rotations, lens: SharedLens, chosen: _Chosen,
 ) -> Averaged:  # fmt: skip

@@ -83,6 +83,10 @@ class BundleOptions:
     # px, the scale of the Cauchy cost: wide at first with the lenses held, then with all free.
     first_kernel_px: float = 4.0
     kernel_px: float = 2.0
+    # The same at last, in σ of the noise (2.4: for normal noise 95 % as good as least squares), and px at least: with a
+    # wider one matches that are a little wrong, as many are, turn cameras by a tenth of a degree.
+    last_kernel_sigmas: float = 2.4
+    least_kernel_px: float = 0.2
     # σ of k1 and px of noise that priors are weighed with: errors of a lens that the model leaves go together, so that
     # thousands of observations do not outweigh a prior as independent ones would.
     k1_sigma: float = 0.05
@@ -93,7 +97,7 @@ class BundleOptions:
     behind_px: float = 1e3
     least_ahead: float = 1e-3
     # Levenberg's damping: at first, its factors after a good and a bad step, its least, and tries at most.
-    damping: float = 1e-3
+    damping: float = 1e-4
     damping_down: float = 0.1
     damping_up: float = 8.0
     least_damping: float = 1e-9
@@ -101,7 +105,7 @@ class BundleOptions:
     # Most that log f changes in a step.
     most_log_focal: float = 0.2
     # What keeps the equations regular, and stiffness that keeps the scale, in units of their mean diagonal.
-    regular: float = 1e-9
+    regular: float = 1e-15
     scale_stiffness: float = 1e3
 
 
@@ -114,15 +118,16 @@ class PolishingOptions:
     first_iterations: int = 15
     first_tolerance: float = 1e-4
     iterations: tuple[int, ...] = (25, 30, 60, 60, 60, 60)
-    tolerances: tuple[float, ...] = (1e-4, 1e-5, 1e-7, 1e-8, 1e-8, 1e-8)
+    tolerances: tuple[float, ...] = (1e-4, 1e-5, 1e-6, 1e-8, 1e-8, 1e-8)
     revived_rounds: int = 2
+    # Round from which the kernel is as wide as the noise.
+    sharp_round: int = 2
     # Robust σ beyond which an observation is left out, and px below which none is.
     prune_sigmas: float = 4.0
     prune_px: float = 1.5
     # px from which a point's worst observation has it triangulated anew.
     retriangulate_px: float = 8.0
-    # From this round on: done when so small a share was left out and the cost fell by less than this share.
-    settled_round: int = 3
+    # After the first sharp round: done when so small a share was left out and the cost fell by less than this share.
     settled_pruned: float = 0.002
     settled_cost: float = 0.001
     # Rotations alone: px of the Cauchy cost in turn, iterations and σ at which observations are left out.
@@ -153,8 +158,6 @@ class JudgeOptions:
     # Points of three pictures from which a pair's baseline is measured, and its parallax in σ from which it has any.
     three_view_points: int = 10
     parallax_sigmas: float = 3.0
-    # Inliers below which a link that no loop checks is called ambiguous.
-    weak_link: int = 40
     # px: where costs are weighed against numbers of parameters, noise is never taken to be less.
     least_noise_px: float = 0.1
 

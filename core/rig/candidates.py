@@ -70,7 +70,7 @@ def candidates(matched: MatchedRays, lens: SharedLens, scale: float, seed: int) 
     Candidates
         Of the pairs that some pose explains.
     """
-    seen = matched.through(lens)
+    seen = matched.undistorted(lens)
     numbers, turned, starts = [], [], []
     inliers = np.zeros(len(seen.a), bool)
     for k in range(len(matched)):
@@ -191,7 +191,7 @@ def fit_rotation(a: Array, b: Array, R: Array, width: float, rounds: int) -> Arr
 def _facing(rays: MatchedRays, residual: Array, poses: Poses, lens: SharedLens, width: float) -> tuple[Array, Poses]:
     """What points behind the cameras cost (P,), px², and t with the sign that has fewer: parallax along the epipolar
     line is of one sign in front."""
-    seen = rays.through(lens)
+    seen = rays.undistorted(lens)
     a, b = seen.unit()
     turned = np.einsum("oij,oj->oi", poses.R[rays.owner], a)
     t = poses.t[rays.owner]

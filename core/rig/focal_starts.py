@@ -61,7 +61,7 @@ def log_sigma(cameras: Sequence[Camera]) -> float:
 
 def _cost(matched: MatchedRays, lens: SharedLens, verified: Verified) -> float:
     """Robust cost of the poses that RANSAC finds with this focal length, log likelihood."""
-    seen = matched.through(lens)
+    seen = matched.undistorted(lens)
     x, y = (ray[:, :2] * focal[:, None] for ray, focal in zip((seen.a, seen.b), seen.focal, strict=True))
     options = {
         "max_epipolar_error": CANDIDATES.inlier_px * verified.scale,

@@ -73,18 +73,19 @@ def registered(
     order = sorted(range(len(pictures)), key=lambda number: content_key(pictures[number]))
     inner = renumbered(matched, np.argsort(order).tolist())
     cameras = tuple(cameras[number] for number in order)
+    names = tuple(pictures[number].name for number in order)
 
     def found() -> _Kept:
-        one = register(cameras, inner.points, inner.matches, inner.scale, seed, progress)
-        return _Kept(one.rig, one.numbers, tuple(one.left_out.items()), one.warnings)
+        one = register(cameras, inner.points, inner.matches, inner.scale, seed, progress, names)
+        return _Kept(one.rig, one.numbers, tuple(one.left_out.items()))
 
     progress("geometry", 0.0)
-    kept = cache.remember("registration", (cameras, inner.points, inner.matches, inner.scale, seed), found)
+    kept = cache.remember("registration", (cameras, inner.points, inner.matches, inner.scale, seed, names), found)
     numbers = [order[number] for number in kept.numbers]
     ascending = np.argsort(numbers).tolist()
     return Registration(
         reordered(kept.rig, ascending), tuple(sorted(numbers)),
-        {order[number]: why for number, why in sorted(kept.left_out, key=lambda one: order[one[0]])}, kept.warnings,
+        {order[number]: why for number, why in sorted(kept.left_out, key=lambda one: order[one[0]])},
     )  # fmt: skip
 
 
@@ -105,4 +106,3 @@ class _Kept:
     rig: Rig
     numbers: tuple[int, ...]
     left_out: tuple[tuple[int, str], ...]
-    warnings: tuple[str, ...]

@@ -66,7 +66,7 @@ class MatchedRays:
     zooms: Array
     bends: Array
     starts: NDArray[np.intp]
-    # what `through` found last: refining poses asks for it again and again
+    # what `undistorted` found last: refining poses asks for it again and again
     _last: list[tuple[SharedLens, Rays]] = field(default_factory=list, repr=False)
 
     def __len__(self) -> int:
@@ -114,7 +114,7 @@ class MatchedRays:
         """Whether some focal length, and some k1, is not given."""
         return bool(self.zooms.any()), bool(self.bends.any())
 
-    def through(self, lens: SharedLens) -> Rays:
+    def undistorted(self, lens: SharedLens) -> Rays:
         """The matches without the lens's distortion."""
         if self._last and self._last[0][0] == lens:
             return self._last[0][1]

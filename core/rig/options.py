@@ -165,6 +165,10 @@ class AveragingOptions:
     agrees_sigmas: float = 4.0
     # Cauchy widths beyond which a verified match costs no more, in the figure that compares starts.
     unexplained_widths: float = 5.0
+    # Changes of log f, of k1 and of any rotation up to which two hypotheses are one.
+    alike_log_focal: float = 0.01
+    alike_k1: float = 0.01
+    alike_degrees: float = 1.0
     # Iterations of refining the poses that were chosen.
     pose_iterations: int = 6
 

@@ -41,7 +41,7 @@ class PairModel(Protocol):
     def equations(self, poses: Poses, lens: SharedLens, shared: bool) -> tuple[Array, Array]:
         """Normal matrices and gradients of every pair, px²; with the shared parameters or without."""
 
-    def moved(self, poses: Poses, steps: Array) -> Poses:
+    def stepped(self, poses: Poses, steps: Array) -> Poses:
         """The poses after steps (P, freedom)."""
 
     def costs(self, poses: Poses, lens: SharedLens) -> Array:
@@ -58,7 +58,7 @@ class EpipolarModel:
 
     def residuals(self, poses: Poses, lens: SharedLens) -> Array:
         """Signed distances (O,), px."""
-        seen = self.rays.through(lens)
+        seen = self.rays.undistorted(lens)
         return _Sampson(seen, (skew(poses.t) @ poses.R)[self.rays.owner]).residual
 
     def squares(self, poses: Poses, lens: SharedLens) -> Array:
@@ -72,7 +72,7 @@ class EpipolarModel:
 
     def equations(self, poses: Poses, lens: SharedLens, shared: bool) -> tuple[Array, Array]:
         """Normal matrices and gradients of every pair, px²."""
-        seen = self.rays.through(lens)
+        seen = self.rays.undistorted(lens)
         sampson = _Sampson(seen, (skew(poses.t) @ poses.R)[self.rays.owner])
         columns = sampson.by_matrix()
         if shared:
@@ -90,7 +90,7 @@ class EpipolarModel:
         back = np.swapaxes(chain, 1, 2)
         return back @ H @ chain, np.einsum("pij,pj->pi", back, g)
 
-    def moved(self, poses: Poses, steps: Array) -> Poses:
+    def stepped(self, poses: Poses, steps: Array) -> Poses:
         """The poses after steps (P, 5)."""
         t = poses.t + np.einsum("pij,pj->pi", tangents(poses.t), steps[:, 3:5])
         return Poses(rotations(steps[:, :3]) @ poses.R, t / np.linalg.norm(t, axis=1, keepdims=True))
@@ -146,7 +146,7 @@ class RotationModel:
 
     def vectors(self, poses: Poses, lens: SharedLens) -> tuple[Array, Array, Array]:
         """Residuals (O, 3) in px, the turned rays (O, 3), and px a radian over √2 (O,): both pictures err."""
-        seen = self.rays.through(lens)
+        seen = self.rays.undistorted(lens)
         a, b = seen.unit()
         turned = np.einsum("oij,oj->oi", poses.R[self.rays.owner], a)
         scale = seen.focal[1] / np.sqrt(2)
@@ -174,7 +174,7 @@ class RotationModel:
         flat = columns.reshape(-1, columns.shape[2])
         return normal_equations(flat, np.repeat(weight, 3), residual.ravel(), 3 * self.rays.starts)
 
-    def moved(self, poses: Poses, steps: Array) -> Poses:
+    def stepped(self, poses: Poses, steps: Array) -> Poses:
         """The poses after steps (P, 3)."""
         return Poses(rotations(steps) @ poses.R, poses.t)
 

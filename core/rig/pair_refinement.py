@@ -26,7 +26,7 @@ def refine_each(model: PairModel, poses: Poses, lens: SharedLens, iterations: in
             H, g = model.equations(poses, lens, shared=False)
         ridge = damping * np.trace(H, axis1=1, axis2=2) + RIDGE
         steps = -np.linalg.solve(H + ridge[:, None, None] * np.eye(model.freedom), g[..., None])[..., 0]
-        tried = model.moved(poses, _short(steps))
+        tried = model.stepped(poses, _short(steps))
         tried_cost = model.costs(tried, lens)
         better = tried_cost < cost
         poses, cost = poses.chosen(better, tried), np.where(better, tried_cost, cost)
@@ -80,7 +80,7 @@ def refine_together(
         q = system.lens_step(damping, free)
         steps = system.pose_steps(q, damping)
         new_lens = model.rays.within_limits(SharedLens(lens.factor * float(np.exp(q[0])), lens.k1 + float(q[1])))
-        tried = model.moved(poses, _short(steps))
+        tried = model.stepped(poses, _short(steps))
         tried_cost = _total(model, tried, new_lens, prior, noise)
         if tried_cost < cost:
             gained = cost - tried_cost

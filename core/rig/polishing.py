@@ -37,19 +37,21 @@ def polish(problem: Problem, solution: Solution, tick: Tick) -> Polished:
     prior = depth_prior(solution)
     wide = Settings(BUNDLE.first_kernel_px, POLISHING.first_iterations, POLISHING.first_tolerance, lenses=False)
     solution = bundle(problem, solution, wide, reference, prior, tick).solution
-    last = np.inf
+    last, kernel = np.inf, BUNDLE.kernel_px
     for k, (iterations, tolerance) in enumerate(zip(POLISHING.iterations, POLISHING.tolerances, strict=True)):
         if k < POLISHING.revived_rounds:
             solution = _revived(problem, solution)
         solution = solution.rescaled()
         prior = depth_prior(solution)
-        settings = Settings(iterations=iterations, tolerance=tolerance)
+        settings = Settings(kernel, iterations, tolerance)
         bundled = bundle(problem, solution, settings, reference, prior, tick)
         solution, pruned = _pruned(problem, bundled, POLISHING.prune_sigmas)
         settled = pruned < POLISHING.settled_pruned * len(bundled.chosen)
-        if k >= POLISHING.settled_round and settled and bundled.cost > (1 - POLISHING.settled_cost) * last:
+        if k > POLISHING.sharp_round and settled and bundled.cost > (1 - POLISHING.settled_cost) * last:
             break
         last = bundled.cost
+        if k + 1 == POLISHING.sharp_round:
+            kernel = _as_wide_as_noise(problem, bundled)
     solution = solution.rescaled()
     return Polished(problem, solution, total_cost(problem, solution), _behind(solution), False, depth_prior(solution))
 
@@ -118,6 +120,12 @@ def _pruned(problem: Problem, bundled: Bundled, sigmas: float) -> tuple[Solution
     used = solution.used.copy()
     used[bad] = False
     return replace(solution, used=used), len(bad)
+
+
+def _as_wide_as_noise(problem: Problem, bundled: Bundled) -> float:
+    """A kernel in px at the features' scale."""
+    sigma = sigma_of_lengths(bundled.lengths) / problem.scale if len(bundled.lengths) else np.inf
+    return float(np.clip(BUNDLE.last_kernel_sigmas * sigma, BUNDLE.least_kernel_px, BUNDLE.kernel_px))
 
 
 def _behind(solution: Solution) -> float:

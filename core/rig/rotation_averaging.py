@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..raster.arrays import Array
 from .graph import Pair, is_bridge, strongest_tree, walk
 from .options import AVERAGING
-from .triplets import triangles, without_contradicted
+from .triplets import Triangles, triangles, without_contradicted
 from .turns import degrees_between, rotation_vectors, rotations
 
 # The cost of a candidate that a pair does not have.
@@ -99,50 +99,65 @@ def average(links: Links, focal_information: float, log_focal_before: float = 0.
     -------
     Rotations
     """
-    degrees = links.degrees
     choices = [R[cost < NEVER] for R, cost in zip(links.R, links.costs, strict=True)]
-    used, closed = without_contradicted(links.count, links.pairs, triangles(links.pairs, choices, degrees), degrees)
+    found = triangles(links.pairs, choices, links.degrees)
     problem = _Problem(links, focal_information, log_focal_before)
-    state, used = _without_false(problem, used, closed)
-    state = _switched(problem, state, used)
-    return Rotations(state.R, state.choice, state.log_focal, used, problem.cost(state), problem.off_degrees(state))
+    averaged = _without_false(problem, found)
+    state = _switched(problem, averaged.state, averaged.used)
+    return Rotations(
+        state.R, state.choice, state.log_focal, averaged.used, problem.cost(state), problem.off_degrees(state)
+    )
 
 
-def _without_false(
-    problem: _Problem, used: NDArray[np.bool_], closed: NDArray[np.intp]
-) -> tuple[_State, NDArray[np.bool_]]:
-    """Averaged rotations, and which pairs take part. Where some disagree, those that no triangle confirms are left out
-    one at a time: a false one in the first tree would have sound ones dropped for it."""
+@dataclass(frozen=True, eq=False)
+class _State:
+    R: Array
+    choice: NDArray[np.intp]
+    log_focal: float
+
+
+@dataclass(frozen=True, eq=False)
+class _FromTree:
+    """Averaged from a tree on: which pairs took part at the end, and which of those no triangle confirms; cost."""
+
+    state: _State
+    used: NDArray[np.bool_]
+    unconfirmed: NDArray[np.bool_]
+    cost: float
+
+
+def _without_false(problem: _Problem, found: Triangles) -> _FromTree:
+    """Averaged rotations. Where some pairs disagree, those that no triangle confirms are left out one at a time: a
+    false one in the first tree would have sound ones dropped for it."""
     links = problem.links
-    state, taking_part = _from_tree(problem, used, closed)
-    cost = problem.cost(state)
-    while (problem.off_degrees(state) > links.allowed_degrees).any():
-        better = None
-        kept = [links.pairs[k] for k in np.flatnonzero(used)]
-        for k in np.flatnonzero(used & (closed == 0)):
-            if is_bridge(links.count, kept, links.pairs[k]):
-                continue
-            without = used.copy()
-            without[k] = False
-            tried, with_back = _from_tree(problem, without, closed)
-            if problem.cost(tried) < cost - AVERAGING.switch_gain:
-                cost, better = problem.cost(tried), (tried, with_back, without)
-        if better is None:
+    given = np.ones(len(links.pairs), bool)
+    best = _from_tree(problem, found, given)
+    while (problem.off_degrees(best.state) > links.allowed_degrees).any():
+        left = [links.pairs[k] for k in np.flatnonzero(given)]
+        before = best
+        for k in np.flatnonzero(before.unconfirmed & given):
+            if not is_bridge(links.count, left, links.pairs[k]):
+                without = given & (np.arange(len(given)) != k)
+                tried = _from_tree(problem, found, without)
+                if tried.cost < min(best.cost, before.cost - AVERAGING.switch_gain):
+                    best, fewer = tried, without
+        if best is before:
             break
-        state, taking_part, used = better
-    return state, taking_part
+        given = fewer
+    return best
 
 
-def _from_tree(
-    problem: _Problem, used: NDArray[np.bool_], closed: NDArray[np.intp]
-) -> tuple[_State, NDArray[np.bool_]]:
-    """Averaged from the tree of the most trusted pairs on; which pairs take part at the end."""
+def _from_tree(problem: _Problem, found: Triangles, given: NDArray[np.bool_]) -> _FromTree:
+    """Averaged with the given pairs, from the tree of the most trusted on; others come back where they agree."""
     links = problem.links
+    used, closed = without_contradicted(links.count, links.pairs, found, links.degrees, given)
+    unconfirmed = used & (closed == 0)
     state = _State(_along_tree(links, used, closed), np.zeros(len(links.pairs), np.intp), 0.0)
     state = problem.followed(state, used, AVERAGING.iterations, AVERAGING.widths)
     back = np.maximum(AVERAGING.back_degrees, AVERAGING.back_sigmas * links.degrees)
     used = used | (problem.off_degrees(state) < back)
-    return problem.followed(state, used, AVERAGING.again_iterations, AVERAGING.widths[-1:]), used
+    state = problem.followed(state, used, AVERAGING.again_iterations, AVERAGING.widths[-1:])
+    return _FromTree(state, used, unconfirmed, problem.cost(state))
 
 
 def _along_tree(links: Links, used: NDArray[np.bool_], closed: NDArray[np.intp]) -> Array:
@@ -156,13 +171,6 @@ def _along_tree(links: Links, used: NDArray[np.bool_], closed: NDArray[np.intp])
     for i, j in walk(tree, 0):
         R[j] = (links.R[number[i, j], 0] if (i, j) in number else links.R[number[j, i], 0].T) @ R[i]
     return R
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    R: Array
-    choice: NDArray[np.intp]
-    log_focal: float
 
 
 class _Problem:

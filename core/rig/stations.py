@@ -77,10 +77,15 @@ def _ties(stations: Sequence[Station]) -> list[list[Station]]:
 
 
 def information_criterion(found: Polished) -> float:
-    """Schwarz's criterion: the cost in nats, and half the log of the number of observations for each free parameter."""
+    """Schwarz's criterion: the cost in nats, and half the log of the number of observations for each free parameter.
+
+    A point that is seen from one place only has no depth: that is most of what a station saves.
+    """
     problem = found.problem
-    observations = len(problem.tracks.point)
+    tracks = problem.tracks
     places = len(np.unique(problem.place)) - 1
-    depths = 0 if found.one_place else int(found.solution.solved.sum())
+    place = problem.place[tracks.picture]
+    several = np.maximum.reduceat(place, tracks.starts) > np.minimum.reduceat(place, tracks.starts)
+    depths = 0 if found.one_place else int((several & found.solution.solved).sum())
     noise = max(problem.noise_px, JUDGE.least_noise_px * problem.scale)
-    return found.cost / (2 * noise**2) + (3 * places + depths) * np.log(observations) / 2
+    return float(found.cost / (2 * noise**2) + (3 * places + depths) * np.log(len(tracks.point)) / 2)

@@ -73,14 +73,15 @@ def closing(found: Triangles, count: int, used: NDArray[np.bool_]) -> tuple[Arra
 
 
 def without_contradicted(
-    nodes: int, pairs: Sequence[Pair], found: Triangles, degrees: Array
+    nodes: int, pairs: Sequence[Pair], found: Triangles, degrees: Array, given: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
-    """Which pairs stay (P,) when those go none of whose triangles closes; and how many triangles close for each.
+    """Which of the given pairs stay (P,) when those go none of whose triangles closes; how many triangles close for
+    each.
 
     The least certain goes first, since it may be why others do not close; one without which pictures would fall apart
     stays.
     """
-    used = np.ones(len(pairs), bool)
+    used = given.copy()
     while True:
         least, closed = closing(found, len(pairs), used)
         contradicted = np.flatnonzero(used & np.isfinite(least) & (least > 1))

@@ -11,9 +11,10 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.compose.composition import Composition, composed
-from edf_stitch.core.compose.decided import Decided, pooled_decision
+from edf_stitch.core.compose.decided import Decided
 from edf_stitch.core.compose.inpaint import closed_holes
 from edf_stitch.core.compose.options import INPAINT, OVERLAP
+from edf_stitch.core.compose.pooling import pooled_decision
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.reference_map import ReferenceMap

@@ -6,9 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.rig import Rig, RigEdge
-from edf_stitch.core.measure.rig_figures import residuals, scale_kind, shares, weak_links
+from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.edge import Edge
+from edf_stitch.core.cameras.matches import Matches
+from edf_stitch.core.cameras.rig import FocalGuess, Rig, RigEdge
+from edf_stitch.core.measure.rig_figures import focal_spread, map_errors, residuals, scale_kind, shares, weak_links
+from edf_stitch.core.panorama.canvas import Canvas
+from edf_stitch.core.panorama.warp import Warp
+from edf_stitch.core.raster.picture_map import BoxedMap, PictureMap
 
+from ...conftest import view_of
 from ..rig.known_rigs import known_rig
 
 
@@ -53,8 +60,31 @@ def test_a_weak_link_is_one_that_something_hangs_by() -> None:
     assert not weak_links(replace(rig, edges=()))
 
 
+def test_guesses_of_the_focal_length_are_compared() -> None:
+    rig, _ = known_rig()
+    assert focal_spread(rig) == 0
+    guesses = tuple(FocalGuess(focal, 0.0, 1.0) for focal in (471.0, 480.0, 475.0))
+    assert focal_spread(replace(rig, guesses=guesses)) == pytest.approx(480 / 471 - 1)
+
+
 def test_shares_add_up() -> None:
     labels = np.array([[0, 0, 1], [2, -1, 2]], np.int16)
-    assert shares(labels, [np.ones((2, 3), bool)] * 4) == [0.4, 0.2, 0.4, 0.0]
-    some = np.array([[True, False], [False, False]])
-    assert shares(None, [some, ~some]) == [0.25, 0.75]
+    ramp = np.arange(6, dtype=np.float32).reshape(2, 3)
+    maps = [PictureMap(ramp - start, np.zeros_like(ramp), (3, 1)) for start in (0, 2, 4)]
+    assert shares(labels, maps, 5) == [0.4, 0.2, 0.4]
+    assert shares(None, maps, 6) == [0.5, 0.5, pytest.approx(1 / 3)]
+
+
+def test_maps_are_asked_where_pictures_show_what_matches() -> None:
+    """Two pictures of 40 × 30 px on a canvas, the second 10 px further right, its map known in its box only."""
+    x, y = (values.astype(np.float32) for values in np.meshgrid(np.arange(60), np.arange(30)))
+    whole = PictureMap(x, y, (40, 30))
+    boxed = BoxedMap(PictureMap(x[:, :50], y[:, :50], (40, 30)), (10, 0), (30, 60))
+    warp = Warp(Canvas(60, 30, (0, 0)), (whole, boxed), np.zeros((30, 60), np.float32))
+    points = np.random.default_rng(0).uniform((12, 2), (36, 28), (50, 2))
+    camera = Camera(np.eye(3), (40, 30), "test", 0.0)
+    view = view_of(camera, camera, (0, 0, 0), (1, 0, 0))
+    for off in (0.0, 3.0):
+        matches = Matches(points, points - (10, 0) + (off, 0))
+        edge = Edge(0, 1, matches, matches, replace(view, inliers=np.ones(50, bool)))
+        np.testing.assert_allclose(map_errors(warp, [edge]), off, atol=1e-3)

@@ -118,6 +118,11 @@ def test_a_large_part_that_is_bent_is_a_place_unless_the_frame_was_asked_for() -
     assert judge(bent, (0, 0), {**RIGHT, "options": {"projection": "perspective"}}).rating == "good"
     elsewhere = replace(bent, maps=(bent.maps[1], bent.maps[0]))
     assert judged(elsewhere).rating == "good", "the reference is not shown there"
+    assert found.what_to_do.startswith("give the focal length"), "no mask mends that"
+    blank = [tones.copy() for tones in good.tones]
+    for tones in blank:
+        tones[80:240, 240:400] = 200
+    assert judged(replace(bent, tones=tuple(blank))).rating == "good", "of a blank sky nobody sees how it is mapped"
     small = good.maps[1].x.copy()
     small[100:115, 300:315] += 0.8 * (good.maps[1].y[100:115, 300:315] - 107)
     assert judged(replace(good, maps=(good.maps[0], replace(good.maps[1], x=small)))).rating == "good", "outlines"
@@ -126,11 +131,14 @@ def test_a_large_part_that_is_bent_is_a_place_unless_the_frame_was_asked_for() -
 def test_light_that_is_lost_is_a_place() -> None:
     good = look()
     sky = np.s_[:60, 250:]
-    for taken, shown, what in ((240, 255, "blown"), (255, 220, "too bright")):
+    for taken, shown, what, helps in (
+        (240, 255, "blown", "--exposure=-1"), (255, 220, "too bright", "--exposure=1"),
+    ):  # fmt: skip
         before, now = good.taken[1].copy(), good.tones[1].copy()
         before[sky], now[sky] = taken, shown
         found = judged(replace(good, tones=(good.tones[0], now), taken=(good.taken[0], before)))
         assert [what in place.what for place in found.places] == [True] and found.places[0].box == (250, 0, 150, 60)
+        assert helps in found.what_to_do and "--mask" not in found.what_to_do
         alike = replace(good, tones=(np.where(now == shown, now, good.tones[0]), now), taken=(good.taken[0], before))
         assert (judged(alike).rating == "good") == (what == "too bright"), "darker, as the other picture has it"
         elsewhere = replace(good, tones=(now, good.tones[1]), taken=(before, good.taken[1]))
@@ -222,7 +230,7 @@ def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> N
 
 SURE = {
     **RIGHT, "pictures": [{"name": name} for name in ("a.png", "b.png", "c.png")], "left_out": [],
-    "rig": {"scale": "measured", "focal_guesses": []}, "field": {"leave_one_out_px": 0.4},
+    "rig": {"scale": "measured", "focal_spread": 0.002}, "field": {"leave_one_out_px": 0.4},
 }  # fmt: skip
 
 
@@ -262,8 +270,9 @@ def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:
 
 @pytest.mark.parametrize(("changes", "why", "advice"), [
     ({"left_out": [{"name": "d.png", "why": ""}]}, "d.png connects with no others", "take more pictures"),
-    ({"rig": {"scale": "none", "focal_guesses": []}}, "how far apart", "take more pictures"),
-    ({"rig": {"scale": "measured", "focal_guesses": [{}, {}]}}, "focal length is not sure", "--focal35"),
+    ({"rig": {"scale": "none", "focal_spread": 0.0}}, "how far apart", "take more pictures"),
+    ({"rig": {"scale": "measured", "focal_spread": 0.03}}, "focal length is not sure", "--focal35"),
+    ({"measured": {"alignment_p95_px": 1.0, "folds": 0.2}}, "folds over in 20%", "take more pictures"),
     ({"field": {"leave_one_out_px": 2.5}}, "too near and deep", "take more pictures"),
 ])  # fmt: skip
 def test_what_is_doubtful_about_the_cameras_is_said(changes: dict, why: str, advice: str) -> None:

@@ -60,14 +60,15 @@ def test_distances_are_sampsons_in_px_of_each_picture():
 def test_gradients_are_the_costs_derivatives(seed, factor, k1):
     rays, _, poses, _, _ = two_pairs(seed)
     poses = Poses(rotations(np.full((2, 3), 0.003)) @ poses.R, poses.t)
-    lens, h = SharedLens(factor, k1), 1e-6
+    lens, h = rays.within_limits(SharedLens(factor, k1)), 1e-6
+    k1 = lens.k1
     for model in (EpipolarModel(rays, 1.5), RotationModel(rays, 20.0)):
         H, gradient = model.equations(poses, lens, shared=True)
         numbers = np.zeros_like(gradient)
         for k in range(model.freedom):
             step = np.zeros((2, model.freedom))
             step[:, k] = h
-            ahead, behind = (model.costs(model.moved(poses, sign * step), lens) for sign in (1, -1))
+            ahead, behind = (model.costs(model.stepped(poses, sign * step), lens) for sign in (1, -1))
             numbers[:, k] = (ahead - behind) / (2 * h)
         for k, ends in enumerate(
             ((SharedLens(factor * np.exp(h), k1), SharedLens(factor * np.exp(-h), k1)),
@@ -82,7 +83,7 @@ def test_gradients_are_the_costs_derivatives(seed, factor, k1):
 def test_rays_through_a_lens_are_undistorted(k1, factor):
     rays, _, _, _, _ = two_pairs(1)
     lens = rays.within_limits(SharedLens(factor, k1))
-    seen = rays.through(lens).a[:, :2]
+    seen = rays.undistorted(lens).a[:, :2]
     bent = seen * (1 + lens.k1 * (seen**2).sum(axis=1, keepdims=True))
     np.testing.assert_allclose(bent, rays.x / factor, atol=1e-4)
 
@@ -91,7 +92,7 @@ def test_rays_through_a_lens_are_undistorted(k1, factor):
 def test_no_lens_folds_inside_a_picture(k1, factor):
     rays, _, _, _, _ = two_pairs(1)
     lens = rays.within_limits(SharedLens(factor, k1))
-    seen = rays.through(lens).a[:, :2]
+    seen = rays.undistorted(lens).a[:, :2]
     assert (1 + 3 * lens.k1 * (seen**2).sum(axis=1) > 0).all()
 
 
@@ -150,6 +151,6 @@ def test_a_rotation_is_told_from_a_pose(still):
 def test_an_essential_matrix_is_a_turn_and_a_direction():
     """The parameters of a pose keep |t| = 1 and R a rotation."""
     rays, _, poses, _, _ = two_pairs(7)
-    moved = EpipolarModel(rays, 1.5).moved(poses, np.full((2, 5), 0.1))
+    moved = EpipolarModel(rays, 1.5).stepped(poses, np.full((2, 5), 0.1))
     E = skew(moved.t) @ moved.R
     np.testing.assert_allclose(np.linalg.svd(E)[1], [[1, 1, 0]] * 2, atol=1e-12)
