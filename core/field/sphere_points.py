@@ -21,7 +21,7 @@ class SpherePoints:
     """Points (N) of a rig.
 
     rays (N, 3): unit; inverse_ranges, deviations (N,): and their standard deviations, in any unit; sensitivity (N,): px
-    per unit of inverse range, over all pictures that see a point; error_px (N,): how far off it is in the worst of them.
+    per unit of inverse range, over all pictures that see a point; error_px (N,): how far it is off in the worst one.
     """
 
     rays: Array
