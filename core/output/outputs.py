@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..measure.report import plain
 from ..panorama.layers import Layer
+from ..panorama.rig_viewpoint import RigViewpoint
 from ..pictures.encoding import encode_picture, output_bits
 from ..pipeline import StitchResult
 from ..raster.arrays import cut
@@ -331,6 +332,9 @@ def warp_bytes(result: StitchResult) -> bytes:
         }  # fmt: skip
     if warp.slide is not None and warp.viewpoint is not None:
         arrays |= {"slide": whole(warp.slide), "s1": np.array(warp.viewpoint.s1)}
+    elif isinstance(warp.viewpoint, RigViewpoint):
+        places = warp.viewpoint.s1 * warp.viewpoint.places
+        arrays |= {"s1": np.array(warp.viewpoint.s1), "places": places, "upright": warp.viewpoint.rotation}
     return npz_bytes(arrays)
 
 
