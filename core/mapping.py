@@ -25,12 +25,14 @@ from .field.slack import SlackField
 from .field.sphere_field import SphereField
 from .field.strict import StrictField
 from .options import StitchOptions
-from .panorama.choosing_slide import NO_WAY, SlideChoice, choose_slide
+from .panorama.choosing_slide import NO_WAY, SlideChoice, choose_rig_slide, choose_slide
 from .panorama.framing import FrameRequest, frame_for
+from .panorama.framing_options import FRAMING
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
-from .panorama.rig_warp import build_rig_warp
+from .panorama.rig_viewpoint import RigViewpoint, rig_viewpoint
+from .panorama.rig_warp import build_rig_warp, outline_of
 from .panorama.slid_warp import slid_warp
 from .panorama.upright_edges import StraightEdges, straight_edges
 from .panorama.viewpoint import Viewpoint, viewpoint_between
@@ -181,10 +183,35 @@ def map_rig(
     if options.surface[0] == "reference":
         still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
         return Mapped(build_rig_warp(field, views), None, still)
-    frame = _frame(AllEdges(pictures, views), options, lambda projection: build_rig_warp(field, views, projection))
+    lines = AllEdges(pictures, views)
+    slide, viewpoint = _rig_slide(field, lines, options, lambda share: progress("warp", 0.3 * share))
+    progress("warp", 0.3)
+    frame = _frame(lines, options, lambda projection: build_rig_warp(field, views, projection, viewpoint))
     progress("warp", 0.5)
-    still = SlideChoice(0.0, (), "the pictures are seen from one place")
-    return Mapped(build_rig_warp(field, views, frame), None, still)
+    return Mapped(build_rig_warp(field, views, frame, viewpoint), None, slide)
+
+
+def _rig_slide(
+    field: SphereField, lines: AllEdges, options: StitchOptions, progress: Callable[[float], None]
+) -> tuple[SlideChoice, RigViewpoint | None]:
+    """How far the viewpoint slides among the places of N pictures, as asked for or chosen; None where it stays."""
+    asked, views = options.slide, lines.views
+    if not asked:
+        return SlideChoice(0.0, (), "as asked for"), None
+    if not any(view.t.any() for view in views):
+        return SlideChoice(0.0, (), "the pictures were taken from one place"), None
+    if asked == "auto" and options.surface[0] == "equirectangular":
+        return SlideChoice(0.0, (), "a sphere is seen from one place, unless asked otherwise"), None
+    axes = upright(lines.down)
+    viewpoint = rig_viewpoint(views, [outline_of(field, view) for view in views], axes)
+    if asked != "auto":
+        return SlideChoice(float(asked), (), "as asked for"), viewpoint.sliding(float(asked))
+    cylinder = round_projection("cylindrical", views[0].K, axes, CHOICE.base_px_per_radian)
+    base = build_rig_warp(field, views, cylinder)
+    if base.canvas.width > np.radians(FRAMING.ring_fov_deg) * cylinder.focal:
+        return SlideChoice(0.0, (), "a ring is seen from one place, unless asked otherwise"), None
+    choice = choose_rig_slide(base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None, progress)
+    return choice, viewpoint.sliding(choice.s1) if choice.s1 else None
 
 
 def _frame(lines: AllEdges, options: StitchOptions, warp_on: Callable[[Projection], Warp]) -> Projection:

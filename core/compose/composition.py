@@ -118,7 +118,8 @@ def composed(
     for step, number in enumerate(order[1:]):
 
         def report(stage: str, share: float, before: int = step) -> None:
-            progress(stage, (before + share) / (len(order) - 1))
+            part = share if len(order) == 2 else (share + (stage == "blend")) / 2  # seam and blend take turns
+            progress(stage, (before + part) / (len(order) - 1))
 
         found[number] = panorama.add(number, found[number], fetched, painted, (decided is not None, keep), report)
     out, labels = panorama.layer, panorama.labels(found)

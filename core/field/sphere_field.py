@@ -1,7 +1,7 @@
 """Inverse range d(r) on every ray from the viewpoint, fitted to the points of N pictures (docs/method.md).
 
-Picture j sees the ray r at K_j (R_j r + d(r) t_j). The spline bends only where points ask for it; where there are none,
-anchors hold it at the inverse range of the points nearby, and it goes over to that smoothly.
+Picture j sees the ray r at K_j (R_j r + d(r) t_j). Among the points d is a spline that bends only where they ask for
+it. Beyond them it fades to another, which anchors hold at the inverse range of the points nearby.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from ..cameras.rig import Rig
 from ..raster.arrays import Array
 from ..raster.robust import sigma_of
 from ..system.errors import DegenerateGeometry
+from .fade import fading
 from .sphere_options import SPHERE
 from .sphere_points import SpherePoints, angular_unit, points_of, px_scale, seen_at
 from .sphere_slack import SphereSlack, fit_sphere_slack
@@ -28,23 +29,21 @@ from .strict import best_smoothing
 class SphereField:
     """d on the sphere, and what each picture is off beside it.
 
-    spline: d before it is bounded; bounds: least and largest d; doubt: the variance of d; slacks: of each picture, None
-    where it has too few points; smoothing: λ; leave_one_out_px: median px by which the points are off, each predicted
-    without itself; centres: how many points it stands on.
+    depth: d; slacks: of each picture, None where it has too few points or none was asked for.
     """
 
-    spline: SphereSpline
-    bounds: tuple[float, float]
-    doubt: Nearby
+    depth: SphereDepth
     slacks: tuple[SphereSlack | None, ...]
-    smoothing: float
-    leave_one_out_px: float
-    centres: int
+
+    @property
+    def leave_one_out_px(self) -> float:
+        """Median px by which the points are off, each predicted without itself."""
+        return self.depth.leave_one_out_px
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know."""
-        if not self.leave_one_out_px > SPHERE.deep_px:
+        if not self.leave_one_out_px > SPHERE.deep_px * self.depth.px_scale:
             return ()
         return (
             "the scene is too near and deep for the points that were found: half of them lie more than "
@@ -53,16 +52,49 @@ class SphereField:
 
     def at(self, rays: Array) -> Array:
         """Inverse range (…) on unit rays (…, 3)."""
-        return np.clip(self.spline.at(rays)[..., 0], *self.bounds)
+        return self.depth.at(rays)
 
     def deviation(self, rays: Array) -> Array:
         """Standard deviation (…) of that on unit rays (…, 3)."""
-        return np.sqrt(self.doubt.at(rays))
+        return np.sqrt(self.depth.doubt.at(rays))
 
     def slack(self, number: int, rays: Array) -> Array | None:
         """px (…, 2), before the lens, by which picture `number` is off on unit rays (…, 3); None if it has none."""
         slack = self.slacks[number]
         return None if slack is None else slack.at(rays)
+
+
+@dataclass(frozen=True, eq=False)
+class SphereDepth:
+    """d on the sphere.
+
+    inner: among the points; outer: beyond them, None without points: then d = 0; reach, width: radians from the nearest
+    point where it begins to fade, and over which; bounds: least and largest d; doubt: its variance; smoothing: λ;
+    leave_one_out_px: see `SphereField`; px_scale: see `sphere_points`.
+    """
+
+    inner: SphereSpline
+    outer: SphereSpline | None
+    reach: float
+    width: float
+    bounds: tuple[float, float]
+    doubt: Nearby
+    smoothing: float
+    leave_one_out_px: float
+    px_scale: float
+
+    def at(self, rays: Array) -> Array:
+        """Inverse range (…) on unit rays (…, 3)."""
+        flat = rays.reshape(-1, 3)
+        out = np.zeros(len(flat))
+        if self.outer is not None:
+            distance = cKDTree(self.inner.centres * self.inner.unit).query(flat)[0]
+            share = fading(np.maximum(distance - self.reach, 0.0), self.width)
+            for spline, part in ((self.inner, share), (self.outer, 1 - share)):
+                counts = part > 0
+                out[counts] += part[counts] * spline.at(flat[counts])[:, 0]
+            np.clip(out, *self.bounds, out=out)
+        return out.reshape(rays.shape[:-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,42 +136,44 @@ def fit_sphere_field(rig: Rig, with_slack: bool = True) -> SphereField:
         Too few points tell a range.
     """
     unit = angular_unit(rig)
-    if rig.t.any():
-        spline, bounds, doubt, smoothing, left_out, count = _fitted(rig, unit)
-    else:
-        spline = SphereSpline(np.empty((0, 3)), np.empty((0, 1)), np.zeros((4, 1)), unit)
-        doubt = Nearby(np.empty((0, 3)), np.empty(0), SPHERE.doubt_reach * unit)
-        bounds, smoothing, left_out, count = (0.0, 0.0), np.inf, 0.0, 0
-    field = SphereField(spline, bounds, doubt, (None,) * len(rig), smoothing, left_out, count)
-    if not with_slack:
-        return field
-    slacks = tuple(fit_sphere_slack(rig, number, field.at, unit) for number in range(len(rig)))
-    return SphereField(spline, bounds, doubt, slacks, smoothing, left_out, count)
+    depth = _fitted(rig, unit) if rig.t.any() else _without_parallax(unit)
+    numbers = range(len(rig))
+    slacks = (fit_sphere_slack(rig, number, depth.at, unit) if with_slack else None for number in numbers)
+    return SphereField(depth, tuple(slacks))
 
 
-def _fitted(rig: Rig, unit: float) -> tuple[SphereSpline, tuple[float, float], Nearby, float, float, int]:
-    """Spline, bounds, doubt, λ, median leave-one-out error in px and number of points of the field of a rig."""
-    points = points_of(rig)
+def _without_parallax(unit: float) -> SphereDepth:
+    """d = 0 everywhere, for pictures from one place."""
+    nothing = SphereSpline(np.empty((0, 3)), np.empty((0, 1)), np.zeros((4, 1)), unit)
+    sure = Nearby(np.empty((0, 3)), np.empty(0), unit)
+    return SphereDepth(nothing, None, 0.0, unit, (0.0, 0.0), sure, np.inf, 0.0, 1.0)
+
+
+def _fitted(rig: Rig, unit: float) -> SphereDepth:
+    """d by the points of a rig; unit: radians."""
+    points, scale = points_of(rig), px_scale(rig)
     if len(points) < SPHERE.min_centres:
         raise DegenerateGeometry(
             f"only {len(points)} points tell how far the scene is, at least {SPHERE.min_centres} needed: the pictures "
             "were taken too close together, or share too little"
         )
-    spacing = SPHERE.spacing * unit
-    points = points.subset(spread_points(points.rays, points.error_px, SPHERE.max_centres, spacing))
-    points, problem, smoothing = _pruned(points, unit, px_scale(rig))
-    values, noise = points.inverse_ranges, points.noise
+    chosen = spread_points(points.rays, points.error_px, SPHERE.max_centres, SPHERE.spacing * unit)
+    points, problem, smoothing = _pruned(points.subset(chosen), unit, scale)
+    values = points.inverse_ranges
+    inner, residual = solved_on_sphere(problem, values[:, None], smoothing)
     left_out = problem.inverse(smoothing).held_out(values)
-    low, high = np.percentile(values, SPHERE.outer_percents)
-    bounds = float(min(low, 0.0)), float(SPHERE.nearest * max(high, 0.0))
     anchors, levels, spreads = _anchors(rig, points, unit)
     rays = np.vstack([points.rays, anchors])
-    held = np.concatenate([noise, np.full(len(anchors), _anchor_noise(smoothing))])
-    problem = problem_on_sphere(rays, held, unit)
-    spline, _ = solved_on_sphere(problem, np.concatenate([values, levels])[:, None], smoothing)
-    doubt = Nearby(rays, np.concatenate([left_out**2, spreads**2]), SPHERE.doubt_reach * unit)
-    error = float(np.median(np.abs(left_out) * points.sensitivity))
-    return spline, bounds, doubt, smoothing, error, len(points)
+    noise = np.concatenate([points.noise, np.full(len(anchors), _anchor_noise(smoothing))])
+    together = np.concatenate([values - residual[:, 0], levels])
+    outer, _ = solved_on_sphere(problem_on_sphere(rays, noise, unit), together[:, None], smoothing)
+    low, high = np.percentile(values, SPHERE.outer_percents)
+    return SphereDepth(
+        inner, outer, SPHERE.fade_reach * unit, SPHERE.fade * unit,
+        (float(min(low, 0.0)), float(SPHERE.nearest * max(high, 0.0))),
+        Nearby(rays, np.concatenate([left_out**2, spreads**2]), SPHERE.doubt_reach * unit), smoothing,
+        float(np.median(np.abs(left_out) * points.sensitivity)), scale,
+    )  # fmt: skip
 
 
 def _pruned(points: SpherePoints, unit: float, scale: float) -> tuple[SpherePoints, SmoothingProblem, float]:

@@ -59,14 +59,20 @@ class SphereOptions:
     agreement_px: float = 2.0
     """px within which neighbours agree."""
 
+    fade_reach: float = 0.15
+    """Distance from the nearest point where what the spline says begins to fade."""
+
+    fade: float = 0.3
+    """Distance over which it fades to what anchors hold."""
+
     anchor_spacing: float = 0.15
-    """Distance between the anchors that hold the spline where no points are."""
+    """Distance between the anchors that hold d where no points are."""
 
     anchor_reach: float = 2.0
-    """Spacings of the anchors beside all points beyond which there are anchors: so far a spline continues well."""
+    """Spacings of the anchors beside all points beyond which there are any: so far a spline continues well."""
 
     anchor_stiffness: float = 0.3
-    """Distance over which the spline goes over to what the anchors say."""
+    """Distance over which d goes over from what the last points say to what the anchors do."""
 
     anchor_neighbours: int = 20
     """Nearest points whose median inverse range an anchor has."""
@@ -116,6 +122,9 @@ class SphereSlackOptions:
 
     smoothing_decades: tuple[float, float] = (-5.0, 0.0)
     """Powers of ten between which leave-one-out looks for the best λ, by halves."""
+
+    min_gain: float = 0.03
+    """Share by which slack has to lower the mean square of the leave-one-out errors: less is chance."""
 
     max_px: float = 12.0
     """px that slack may move a pixel at most."""

@@ -1,6 +1,7 @@
-"""What the points of one picture leave beside the field on the sphere: a smooth two-vector of its px.
+"""What the points of one picture leave across its epipolar lines: a smooth two-vector of its px.
 
-It stands for what no smooth d explains: near things that the spline smooths away, lenses, errors of a pose.
+It stands for lenses and errors of a pose. Along the lines d explains what is left: an edge of depth that the spline
+smooths away is no error of the lens, and slack that followed it would bend both sides.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from .sphere_options import SPHERE, SPHERE_SLACK
 from .sphere_points import px_scale
 from .sphere_spline import SphereSpline, problem_on_sphere, solved_on_sphere
 from .spline import spread_points
-from .strict import best_smoothing
+from .strict import robust_mean
 from .transfer import transfer
 
 
@@ -65,13 +66,14 @@ def fit_sphere_slack(rig: Rig, number: int, field: Callable[[Array], Array], uni
     Returns
     -------
     SphereSlack or None
-        None if there are too few points.
+        None if there are too few points, or they are off by chance alone.
     """
     scale, view, seen = px_scale(rig), rig.views[number], rig.observations
     here = seen.used & (seen.picture == number)
     rays = rig.rays[seen.point[here]]
     infinite = list(view.H_inf @ rig.cameras[0].K @ rays.T)
-    rest = undistort(seen.pixels[here], view.camera) - np.stack(transfer(view, infinite, field(rays)), axis=-1)
+    predicted = np.stack(transfer(view, infinite, field(rays)), axis=-1)
+    rest = _across(undistort(seen.pixels[here], view.camera) - predicted, predicted, view.e_prime)
     length = np.linalg.norm(rest, axis=1)
     usable = np.flatnonzero(length < SPHERE_SLACK.gross_error_px * scale)
     chosen = usable[spread_points(rays[usable], 0 * length[usable], SPHERE_SLACK.max_centres, SPHERE.spacing * unit)]
@@ -79,7 +81,12 @@ def fit_sphere_slack(rig: Rig, number: int, field: Callable[[Array], Array], uni
         return None
     rays, rest, ones = rays[chosen], rest[chosen], np.ones(len(chosen))
     problem = problem_on_sphere(rays, ones, unit)
-    smoothing = best_smoothing(problem, rest, ones, SPHERE_SLACK.smoothing_ladder)
+    errors = np.linalg.norm(problem.held_out(rest, SPHERE_SLACK.smoothing_ladder), axis=-1)
+    *scores, without = robust_mean(np.vstack([errors, np.linalg.norm(rest, axis=1)]))
+    best = int(np.argmin(scores))
+    if scores[best] >= (1 - SPHERE_SLACK.min_gain) * without:
+        return None
+    smoothing = float(SPHERE_SLACK.smoothing_ladder[best])
     spline, residual = solved_on_sphere(problem, rest, smoothing)
     error = np.linalg.norm(residual, axis=1)
     sigma = float(np.sqrt(np.mean(error**2)))
@@ -89,3 +96,14 @@ def fit_sphere_slack(rig: Rig, number: int, field: Callable[[Array], Array], uni
         rays = rays[keep]
     reach, width = SPHERE_SLACK.reach * unit, SPHERE_SLACK.fade * unit
     return SphereSlack(spline, rays, SPHERE_SLACK.max_px * scale, reach, width)
+
+
+def _across(rest: Array, predicted: Array, epipole: Array) -> Array:
+    """The part of what is left (N, 2) px that lies across the epipolar lines through predicted px (N, 2); all of it in
+    a picture from the viewpoint itself, whose `epipole` K t (3,) is 0."""
+    if not epipole.any():
+        return rest
+    along = epipole[:2] - epipole[2] * predicted
+    normal = along[:, ::-1] * (1.0, -1.0) / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    across: Array = np.sum(rest * normal, axis=1, keepdims=True) * normal
+    return across

@@ -49,24 +49,6 @@ class WarpOptions:
 
 
 @dataclass(frozen=True)
-class RigWarpOptions:
-    """Maps of N pictures (`rig_warp`)."""
-
-    nodes: int = 60_000
-    """Nodes of a grid over the canvas: N pictures together hold more than two."""
-
-    deviation_nodes: int = 4_000
-    """The same of the grid that the deviation of inverse range is worked out on: it changes slowly."""
-
-    outline_steps: int = 4
-    """Steps by which the ray that shows a picture's border is found: each looks its range up where the last one ended.
-    """
-
-    least_share: float = 0.05
-    """Range from a picture's camera, at least, in units of that from the viewpoint, where outlines are sought."""
-
-
-@dataclass(frozen=True)
 class LayerOptions:
     """Fetching pictures through their maps (`layers`)."""
 
@@ -372,7 +354,6 @@ class CarryOptions:
 
 CANVAS = CanvasOptions()
 WARP = WarpOptions()
-RIG_WARP = RigWarpOptions()
 LAYER = LayerOptions()
 PROJECTION = ProjectionOptions()
 LEVELLING = LevellingOptions()

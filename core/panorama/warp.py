@@ -32,6 +32,7 @@ from .depth import Confidence, Depth, Nearness
 from .options import WARP
 from .projection import Projection, focal_of
 from .reference_map import ReferenceMap
+from .rig_viewpoint import RigViewpoint
 
 if TYPE_CHECKING:
     from ..continuation.continuation import Continuation
@@ -58,8 +59,8 @@ class Warp:
         are seen from the reference's place.
     behind : (H, W) bool array or None
         What the reference cannot see though its map falls inside it, likewise: something nearer hides it.
-    viewpoint : Viewpoint or None
-        How far it slides in any direction.
+    viewpoint : Viewpoint, RigViewpoint or None
+        How far it slides in any direction: of a pair (then `slide` says so too), or of more pictures.
     refilled : (H, W) bool array or None
         Where depth was taken from the background, since a border cuts what was there: nothing counts as hidden there.
     beside : (H, W, 3) float32 array or None
@@ -75,7 +76,7 @@ class Warp:
     lazy_confidence: AnyImage | None = None
     slide: AnyImage | None = None
     behind: NDArray[np.bool_] | None = None
-    viewpoint: Viewpoint | None = None
+    viewpoint: Viewpoint | RigViewpoint | None = None
     refilled: NDArray[np.bool_] | None = None
     beside: NDArray[np.float32] | None = None
     deviation: AnyImage | None = None
@@ -118,6 +119,8 @@ class Warp:
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
         view = views[number]
+        if isinstance(self.viewpoint, RigViewpoint):
+            return Nearness(self.canvas, views[0].camera, view, self.depth, viewpoint=(views[0].K, self.viewpoint))
         if self.slide is None or self.viewpoint is None:
             return Nearness(self.canvas, views[0].camera, view, self.depth)
         nearer = float(view.H_inf[2] @ views[0].K @ self.viewpoint.c)
@@ -296,6 +299,8 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     across, down = width + 2 * margin, height + 2 * margin
     share = min(WARP.max_node_factor, max(1.0, across * down / (2 * width * height)))
     step = WARP.node_share * grid.step * focal_of(canvas.projection.K) / canvas.projection.focal
+    # a power of two: canvases of one stitch are of similar size, and so share these nodes (see `Remembered`)
+    step = 2.0 ** np.floor(np.log2(step))
     flat = Grid.over(-margin, -margin, across, down, int(min(share * GRID.nodes, across * down / step**2)))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)

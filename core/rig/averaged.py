@@ -8,7 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.camera import Camera
+from ..cameras.rig import PictureMatches
 from ..raster.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """Matches of pairs that agree with some motion of the camera.
+
+    pairs: of those pairs that do, the strongest first; found: how many matches each of them had before; best (N,): for
+    each picture, how many agreed in the best of its pairs, also where those were too few; scale: px by which thresholds
+    are multiplied; seed: of every random choice.
+    """
+
+    pairs: tuple[PictureMatches, ...]
+    found: tuple[int, ...]
+    best: NDArray[np.intp]
+    scale: float
+    seed: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,8 +35,9 @@ class PairGeometry:
     index (M, 2): features of both that their epipolar geometry explains; verified: how many matches any fundamental
     matrix explained, found: how many there were; R (3, 3), t (3,): the pair's own pose, |t| = 1; information (3, 3): of
     R, 1 / rad², turned by a rotation vector from the left, t eliminated; noise_px: of the Sampson distances;
-    parallax_px: the median distance from the best pure rotation; rotates: whether a pure rotation explains the pair as
-    well as a pose does, and the averaged rotations agree with it; off_degrees: of R from the averaged rotations.
+    parallax_px: the median distance from the best pure rotation; rotation_gain: by how much a pure rotation is the
+    better model of a match (GRIC), negative where a pose is; rotates: whether it is by far, and the averaged rotations
+    agree with it; off_degrees: of R from the averaged rotations.
     """
 
     i: int
@@ -32,6 +50,7 @@ class PairGeometry:
     information: Array
     noise_px: float
     parallax_px: float
+    rotation_gain: float
     rotates: bool
     off_degrees: float
 

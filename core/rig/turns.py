@@ -20,6 +20,11 @@ def rotation_vectors(R: Array) -> Array:
     return vectors
 
 
+def dot(first: Array, second: Array) -> Array:
+    """Inner products (O,) of rows (O, n); several times faster than a sum over so short an axis."""
+    return np.asarray(np.einsum("oi,oi->o", first, second))
+
+
 def degrees_between(first: Array, second: Array) -> Array:
     """Angles (…) between rotations (…, 3, 3)."""
     between: Array = np.degrees(np.linalg.norm(rotation_vectors(first @ np.swapaxes(second, -1, -2)), axis=-1))

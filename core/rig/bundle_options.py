@@ -1,0 +1,170 @@
+"""Tuning values from averaged rotations to a bundled rig, with their units and why they are what they are.
+
+Lengths called px are in px of the pictures that the features were found in: they are multiplied by the scale that
+`registration.register` is given. References: Jiang, Cui and Tan, A Global Linear Method for Camera Pose Registration,
+ICCV 2013; Pan et al., Global Structure-from-Motion Revisited, ECCV 2024; Triggs et al., Bundle Adjustment: A Modern
+Synthesis, 1999.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class TrackOptions:
+    """Which pairs' matches become tracks (`tracks`)."""
+
+    # Degrees, and standard deviations of its own rotation, that a pair may be off the averaged rotations: the larger of
+    # both counts. What is further off shows something else, and its matches would join what does not belong together.
+    most_degrees: float = 2.0
+    most_sigmas: float = 4.0
+
+
+@dataclass(frozen=True)
+class PositionOptions:
+    """Places of the pictures by linear equations (`positions`, `continuity`)."""
+
+    # Rounds at most, and the round from which steps of Gauss-Newton replace solving anew: the first rounds need no
+    # start, but without the projector parts of free scale shrink in them.
+    rounds: int = 32
+    newton_round: int = 8
+    # Rounds at which every track chooses its two views of most parallax again, now that outliers are known.
+    choosing_rounds: tuple[int, ...] = (4, 10, 16)
+    # Ends the rounds when places move less than this share of their extent, from this round on.
+    tolerance: float = 1e-5
+    least_rounds: int = 22
+    # Parallax in standard deviations from which a track's depth counts as measured, and from which it counts fully
+    # where the scale is held.
+    measured_sigmas: float = 4.0
+    sure_sigmas: float = 10.0
+    # σ within which the Cauchy weight is flat, at first, by which factor it falls each round, and where it ends.
+    first_kernel_sigmas: float = 8.0
+    kernel_decay: float = 0.7
+    last_kernel_sigmas: float = 2.0
+    # Residual in σ that a view behind which a point lies has at least, and weight below which a view is not chosen.
+    behind_sigmas: float = 3.0
+    least_weight: float = 0.2
+    # Distances are never taken to be less than this share of the median depth: residuals are divided by them.
+    least_distance: float = 1e-3
+    # A step changes depths by at most this share (85th percentile), and is at most this share of Gauss-Newton's.
+    most_change: float = 0.4
+    most_step: float = 0.8
+    change_percentile: float = 85.0
+    # Stiffness that keeps the scale during steps, and what keeps the equations regular, in units of the mean diagonal.
+    scale_stiffness: float = 1e6
+    regular: float = 1e-10
+    # A pair that a pure rotation explains pulls its places together by its matches, at most so many, each with this
+    # share of its weight; by more than so many σ of parallax it lets go.
+    station_matches: int = 200
+    station_share: float = 1 / 6
+    station_sigmas: float = 2.0
+
+
+@dataclass(frozen=True)
+class ContinuityOptions:
+    """Equal depth of neighbours in a picture where no point is seen by three (`continuity`)."""
+
+    # σ of the log of the ratio of two neighbours' depths, and how many equations all of a picture's count as.
+    log_sigma: float = 0.5
+    weight: float = 4.0
+    # Neighbours that are looked at, neighbours of other tracks that are taken, and points of a picture at least.
+    neighbours: int = 11
+    most: int = 400
+    least_points: int = 12
+    # Relative difference of depths below which L1 becomes L2, before depths are positive enough for logarithms.
+    flat: float = 0.2
+
+
+@dataclass(frozen=True)
+class BundleOptions:
+    """The bundle (`bundle`, `reprojection`)."""
+
+    # px, the scale of the Cauchy cost: wide at first with the lenses held, then with all free.
+    first_kernel_px: float = 4.0
+    kernel_px: float = 2.0
+    # The same at last, in σ of the noise (2.4: for normal noise 95 % as good as least squares), and px at least: with a
+    # wider one matches that are a little wrong, as many are, turn cameras by a tenth of a degree.
+    last_kernel_sigmas: float = 2.4
+    least_kernel_px: float = 0.2
+    # σ of k1 and px of noise that priors are weighed with: errors of a lens that the model leaves go together, so that
+    # thousands of observations do not outweigh a prior as independent ones would.
+    k1_sigma: float = 0.05
+    prior_noise_px: float = 1.0
+    # Iterations that undo a distortion.
+    undistorting: int = 8
+    # Residual px of what lies behind a camera, and the third coordinate of |r| = 1 from which a point is before it.
+    behind_px: float = 1e3
+    least_ahead: float = 1e-3
+    # Levenberg's damping: at first, its factors after a good and a bad step, its least, and tries at most.
+    damping: float = 1e-4
+    damping_down: float = 0.1
+    damping_up: float = 8.0
+    least_damping: float = 1e-9
+    tries: int = 8
+    # Most that log f changes in a step.
+    most_log_focal: float = 0.2
+    # What keeps the equations regular, and stiffness that keeps the scale, in units of their mean diagonal.
+    regular: float = 1e-15
+    scale_stiffness: float = 1e3
+
+
+@dataclass(frozen=True)
+class PolishingOptions:
+    """Bundling, leaving out what does not fit, bundling again (`polishing`)."""
+
+    # Iterations at most and relative change of the cost that ends each round. Stopping early is no saving: in a flat
+    # valley centimetres remain. The first rounds begin with all observations again.
+    first_iterations: int = 15
+    first_tolerance: float = 1e-4
+    iterations: tuple[int, ...] = (25, 30, 60, 60, 60, 60)
+    tolerances: tuple[float, ...] = (1e-4, 1e-5, 1e-6, 1e-8, 1e-8, 1e-8)
+    revived_rounds: int = 2
+    # Round from which the kernel is as wide as the noise.
+    sharp_round: int = 2
+    # Robust σ beyond which an observation is left out, and px below which none is.
+    prune_sigmas: float = 4.0
+    prune_px: float = 1.5
+    # px from which a point's worst observation has it triangulated anew.
+    retriangulate_px: float = 8.0
+    # After the first sharp round: done when so small a share was left out and the cost fell by less than this share.
+    settled_pruned: float = 0.002
+    settled_cost: float = 0.001
+    # Rotations alone: px of the Cauchy cost in turn, iterations and σ at which observations are left out.
+    rotation_kernels_px: tuple[float, ...] = (8.0, 2.0)
+    rotation_iterations: int = 30
+    rotation_tolerance: float = 1e-8
+    rotation_prune_sigmas: float = 5.0
+    # Neighbours whose median ρ draws a point, and σ of that in units of the 90th percentile of |ρ|: it only holds
+    # points that have no parallax.
+    prior_neighbours: int = 8
+    prior_share: float = 1.0
+    prior_percentile: float = 90.0
+    prior_least_points: int = 20
+
+
+@dataclass(frozen=True)
+class JudgeOptions:
+    """Comparing hypotheses, and what is said of the result (`registration`, `stations`)."""
+
+    # Log f by which the bundle may move it before pairs are estimated again with the bundle's, and passes at most.
+    most_log_focal: float = 0.01
+    passes: int = 3
+    # Kernel widths squared of a match that no track took: as if it were 5 kernels off.
+    missed_kernels: float = 25.0
+    # Relative cost within which hypotheses are reported as possible, and log f within which two are the same.
+    possible: float = 0.05
+    same_log_focal: float = 0.002
+    # Points of three pictures from which a pair's baseline is measured, and its parallax in σ from which it has any.
+    three_view_points: int = 10
+    parallax_sigmas: float = 3.0
+    # px: where costs are weighed against numbers of parameters, noise is never taken to be less.
+    least_noise_px: float = 0.1
+
+
+TRACKS = TrackOptions()
+POSITIONS = PositionOptions()
+CONTINUITY = ContinuityOptions()
+BUNDLE = BundleOptions()
+POLISHING = PolishingOptions()
+JUDGE = JudgeOptions()

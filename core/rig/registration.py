@@ -1,0 +1,225 @@
+"""The way in: from features and matches of N pictures to their cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ..cameras.camera import Camera
+from ..cameras.lens import undistort
+from ..cameras.rig import FocalGuess, Observations, PictureMatches, Registration, Rig, RigEdge
+from ..raster.arrays import Array
+from ..raster.robust import sigma_of_lengths
+from ..system.errors import NoOverlap
+from ..system.progress import Progress, ReportProgress
+from .averaged import PairGeometry, Verified
+from .bundle_options import JUDGE
+from .focal_starts import starts
+from .graph import components
+from .options import PAIRS
+from .pairs import verified as verify
+from .polishing import Polished
+from .reprojection import lengths_of_errors
+from .solution import lens_of
+from .solving import Solved, solve
+from .turns import degrees_between
+from .uncertainty import deviations
+
+
+def register(
+    cameras: Sequence[Camera],
+    points: Sequence[Array],
+    matches: Sequence[PictureMatches],
+    scale: float = 1.0,
+    seed: int = 0,
+    progress: ReportProgress | None = None,
+    names: Sequence[str] = (),
+) -> Registration:
+    """Find the cameras of all pictures that connect, in the frame of the first of them.
+
+    The order of the pictures matters for nothing else.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        As known before matching. Given focal lengths and poses stay; poses are world to camera.
+    points : sequence of (M_i, 2)
+        The features of every picture, raw px.
+    matches : sequence of PictureMatches
+        Which of them match, of each pair at most once.
+    scale : float
+        px by which thresholds are multiplied: full pixels per pixel of the picture that features were found in.
+    seed : int
+        Of every random choice.
+    progress : callable
+        Told of the stage "geometry"; raises `Cancelled` when it was asked to.
+    names : sequence of str, optional
+        What pictures are called where it is said why one is left out; by default their numbers from 1.
+
+    Returns
+    -------
+    Registration
+
+    Raises
+    ------
+    NoOverlap
+        If no two pictures connect.
+    """
+    progress = progress or Progress()
+    ideal = [undistort(p, camera) if camera.distortion.any() else p for p, camera in zip(points, cameras, strict=True)]
+    plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
+    verified = verify(ideal, matches, scale, seed)
+    progress("geometry", 0.0)
+    lenses = starts(plain, ideal, verified)
+    found = []
+    for k, lens in enumerate(lenses):
+        solved = solve(plain, ideal, verified, lens, partial(progress, "geometry", k / len(lenses)))
+        if solved is not None:
+            found.append(solved)
+    if not found:
+        raise NoOverlap(_nothing_connects(verified))
+    found.sort(key=lambda solved: solved.cost)
+    names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
+    return _told(cameras, points, verified, found, names)
+
+
+def _told(
+    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, found: Sequence[Solved],
+    names: Sequence[str],
+) -> Registration:  # fmt: skip
+    best = found[0]
+    framed = replace(best.found, solution=best.found.solution.seen_from(0).rescaled())
+    edges = _edges(best, framed)
+    rig = _rig(cameras, points, best, framed, edges, _guesses(found))
+    members = best.averaged.members
+    return Registration(rig, members, _left_out(names, members, verified))
+
+
+def _rig(
+    cameras: Sequence[Camera], points: Sequence[Array], best: Solved, found: Polished, edges: tuple[RigEdge, ...],
+    guesses: tuple[FocalGuess, ...],
+) -> Rig:  # fmt: skip
+    problem, solution, members = found.problem, found.solution, best.averaged.members
+    tracks, lens = problem.tracks, problem.lenses.of
+    lengths = lengths_of_errors(problem, solution)
+    used = solution.used & np.isfinite(lengths)
+    noise = sigma_of_lengths(lengths[used]) if used.any() else float("nan")
+    sure = deviations(found, noise)
+    whole = solution.solved & (np.bincount(tracks.point[used], minlength=len(tracks)) >= 2)
+    number = np.cumsum(whole) - 1
+    rows = np.flatnonzero(whole[tracks.point])
+    raw = np.array([points[members[j]][k] for j, k in zip(tracks.picture[rows], tracks.feature[rows], strict=True)])
+    seen = Observations(tracks.picture[rows], number[tracks.point[rows]], raw.reshape(-1, 2), used[rows])
+    return Rig(
+        tuple(_camera(cameras[member], found, k) for k, member in enumerate(members)),
+        solution.R,
+        solution.t,
+        solution.rays[whole],
+        solution.inverse_ranges[whole],
+        sure.inverse_ranges[whole],
+        seen,
+        edges,
+        _stations(found),
+        tuple(int(k) for k in lens),
+        sure.log_focal,
+        sure.places,
+        guesses,
+        noise,
+        best.averaged.loop_degrees,
+    )
+
+
+def _camera(camera: Camera, found: Polished, picture: int) -> Camera:
+    """As estimated; what was given stays to the last bit."""
+    log_factor, k1, *shift = found.solution.lens[found.problem.lenses.of[picture]]
+    K = camera.scaled(float(np.exp(log_factor)))
+    K[:2, 2] += shift
+    distortion = camera.distortion if camera.distortion.any() else np.array([k1, 0, 0, 0, 0])
+    return replace(camera, K=K, distortion=distortion)
+
+
+def _stations(found: Polished) -> tuple[tuple[int, ...], ...]:
+    place = found.problem.place
+    groups = [tuple(int(k) for k in np.flatnonzero(place == number)) for number in np.unique(place)]
+    return tuple(group for group in groups if len(group) > 1)
+
+
+def _edges(best: Solved, found: Polished) -> tuple[RigEdge, ...]:
+    solution = found.solution
+    place = {member: k for k, member in enumerate(best.averaged.members)}
+    told = []
+    for pair in sorted(best.averaged.pairs, key=lambda pair: (pair.i, pair.j)):
+        i, j = place[pair.i], place[pair.j]
+        off = float(degrees_between(pair.R, solution.R[j] @ solution.R[i].T))
+        baseline = _baseline(pair, i, j, found)
+        told.append(RigEdge(i, j, pair.found, len(pair.index), pair.noise_px, pair.parallax_px, off, baseline))
+    return tuple(told)
+
+
+def _baseline(pair: PairGeometry, i: int, j: int, found: Polished) -> str:
+    """How the length between two pictures is known."""
+    problem, solution = found.problem, found.solution
+    if problem.place[i] == problem.place[j] or pair.parallax_px < JUDGE.parallax_sigmas * problem.noise_px:
+        return "none"
+    if problem.pictures == 2:
+        return "measured"  # it is the unit
+    tracks = problem.tracks
+    used = solution.used & solution.solved[tracks.point]
+    seen = np.zeros((3, len(tracks)), np.intp)
+    seen[0] = np.bincount(tracks.point[used], minlength=len(tracks))
+    for row, picture in ((1, i), (2, j)):
+        seen[row] = np.bincount(tracks.point[used & (tracks.picture == picture)], minlength=len(tracks))
+    shared = (seen[0] > 2) & (seen[1] > 0) & (seen[2] > 0)
+    return "measured" if shared.sum() >= JUDGE.three_view_points else "continuity"
+
+
+def _guesses(found: Sequence[Solved]) -> tuple[FocalGuess, ...]:
+    """Hypotheses that cost little more than the best, each lens once."""
+    guesses: list[FocalGuess] = []
+    for solved in found:
+        solution = solved.found.solution
+        lens = lens_of(solved.found.problem, solution, np.zeros(1, np.intp))
+        guess = FocalGuess(float(lens.focal[0]), float(lens.k1[0]), solved.cost)
+        near = any(abs(np.log(guess.focal / other.focal)) < JUDGE.same_log_focal for other in guesses)
+        if solved.cost <= found[0].cost * (1 + JUDGE.possible) and not near:
+            guesses.append(guess)
+    return tuple(guesses)
+
+
+def _left_out(names: Sequence[str], members: Sequence[int], verified: Verified) -> dict[int, str]:
+    """Why each other picture is not in the rig."""
+    count, pairs = len(names), [(pair.i, pair.j) for pair in verified.pairs]
+    groups = {k: group for group in components(count, pairs) for k in group}
+    told = {}
+    for k in sorted(set(range(count)) - set(members)):
+        best = int(verified.best[k])
+        others = [other for other in groups[k] if other != k]
+        if not others:
+            told[k] = (
+                f"connects to no other picture: at best {best} matches agree on how the camera moved, "
+                f"{PAIRS.min_inliers} are needed; take a picture in between"
+            )
+        elif set(others).isdisjoint(members):
+            told[k] = (
+                f"connects only with {_listed([names[other] for other in others])}, and that group with none of the "
+                f"others (at best {best} matches agree): take a picture in between"
+            )
+        else:
+            told[k] = f"its pairs contradict the others' ({best} matches agree in the best of them)"
+    return told
+
+
+def _nothing_connects(verified: Verified) -> str:
+    best = int(verified.best.max(initial=0))
+    return (
+        f"no two pictures connect: at best {best} matches of a pair agree on how the camera moved, and "
+        f"{PAIRS.min_inliers} are needed. Use pictures that overlap by a third or more."
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in words."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
