@@ -88,9 +88,6 @@ class PairFitOptions:
     # A change of log f or of k1 from which candidates are sought once more, with the new lens.
     repeat_log_focal: float = 0.02
     repeat_k1: float = 0.02
-    # Changes up to which those found before are followed; beyond, RANSAC starts anew.
-    follow_log_focal: float = 0.1
-    follow_k1: float = 0.06
     # Share of the matches that pure rotations must explain better before the focal length is taken from them: that of
     # poses without parallax is arbitrary.
     rotation_share: float = 0.3
