@@ -43,18 +43,15 @@ def solve(
     Where the bundle moves the focal length much, pairs are estimated again with the bundle's: an error of some per cent
     turns every pair by degrees, and the tracks were chosen by that.
     """
-    tick()
-    solved = None
-    for _ in range(JUDGE.passes):
-        if rotated is None or len(rotated.members) < 2:
-            break
-        solved = _bundled(cameras, points, verified, rotated, tick)
-        if solved.moved < JUDGE.most_log_focal:
-            break
+    found: list[Solved] = []
+    while rotated is not None and len(rotated.members) > 1:
         tick()
-        known, shared = _cameras_of(cameras, rotated, solved.found)
+        found.append(_bundled(cameras, points, verified, rotated, tick))
+        if found[-1].moved < JUDGE.most_log_focal or len(found) == JUDGE.passes:
+            break
+        known, shared = _cameras_of(cameras, rotated, found[-1].found)
         rotated = averaged(known, points, verified, shared, hold=True)
-    return solved
+    return min(found, key=lambda solved: solved.cost, default=None)
 
 
 def _bundled(
