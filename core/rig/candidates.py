@@ -29,7 +29,8 @@ DIRECTIONS = _CUBE / np.linalg.norm(_CUBE, axis=1, keepdims=True)
 class Candidates:
     """The poses of the pairs that have any, by one lens.
 
-    numbers (P,): which of all verified pairs they are; inliers (O,): of all verified matches; rays: those inliers;
+    numbers (P,): which of all verified pairs they are; inliers (O,): of all verified matches; rays: those inliers,
+    thinned in pairs with very many;
     turned (P, 3, 3): the best pure rotations; poses: of every pair the best first; costs: their negative log
     likelihoods; noise: σ px of a Sampson distance.
     """
@@ -113,7 +114,7 @@ def belonging(matched: MatchedRays, squares: Array, before: NDArray[np.bool_], s
 
 def _of_inliers(matched: MatchedRays, kept: NDArray[np.intp], inliers: NDArray[np.bool_]) -> MatchedRays:
     masks = [inliers[matched.starts[k] : matched.starts[k + 1]] for k in kept]
-    return matched.of_pairs(kept).where(np.concatenate(masks))
+    return matched.of_pairs(kept).where(np.concatenate(masks)).thinned(CANDIDATES.most_matches)
 
 
 def _refined(
