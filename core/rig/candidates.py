@@ -29,10 +29,9 @@ DIRECTIONS = _CUBE / np.linalg.norm(_CUBE, axis=1, keepdims=True)
 class Candidates:
     """The poses of the pairs that have any, by one lens.
 
-    numbers (P,): which of all verified pairs they are; inliers (O,): of all verified matches; rays: those inliers,
-    thinned in pairs with very many;
-    turned (P, 3, 3): the best pure rotations; poses: of every pair the best first; costs: their negative log
-    likelihoods; noise: σ px of a Sampson distance.
+    numbers (P,): which of all verified pairs they are; inliers (O,): of all verified matches; rays: those inliers, of
+    pairs with very many only some; turned (P, 3, 3): the best pure rotations; poses: of every pair the best first;
+    costs: their negative log likelihoods; noise: σ px of a Sampson distance.
     """
 
     numbers: NDArray[np.intp]
