@@ -50,30 +50,25 @@ def polish_best(
     problem: Problem, start: Solution, stations: Sequence[Station], same: Sequence[SamePlace],
     framed: Callable[[Array], Array], tick: Tick,
 ) -> Polished:  # fmt: skip
-    """The cheapest of: every picture at a place of its own; those of each station at one place, and of the largest
-    alone; all at one place, where a station holds all. What it costs to have more places is counted (BIC).
+    """The cheapest of: every picture at a place of its own, from averaged rotations and, where there are stations, from
+    those of all pictures bundled as if at one place, which are better where there is little parallax; those of each
+    station at one place; all at one place, where a station holds all. What more places cost is counted (BIC).
 
     framed: brings places (N, 3) to where the start's poses stand.
     """
-    if any(len(station) == problem.pictures for station in stations):
-        candidates = [polish_rotations(problem.tied([tuple(range(problem.pictures))]), start, tick)]
-        stations = []
-    else:
-        candidates = []
-    for tied in _ties(stations):
-        assigned = problem.tied(tied)
-        placed = place_pictures(assigned, start, same)
-        candidates.append(polish(assigned, replace(start, centres=framed(placed.centres)), tick))
+    candidates = []
+    starts: list[tuple[Problem, Solution]] = [(problem, start)]
+    if stations and not problem.held.any():  # given poses say themselves what is at one place
+        turned = polish_rotations(problem.tied([tuple(range(problem.pictures))]), start, tick)
+        starts.append((problem, replace(start, R=turned.solution.R, lens=turned.solution.lens)))
+        if any(len(station) == problem.pictures for station in stations):
+            candidates.append(turned)
+        else:
+            starts.append((problem.tied(stations), start))
+    for assigned, begun in starts:
+        placed = place_pictures(assigned, begun, same)
+        candidates.append(polish(assigned, replace(begun, centres=framed(placed.centres)), tick))
     return min(candidates, key=information_criterion)
-
-
-def _ties(stations: Sequence[Station]) -> list[list[Station]]:
-    ties: list[list[Station]] = [[]]
-    if stations:
-        ties.append(list(stations))
-    if len(stations) > 1:
-        ties.append([max(stations, key=len)])
-    return ties
 
 
 def information_criterion(found: Polished) -> float:
