@@ -80,10 +80,10 @@ def register(
     if not found:
         raise NoOverlap(_nothing_connects(verified))
     found.sort(key=lambda solved: solved.cost)
-    return _told(cameras, points, verified, found)
+    return _registration_of(cameras, points, verified, found)
 
 
-def _told(
+def _registration_of(
     cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, found: Sequence[Solved]
 ) -> Registration:
     best = found[0]

@@ -59,12 +59,12 @@ def polish_best(
     candidates = []
     starts: list[tuple[Problem, Solution]] = [(problem, start)]
     if stations and not problem.held.any():  # given poses say themselves what is at one place
-        turned = polish_rotations(problem.tied([tuple(range(problem.pictures))]), start, tick)
+        turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
         starts.append((problem, replace(start, R=turned.solution.R, lens=turned.solution.lens)))
         if any(len(station) == problem.pictures for station in stations):
             candidates.append(turned)
         else:
-            starts.append((problem.tied(stations), start))
+            starts.append((problem.with_stations(stations), start))
     for assigned, begun in starts:
         placed = place_pictures(assigned, begun, same)
         candidates.append(polish(assigned, replace(begun, centres=framed(placed.centres)), tick))
