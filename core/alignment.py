@@ -18,6 +18,7 @@ from .cameras.camera import Camera
 from .cameras.edge import Edge
 from .cameras.lens import undistort
 from .cameras.matches import Matches
+from .cameras.rig import Rig
 from .cameras.sources import cameras_for, role
 from .cameras.two_view import TwoView
 from .cameras.view import View, views_of
@@ -25,20 +26,26 @@ from .continuation.continuation import Continuation
 from .dense.refine import Dense, refine
 from .field.field import Field
 from .field.slack import SlackField
+from .field.sphere_field import SphereField, fit_sphere_field
 from .field.strict import StrictField
 from .fields import fit_field
-from .mapping import map_pictures
+from .frames.frame import Frame, size_of
+from .mapping import map_pictures, map_rig
 from .options import StitchOptions
 from .panorama.choosing_slide import SlideChoice
 from .panorama.upright_edges import straight_edges
 from .panorama.warp import Warp
-from .pictures.masks import read_mask, read_painted, without
-from .pictures.picture import Picture, resized
+from .pictures.picture import Picture
 from .pose import features
 from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
 from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
+from .rig.from_pictures import matched_pictures, registered
+from .rig.given import given_matches
+from .rig.left_out import check_connected
+from .rig.pair_edges import edges_of
+from .rig.reframing import seen_from
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, StitchError, TooFewMatches
 from .system.memory import give_back
@@ -58,8 +65,8 @@ class Alignment:
         Pairs of pictures with their matches and geometry.
     views : tuple of View
         Each picture's place relative to the reference, as its edges have it.
-    field : Field
-        The displacement field.
+    field : Field or SphereField
+        The displacement field; of more than two pictures, on the sphere.
     warp : Warp
         The maps from the canvas to each picture.
     warnings : tuple of str
@@ -70,49 +77,29 @@ class Alignment:
         What goes on beyond the overlap; None where the field itself does.
     slide : SlideChoice
         How far the viewpoint slides, and why.
+    rig : Rig or None
+        The cameras of more than two pictures, which `cameras` are then as well; None of a pair.
+    left_out : tuple of (str, str)
+        Names of the pictures that connect with no others, and why.
     """
 
     cameras: tuple[Camera, ...]
     edges: tuple[Edge, ...]
     views: tuple[View, ...]
-    field: Field
+    field: Field | SphereField
     warp: Warp
     warnings: tuple[str, ...]
     dense: Dense | None = None
     continuation: Continuation | None = None
     slide: SlideChoice = SlideChoice(0.0, (), "")
+    rig: Rig | None = None
+    left_out: tuple[tuple[str, str], ...] = ()
 
-
-@dataclass(frozen=True)
-class Frame:
-    """The pictures of one panorama, made ready.
-
-    Attributes
-    ----------
-    pictures : tuple of Picture
-        The reference first, scaled, and without what is masked.
-    full_sizes : tuple of (W, H)
-        px of the pictures as they came.
-    painted : ndarray (H, W) int8 or None
-        What was painted over the panorama (see `masks.read_painted`).
-    """
-
-    pictures: tuple[Picture, ...]
-    full_sizes: tuple[tuple[int, int], ...]
-    painted: NDArray[np.int8] | None = None
-
-
-def prepare(pictures: Sequence[Picture], options: StitchOptions) -> Frame:
-    """A frame of full pictures in one colour space. Raises BadRequest or UnreadableImage about a mask."""
-    worked_on = []
-    for number, picture in enumerate(pictures):
-        mask = options.ignored(number)
-        shown = picture
-        if mask is not None:
-            shown = without(picture, read_mask(mask, size_of(picture), f"the {role(number)}"))
-        worked_on.append(resized(shown, options.scale))
-    painted = None if options.mask is None else read_painted(options.mask)
-    return Frame(tuple(worked_on), tuple(size_of(picture) for picture in pictures), painted)
+    @property
+    def pair_field(self) -> Field:
+        """The displacement field of a pair."""
+        assert not isinstance(self.field, SphereField)
+        return self.field
 
 
 @dataclass(frozen=True)
@@ -121,13 +108,18 @@ class Geometry:
 
     Attributes
     ----------
-    cameras, edges, warnings
+    cameras, edges, warnings, rig, left_out
         As in `Alignment`.
+    numbers : tuple of int
+        Which of the frame's pictures are used, in their order from here on.
     """
 
     cameras: tuple[Camera, ...]
     edges: tuple[Edge, ...]
     warnings: tuple[str, ...]
+    numbers: tuple[int, ...] = (0, 1)
+    rig: Rig | None = None
+    left_out: tuple[tuple[str, str], ...] = ()
 
 
 def align(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Alignment:
@@ -181,10 +173,10 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     pictures, sizes = frames[0].pictures, frames[0].full_sizes
     if any(frame.full_sizes != sizes for frame in frames):
         raise BadRequest("the frames of a clip differ in size: one alignment is for one camera each")
-    full, warnings = cameras_for(
-        options.camera, [picture.name for picture in pictures], sizes, [picture.exif for picture in pictures]
-    )
+    full, warnings = cameras_for(options.camera, frames[0].names, sizes, [picture.exif for picture in pictures])
     cameras = tuple(camera.resized(size_of(picture)) for camera, picture in zip(full, pictures, strict=True))
+    if len(pictures) > 2:
+        return _of_many(frames[0], cameras, warnings, options, progress)
     cache = Cache(options.cache)
     if options.matches is None:
         progress("features", 0.0)
@@ -202,6 +194,29 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
         lambda: _estimated(ideal, cameras, options.seed, looked_at),
     )  # fmt: skip
     return Geometry(cameras, (Edge(0, 1, matches, ideal, two_view),), (*warnings, *two_view.warnings))
+
+
+def _of_many(
+    frame: Frame, cameras: tuple[Camera, ...], warnings: Sequence[str], options: StitchOptions,
+    progress: ReportProgress,
+) -> Geometry:  # fmt: skip
+    """The geometry of more than two pictures; of two of them, if no more connect."""
+    pictures, cache = frame.pictures, Cache(options.cache)
+    if options.matches is None:
+        matched = matched_pictures(pictures, options.preview, cache, progress)
+    else:
+        worked = [camera.size for camera in cameras]
+        matched = given_matches(options.matches, pictures, frame.full_sizes, worked)
+    found = registered(pictures, cameras, matched, options.seed, cache, progress)
+    check_connected(found, frame.names, options.require_all)
+    left_out = tuple((frame.names[number], why) for number, why in found.left_out.items())
+    warnings = (*warnings, *(f"{name} is left out: {why}" for name, why in left_out))
+    found = seen_from(found, options.viewpoint, frame.names, frame.shown_by)
+    if len(found.numbers) == 2:
+        pair = estimate_geometry([frame.only(found.numbers)], replace(options, viewpoint=None), progress)
+        return replace(pair, warnings=(*warnings, *pair.warnings), numbers=found.numbers, left_out=left_out)
+    edges = edges_of(found.rig, matched, found.numbers)
+    return Geometry(found.rig.cameras, edges, warnings, found.numbers, found.rig, left_out)
 
 
 def _estimated(ideal: Matches, cameras: tuple[Camera, ...], seed: int, pictures: Sequence[Picture]) -> TwoView:
@@ -250,6 +265,8 @@ def fit_and_warp(
     NoOverlap, OutputTooLarge, BadRequest
         There is no canvas for it (see `build_warp`).
     """
+    if geometry.rig is not None:
+        return _many_mapped(geometry, geometry.rig, frames[0], options, progress)
     cameras = geometry.cameras
     (edge,) = geometry.edges
     progress("field", 0.0)
@@ -276,8 +293,25 @@ def fit_and_warp(
     mapped = map_pictures(field, views, refined, frames[0].pictures, shown, progress)
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(
-        cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide
-    )
+        cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide,
+        left_out=geometry.left_out,
+    )  # fmt: skip
+
+
+def _many_mapped(
+    geometry: Geometry, rig: Rig, frame: Frame, options: StitchOptions, progress: ReportProgress
+) -> Alignment:
+    """The second half of `align` for the pictures of a rig."""
+    progress("field", 0.0)
+    slack = options.field == "slack"
+    field = Cache(options.cache).remember("sphere", (rig, slack), lambda: fit_sphere_field(rig, slack))
+    progress("warp", 0.0)
+    mapped = map_rig(rig, field, frame.pictures, options, progress)
+    warnings = (*geometry.warnings, *field.warnings)
+    return Alignment(
+        geometry.cameras, geometry.edges, rig.views, field, mapped.warp, warnings, None, mapped.continuation,
+        mapped.slide, rig, geometry.left_out,
+    )  # fmt: skip
 
 
 def _refined(
@@ -289,12 +323,6 @@ def _refined(
     if not isinstance(field, (StrictField, SlackField)):
         return Dense(None, f"the field {field.name!r} is shown as it is")
     return refine(field, field.two_view, inliers, edge.pair(frames[0].pictures), cameras)
-
-
-def size_of(picture: Picture) -> tuple[int, int]:
-    """(W, H) px of a picture."""
-    height, width = picture.light.shape[:2]
-    return width, height
 
 
 def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:
@@ -328,17 +356,9 @@ def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
 
 def _given(source: Path | NDArray[Any], frame: Frame, cameras: tuple[Camera, ...]) -> Matches:
     """Matches from a file or array, at the scale of the work, without those in masked parts."""
-    matches = read_matches(source, frame.full_sizes[0], frame.full_sizes[1], (cameras[0].size, cameras[1].size))
-    seen = _shown(frame.pictures[0], matches.x) & _shown(frame.pictures[1], matches.y)
+    worked, names = (cameras[0].size, cameras[1].size), (frame.names[0], frame.names[1])
+    matches = read_matches(source, frame.full_sizes[0], frame.full_sizes[1], worked, names)
+    seen = frame.pictures[0].shows(matches.x) & frame.pictures[1].shows(matches.y)
     if not seen.any():
         raise NoOverlap("all the given matches lie in parts of the pictures that are masked or transparent")
     return matches.subset(seen)
-
-
-def _shown(picture: Picture, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which points (N, 2) px lie where the picture is not transparent (N,)."""
-    if picture.alpha is None:
-        return np.ones(len(points), bool)
-    column, row = np.clip(np.rint(points).astype(int), 0, np.array(size_of(picture)) - 1).T
-    opaque: NDArray[np.bool_] = picture.alpha[row, column] > 0
-    return opaque

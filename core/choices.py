@@ -19,6 +19,8 @@ FADES = ("continue", "plane", "infinity")
 PROJECTIONS = ("auto", "reference", "perspective", "pannini", "cylindrical", "equirectangular")
 # How far the viewpoint slides from the reference's place to the target's: chosen, or a share from 0 to 1.
 Slide = str | float
+# The viewpoint that is the picture best connected with all others.
+CENTRE = "centre"
 # How a panorama that is not on the reference's plane is turned: one of LEVELS, or yaw, pitch, roll in degrees.
 LEVELS = ("auto", "none")
 Level = str | tuple[float, float, float]

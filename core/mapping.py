@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .cameras.rig import Rig
 from .cameras.view import View
 from .compose.cut_things import without_cut_things
 from .compose.rough_seam import RoughSeam
@@ -21,13 +22,16 @@ from .field.field import Field
 from .field.refined_depth import RefinedDepth
 from .field.remembered import Remembered
 from .field.slack import SlackField
+from .field.sphere_field import SphereField
 from .field.strict import StrictField
 from .options import StitchOptions
-from .panorama.choosing_slide import NO_WAY, SlideChoice, choose_slide
+from .panorama.choosing_slide import NO_WAY, SlideChoice, choose_rig_slide, choose_slide
 from .panorama.framing import FrameRequest, frame_for
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
+from .panorama.rig_viewpoint import RigViewpoint, rig_viewpoint
+from .panorama.rig_warp import build_rig_warp, outline_of
 from .panorama.slid_warp import slid_warp
 from .panorama.upright_edges import StraightEdges, straight_edges
 from .panorama.viewpoint import Viewpoint, viewpoint_between
@@ -135,10 +139,7 @@ def map_pictures(
         return slid_warp(sliding.base, views, sliding.viewpoint, projection)
 
     progress("warp", 0.4)
-    kind, distance = options.surface
-    asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
-    edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
-    frame = frame_for(asked, views, edges, down, coarsely)
+    frame = _frame(lines, options, coarsely)
     progress("warp", 0.5)
     if sliding is None:
         warp = known.on(frame)
@@ -148,6 +149,74 @@ def map_pictures(
         base = known.base(lines.down, focal_of(views[0].K), cache)
         warp = slid_warp(base, views, sliding.viewpoint, frame)
     return Mapped(_settled(warp, known, pictures), continuation, slide)
+
+
+def map_rig(
+    rig: Rig, field: SphereField, pictures: Sequence[Picture], options: StitchOptions, progress: ReportProgress
+) -> Mapped:
+    """Choose a frame, and map N pictures onto the canvas, seen from the first one's place.
+
+    Parameters
+    ----------
+    rig : Rig
+    field : SphereField
+        Fitted to its points.
+    pictures : sequence of Picture
+        In the rig's order.
+    options : StitchOptions
+        Projection, level, centre and fov.
+    progress : callable
+        progress(stage, share of that stage that is done).
+
+    Returns
+    -------
+    Mapped
+
+    Raises
+    ------
+    NoOverlap, OutputTooLarge, BadRequest
+        There is no canvas for it (see `build_rig_warp`).
+    """
+    views = rig.views
+    progress("warp", 0.0)
+    if options.surface[0] == "reference":
+        still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
+        return Mapped(build_rig_warp(field, views), None, still)
+    lines = AllEdges(pictures, views)
+    slide, viewpoint = _rig_slide(field, lines, options, lambda share: progress("warp", 0.3 * share))
+    progress("warp", 0.3)
+    frame = _frame(lines, options, lambda projection: build_rig_warp(field, views, projection, viewpoint))
+    progress("warp", 0.5)
+    return Mapped(build_rig_warp(field, views, frame, viewpoint), None, slide)
+
+
+def _rig_slide(
+    field: SphereField, lines: AllEdges, options: StitchOptions, progress: Callable[[float], None]
+) -> tuple[SlideChoice, RigViewpoint | None]:
+    """How far the viewpoint slides among the places of N pictures, as asked for or chosen; None where it stays."""
+    asked, views = options.slide, lines.views
+    if not asked:
+        return SlideChoice(0.0, (), "as asked for"), None
+    if not any(view.t.any() for view in views):
+        return SlideChoice(0.0, (), "the pictures were taken from one place"), None
+    if asked == "auto" and options.surface[0] == "equirectangular":
+        return SlideChoice(0.0, (), "a sphere is seen from one place, unless asked otherwise"), None
+    axes = upright(lines.down)
+    viewpoint = rig_viewpoint(views, [outline_of(field, view) for view in views], axes)
+    if asked != "auto":
+        return SlideChoice(float(asked), (), "as asked for"), viewpoint.sliding(float(asked))
+    cylinder = round_projection("cylindrical", views[0].K, axes, CHOICE.base_px_per_radian)
+    base = build_rig_warp(field, views, cylinder)
+    choice = choose_rig_slide(base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None, progress)
+    return choice, viewpoint.sliding(choice.s1) if choice.s1 else None
+
+
+def _frame(lines: AllEdges, options: StitchOptions, warp_on: Callable[[Projection], Warp]) -> Projection:
+    """The frame that is asked for; warp_on: coarse maps of all pictures on a projection."""
+    kind, distance = options.surface
+    asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
+    edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
+    return frame_for(asked, lines.views, edges, down, warp_on)
 
 
 def _settled(warp: Warp, known: _Known, pictures: Sequence[Picture]) -> Warp:

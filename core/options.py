@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from .cameras.sources import CameraRequest
 from .choices import (
     BLENDS,
+    CENTRE,
     CROPS,
     EXPOSURES,
     FADES,
@@ -27,6 +29,7 @@ from .choices import (
     Level,
     Slide,
 )
+from .pictures.naming import number_of
 from .system.errors import BadRequest
 
 # Below a fiftieth of its side a photograph has too few pixels for features.
@@ -53,6 +56,13 @@ class StitchOptions:
     ignore : tuple of (Path, ndarray or None), default empty
         For each picture, the reference first, a mask of what is kept out of everything, white = ignored. None, and what
         is not named: nothing.
+    ignore_in : tuple of (str, Path or ndarray), default empty
+        The same by the names of pictures, with or without their suffix.
+    viewpoint : int, str or None, default None
+        The picture from whose place a panorama of more than two is seen: its number, counted from 1, its name, or
+        "centre" for the one that is best connected with all others. By default the first that connects with others.
+    require_all : bool, default False
+        Whether a picture that connects with no others is an error, and not left out.
     slide : float or "auto", default "auto"
         How far the viewpoint slides from the reference's place to the target's across the overlap: 0 stays, 1 goes all
         the way, "auto" chooses (docs/method.md).
@@ -101,6 +111,9 @@ class StitchOptions:
     camera: CameraRequest = CameraRequest()
     matches: Path | NDArray[Any] | None = None
     ignore: tuple[Path | NDArray[Any] | None, ...] = ()
+    ignore_in: tuple[tuple[str, Path | NDArray[Any]], ...] = ()
+    viewpoint: int | str | None = None
+    require_all: bool = False
     slide: Slide = "auto"
     projection: str = "auto"
     level: Level = "auto"
@@ -119,8 +132,33 @@ class StitchOptions:
     cache: Path | None = dataclasses.field(default=None, compare=False)
 
     def ignored(self, number: int) -> Path | NDArray[Any] | None:
-        """The mask of what is to be kept out of picture `number`."""
+        """The mask of what is to be kept out of picture `number`, by its number."""
         return self.ignore[number] if number < len(self.ignore) else None
+
+    def ignored_in(self, names: Sequence[str]) -> list[Path | NDArray[Any] | None]:
+        """The mask of each of the pictures of these names. Raises BadRequest about a name that none of them has."""
+        masks = [self.ignored(number) for number in range(len(names))]
+        for name, mask in self.ignore_in:
+            masks[number_of(name, names, "--ignore")] = mask
+        return masks
+
+    def check_goes_with(self, count: int) -> None:
+        """Raises BadRequest where an option makes no sense for so many pictures."""
+        if count == 2:
+            if self.viewpoint not in (None, 1, CENTRE):
+                raise BadRequest("of two pictures the first is the viewpoint: name the other one first")
+            return
+        unfit = {
+            f"the field {self.field!r}": (self.field not in ROUND_FIELDS, f"choose from: {', '.join(ROUND_FIELDS)}"),
+            "a painted mask": (self.mask is not None, "name what is not to be shown by --ignore NAME=MASK"),
+            "the fade to infinity": (self.fade == "infinity", "choose --fade continue"),
+            "a value for either of two cameras": (
+                self.camera.of_two, "give one for all pictures, or each its own by --cameras FILE.json"
+            ),
+        }  # fmt: skip
+        for what, (given, advice) in unfit.items():
+            if given:
+                raise BadRequest(f"{what} is for two pictures only, and {count} are given: {advice}")
 
     @property
     def surface(self) -> tuple[str, float | None]:
@@ -160,7 +198,7 @@ class StitchOptions:
     @property
     def files_read(self) -> list[Path]:
         """The files that these options name."""
-        named = (self.camera.cameras, self.matches, *self.ignore, self.mask)
+        named = (self.camera.cameras, self.matches, *self.ignore, *(mask for _, mask in self.ignore_in), self.mask)
         return [Path(one) for one in named if isinstance(one, (str, Path))]
 
     def __post_init__(self) -> None:
@@ -177,6 +215,8 @@ class StitchOptions:
             raise BadRequest(f"a scale of {self.scale:g}: it must lie between {LEAST_SCALE:g} and 1 (the full size)")
         if not 0 <= self.seed < 2**31:
             raise BadRequest("the seed must be a whole number from 0 to 2147483647")
+        if isinstance(self.viewpoint, int) and self.viewpoint < 1:
+            raise BadRequest(f"the viewpoint {self.viewpoint}: pictures are counted from 1")
         self._check_projection()
         self._check_level()
         self._check_frame()

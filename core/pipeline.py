@@ -9,48 +9,51 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .alignment import Alignment, Frame, estimate_geometry, fit_and_warp, prepare
+from .alignment import Alignment, estimate_geometry, fit_and_warp
 from .cameras.camera import Camera
 from .cameras.edge import Edge
 from .cameras.matches import Matches
+from .cameras.rig import Rig
 from .cameras.view import View
-from .compose.composition import Composition, Decided, composed
+from .compose.composition import Composition, composed
 from .compose.crop import crop_box
+from .compose.decided import Decided
 from .field.field import Field
+from .field.sphere_field import SphereField
+from .frames.frame import Frame
+from .frames.reading import Source, read_frame
 from .measure.fallback import first_usable
+from .measure.look import look_at
 from .measure.metrics import appearance
 from .measure.report import make_report
-from .measure.verdict import judge, look_at
+from .measure.rig_report import make_rig_report
+from .measure.verdict import judge
 from .options import StitchOptions
 from .panorama.canvas import Canvas
 from .panorama.layers import Layer, layer_of
 from .panorama.warp import Warp
 from .pictures.masks import has_shape, painted_over
-from .pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
+from .pictures.picture import Picture
 from .raster.arrays import Box, box_of, common, cut
 from .raster.resizing import resized_points
-from .system.errors import BadRequest, NoOverlap
-from .system.progress import Progress
-from .system.threads import in_order
-
-# What can be stitched: a file's name, an array, or a Picture that was read already.
-Source = str | Path | NDArray[Any] | Picture
+from .system.errors import BadRequest
+from .system.progress import STAGES, STAGES_OF_MANY, Progress
 
 
 @dataclass(frozen=True)
 class StitchResult:
     """A finished panorama and everything it was made of.
 
-    Tuples hold one entry for each picture, the reference first. Scale and crop are done: px are those of the panorama,
-    and of the pictures as they were worked on. `warp`, `layers`, `occluded` and `labels` lie on `warp.canvas` (H, W).
-    That is `canvas`, but of a whole sphere only the part that the pictures cover (see `spread`).
+    Tuples hold one entry for each picture that is used, the reference first: of many, the viewpoint's. Scale and crop
+    are done: px are those of the panorama, and of the pictures as they were worked on. `warp`, `layers`, `occluded` and
+    `labels` lie on `warp.canvas` (H, W). That is `canvas`, but of a whole sphere only the part that the pictures cover
+    (see `spread`).
 
     Attributes
     ----------
@@ -76,10 +79,12 @@ class StitchResult:
         Pairs of pictures with their geometry and all matches, before inliers were chosen.
     views : tuple of View
         Each picture's place relative to the reference.
-    field : Field
+    field : Field or SphereField
         The displacement field.
     cameras : tuple of Camera
-        As they were known before estimation.
+        As they were known before estimation; of more than two pictures, as they were estimated.
+    rig : Rig or None
+        The cameras and points of more than two pictures.
     warnings : tuple of str
         In plain words.
     report : dict
@@ -101,12 +106,13 @@ class StitchResult:
     decided: tuple[Decided, ...]
     edges: tuple[Edge, ...]
     views: tuple[View, ...]
-    field: Field
+    field: Field | SphereField
     cameras: tuple[Camera, ...]
     warnings: tuple[str, ...]
     report: dict[str, Any]
     seconds: dict[str, float]
     full_sizes: tuple[tuple[int, int], ...]
+    rig: Rig | None = None
 
     @property
     def pixels(self) -> NDArray[np.float32]:
@@ -119,9 +125,18 @@ class StitchResult:
         return self.panorama.alpha.astype(np.float32)
 
     @property
+    def pair_field(self) -> Field:
+        """The displacement field of a pair."""
+        assert not isinstance(self.field, SphereField)
+        return self.field
+
+    @property
     def full_matches(self) -> Matches:
-        """All matches, before any was left out, in px of the full pictures."""
-        edge = self.edges[0]
+        """All matches of a pair, before any was left out, in px of the full pictures."""
+        return self.matches_of(self.edges[0])
+
+    def matches_of(self, edge: Edge) -> Matches:
+        """The same of one of its edges."""
         matches = edge.matches
         sides = zip((matches.x, matches.y), edge.pair(self.cameras), edge.pair(self.full_sizes), strict=True)
         x, y = (resized_points(points, camera.size, full) for points, camera, full in sides)
@@ -129,13 +144,19 @@ class StitchResult:
 
     @property
     def used_matches(self) -> Matches:
-        """The matches that the field stands on, in px of the full pictures."""
+        """The matches of a pair that the field stands on, in px of the full pictures."""
         return self.full_matches.subset(self.used)
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Which of all matches the field stands on (N,), bool."""
-        inliers = self.edges[0].two_view.inliers
+        """Which of all matches of a pair the field stands on (N,), bool."""
+        return self.used_of(self.edges[0])
+
+    def used_of(self, edge: Edge) -> NDArray[np.bool_]:
+        """The same of one of its edges; of more than two pictures, which are points of the rig."""
+        inliers = edge.two_view.inliers
+        if isinstance(self.field, SphereField):
+            return inliers
         used = np.zeros(len(inliers), bool)
         used[np.flatnonzero(inliers)[self.field.fit.inliers_used]] = True
         return used
@@ -176,15 +197,16 @@ def stitch(
     progress: Callable[[str, float], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> StitchResult:
-    """Stitches pictures into one panorama, seen from where the first of them was taken, or from there on (see `slide`).
+    """Stitches pictures into one panorama, seen from where the first of them was taken, or from there on (see `slide`
+    and `viewpoint`). Of more than two, those that connect with no others are left out, and named in the warnings.
 
-    Where that is not usable (see `measure.verdict`) and something simpler is, the simpler one is the result.
+    Where a pair's is not usable (see `measure.verdict`) and something simpler is, the simpler one is the result.
 
     Parameters
     ----------
     pictures
-        Files, arrays (see `picture_from_array`: 8 and 16 bit display-encoded, float scene-linear; RGB(A) or gray), or
-        Pictures; the first is the reference. Two, for now.
+        2 to 60 files, arrays (see `picture_from_array`: 8 and 16 bit display-encoded, float scene-linear; RGB(A) or
+        gray), or Pictures. Of two the first is the reference; more may come in any order.
     options
         What may be chosen; the defaults are right for photographs of one camera.
     progress
@@ -206,55 +228,17 @@ def stitch(
     if isinstance(pictures, (str, Path, np.ndarray, Picture)):
         raise BadRequest("stitch() takes its pictures as a list: stitch([left, right], options)")
     options = options or StitchOptions()
-    stopwatch = Stopwatch(Progress(progress, cancelled))
+    stopwatch = Stopwatch(Progress(progress, cancelled, STAGES if len(pictures) == 2 else STAGES_OF_MANY))
 
     stopwatch("read")
     frame = read_frame(pictures, options)
     geometry = estimate_geometry([frame], options, stopwatch)
+    frame = frame.only(geometry.numbers)
 
     def made(by: StitchOptions) -> StitchResult:
         return compose(frame, fit_and_warp(geometry, [frame], by, stopwatch), by, stopwatch)
 
-    return first_usable(made, options)
-
-
-def check_count(count: int) -> None:
-    """Refuses (BadRequest) as many pictures as cannot be stitched."""
-    if count < 2:
-        raise BadRequest("one picture alone makes no panorama: give two that were taken from different places")
-    if count > 2:
-        raise BadRequest(f"{count} pictures given: two at a time for now; stitch them pair by pair")
-
-
-def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
-    """Reads the pictures of one panorama and brings them into one colour space.
-
-    Parameters
-    ----------
-    sources : sequence of (str, Path, ndarray or Picture)
-        The first is the reference.
-    options : StitchOptions
-        Their scale and masks.
-
-    Returns
-    -------
-    Frame
-
-    Raises
-    ------
-    UnreadableImage
-        A file is no picture, or damaged.
-    BadRequest
-        A wrong number of pictures, or a mask that does not fit.
-    NoOverlap
-        The same picture twice.
-    """
-    check_count(len(sources))
-    pictures = in_same_colour_space(list(in_order(_picture, sources)))
-    views = [picture.view for picture in pictures]
-    if any(np.array_equal(one, other) for one, other in combinations(views, 2)):
-        raise NoOverlap("the two pictures are the same picture: choose two photographs taken from different places")
-    return prepare(pictures, options)
+    return first_usable(made, options) if geometry.rig is None else made(options)
 
 
 def compose(
@@ -313,11 +297,13 @@ def compose(
 
     progress("write", 0.0)
     hidden = np.logical_or.reduce([one.hidden for one in made.decided])
-    report, more = make_report(
+    told = (
         options, pictures, alignment, canvas, made.decided, looks, panorama.alpha > 0, int(made.filled.sum()),
         int((hidden & (made.panorama.alpha == 0)).sum()),
     )  # fmt: skip
-    warnings = (*(line for picture in pictures for line in _named(picture)), *alignment.warnings, *more)
+    report, more = make_report(*told) if alignment.rig is None else make_rig_report(*told, labels)
+    named = (line for picture in pictures for line in _named(picture))
+    warnings = (*frame.warnings, *named, *alignment.warnings, *more)
     report["warnings"] = list(warnings)
     warp, occluded = whole.within(box), tuple(cut(one.hidden, box) for one in made.decided)
     labels = None if labels is None else cut(labels, box, -1)
@@ -330,7 +316,7 @@ def compose(
         warp=warp, occluded=occluded, labels=labels, inpainted=cut(made.filled, box),
         decided=made.decided, edges=alignment.edges, views=alignment.views, field=alignment.field,
         cameras=alignment.cameras, warnings=warnings, report=report, seconds=progress.seconds,
-        full_sizes=frame.full_sizes,
+        full_sizes=frame.full_sizes, rig=alignment.rig,
     )  # fmt: skip
 
 
@@ -348,13 +334,6 @@ class Stopwatch:
             self.seconds[self._stage] = self.seconds.get(self._stage, 0.0) + now - self._since
         self._stage, self._since = stage, now
         self._progress(stage, fraction)
-
-
-def _picture(source: Source) -> Picture:
-    """A picture, read where it is not one yet."""
-    if isinstance(source, Picture):
-        return source
-    return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
 
 
 def _on_canvas(painted: NDArray[np.int8], canvas: Canvas, place: Box) -> NDArray[np.int8]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..core.alignment import Frame, Geometry, estimate_geometry, fit_and_warp
+from ..core.alignment import Geometry, estimate_geometry, fit_and_warp
 from ..core.cameras.sources import CameraRequest
 from ..core.choices import RIVALS, Slide
+from ..core.frames.frame import Frame
+from ..core.frames.reading import read_frame
 from ..core.options import StitchOptions
-from ..core.pipeline import StitchResult, Stopwatch, compose, read_frame
+from ..core.pipeline import StitchResult, Stopwatch, compose
 from ..core.system.progress import Progress
 from .rendered import RenderedPair
 

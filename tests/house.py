@@ -17,14 +17,14 @@ ADDON = ROOT / "edf_addon"
 # Which rooms each may import, itself left out. Rooms stand in the order of the data.
 BELOW_POSE = ("system", "raster", "pictures", "cameras")
 BELOW_MEASURE = (*BELOW_POSE, "pose", "rig", "field", "dense", "continuation", "panorama", "compose")
-TOP = ("choices", "options", "fields", "mapping", "alignment", "pipeline")
+TOP = ("frames", "choices", "options", "fields", "mapping", "alignment", "pipeline")
 MAY_IMPORT = {
     "system": (),
     "raster": ("system",),
     "pictures": ("system", "raster"),
     "cameras": ("system", "raster", "pictures"),
     "pose": BELOW_POSE,
-    "rig": (*BELOW_POSE, "pose"),
+    "rig": (*BELOW_POSE, "pose", "choices"),
     "field": ("system", "raster", "cameras"),
     "rivals": ("system", "raster", "cameras", "pose", "field"),
     "dense": (*BELOW_POSE, "field"),
@@ -37,11 +37,12 @@ MAY_IMPORT = {
     "compare": (*BELOW_MEASURE, "measure", "output", *TOP),
     "commands": (*BELOW_MEASURE, "measure", "rivals", "output", "batch", "compare", *TOP),
     "choices": (),
-    "options": ("system", "cameras", "choices"),
+    "options": ("system", "pictures", "cameras", "choices"),
+    "frames": (*BELOW_POSE, "options"),
     "fields": ("cameras", "field", "rivals"),
     "mapping": (*BELOW_MEASURE, "choices", "options"),
-    "alignment": (*BELOW_MEASURE, "options", "fields", "mapping"),
-    "pipeline": (*BELOW_MEASURE, "measure", "options", "alignment"),
+    "alignment": (*BELOW_MEASURE, "frames", "options", "fields", "mapping"),
+    "pipeline": (*BELOW_MEASURE, "frames", "measure", "options", "alignment"),
 }
 # The same for the add-on. What lies beside its rooms is known to all of them, or to those after it.
 BESIDE = ("idnames", "offered", "pair", "properties", "earlier", "engine_options", "status", "editor", "explain")

@@ -1,4 +1,4 @@
-"""The list of a batch: pairs of pictures and frame ranges of two fixed cameras, from a CSV file."""
+"""The list of a batch: pictures of one panorama each, and frame ranges of two fixed cameras, from a CSV file."""
 
 from __future__ import annotations
 
@@ -12,15 +12,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..cameras.sources import CameraRequest
+from ..pictures.listing import listed
 from ..system.errors import BadRequest
 from ..system.text_files import read_lines
 from .options import CLIP
 
 COLUMNS = ("reference", "target", "name", "first", "last", "step", "focal_px", "focal35")
 _LAYOUT = (
-    "each line holds reference,target and optionally a name; a header names the columns in any order, from: "
-    + ", ".join(COLUMNS)
+    "each line holds reference,target and optionally a name, or one folder of pictures; a header names the columns in "
+    f"any order, from: {', '.join(COLUMNS)}, and picture3, picture4 and so on for more than two"
 )
+# Columns of the third picture and of those after it.
+_FURTHER = re.compile(r"picture([3-9]|[1-5]\d|60)")
 # Where the frame's number stands in a file's name: %d, %04d, or #### as Blender and Nuke have it.
 _PLACE = re.compile(r"%(?:0(\d{1,2}))?d|#{2,}")
 _NOT_IN_NAMES = re.compile(r'[\x00-\x1f/\\:*?"<>|]')
@@ -28,11 +31,12 @@ _NOT_IN_NAMES = re.compile(r'[\x00-\x1f/\\:*?"<>|]')
 
 @dataclass(frozen=True)
 class BatchItem:
-    """One line of a list: a pair of pictures, or a clip of two cameras that stand still.
+    """One line of a list: pictures of one panorama, or a clip of two cameras that stand still.
 
     name: of its outputs; reference, target: files, or for clips patterns like a_%04d.png or a_####.png; frames: the
-    numbers that both sides have, None for a pair; missing: expected numbers that one side or both lack; camera: what
-    this line says about the cameras, instead of the options. Raises BadRequest for a name that no file can have.
+    numbers that both sides have, None for pictures; missing: expected numbers that one side or both lack; camera: what
+    this line says about the cameras, instead of the options; more: pictures beyond two. Raises BadRequest for a name
+    that no file can have.
     """
 
     name: str
@@ -41,6 +45,7 @@ class BatchItem:
     frames: tuple[int, ...] | None = None
     missing: tuple[int, ...] = ()
     camera: CameraRequest | None = None
+    more: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         found = _NOT_IN_NAMES.search(self.name)
@@ -60,10 +65,10 @@ class BatchItem:
         count = min(len(frames), CLIP.aligned_frames)
         return tuple(frames[round(i * (len(frames) - 1) / max(1, count - 1))] for i in range(count))
 
-    def pair(self, frame: int | None = None) -> tuple[Path, Path]:
-        """The two files; of a clip, those of a frame."""
+    def files(self, frame: int | None = None) -> tuple[Path, ...]:
+        """The files of its pictures; of a clip, those of a frame."""
         if frame is None:
-            return self.reference, self.target
+            return self.reference, self.target, *self.more
         return _with_number(self.reference, frame), _with_number(self.target, frame)
 
     def numbered(self, frame: int) -> str:
@@ -74,7 +79,8 @@ class BatchItem:
 def read_list(path: str | Path) -> list[BatchItem]:
     """Reads a list: a CSV file in UTF-8, separated by commas, semicolons or tabs.
 
-    A header names columns out of COLUMNS; without one they are reference, target and perhaps name. Empty lines and
+    A header names columns out of COLUMNS, and picture3, picture4 and so on; without one they are reference, target and
+    perhaps name. A folder or a pattern like IMG_*.jpg without a target stands for all its pictures. Empty lines and
     those that start with # are skipped. Relative paths start at the list's folder. A missing name is derived from the
     reference's. first, last and step select frames of patterns; without them all frames found are meant.
 
@@ -214,6 +220,9 @@ def _find_frames(
 
 
 def _item(row: dict[str, str], folder: Path, folders: _Folders) -> BatchItem:
+    alone = folder / row.get("reference", "")
+    if row.get("reference") and not row.get("target") and (alone.is_dir() or re.search(r"[*?\[]", alone.name)):
+        return _set(row, alone)
     for column in ("reference", "target"):
         if not row.get(column):
             raise BadRequest(f"the {column} is missing; {_LAYOUT}")
@@ -222,17 +231,29 @@ def _item(row: dict[str, str], folder: Path, folders: _Folders) -> BatchItem:
             raise BadRequest(f"{row[column]}: the frame's number may stand in the file's name, not in a folder's")
     reference, target = folder / row["reference"], folder / row["target"]
     camera = _camera(row)
+    more = tuple(folder / row[column] for column in row if _FURTHER.fullmatch(column) and row[column])
     span = {column: _whole_number(row[column], column) for column in ("first", "last", "step") if row.get(column)}
     if _is_pattern(reference) != _is_pattern(target):
         raise BadRequest("one side is a pattern of frames and the other is not; both need to be")
     if not _is_pattern(reference):
         if span:
             raise BadRequest(f"{' and '.join(span)} given, but the files are no patterns like a_%04d.png or a_####.png")
-        return BatchItem(row.get("name") or reference.stem, reference, target, camera=camera)
+        return BatchItem(row.get("name") or reference.stem, reference, target, camera=camera, more=more)
+    if more:
+        raise BadRequest("a clip has two cameras for now, and this line names more; stitch it pair by pair")
     frames, missing = _find_frames(
         reference, target, span.get("first"), span.get("last"), span.get("step", 1), folders
     )
     return BatchItem(row.get("name") or _clip_name(reference), reference, target, frames, missing, camera)
+
+
+def _set(row: dict[str, str], source: Path) -> BatchItem:
+    """The item of a folder or pattern that stands for all its pictures."""
+    files = listed([source])
+    if len(files) < 2:
+        raise BadRequest(f"{source}: only one picture ({files[0].name}); a panorama needs two or more")
+    name = row.get("name") or (source.resolve().name if source.is_dir() else files[0].stem)
+    return BatchItem(name, files[0], files[1], camera=_camera(row), more=tuple(files[2:]))
 
 
 def _clip_name(reference: Path) -> str:
@@ -289,7 +310,7 @@ def _columns(cells: list[str]) -> tuple[tuple[str, ...], bool]:
         if column not in names:
             raise BadRequest(f"the header lacks {column}; {_LAYOUT}")
     for at, name in enumerate(names):
-        if name not in COLUMNS:
+        if name not in COLUMNS and not _FURTHER.fullmatch(name):
             raise BadRequest(f"the header names a column {cells[at]!r} that is not known; {_LAYOUT}")
         if name in names[:at]:
             raise BadRequest(f"the header names the column {name} twice")

@@ -12,12 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment import Alignment, Frame, align
-from ..compose.composition import Decided, pooled_decision
+from ..alignment import Alignment, align
+from ..compose.decided import Decided
+from ..compose.pooling import pooled_decision
+from ..frames.frame import Frame
+from ..frames.reading import read_frame
 from ..options import StitchOptions
 from ..output.outputs import json_bytes
 from ..pictures.picture import Picture
-from ..pipeline import StitchResult, Stopwatch, compose, read_frame, stitch
+from ..pipeline import StitchResult, Stopwatch, compose, stitch
 from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage
 from ..system.progress import Progress
 from .list import BatchItem
@@ -312,14 +315,14 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
     quick = replace(options, crop="full", measure=False)
     decided = pooled_decision([
         compose(
-            read_frame(item.pair(number), options), alignment, quick, meter.stopwatch(CLIP.frame_weight), keep=True
+            read_frame(item.files(number), options), alignment, quick, meter.stopwatch(CLIP.frame_weight), keep=True
         ).decided
         for number in used
     ])
     reports = [unit for unit in job.todo if unit.frame is None]
     crop = options.crop
     if reports or crop == "inscribed":
-        frame = read_frame(item.pair(first), options)
+        frame = read_frame(item.files(first), options)
         result = compose(frame, alignment, options, meter.stopwatch(CLIP.frame_weight), decided)
         if crop == "inscribed":  # one frame decides for all: the frames of a clip have one size
             whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
@@ -337,7 +340,7 @@ def _readable(item: BatchItem, options: StitchOptions, progress: Stopwatch) -> d
     for at, number in enumerate(item.aligned_on):
         progress("read", at / len(item.aligned_on))
         try:
-            frame = _without_light(read_frame(item.pair(number), options))
+            frame = _without_light(read_frame(item.files(number), options))
         except StitchError as trouble:  # reported when it is the frame's turn
             troubles.append(trouble)
             continue

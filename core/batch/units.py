@@ -20,7 +20,15 @@ from typing import Any
 import numpy as np
 
 from ..options import StitchOptions
-from ..output.outputs import OutputRequest, add_report, json_bytes, layer_files, warp_bytes, write
+from ..output.outputs import (
+    CANVAS,
+    OutputRequest,
+    add_report,
+    json_bytes,
+    layer_files,
+    warp_bytes,
+    write,
+)
 from ..pictures.encoding import output_bits
 from ..pipeline import StitchResult
 from ..system.errors import BadRequest, UnreadableImage, UnwritableOutput
@@ -96,17 +104,18 @@ class Unit:
                 [path.name for path in self.pictures], seam=self.options.has_seam,
                 inpainted=self.options.fills_holes, slides=self.options.may_slide,
             )  # fmt: skip
-            out += [self._layers / name for name in names]
+            # of more than two, which is numbered how is known only when they are stitched
+            out += [self._layers / name for name in (names if len(self.pictures) == 2 else [CANVAS])]
         if self.report:
             out += [self.report, self._named(".matches.csv"), self._named(".timing.json")]
             out += [self._named(".warp.npz")] if self.request.warp else []
         return out
 
     @property
-    def pictures(self) -> tuple[Path, Path]:
-        """The two files; for a clip's report those of its first frame."""
+    def pictures(self) -> tuple[Path, ...]:
+        """The files of its pictures; for a clip's report those of its first frame."""
         frames = self.item.frames
-        return self.item.pair(frames[0] if self.frame is None and frames else self.frame)
+        return self.item.files(frames[0] if self.frame is None and frames else self.frame)
 
     def write(self, result: StitchResult) -> list[str]:
         """Writes all files or none; returns all warnings. Raises UnwritableOutput and BadRequest."""
@@ -264,7 +273,7 @@ def _options_for(item: BatchItem, options: StitchOptions) -> StitchOptions:
 
 def _units(item: BatchItem, options: StitchOptions, request: BatchRequest, version: str) -> Iterator[Unit]:
     decided = [version, asdict(replace(options, cache=None)), request.suffix.lower(), request.warp, request.layers]
-    shared = [path for frame in item.aligned_on for path in item.pair(frame)]
+    shared = [path for frame in item.aligned_on for path in item.files(frame)]
     known = [*decided, *(_identity(path) for path in (*options.files_read, *shared))]
     frames: Sequence[int | None] = (None,) if item.frames is None else (None, *item.frames)
     for frame in frames:

@@ -49,7 +49,7 @@ def normalisation(points: Array) -> Array:
 def skew(v: Array) -> Array:
     """The matrices (…, 3, 3) that take the cross product with vectors (…, 3) from the left."""
     out = np.zeros((*v.shape, 3))
-    x, y, z = np.moveaxis(v, -1, 0)
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
     return out

@@ -144,4 +144,3 @@ class Registration:
     rig: Rig
     numbers: tuple[int, ...]
     left_out: dict[int, str]
-    warnings: tuple[str, ...] = ()

@@ -38,6 +38,12 @@ class CameraRequest:
     principal: tuple[float, ...] = ()
     cameras: str | Path | dict[str, Any] | None = None
 
+    @property
+    def of_two(self) -> bool:
+        """Whether a value is that of one of two pictures."""
+        focals = (self.focal_px, self.focal_mm, self.sensor_mm, self.focal35)
+        return any(len(values) == 2 for values in focals) or len(self.principal) == 4
+
     def __post_init__(self) -> None:
         ways = [self.focal_px, self.focal_mm, self.focal35, (self.cameras,) if self.cameras is not None else ()]
         if sum(bool(way) for way in ways) > 1:
@@ -63,6 +69,11 @@ class CameraRequest:
 def role(number: int) -> str:
     """What messages and camera files call a picture."""
     return "reference" if number == 0 else "target"
+
+
+def called(number: int, names: Sequence[str]) -> str:
+    """What messages call one of these pictures: of two by its role, of more by its name."""
+    return f"the {role(number)}" if len(names) == 2 else names[number]
 
 
 def cameras_for(
@@ -97,13 +108,14 @@ def cameras_for(
         The camera file cannot be read.
     """
     warnings: list[str] = []
+    held: Sequence[Camera | None] = [None] * len(names)
     if request.cameras is not None:
-        cameras = read_camera_file(request.cameras, names, sizes)
-    else:
-        cameras = [
-            _one_camera(request, number, size, exif, warnings)
-            for number, (size, exif) in enumerate(zip(sizes, exifs, strict=True))
-        ]
+        held = read_camera_file(request.cameras, names, sizes)
+    cameras = [
+        camera or _one_camera(request, called(number, names), number, size, exif, warnings)
+        for number, (camera, size, exif) in enumerate(zip(held, sizes, exifs, strict=True))
+    ]
+    if None in held:
         known = [camera for camera in cameras if not camera.assumed]
         if known:  # one lens took all pictures more often than not
             cameras = [_with_lens_of(known[0], camera) if camera.assumed else camera for camera in cameras]
@@ -123,7 +135,9 @@ def _with_lens_of(known: Camera, unknown: Camera) -> Camera:
     return _camera(guess, unknown.size, source, INTRINSICS.cropped_sigma, known.knowledge)
 
 
-def _one_camera(request: CameraRequest, index: int, size: tuple[int, int], exif: Exif, warnings: list[str]) -> Camera:
+def _one_camera(
+    request: CameraRequest, name: str, index: int, size: tuple[int, int], exif: Exif, warnings: list[str]
+) -> Camera:
     def pick(values: tuple[float, ...]) -> float:
         return values[min(index, len(values) - 1)]
 
@@ -134,7 +148,7 @@ def _one_camera(request: CameraRequest, index: int, size: tuple[int, int], exif:
         return _camera(pick(request.focal_mm) / pick(request.sensor_mm) * max(size), size, "given in mm", 0.0)
     if request.focal35:
         return _camera(_from_35mm(pick(request.focal35), size), size, "given as 35 mm equivalent", 0.0)
-    return _from_exif(exif, size, role(index), warnings)
+    return _from_exif(exif, size, name, warnings)
 
 
 def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]) -> Camera:
@@ -158,7 +172,7 @@ def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]
     for other, other_source in found[1:]:
         if abs(np.log(other / focal)) > INTRINSICS.contradiction:
             warnings.append(
-                f"the {name}'s EXIF contradicts itself: {focal:.0f} px by {source}, {other:.0f} px by "
+                f"{name}'s EXIF contradicts itself: {focal:.0f} px by {source}, {other:.0f} px by "
                 f"{other_source}; the first is used"
             )
     sigma = INTRINSICS.exif_sigma
@@ -167,7 +181,7 @@ def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]
         if abs(np.log(aspect / original)) > INTRINSICS.cropped_aspect:
             sigma = INTRINSICS.cropped_sigma
             warnings.append(
-                f"the {name} was cropped since it was taken ({exif.width}×{exif.height} in EXIF, {size[0]}×{size[1]} "
+                f"{name} was cropped since it was taken ({exif.width}×{exif.height} in EXIF, {size[0]}×{size[1]} "
                 "now): its EXIF focal "
                 "length is only a hint; give the focal length if you know it"
             )
@@ -193,7 +207,7 @@ def _with_principal_point(camera: Camera, principal: tuple[float, ...]) -> Camer
 
 def read_camera_file(
     source: str | Path | dict[str, Any], names: Sequence[str], sizes: Sequence[tuple[int, int]]
-) -> list[Camera]:
+) -> list[Camera | None]:
     """Cameras of the pictures from a JSON file or its content.
 
     Parameters
@@ -208,7 +222,8 @@ def read_camera_file(
 
     Returns
     -------
-    list of Camera
+    list of Camera or None
+        None for those of more than two pictures that the file does not name.
 
     Raises
     ------
@@ -227,16 +242,29 @@ def read_camera_file(
     table = source.get("cameras", source) if isinstance(source, dict) else None
     if not isinstance(table, dict):
         raise BadRequest('a camera file holds {"cameras": {"NAME": {"K": [[…]], "R": [[…]], "t": […]}}}')
-    out = []
+    out: list[Camera | None] = []
+    several = len(names) > 2
     for number, (name, size) in enumerate(zip(names, sizes, strict=True)):
-        entry = table.get(name, table.get(role(number)))
+        entry = table.get(name) if several else table.get(name, table.get(role(number)))
+        if several and name not in table:
+            out.append(None)
+            continue
         if not isinstance(entry, dict):
+            if several:
+                raise BadRequest(f"the camera of {name}: an object with K and perhaps distortion, R and t is needed")
             raise BadRequest(
                 f"the camera file has no camera named {name!r} or {role(number)!r}; it has: "
                 f"{', '.join(map(str, table))}"
             )
         out.append(_camera_from_entry(entry, name, size))
-    if len({camera.pose is None for camera in out}) > 1:
+    named = [camera for camera in out if camera is not None]
+    if not named:
+        raise BadRequest(
+            f"the camera file names none of the pictures ({', '.join(names[:3])}, …); it has: "
+            f"{', '.join(map(str, table))}"
+        )
+    posed = sum(camera.pose is not None for camera in named)
+    if posed == 1 or (posed and not several and posed < len(named)):
         raise BadRequest("the camera file gives R and t for one picture only: give both or neither")
     return out
 

@@ -24,6 +24,7 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
     """
     _add_cameras(parser)
     _add_control(parser)
+    _add_many(parser)
     how = parser.add_argument_group("how")
     if with_field:
         how.add_argument(
@@ -39,7 +40,7 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
 def _add_cameras(parser: argparse.ArgumentParser) -> None:
     """What is known of the cameras."""
     camera = parser.add_argument_group(
-        "cameras", "One value serves both pictures; two are for REF,TARGET. Without any: EXIF, or an estimate."
+        "cameras", "One value serves all pictures; two are for REF,TARGET. Without any: EXIF, or an estimate."
     )
     camera.add_argument("--focal-px", type=_numbers, default=(), metavar="F[,F2]", help="focal length in pixels")
     camera.add_argument(
@@ -55,8 +56,23 @@ def _add_cameras(parser: argparse.ArgumentParser) -> None:
         help="principal point in pixels (default: the middle)",
     )  # fmt: skip
     camera.add_argument(
-        "--cameras", type=Path, metavar="FILE.json", help="per picture K, optionally distortion, R and t"
+        "--cameras", type=Path, metavar="FILE.json",
+        help="per picture K, optionally distortion, R and t; of more than two, those that are in it are held",
     )
+
+
+def _add_many(parser: argparse.ArgumentParser) -> None:
+    """What is decided about more than two pictures."""
+    many = parser.add_argument_group("more than two pictures")
+    many.add_argument(
+        "--viewpoint", type=_viewpoint, metavar="N|NAME|centre",
+        help="the picture from whose place all is seen: its number, counted from 1, its name, or centre for the one "
+        "that is best connected with all others (default: the first that connects with others)",
+    )  # fmt: skip
+    many.add_argument(
+        "--require-all", action="store_true",
+        help="exit with 3 where a picture connects with no others (by default it is left out, and named)",
+    )  # fmt: skip
 
 
 def _add_control(parser: argparse.ArgumentParser) -> None:
@@ -71,7 +87,11 @@ def _add_control(parser: argparse.ArgumentParser) -> None:
     )
     control.add_argument("--ignore-target", type=Path, metavar="MASK", help="the same for TARGET")
     control.add_argument(
-        "--scale", type=float, default=1.0, metavar="S", help="resize both pictures by S ≤ 1 first, for a fast preview"
+        "--ignore", type=_named_mask, action="append", default=[], metavar="NAME=MASK",
+        help="the same for the picture of that name; may be given for several",
+    )  # fmt: skip
+    control.add_argument(
+        "--scale", type=float, default=1.0, metavar="S", help="resize all pictures by S ≤ 1 first, for a fast preview"
     )
     control.add_argument(
         "--crop", default="auto", metavar="CROP",
@@ -171,6 +191,9 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         ),
         matches=args.matches,
         ignore=(args.ignore_ref, args.ignore_target) if args.ignore_ref or args.ignore_target else (),
+        ignore_in=tuple(args.ignore),
+        viewpoint=args.viewpoint,
+        require_all=args.require_all,
         slide=args.slide,
         projection=args.projection,
         level=parse_level(args.level),
@@ -190,11 +213,30 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
     )
 
 
+def refuse_roles(args: argparse.Namespace, count: int) -> None:
+    """Raises BadRequest where a mask is meant for REF or TARGET, of more than two pictures."""
+    from ..system.errors import BadRequest
+
+    if count > 2 and (args.ignore_ref or args.ignore_target):
+        raise BadRequest(f"{count} pictures are given, none of them REF or TARGET: name them, as --ignore NAME=MASK")
+
+
 def _numbers(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers like 1200 or 1200,1180") from None
+
+
+def _viewpoint(text: str) -> int | str:
+    return int(text) if text.isdecimal() else text
+
+
+def _named_mask(text: str) -> tuple[str, Path]:
+    name, _, mask = text.rpartition("=")
+    if not name or not mask:
+        raise argparse.ArgumentTypeError(f"{text!r} is not like NAME=MASK: a picture's name and the mask's file")
+    return name, Path(mask)
 
 
 def _projection(text: str) -> str:

@@ -16,8 +16,8 @@ from typing import NoReturn
 
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
-from .arguments import add_options, options_from
-from .messages import print_summary, progress_shown, say, verdict_line
+from .arguments import add_options, options_from, refuse_roles
+from .messages import print_summary, progress_shown, say, shortened, verdict_line
 from .options import MESSAGES
 
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
@@ -116,11 +116,11 @@ def _too_late_to_interrupt() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="edf",
-        description="Stitches two photographs taken from different places into one picture seen from the first place.",
+        description="Stitches photographs taken from different places into one picture seen from one place.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    _add_stitch(commands.add_parser("stitch", help="stitch a pair into one panorama", description=_STITCH))
+    _add_stitch(commands.add_parser("stitch", help="stitch pictures into one panorama", description=_STITCH))
     _add_batch(commands.add_parser("batch", help="stitch a list of pairs and clips", description=_BATCH))
     _add_compare(
         commands.add_parser("compare", help="every field on every pair, in one table", description=_COMPARE)
@@ -140,8 +140,9 @@ class _Version(argparse.Action):
         raise SystemExit(0)
 
 
-_STITCH = """Stitch TARGET into the plane of REF. REF keeps every pixel it has; TARGET slides along its epipolar lines
-to meet it. Messages go to stderr; the last line says whether the panorama is good, where to look at it, or why it is
+_STITCH = """Stitch 2 to 60 pictures into one, seen from one place. Of two, the first is REF and the other TARGET, which
+slides along its epipolar lines to meet it; more may come in any order, and those that connect with no others are left
+out and named. Messages go to stderr; the last line says whether the panorama is good, where to look at it, or why it is
 not usable. Exit codes: 0 done, 1 not usable (with --strict-verdict), 2 the call is wrong, 3 the pictures can't be
 stitched, 4 a file can't be read or written, 130 interrupted."""
 _BATCH = """Stitch every line of LIST.csv: a pair of pictures, or a clip of two cameras that stand still (a_%04d.png or
@@ -165,8 +166,8 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_stitch)
     parser.add_argument(
         "pictures", metavar="PICTURE", type=Path, nargs="+",
-        help="the first is the reference, whose plane and place the panorama keeps; the others are warped into it (one "
-        "other, for now)",
+        help="files, folders, or patterns like IMG_*.jpg, which stand for all pictures in them but hidden ones, sorted "
+        "as people count; of two pictures the first is the reference",
     )  # fmt: skip
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="OUT", help=".png, .jpg, .tif (8 or 16 bit) or .exr (float)"
@@ -182,6 +183,9 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
         help="each picture on the canvas before blending, with alpha; what it cannot see; which is shown where",
     )
     files.add_argument("--warp", type=Path, metavar="FILE.npz", help="the maps, the inverse depth and the geometry")
+    files.add_argument(
+        "--cameras-out", type=Path, metavar="FILE.json", help="the cameras that were found, as --cameras takes them"
+    )
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")
     _add_loudness(parser)
     parser.add_argument(
@@ -265,19 +269,25 @@ def _stitch(args: argparse.Namespace) -> int:
     from ..system.output_files import OutputFiles, undisturbed
 
     with undisturbed():  # interrupted while it loads, NumPy prints a traceback
+        from ..frames.reading import check_count
         from ..output.outputs import OutputRequest, check, write
-        from ..pipeline import check_count, stitch
+        from ..pictures.listing import listed
+        from ..pipeline import stitch
         from ..system.memory import use_again
 
     use_again()
-    check_count(len(args.pictures))
+    pictures = listed(args.pictures)
+    if pictures != args.pictures and not args.quiet:
+        print(f"edf: {len(pictures)} pictures: {shortened([path.name for path in pictures])}", file=sys.stderr)
     options = options_from(args, measure=bool(args.report or args.verbose))
-    outputs = OutputRequest(args.output, args.report, args.layers, args.warp)
-    with OutputFiles(args.overwrite, [*args.pictures, *options.files_read]) as files:
-        names = [path.name for path in args.pictures]
+    check_count(len(pictures), options)
+    refuse_roles(args, len(pictures))
+    outputs = OutputRequest(args.output, args.report, args.layers, args.warp, args.cameras_out)
+    with OutputFiles(args.overwrite, [*pictures, *options.files_read]) as files:
+        names = [path.name for path in pictures]
         check(outputs, files, names, options.has_seam, options.fills_holes, options.may_slide)
         with progress_shown(args.quiet) as show:
-            result = stitch(args.pictures, options, progress=show)
+            result = stitch(pictures, options, progress=show)
             show("write", MESSAGES.written_share)
             warnings = [*result.warnings, *write(result, outputs, files)]
         _too_late_to_interrupt()

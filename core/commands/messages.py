@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
+
+from .options import MESSAGES
 
 
 def say(line: str) -> None:
@@ -18,14 +20,19 @@ def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
 
+def shortened(names: Sequence[str]) -> str:
+    """Names in words: the first ones and the last of many."""
+    most = MESSAGES.max_names
+    return ", ".join(names) if len(names) <= most else ", ".join([*names[: most - 1], "…", names[-1]])
+
+
 def print_summary(report: dict[str, Any], seconds: dict[str, float]) -> None:
     """What was decided and measured, from a stitch's report, and its seconds by stage; for --verbose."""
+    if "rig" in report:
+        print("\n".join(f"edf: {line}" for line in _rig_lines(report, seconds)), file=sys.stderr)
+        return
     view, field, measured = report["two_view"], report["field"], report["measured"]
     focal = ", ".join(f"{value:.1f}" for value in view["focal_px"])
-
-    def said(value: float | None, form: str) -> str:
-        return "-" if value is None else format(value, form)
-
     lines = [
         f"{view['model']}: {view['why']}",
         f"focal length {focal} px ({view['focal_source']}; ± {said(view['focal_deviation'], '.1%')}, at infinity ± "
@@ -39,9 +46,43 @@ def print_summary(report: dict[str, Any], seconds: dict[str, float]) -> None:
         f"projectivity {said(measured['projectivity_own_px'], '.2f')} px, by an independent F "
         f"{said(measured['projectivity_independent_px'], '.2f')} px",
         f"overlap PSNR {said(measured['overlap_psnr_db'], '.2f')} dB, SSIM {said(measured['overlap_ssim'], '.3f')}",
-        "seconds: " + ", ".join(f"{stage} {value:.2f}" for stage, value in seconds.items()),
+        _seconds_line(seconds),
     ]
     print("\n".join(f"edf: {line}" for line in lines), file=sys.stderr)
+
+
+def said(value: float | None, form: str) -> str:
+    """A figure in words."""
+    return "-" if value is None else format(value, form)
+
+
+def _seconds_line(seconds: dict[str, float]) -> str:
+    return "seconds: " + ", ".join(f"{stage} {value:.2f}" for stage, value in seconds.items())
+
+
+def _rig_lines(report: dict[str, Any], seconds: dict[str, float]) -> list[str]:
+    """The same of more than two pictures."""
+    rig, field, measured, pictures = (report[key] for key in ("rig", "field", "measured", "pictures"))
+    lines = [
+        f"{len(pictures)} pictures, {len(report['left_out'])} left out; {len(rig['edges'])} pairs, "
+        f"{rig['points']} points, "
+        f"noise {said(report['matches']['noise_px'], '.2f')} px, worst loop {said(rig['loop_degrees'], '.2f')}°",
+    ]
+    for one in pictures:
+        camera = one["camera"]
+        lines.append(
+            f"{one['name']}: focal length {camera['focal_px']:.1f} px ({camera['source']}; "
+            f"± {said(camera['focal_deviation'], '.1%')}), {one['inliers']} points, "
+            f"{said(one['residual_px'], '.2f')} px, {one['share']:.0%} of the panorama"
+        )
+    return [
+        *lines,
+        f"field {field['kind']}: {field['centres']} points, each told by the others to "
+        f"{said(field['leave_one_out_px'], '.2f')} px (median)",
+        f"alignment {said(measured['alignment_median_px'], '.2f')} px (median), "
+        f"{said(measured['alignment_p95_px'], '.2f')} px (95 %)",
+        _seconds_line(seconds),
+    ]
 
 
 def verdict_line(verdict: dict[str, Any]) -> str:
@@ -55,6 +96,8 @@ def verdict_line(verdict: dict[str, Any]) -> str:
         left, top, width, height = place["box"]
         places.setdefault(place["what"], []).append(f"{left},{top} {width}×{height}")
     found = "; ".join(f"{what} ({', '.join(boxes)})" for what, boxes in places.items())
+    if not found:
+        return f"look at it: {verdict['because']}; {verdict['what_to_do']}"
     return f"look at these places: {found}; {verdict['what_to_do']}"
 
 

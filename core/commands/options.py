@@ -15,6 +15,9 @@ class MessageOptions:
     max_warnings: int = 5
     """Warnings shown of one item of a batch: every frame of a clip may have its own. All stand in its report."""
 
+    max_names: int = 6
+    """Names of files that a message lists; of more, the first ones and the last."""
+
     written_share: float = 0.98
     """Share of a stitch that is done when its files are to be written."""
 

@@ -166,8 +166,8 @@ def cameras_of(entries: dict[str, Any], pictures: tuple[Any, ...]) -> dict[str, 
     """
     import numpy as np
 
-    from ..alignment import size_of
     from ..cameras.blender_camera import BlenderLens, pose_of
+    from ..frames.frame import size_of
 
     table = {}
     for side, picture in zip(SIDES, pictures, strict=True):

@@ -42,7 +42,7 @@ def figures_of(result: StitchResult, edge: Edge, independent: Array, seed: int) 
     warp = result.warp
     shown = coverage_samples(warp, result.cameras, edge.j)
     F = edge.two_view.F
-    unseen = held_out(result.field, edge.inliers, shown, seed)
+    unseen = held_out(result.pair_field, edge.inliers, shown, seed)
     measured = result.report["measured"]
     inside = (result.layers[edge.i].alpha > 0) & warp.maps[edge.j].inside()
     hidden = result.occluded[edge.j] & inside

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..pictures.listing import SUFFIXES
 from ..system.errors import BadRequest
 
-SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".webp", ".bmp"))
 # A folder with files of these names may hold other pictures as well: `edf validate` keeps its true panorama there.
 ROLES = ("reference", "target")
 

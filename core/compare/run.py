@@ -8,13 +8,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..alignment import Frame, Geometry, estimate_geometry, fit_and_warp
+from ..alignment import Geometry, estimate_geometry, fit_and_warp
 from ..cameras.sources import CameraRequest
 from ..choices import FIELDS
+from ..frames.frame import Frame
+from ..frames.reading import read_frame
 from ..measure.projectivity import independent_fundamental
 from ..options import StitchOptions
 from ..output.outputs import json_bytes
-from ..pipeline import StitchResult, Stopwatch, compose, read_frame
+from ..pipeline import StitchResult, Stopwatch, compose
 from ..system.errors import BadRequest, Cancelled, StitchError
 from ..system.output_files import OutputFiles
 from ..system.progress import Progress

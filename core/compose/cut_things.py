@@ -254,7 +254,11 @@ def _at_changes(labels: NDArray[np.bool_], shown: NDArray[np.bool_], tones: Plan
 
 
 def _own_cuts(look: Look) -> Plane:
-    """Where (H, W) a picture is cut within itself: its map jumps, and it is shown on both sides."""
+    """Where (H, W) a picture is cut within itself: its map jumps, and it is shown on both sides.
+
+    Every jump counts by its tones. `tears` forgives those that the picture explains, and those in foliage: refills that
+    slice a house would be taken for better.
+    """
     out = np.zeros(look.chosen.shape, np.float32)
     if look.overlap is None:
         return out

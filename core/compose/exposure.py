@@ -24,7 +24,7 @@ from .tone_fit import fit_tone
 from .tone_options import CLIPPED, TONE
 from .toned import NO_VIGNETTING, Exposed, ToneCurve, Toned, Vignetting
 
-_TOO_LITTLE = "too little of what both pictures show is neither clipped nor dark"
+TOO_LITTLE = "too little of what both pictures show is neither clipped nor dark"
 
 
 @dataclass(frozen=True)
@@ -130,12 +130,12 @@ def match_exposure(
         return unchanged(channels)
     blocks = bright_blocks(shared)
     if len(blocks) < EXPOSURE.min_blocks:
-        return replace(unchanged(channels), why_not=_TOO_LITTLE)
+        return replace(unchanged(channels), why_not=TOO_LITTLE)
     ratios, weights = log_ratios(blocks.means), block_weights(blocks)
     middle = np.array([weighted_median(ratios[:, k], weights) for k in range(channels)])
     spread = np.median(np.abs(ratios - middle), axis=0)
     if np.abs(middle).max() > np.log(EXPOSURE.max_gain):
-        return replace(unchanged(channels), why_not=_too_different(np.exp(middle)))
+        return replace(unchanged(channels), why_not=too_different(np.exp(middle)))
     return Exposure(np.exp(middle).astype(np.float32), spread.astype(np.float32), len(blocks))
 
 
@@ -171,11 +171,11 @@ def match_tones(
         return plain, plain
     blocks = bright_blocks(shared)
     if len(blocks) < EXPOSURE.min_blocks:
-        return plain, replace(plain, why_not=_TOO_LITTLE)
+        return plain, replace(plain, why_not=TOO_LITTLE)
     blocks = blocks.subset(slice(None, None, -(-len(blocks) // TONE.fitted_blocks)))
     fit = fit_tone(blocks, (blocks.radii(maps[0]), blocks.radii(maps[1])), with_curve=not radiance)
     if np.abs(np.log(fit.gain)).max() > np.log(TONE.max_gain):
-        return plain, replace(plain, why_not=_too_different(fit.gain))
+        return plain, replace(plain, why_not=too_different(fit.gain))
     moved = 0.0 if radiance else -TONE.reference_share * float(np.log2(np.median(fit.gain)))
     common = 2.0 ** (stops + np.clip(moved, -TONE.most_reference_stops, TONE.most_reference_stops))
     spread = fit.spread.astype(np.float32)
@@ -209,7 +209,7 @@ def _with_clipped(
     return first, second
 
 
-def _too_different(gain: Array) -> str:
+def too_different(gain: Array) -> str:
     """What is said where a gain (C,) is too large."""
     return f"it differs by {np.abs(np.log2(gain)).max():.1f} stops"
 

@@ -20,6 +20,7 @@ from ..raster.arrays import Part, Plane, beside, eroded, small_strips, strips
 from ..raster.lazy import AnyImage
 from ..raster.picture_map import PictureMap
 from ..system.threads import each
+from .graph_options import PLACING
 from .options import OVERLAP
 from .seam_options import SEAM
 
@@ -50,6 +51,7 @@ class SeamCosts:
 def seam_costs(
     overlap: Overlap, picture_map: PictureMap, confidence: AnyImage | None, hidden: NDArray[np.bool_],
     moving: NDArray[np.int8] | None = None, behind: NDArray[np.bool_] | None = None, slide: AnyImage | None = None,
+    misplaced: Plane | None = None,
 ) -> SeamCosts:  # fmt: skip
     """Price every seam through an overlap.
 
@@ -73,6 +75,8 @@ def seam_costs(
     slide : (H, W) image, optional
         How far each pixel's viewpoint lies towards that of the added picture, 0..1. At 0 the panorama before is exact,
         and at 1 the added picture is.
+    misplaced : (H, W) float32 array, optional
+        px by which the added picture is expected to be further from its place than the panorama before.
 
     Returns
     -------
@@ -87,7 +91,11 @@ def seam_costs(
         if moving is not None:
             cost[means(moving != 0, 1 << level) > 0] = 1
         levels.append(cost)
-    return SeamCosts(overlap.box, tuple(levels), _price(overlap, difference, 1 << count, hidden, moving, behind, slide))
+    price = _price(overlap, difference, 1 << count, hidden, moving, behind, slide)
+    if misplaced is not None:
+        off = np.where(overlap.both, np.clip(misplaced[overlap.box], -PLACING.max_px, PLACING.max_px), np.float32(0))
+        price += np.float32(PLACING.price / math.hypot(*price.shape)) * means(off, 1 << count)
+    return SeamCosts(overlap.box, tuple(levels), price)
 
 
 def averaged_costs(several: Sequence[SeamCosts]) -> SeamCosts:

@@ -92,13 +92,13 @@ def shared_blocks(
     def means_of(top: int) -> tuple[list[Array], NDArray[np.intp], list[int]]:
         part = slice(top, min(rows.stop, top + at_once)), columns
         pixels, both = [one.light[part] for one in (before, layer)], shown[part]
-        unclipped = [_unclipped(light, both, is_float) for light, is_float in zip(pixels, floats, strict=True)]
+        unclipped = [unclipped_in(light, both, is_float) for light, is_float in zip(pixels, floats, strict=True)]
         counts = unclipped[0] & unclipped[1]
         number = int(counts.sum())
         alone = [int(other.sum()) - number for other in reversed(unclipped)]
-        share, enough = _shares(counts)
+        share, enough = block_shares(counts)
         at = np.argwhere(enough) + (top // block, columns.start // block)
-        return [_block_means(light, counts, share, enough) for light in pixels], at, [*alone, int(both.sum())]
+        return [block_means(light, counts, share, enough) for light in pixels], at, [*alone, int(both.sum())]
 
     parts = list(in_order(means_of, range(rows.start, rows.stop, at_once)))
     first, second = (np.concatenate([part[0][k] for part in parts]) for k in range(2))
@@ -107,7 +107,7 @@ def shared_blocks(
     return Blocks((first, second), at, (clipped_before / max(total, 1), clipped / max(total, 1)))
 
 
-def _unclipped(light: NDArray[np.float32], both: NDArray[np.bool_], is_float: bool) -> NDArray[np.bool_]:
+def unclipped_in(light: NDArray[np.float32], both: NDArray[np.bool_], is_float: bool) -> NDArray[np.bool_]:
     """What both show (H, W) and light has unclipped in every channel."""
     if not is_float:
         for k in range(light.shape[2]):
@@ -115,18 +115,20 @@ def _unclipped(light: NDArray[np.float32], both: NDArray[np.bool_], is_float: bo
     return both
 
 
-def _shares(counts: NDArray[np.bool_]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """The share of each block (h, w) that counts, and where that is enough."""
+def block_shares(
+    counts: NDArray[np.bool_], least: float = EXPOSURE.min_block_share
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """The share of each block (h, w) that counts, and where that is `least` or more."""
     block = EXPOSURE.block_px
     height, width = (block * (side // block) for side in counts.shape)
     if not height or not width:
         return np.zeros((0, 0), np.float32), np.zeros((0, 0), bool)
     size = (width // block, height // block)
     share = cv2.resize(counts[:height, :width].astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    return share, share >= EXPOSURE.min_block_share
+    return share, share >= least
 
 
-def _block_means(
+def block_means(
     pixels: NDArray[np.float32], counts: NDArray[np.bool_], share: NDArray[np.float32], enough: NDArray[np.bool_]
 ) -> Array:
     """Means (N, C) over the blocks, of what counts, where enough of a block does."""
@@ -146,8 +148,8 @@ def _block_means(
 
 def bright_blocks(blocks: Blocks) -> Blocks:
     """The blocks that have no channel that is dark compared with the median block, in either layer."""
-    before, added = (_bright(means) for means in blocks.means)
-    return blocks.subset(before & added)
+    first, second = (bright(means) for means in blocks.means)
+    return blocks.subset(first & second)
 
 
 def block_weights(blocks: Blocks) -> Array:
@@ -169,8 +171,8 @@ def log_ratios(means: Sequence[Array]) -> Array:
     return ratios
 
 
-def _bright(means: Array) -> NDArray[np.bool_]:
+def bright(means: Array) -> NDArray[np.bool_]:
     """Which blocks (N,) have no channel that is dark compared with the median block."""
     typical = float(np.median(means.mean(axis=1))) if len(means) else 0.0
-    bright: NDArray[np.bool_] = means.min(axis=1, initial=np.inf) > max(EXPOSURE.min_brightness * typical, 0.0)
-    return bright
+    enough: NDArray[np.bool_] = means.min(axis=1, initial=np.inf) > max(EXPOSURE.min_brightness * typical, 0.0)
+    return enough

@@ -122,7 +122,7 @@ def _chosen(seen: _Seen, at: NDArray[np.intp], with_curve: bool) -> _Model:
         tried[parts] = score, in_thirds
         if parts[1] and (in_thirds > (1 - TONE.min_third_improvement) * tried[parts[0], False][1]).any():
             continue
-        if parts[0] and not _is_lens(_fitted(seen, *parts).vignetting):
+        if parts[0] and not is_lens(_fitted(seen, *parts).vignetting):
             continue
         more = sum(parts) - sum(best)
         if score < (1 - TONE.min_improvement) ** max(more, 0) * least:
@@ -175,7 +175,7 @@ def _robust(columns: Array, values: Array, weights: Array) -> Array:
     return found
 
 
-def _is_lens(vignetting: Vignetting) -> bool:
+def is_lens(vignetting: Vignetting) -> bool:
     """Whether a lens takes off light like this: ever more towards the corners, and not all."""
     lost = vignetting.at(np.linspace(0, 1, 11))
     falls = np.diff(lost).max() <= TONE.max_rise and lost.max() <= TONE.max_rise

@@ -232,9 +232,10 @@ class EpipolarLines:
             x, y = raw[..., 0], raw[..., 1]
         return x, y
 
-    def along(self, px: Plane) -> Plane:
-        """The moves (h, w) that lead px (h, w) pixels along the lines: the inverse of the map in `target`."""
-        return px / (1 - px * self.w_rate)
+    def along(self, px: Plane, part: slice = slice(None)) -> Plane:
+        """The moves (h, w) that lead px (h, w) pixels along the lines: the inverse of the map in `target`; part: only
+        these rows."""
+        return px / (1 - px * self.w_rate[part])
 
 
 def _middles(box: Box | tuple[float, float, float, float], shape: tuple[int, int]) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from ..cameras.lens import distort
 from ..cameras.matches import Matches
 from ..field.transfer import inverse_depths
 from ..raster.arrays import Array, Plane, eroded
-from ..system.threads import in_order
+from ..system.threads import each, in_order
 from .epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
 from .epipolar_rows import EpipolarRows
 from .options import LINES, MATCHING
@@ -306,15 +306,22 @@ def _on_nodes(
 ) -> tuple[Plane, Plane]:  # fmt: skip
     """From disparities and confidences (rows, columns) to moves (h, w) px and confidences (h, w) at the nodes;
     in_target (rows, columns): where the target shows something."""
-    u, v = rows.column_row(lines.ideal)
-    column = np.clip(np.rint(u).astype(int), 0, rows.shape[1] - 1)
-    row = np.clip(np.rint(v).astype(int), 0, rows.shape[0] - 1)
-    first = row * rows.shape[1]
-    disparity, confidence = (np.take(values, first + column) for values in (disparity, confidence))
-    found_at = np.rint(column - disparity).astype(int)
-    visible = (found_at >= 0) & (found_at < rows.shape[1])
-    visible &= np.take(in_target, first + np.clip(found_at, 0, rows.shape[1] - 1))
-    start = u.astype(np.float32)
-    along = lines.along(arc_lengths.at(start - disparity, row) - arc_lengths.at(start, row))
-    confidence *= visible & np.isfinite(along)
-    return np.where(confidence > 0, along, np.float32(0)), confidence
+    moves, certain = np.empty(lines.shape, np.float32), np.empty(lines.shape, np.float32)
+
+    def look_up(top: int) -> None:
+        part = slice(top, top + LINES.strip_rows)
+        u, v = rows.column_row(lines.ideal[part])
+        column = np.clip(np.rint(u).astype(int), 0, rows.shape[1] - 1)
+        row = np.clip(np.rint(v).astype(int), 0, rows.shape[0] - 1)
+        first = row * rows.shape[1]
+        shifted, sure = (np.take(values, first + column) for values in (disparity, confidence))
+        found_at = np.rint(column - shifted).astype(int)
+        visible = (found_at >= 0) & (found_at < rows.shape[1])
+        visible &= np.take(in_target, first + np.clip(found_at, 0, rows.shape[1] - 1))
+        start = u.astype(np.float32)
+        along = lines.along(arc_lengths.at(start - shifted, row) - arc_lengths.at(start, row), part)
+        sure *= visible & np.isfinite(along)
+        moves[part], certain[part] = np.where(sure > 0, along, np.float32(0)), sure
+
+    each(look_up, range(0, lines.shape[0], LINES.strip_rows))
+    return moves, certain

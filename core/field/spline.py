@@ -34,7 +34,7 @@ class ThinPlateSpline:
     def at(self, points: Array) -> Array:
         """Values (N,) or (N, k) at points (N, 2) px, in float64 throughout."""
         p = (np.asarray(points, np.float64) - self.centre) / self.scale
-        out: Array = p @ self.affine[:2] + self.affine[2]
+        out: Array = p @ self.affine[:-1] + self.affine[-1]
         rows = max(1, SPLINE.kernel_values_at_once // max(1, len(self.centres)))
         for start in range(0, len(p), rows):
             out[start : start + rows] += kernel(p[start : start + rows], self.centres) @ self.weights
@@ -65,8 +65,10 @@ class ThinPlateSpline:
 
 
 def kernel(points: Array, centres: Array) -> Array:
-    """½ r² ln r² between points (N, 2) and centres (M, 2), zero at r = 0."""
-    r2 = np.subtract.outer(points[:, 0], centres[:, 0]) ** 2 + np.subtract.outer(points[:, 1], centres[:, 1]) ** 2
+    """½ r² ln r² between points (N, n) and centres (M, n), zero at r = 0."""
+    r2 = np.subtract.outer(points[:, 0], centres[:, 0]) ** 2
+    for p, c in zip(points.T[1:], centres.T[1:], strict=True):
+        r2 += np.subtract.outer(p, c) ** 2
     result: Array = 0.5 * r2 * np.log(np.maximum(r2, 1e-300))
     return result
 
@@ -75,8 +77,8 @@ def kernel(points: Array, centres: Array) -> Array:
 class SmoothingProblem:
     """The linear system of a smoothing spline: (Φ + 8πλ D) w + M a = g with Mᵀ w = 0.
 
-    centres (N, 2): points (p − centre) / scale; noise (N,): √D, relative; phi (N, N): Φ, the kernel between points; M
-    (N, 3): the points, homogeneous. λ is in units of scale² px².
+    centres (N, n): points (p − centre) / scale, n = 2 in the plane and 3 on a sphere; noise (N,): √D, relative; phi
+    (N, N): Φ, the kernel between points; M (N, n + 1): the points, homogeneous. λ is in units of scale² px².
     """
 
     centres: Array
@@ -87,7 +89,7 @@ class SmoothingProblem:
 
     @staticmethod
     def build(points: Array, noise: Array, scale: float, centre: Array | None = None) -> SmoothingProblem:
-        """The problem of points (N, 2) px with relative noise (N,); centre (2,) px: their centroid if not given."""
+        """The problem of points (N, n) px with relative noise (N,); centre (n,) px: their centroid if not given."""
         centre = points.mean(axis=0) if centre is None else centre
         centres = (points - centre) / scale
         return SmoothingProblem(centres, noise, centre, scale, kernel(centres, centres))
@@ -98,9 +100,9 @@ class SmoothingProblem:
         return SmoothingProblem(self.centres[keep], self.noise[keep], self.centre, self.scale, phi)
 
     def system(self, smoothing: float) -> Array:
-        """The bordered matrix [[Φ + 8πλ D, M], [Mᵀ, 0]] (N + 3, N + 3)."""
-        n = len(self.noise)
-        system = np.zeros((n + 3, n + 3))
+        """The bordered matrix [[Φ + 8πλ D, M], [Mᵀ, 0]] (N + n + 1, N + n + 1)."""
+        n, functions = len(self.noise), self.centres.shape[1] + 1
+        system = np.zeros((n + functions, n + functions))
         system[:n, :n] = self.phi
         system[np.arange(n), np.arange(n)] += 8 * np.pi * smoothing * self.noise**2
         system[:n, n:] = np.column_stack([self.centres, np.ones(n)])
@@ -109,9 +111,9 @@ class SmoothingProblem:
 
     def solve(self, values: Array, smoothing: float) -> tuple[ThinPlateSpline, Array]:
         """The spline of values g (N,) or (N, k) at λ = smoothing, and its residuals g − f = 8πλ D w, shaped as g."""
-        n = len(values)
+        n, functions = len(values), self.centres.shape[1] + 1
         solution = scipy.linalg.solve(
-            self.system(smoothing), np.concatenate([values, np.zeros((3, *values.shape[1:]))])
+            self.system(smoothing), np.concatenate([values, np.zeros((functions, *values.shape[1:]))])
         )
         spline = ThinPlateSpline(self.centres, solution[:n], solution[n:], self.centre, self.scale)
         return spline, ((8 * np.pi * smoothing * self.noise**2) * solution[:n].T).T
@@ -150,10 +152,10 @@ class SmoothingProblem:
         (n, N) or (n, N, k) array
         """
         matrix, affine = self._projected()
-        # the three affine directions get the lowest eigenvalues, and are dropped
+        # the affine directions get the lowest eigenvalues, and are dropped
         matrix -= (1 + np.abs(matrix).sum(axis=1).max()) * (affine @ affine.T)
         eigenvalues, basis = scipy.linalg.eigh(matrix, driver="evd", overwrite_a=True, check_finite=False)
-        eigenvalues, basis = eigenvalues[3:], basis[:, 3:]
+        eigenvalues, basis = eigenvalues[affine.shape[1] :], basis[:, affine.shape[1] :]
         squared = basis**2
         projected = basis.T @ (values.T / self.noise).T
         out = np.empty((len(ladder), *values.shape))
@@ -164,10 +166,10 @@ class SmoothingProblem:
         return out
 
     def _projected(self) -> tuple[Array, Array]:
-        """D^-½ Φ D^-½ projected onto the orthogonal complement Q of D^-½ M, as (N, N), and a basis (N, 3) of D^-½ M.
+        """D^-½ Φ D^-½ projected onto the orthogonal complement Q of D^-½ M, as (N, N), and a basis of D^-½ M.
 
         On Q the system is (Qᵀ D^-½ Φ D^-½ Q + 8πλ I) z = … with v = √D w, positive definite. Q itself is never formed:
-        projections are rank-3 updates.
+        projections are updates of low rank.
         """
         root = self.noise
         polynomial = np.column_stack([self.centres, np.ones(len(root))]) / root[:, None]
@@ -208,10 +210,10 @@ class Inverse:
 
 
 def spread_points(points: Array, cost: Array, budget: int, spacing: float) -> NDArray[np.intp]:
-    """Indices of at most `budget` of the points (N, 2) px: of each cell of `spacing` px the one with the least `cost`
-    (N,)."""
+    """Indices of at most `budget` of the points (N, n): of each cell of `spacing`, in their unit, the one of the least
+    `cost` (N,)."""
     cells = np.floor(points / spacing).astype(np.int64)
-    order = np.lexsort((cost, cells[:, 0], cells[:, 1]))
+    order = np.lexsort((cost, *cells.T))
     first = np.r_[True, np.any(np.diff(cells[order], axis=0) != 0, axis=1)]
     chosen = order[first]
     if len(chosen) > budget:  # larger cells, by the square root of the excess, until they are few enough

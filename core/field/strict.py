@@ -250,7 +250,9 @@ def _supported(x: Array, g: Array, sensitivity: Array, tolerance: float) -> NDAr
     return result
 
 
-def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> float:
+def best_smoothing(
+    problem: SmoothingProblem, g: Array, sensitivity: Array, ladder: Array = STRICT.smoothing_ladder
+) -> float:
     """The λ of the ladder with the least leave-one-out error in px.
 
     Large errors count linearly, not squared: a few depth edges must not decide for the whole picture.
@@ -262,14 +264,16 @@ def best_smoothing(problem: SmoothingProblem, g: Array, sensitivity: Array) -> f
         Values at its points, one or two components.
     sensitivity : (N,) array
         px per unit of g.
+    ladder : (n,) array
+        The λ to choose from.
 
     Returns
     -------
     float
     """
-    error = problem.held_out(g, STRICT.smoothing_ladder)
+    error = problem.held_out(g, ladder)
     error = (np.abs(error) if g.ndim == 1 else np.linalg.norm(error, axis=-1)) * sensitivity
-    return float(STRICT.smoothing_ladder[int(np.argmin(robust_mean(error)))])
+    return float(ladder[int(np.argmin(robust_mean(error)))])
 
 
 def robust_mean(error: Array) -> Array:

@@ -89,17 +89,17 @@ def inverse_depths(view: Transfer, x: Array, y: Array) -> tuple[Array, Array]:
     d = -np.sum(np.cross(yh, q) * cross_e, axis=1) / np.maximum(np.sum(cross_e**2, axis=1), 1e-300)
     for _ in range(8):
         ray = q + d[:, None] * e
-        slope = _slope(ray, e)
+        slope = slope_of(ray, e)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = np.sum(slope * (y - project(ray)), axis=1) / np.maximum(np.sum(slope**2, axis=1), 1e-300)
         d = np.where(np.isfinite(step), d + step, d)
     ray = q + d[:, None] * e
     behind = ray[:, 2] <= 0
-    return np.where(behind, np.nan, d), np.where(behind, np.nan, np.linalg.norm(_slope(ray, e), axis=1))
+    return np.where(behind, np.nan, d), np.where(behind, np.nan, np.linalg.norm(slope_of(ray, e), axis=1))
 
 
-def _slope(ray: Array, e: Array) -> Array:
-    """∂π(ray)/∂d (N, 2) for rays (N, 3) that change by e (3,) per unit of d."""
+def slope_of(ray: Array, e: Array) -> Array:
+    """∂π(ray)/∂d (…, 2) for rays (…, 3) that change by e (3,) per unit of d."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        result: Array = (e[:2] * ray[:, 2:] - ray[:, :2] * e[2]) / ray[:, 2:] ** 2
+        result: Array = (e[:2] * ray[..., 2:] - ray[..., :2] * e[2]) / ray[..., 2:] ** 2
         return result

@@ -12,7 +12,7 @@ from ..raster.arrays import in_any_channel
 from .options import WARNING
 
 if TYPE_CHECKING:
-    from ..compose.composition import Decided
+    from ..compose.decided import Decided
     from ..compose.exposure import Exposure
     from ..pictures.picture import Picture
 

@@ -47,6 +47,23 @@ class QualityOptions:
 
 
 @dataclass(frozen=True)
+class RigOptions:
+    """Figures and warnings about more than two pictures (`rig_figures`, `rig_report`)."""
+
+    weak_inliers: int = 40
+    """Matches below which an edge that the rig cannot do without may be wrong: a pair has several minima then."""
+
+    matches_looked_up: int = 300
+    """Matches of each pair that are looked up in the maps: their median and 95th percentile are what is asked for."""
+
+    same_focal: float = 0.01
+    """Share by which guesses of the focal length may differ and still be one: nobody sees the difference."""
+
+    most_named: int = 4
+    """Pairs that a warning names."""
+
+
+@dataclass(frozen=True)
 class IndependentOptions:
     """F estimated once more, by other means (`projectivity`)."""
 
@@ -206,6 +223,9 @@ class VerdictOptions:
     hidden: float = 0.25
     """Share of the overlap that one picture cannot see: 0.12 at most where the picture is right."""
 
+    deep_px: float = 2.0
+    """px by which half the points are off where each is predicted from the others, of more than two pictures."""
+
     unlike: float = 0.15
     """Share of the overlap in which the pictures differ: 0.085 at most where the picture is right."""
 
@@ -216,3 +236,4 @@ INDEPENDENT = IndependentOptions()
 FOCAL_DOUBT = FocalDoubtOptions()
 WARNING = WarningOptions()
 VERDICT = VerdictOptions()
+RIG = RigOptions()

@@ -26,10 +26,10 @@ from .projectivity import independent_fundamental, projectivity
 if TYPE_CHECKING:
     from ..alignment import Alignment
     from ..cameras.camera import Camera
-    from ..cameras.two_view import TwoView
-    from ..compose.composition import Decided
+    from ..compose.decided import Decided
     from ..dense.refine import Dense
     from ..options import StitchOptions
+    from ..panorama.choosing_slide import SlideChoice
     from ..pictures.picture import Picture
 
 SCHEMA = 1
@@ -68,21 +68,15 @@ def make_report(
     warnings : list of str
         In plain words, for the user.
     """
-    cameras, edge, field = alignment.cameras, alignment.edges[0], alignment.field
+    cameras, edge, field = alignment.cameras, alignment.edges[0], alignment.pair_field
     matches, two_view, further = edge.matches, edge.two_view, decided[edge.j]
     holes = sum(one.holes for one in decided)
     measured = _measured(options, pictures, alignment) | {"folds": max(one.folds for one in decided)} | appearance
     doubt = focal_doubt(alignment.cameras, edge, alignment.warp.canvas)
     report = {
         "schema": SCHEMA,
-        "pictures": [_picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
-        "options": {
-            "field": options.field, "fade": _fade(options, alignment), "dense": options.dense,
-            "projection": options.projection,
-            "slide": options.slide if options.may_slide else 0, "level": options.level, "centre": options.centre,
-            "fov": options.fov, "scale": options.scale, "crop": options.crop, "blend": options.blend,
-            "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
-        },
+        "pictures": [picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
+        "options": options_entry(options, alignment),
         "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
         "two_view": {
             "model": two_view.model, "why": two_view.why, "focal_source": two_view.focal_source,
@@ -99,15 +93,8 @@ def make_report(
             "slack_px": field.slack_px if isinstance(field, SlackField) else 0.0,
             "dense": _dense_entry(alignment.dense),
         },
-        "slide": {
-            "s1": alignment.slide.s1, "costs": [asdict(one) for one in alignment.slide.costs],
-            "why": alignment.slide.why,
-        },
-        "canvas": {
-            "width": canvas.width, "height": canvas.height,
-            "offset": None if canvas.projection else canvas.offset, "cropped": canvas.cropped,
-            "projection": _projection_entry(canvas, two_view),
-        },
+        "slide": slide_entry(alignment.slide),
+        "canvas": canvas_entry(canvas, two_view.K),
         "composition": {
             "exposure_gain": further.exposure.gain / decided[0].exposure.gain,
             "exposure_spread": further.exposure.spread, "exposure_blocks": further.exposure.blocks,
@@ -118,6 +105,8 @@ def make_report(
     }  # fmt: skip
     warnings = doubt.warnings(alignment.cameras, edge) + _warnings(alignment, measured["folds"])
     warnings += exposure_warnings(pictures, [one.exposure for one in decided])
+    if alignment.left_out:
+        report["left_out"] = left_out_entry(alignment.left_out)
     if options.projection == "auto" and canvas.projection is None:
         warnings.append(
             f"the field {field.name!r} knows the reference's plane only: the panorama is drawn on it, as by "
@@ -125,10 +114,7 @@ def make_report(
         )
     open_holes = open_px if options.holes == "auto" else holes
     if open_holes > WARNING.hole_share * further.hidden.size:
-        shown = (
-            "filled smoothly from around there" if options.holes == "inpaint" else
-            "transparent there (black in a JPEG); --holes inpaint fills them"
-        )  # fmt: skip
+        shown = how_holes_are_shown(options)
         without = "--crop reference" if canvas.projection is None else "--projection reference --crop reference"
         warnings.append(
             f"{open_holes} pixels were seen by neither camera, hidden behind something near: the panorama is "
@@ -142,7 +128,7 @@ def _measured(
 ) -> dict[str, float]:
     """The figures of an alignment, NaN where undefined; expensive ones only if options.measure asks for them."""
     cameras, edge = alignment.cameras, alignment.edges[0]
-    field, warp, two_view = alignment.field, alignment.warp, edge.two_view
+    field, warp, two_view = alignment.pair_field, alignment.warp, edge.two_view
     inliers = edge.matches.subset(two_view.inliers)
     # Matches and pixels are compared in the reference's own frame, where only one of the two pictures is resampled.
     flat = warp
@@ -175,7 +161,7 @@ def _measured(
 
 
 def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
-    two_view, field, warp = alignment.edges[0].two_view, alignment.field, alignment.warp
+    two_view, field, warp = alignment.edges[0].two_view, alignment.pair_field, alignment.warp
     out = []
     if field.fit.negative_share > WARNING.behind_infinity_share:
         out.append(
@@ -198,12 +184,48 @@ def _warnings(alignment: Alignment, fold_share: float) -> list[str]:
     return out
 
 
-def _projection_entry(canvas: Canvas, two_view: TwoView) -> dict[str, Any]:
+def options_entry(options: StitchOptions, alignment: Alignment) -> dict[str, Any]:
+    """What was asked for."""
+    return {
+        "field": options.field, "fade": _fade(options, alignment), "dense": options.dense,
+        "projection": options.projection,
+        "slide": options.slide if options.may_slide else 0, "level": options.level, "centre": options.centre,
+        "fov": options.fov, "scale": options.scale, "crop": options.crop, "blend": options.blend,
+        "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
+    }  # fmt: skip
+
+
+def left_out_entry(left_out: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
+    """Pictures that are not used, and why."""
+    return [{"name": name, "why": why} for name, why in left_out]
+
+
+def slide_entry(slide: SlideChoice) -> dict[str, Any]:
+    """How far the viewpoint slides."""
+    return {"s1": slide.s1, "costs": [asdict(one) for one in slide.costs], "why": slide.why}
+
+
+def how_holes_are_shown(options: StitchOptions) -> str:
+    """What becomes of holes, in words."""
+    if options.holes == "inpaint":
+        return "filled smoothly from around there"
+    return "transparent there (black in a JPEG); --holes inpaint fills them"
+
+
+def canvas_entry(canvas: Canvas, K: Array) -> dict[str, Any]:
+    """Size and projection of the panorama; K: the reference's intrinsics."""
+    return {
+        "width": canvas.width, "height": canvas.height, "offset": None if canvas.projection else canvas.offset,
+        "cropped": canvas.cropped, "projection": _projection_entry(canvas, K),
+    }  # fmt: skip
+
+
+def _projection_entry(canvas: Canvas, K: Array) -> dict[str, Any]:
     """How canvas pixels map to rays in the reference camera's frame (see `projection`); level: yaw, pitch and roll of
     the reference in degrees, as for --level."""
     if canvas.projection is None:
-        focal = float(np.sqrt(two_view.K[0, 0] * two_view.K[1, 1]))
-        kind, centre, rotation = "perspective", two_view.K[:2, 2], np.eye(3)
+        focal = float(np.sqrt(K[0, 0] * K[1, 1]))
+        kind, centre, rotation = "perspective", K[:2, 2], np.eye(3)
     else:
         kind, focal, centre = canvas.projection.kind, canvas.projection.focal, np.array(canvas.projection.centre)
         rotation = canvas.projection.rotation
@@ -213,7 +235,8 @@ def _projection_entry(canvas: Canvas, two_view: TwoView) -> dict[str, Any]:
     } | ({"distance": canvas.projection.distance} if canvas.projection and kind == "pannini" else {})  # fmt: skip
 
 
-def _picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:
+def picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:
+    """What a picture is, and what was known of its camera."""
     return {
         "name": picture.name, "width": camera.size[0], "height": camera.size[1], "bits": picture.bits,
         "alpha": picture.alpha is not None, "icc": picture.icc is not None,

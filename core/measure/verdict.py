@@ -8,38 +8,42 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cameras.sources import role
-from ..compose.rough_seam import map_to_small, small_picture
+from ..cameras.sources import called
 from ..field.folding import NO_TURN, cell_areas, turned_over, turning
-from ..panorama.layers import layer_of
 from ..raster.arrays import NEIGHBOURS, Box, Plane, dilated, eroded
-from ..raster.colour import encode
-from ..raster.picture_map import CanvasMap, PictureMap
-from .options import VERDICT
-
-if TYPE_CHECKING:
-    from ..compose.exposure import Exposure
-    from ..pictures.picture import Picture
-
-Levels = NDArray[np.uint8]
+from .look import Levels, Look
+from .options import RIG, VERDICT
 
 GOOD, LOOK, NOT_USABLE = "good", "look", "not usable"
+
+PAINT = (
+    "paint over these places which picture is shown there (--mask), or leave them out (--ignore-ref, --ignore-target)"
+)
+LEAVE_OUT = "leave what is wrong there out of the picture that has it (--ignore NAME=MASK)"
+DARKER = "make the panorama darker by some stops (--exposure=-1)"
+CLIPPED = (
+    "make the panorama brighter (--exposure=1), so that this light is white again; the next time expose for the "
+    "brightest part, or merge bracketed pictures into one EXR"
+)
+FOCAL = "give the focal length (--focal35, --focal-px) if it is known, or keep the reference's place (--slide 0)"
+FILL = "fill holes (--holes inpaint)"
 
 
 @dataclass(frozen=True)
 class Place:
     """Where (left, top, width, height in px of the panorama) to look, and at what; size: how much of it is wrong, in
-    px of the small copy."""
+    px of the small copy; help: what would help."""
 
     box: Box
     what: str
     size: float
+    help: str = PAINT
 
 
 @dataclass(frozen=True)
@@ -70,93 +74,6 @@ class Verdict:
         return {"is": self.rating, "because": self.because, "what_to_do": self.what_to_do, "places": places}
 
 
-@dataclass(frozen=True, eq=False)
-class Look:
-    """A small copy of a panorama: every `step`-th pixel of its canvas.
-
-    Attributes
-    ----------
-    step : int
-    maps : tuple of PictureMap
-        To the small pictures.
-    tones, taken : tuple of (h, w, C) uint8 arrays
-        Each picture on the canvas, in levels of 255: as it is shown, and as it was taken.
-    shows : tuple of (h, w) bool arrays
-        Where each shows anything.
-    hidden : (h, w) bool array
-        What one of them shows though something nearer hides it there.
-    labels : (h, w) int array or None
-        Which picture each pixel comes from, −1 for none.
-    """
-
-    step: int
-    maps: tuple[PictureMap, ...]
-    tones: tuple[Levels, ...]
-    taken: tuple[Levels, ...]
-    shows: tuple[NDArray[np.bool_], ...]
-    hidden: NDArray[np.bool_]
-    labels: NDArray[np.int16] | None
-
-    @property
-    def side(self) -> int:
-        """Its longer side, px."""
-        return max(self.hidden.shape)
-
-    def shown(self, number: int) -> NDArray[np.bool_]:
-        """Where (h, w) a picture is what is shown; without a seam, where it shows anything."""
-        return self.shows[number] if self.labels is None else self.labels == number
-
-    def box(self, mask: NDArray[np.bool_], shift: tuple[int, int]) -> Box:
-        """The box around a mask (h, w) in px of the panorama."""
-        x, y, width, height = (self.step * int(v) for v in cv2.boundingRect(mask.astype(np.uint8)))
-        return x + shift[0], y + shift[1], width, height
-
-
-def look_at(
-    pictures: Sequence[Picture], maps: Sequence[CanvasMap], exposures: Sequence[Exposure],
-    hidden: Sequence[NDArray[np.bool_]], labels: NDArray[np.int16] | None,
-) -> Look:  # fmt: skip
-    """A small copy of a panorama.
-
-    Parameters
-    ----------
-    pictures : sequence of Picture
-    maps : sequence of CanvasMap
-        Of the panorama's canvas, as it is cropped.
-    exposures : sequence of Exposure
-        What was done to the pictures' light.
-    hidden : sequence of (H, W) bool arrays
-        What each picture cannot see.
-    labels : (H, W) int array, optional
-
-    Returns
-    -------
-    Look
-    """
-    height, width = hidden[0].shape
-    step = -(-max(height, width) // VERDICT.side_px)
-    nodes = np.s_[step // 2 :: step, step // 2 :: step]
-    found = [_small(*each, nodes) for each in zip(pictures, maps, exposures, strict=True)]
-    small_maps, tones, taken, shows = zip(*found, strict=True)
-    unseen = np.logical_or.reduce([one[nodes] for one in hidden])
-    return Look(step, small_maps, tones, taken, shows, unseen, None if labels is None else labels[nodes])
-
-
-def _small(
-    picture: Picture, picture_map: CanvasMap, exposure: Exposure, nodes: tuple[slice, slice]
-) -> tuple[PictureMap, Levels, Levels, NDArray[np.bool_]]:
-    """One picture of a small copy: its map, tones as shown and as taken, and where it shows anything."""
-    full = picture_map.arrays()
-    coarse = PictureMap(full.x[nodes], full.y[nodes], full.size)
-    with np.errstate(invalid="ignore"):
-        apart = np.hypot(np.diff(coarse.x, axis=1), np.diff(coarse.y, axis=1))[coarse.inside()[:, 1:]]
-    small = small_picture(picture, 1 / max(1.0, float(np.nanmedian(apart))) if apart.size else 1.0)
-    own = map_to_small(coarse, small)
-    layer = layer_of(small, own)
-    tones, taken = (encode(one.pixels, 8) for one in (exposure.applied(layer, own), layer))
-    return own, tones, taken, layer.alpha > VERDICT.least_alpha
-
-
 def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict:
     """Judge a panorama.
 
@@ -166,39 +83,59 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
     shift : (int, int)
         px from the panorama's first pixel to that of the canvas which was looked at.
     report : dict
-        It tells how far the map misses 5 % of its own matches, which share of it is folded, and where there are holes.
+        It tells how far the map misses 5 % of its own matches, which share of it is folded, and where there are holes;
+        and of more than two pictures, how sure their cameras are.
 
     Returns
     -------
     Verdict
     """
-    unlike = _unlike(look)
-    seam = _along_seam(look, unlike)
+    pairs = _compared(look)
+    names = [picture["name"] for picture in report.get("pictures", [{"name": ""}] * len(look.shows))]
     places = sorted(
-        (*_seam_places(look, seam, shift), *_torn_places(look, unlike, shift), *_light_places(look, shift),
+        (*(place for pair in pairs for place in _seam_places(look, pair, names, shift)),
+         *_torn_places(look, pairs, shift), *_light_places(look, shift),
          # in a frame that was asked for, pictures are squeezed as that has it
          *(_bent_places(look, shift) if report["options"]["projection"] == "auto" else ()),
-         *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2)
+         *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2, FILL)
            for box in report["composition"]["holes"])),
         key=lambda place: -place.size,
     )  # fmt: skip
     missed = (report["measured"]["alignment_p95_px"] or 0.0) / (look.side * look.step)
-    cause = _cause(look, unlike, seam, missed, report["measured"]["folds"] or 0.0)
+    # of many pictures one may be folded where it is not shown
+    folded = 0.0 if "rig" in report else report["measured"]["folds"] or 0.0
+    cause = _cause(look, pairs, missed, folded)
     if cause:
         return Verdict(NOT_USABLE, *cause, tuple(places[: VERDICT.most_places]))
-    if not places:
+    doubts = dict(_doubts(report))
+    if not places and not doubts:
         return Verdict(GOOD, "the pictures agree where the seam changes from one to the other", "")
-    kinds = list(dict.fromkeys(place.what for place in places))
-    return Verdict(
-        LOOK, "; ".join(kinds),
-        "paint over these places which picture is shown there (--mask), or leave them out (--ignore-ref, "
-        "--ignore-target)", tuple(places[: VERDICT.most_places]),
-    )  # fmt: skip
+    kinds = dict.fromkeys([*doubts, *(place.what for place in places)])
+    of_places = [LEAVE_OUT if one.help == PAINT and len(look.shows) > 2 else one.help for one in places]
+    helps = dict.fromkeys([*of_places, *doubts.values()])
+    return Verdict(LOOK, "; ".join(kinds), "; ".join(helps), tuple(places[: VERDICT.most_places]))
 
 
-def _cause(look: Look, unlike: Plane, seam: Plane, missed: float, folded: float) -> tuple[str, str] | None:
-    """Why a panorama is not usable, and what to do; None where it is. unlike, seam: see `_unlike`, `_along_seam`;
-    missed: share of the longer side."""
+def _doubts(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """What is doubtful about the cameras of more than two pictures, and what would help."""
+    more = "take more pictures, from places closer together"
+    if report.get("left_out"):
+        names = ", ".join(entry["name"] for entry in report["left_out"])
+        yield f"what does not connect with the others is left out: {names}", more
+    if "rig" not in report:
+        return
+    if report["rig"]["scale"] in ("continuity", "none"):
+        yield "how far apart some pictures were taken is not known", more
+    if (report["field"]["leave_one_out_px"] or 0.0) > VERDICT.deep_px:
+        yield "the scene is too near and deep for the points that were found", more
+    if (report["measured"]["folds"] or 0.0) > VERDICT.folded:
+        yield f"the map folds over in {report['measured']['folds']:.0%} of a picture: depth is doubtful there", more
+    if report["rig"]["focal_spread"] > RIG.same_focal:
+        yield "the focal length is not sure", "give the focal length (--focal35, --focal-px)"
+
+
+def _cause(look: Look, pairs: Sequence[_Pair], missed: float, folded: float) -> tuple[str, str] | None:
+    """Why a panorama is not usable, and what to do; None where it is. missed: share of the longer side."""
     if folded > VERDICT.folded:
         return (
             f"the target would be folded in {folded:.0%} of what it shows: it is mirrored, or another place that looks "
@@ -206,10 +143,11 @@ def _cause(look: Look, unlike: Plane, seam: Plane, missed: float, folded: float)
             "check that neither picture is mirrored and that both show the same things; else give matches by hand "
             "(--matches)",
         )
-    along = seam >= 0
-    seen = along.any() and (seam[along] > VERDICT.step).mean() > VERDICT.seen_seam
-    both = look.shows[0] & look.shows[1]
-    hidden, differ = ((both & part).sum() / max(1, both.sum()) for part in (look.hidden, unlike > VERDICT.step))
+    along = np.concatenate([pair.seam[pair.seam >= 0] for pair in pairs])
+    seen = along.size and (along > VERDICT.step).mean() > VERDICT.seen_seam
+    both = np.sum(look.shows, axis=0, dtype=np.int16) > 1
+    unlike = np.logical_or.reduce([pair.unlike > VERDICT.step for pair in pairs])
+    hidden, differ = ((both & part).sum() / max(1, both.sum()) for part in (look.hidden, unlike))
     if missed > (VERDICT.missed if seen else VERDICT.missed_by_far):
         why = f"5 % of the matches are missed by more than {missed:.0%} of the panorama: the geometry is wrong"
     elif not seen:
@@ -226,54 +164,83 @@ def _cause(look: Look, unlike: Plane, seam: Plane, missed: float, folded: float)
     )
 
 
-def _unlike(look: Look) -> Plane:
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Two pictures that meet at a seam: their numbers; unlike: levels (h, w) by which they differ where both show
+    something, else 0; seam: the same along the seam between them, −1 elsewhere."""
+
+    numbers: tuple[int, int]
+    unlike: Plane
+    seam: Plane
+
+
+def _compared(look: Look) -> list[_Pair]:
+    """The pictures that meet at a seam, two by two; of two pictures these."""
+    met = [(0, 1)]
+    if len(look.shows) > 2:
+        met = []
+        labels = np.full((0, 0), -1) if look.labels is None else look.labels
+        for here, there in NEIGHBOURS:
+            both = np.stack([labels[here], labels[there]], axis=-1)
+            met += np.unique(np.sort(both[(both >= 0).all(axis=-1)], axis=-1), axis=0).tolist()
+        met = sorted({(one, other) for one, other in met if one != other}) or [(0, 1)]
+    pairs = []
+    for numbers in met:
+        unlike = _unlike(look, *numbers)
+        pairs.append(_Pair(numbers, unlike, _along_seam(look, unlike, *numbers)))
+    return pairs
+
+
+def _unlike(look: Look, one: int, other: int) -> Plane:
     """Levels (h, w) by which two pictures differ where both show something, else 0; not counted is what changes so
     slowly that blending evens it out."""
-    both = (look.shows[0] & look.shows[1]).astype(np.float32)
+    both = (look.shows[one] & look.shows[other]).astype(np.float32)
     window = (2 * round(VERDICT.evened_share * look.side) + 1,) * 2
     shown = np.maximum(cv2.blur(both, window), np.float32(1e-6))
     total = np.zeros_like(both)
-    for first, second in zip(*(cv2.split(tones.astype(np.float32)) for tones in look.tones[:2]), strict=True):
+    tones = (cv2.split(look.tones[number].astype(np.float32)) for number in (one, other))
+    for first, second in zip(*tones, strict=True):
         apart = (second - first) * both
         total += np.abs(apart - cv2.blur(apart, window) / shown)
-    unlike: Plane = cv2.blur(total * both, (3, 3)) / look.tones[0].shape[2]
+    unlike: Plane = cv2.blur(total * both, (3, 3)) / look.tones[one].shape[2]
     return unlike
 
 
-def _along_seam(look: Look, unlike: Plane) -> Plane:
-    """`_unlike` (h, w) along the seam, where both pictures show something, −1 elsewhere."""
+def _along_seam(look: Look, unlike: Plane, one: int, other: int) -> Plane:
+    """`_unlike` (h, w) along the seam between two pictures, where both show something, −1 elsewhere."""
     steps = np.full(look.hidden.shape, np.float32(-1))
     if look.labels is None:
         return steps
     seam = np.zeros(steps.shape, bool)
     for here, there in NEIGHBOURS:
-        changes = (look.labels[here] != look.labels[there]) & (look.labels[here] >= 0) & (look.labels[there] >= 0)
+        first, second = look.labels[here], look.labels[there]
+        changes = (first == one) & (second == other) | (first == other) & (second == one)
         seam[here] |= changes
         seam[there] |= changes
-    return np.where(seam & look.shows[0] & look.shows[1], unlike, steps)
+    return np.where(seam & look.shows[one] & look.shows[other], unlike, steps)
 
 
-def _seam_places(look: Look, steps: Plane, shift: tuple[int, int]) -> Iterator[Place]:
+def _seam_places(look: Look, pair: _Pair, names: Sequence[str], shift: tuple[int, int]) -> Iterator[Place]:
     """Where a seam is seen."""
     apart = VERDICT.together_share * look.side
     least = 2 * max(VERDICT.seam_px, VERDICT.seam_share * look.side)
-    for part in _parts(steps > VERDICT.step, least, apart):
+    for part in _parts(pair.seam > VERDICT.step, least, apart):
         near = dilated(part, max(1, round(VERDICT.rim_share * look.side)))
         cut_by = [
-            role(number) for number, (shown, other) in enumerate((look.shows, look.shows[::-1]))
-            if (near & ~shown & other).any()
+            called(number, names) for number, other in (pair.numbers, pair.numbers[::-1])
+            if (near & ~look.shows[number] & look.shows[other]).any()
         ]  # fmt: skip
         if cut_by:
-            what = f"a thing is cut by the border of the {' and the '.join(cut_by)}"
+            what = f"a thing is cut by the border of {' and '.join(cut_by)}"
         elif look.hidden[part].mean() > VERDICT.mostly:
             what = "near and far do not meet at the seam: depth is doubtful"
         else:
             what = "the pictures differ at the seam: something moved, or its depth is wrong"
-        yield Place(look.box(part, shift), what, float((steps[part] - VERDICT.step).sum()))
+        yield Place(look.box(part, shift), what, float((pair.seam[part] - VERDICT.step).sum()))
 
 
-def _torn_places(look: Look, unlike: Plane, shift: tuple[int, int]) -> Iterator[Place]:
-    """Where the map of the picture that is shown folds or jumps, with detail that shows it, and the other picture does
+def _torn_places(look: Look, pairs: Sequence[_Pair], shift: tuple[int, int]) -> Iterator[Place]:
+    """Where the map of the picture that is shown folds or jumps, with detail that shows it, and another picture does
     not agree."""
     torn = np.zeros(look.hidden.shape, bool)
     for number, one in enumerate(look.maps):
@@ -284,7 +251,9 @@ def _torn_places(look: Look, unlike: Plane, shift: tuple[int, int]) -> Iterator[
         if counts.any():
             large = counts & (areas > VERDICT.jump * np.median(areas[counts]))
             broken = large | (turned_over(turns) & shown)
-            torn |= broken & _detailed(look.tones[number]) & (unlike > VERDICT.torn_step)
+            others = [pair.unlike > VERDICT.torn_step for pair in pairs if number in pair.numbers]
+            if others:
+                torn |= broken & _detailed(look.tones[number]) & np.logical_or.reduce(others)
     for part in _parts(torn, VERDICT.torn_share * look.side * look.side):
         what = "the picture is torn or doubled at an outline: depth is doubtful"
         yield Place(look.box(part, shift), what, float(part.sum()))
@@ -300,11 +269,12 @@ def _bent_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         # half the sum and half the difference of the singular values of the Jacobian
         alike, unlike = np.hypot(x_x + y_y, y_x - x_y) / 2, np.hypot(x_x - y_y, y_x + x_y) / 2
         bent = alike + unlike > VERDICT.squeeze * np.abs(alike - unlike)
-        bent &= eroded(known, side // 2 + 1)
+        # of a blank sky or wall nobody sees how it is mapped
+        bent &= eroded(known, side // 2 + 1) & dilated(_detailed(look.tones[number]), side // 2)
         opened = cv2.morphologyEx(bent.astype(np.uint8), cv2.MORPH_OPEN, np.ones((side // 2,) * 2, np.uint8)) > 0
         for part in _parts(opened, VERDICT.bent_share * opened.size):
             what = "the picture is bent or stretched: depth or the focal length is doubtful"
-            yield Place(look.box(part, shift), what, float(part.sum()))
+            yield Place(look.box(part, shift), what, float(part.sum()), FOCAL)
 
 
 def _detailed(tones: Levels) -> NDArray[np.bool_]:
@@ -322,16 +292,18 @@ def _light_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         white = np.logical_and.reduce([now >= VERDICT.white for now in cv2.split(tones)])
         blown = shown & white & ~np.logical_and.reduce(clipped)
         greyed = shown & _greyed(tones, taken, clipped)
-        both = greyed & look.shows[0] & look.shows[1]
-        apart = np.abs(look.tones[1][both].astype(int) - look.tones[0][both]).max(axis=1)
+        own = greyed & look.shows[number]
+        other = max(set(range(len(look.shows))) - {number}, key=lambda one: (own & look.shows[one]).sum())
+        both = own & look.shows[other]
+        apart = np.abs(look.tones[other][both].astype(int) - tones[both]).max(axis=1)
         if both.sum() >= VERDICT.compared_px and np.median(apart) <= VERDICT.cast:
             greyed[:] = False  # darker, but as the other picture has it
-        for mask, share, what in (
-            (blown, VERDICT.blown_share, "light is blown here that the picture has"),
-            (greyed, VERDICT.greyed_share, "light that was too bright for the picture got a cast or a step"),
+        for mask, share, what, help_ in (
+            (blown, VERDICT.blown_share, "light is blown here that the picture has", DARKER),
+            (greyed, VERDICT.greyed_share, "light that was too bright for the picture got a cast or a step", CLIPPED),
         ):
             if mask.sum() > share * mask.size:
-                yield Place(look.box(max(_parts(mask, 1), key=np.sum), shift), what, float(mask.sum()))
+                yield Place(look.box(max(_parts(mask, 1), key=np.sum), shift), what, float(mask.sum()), help_)
 
 
 def _greyed(tones: Levels, taken: Levels, clipped: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from ..cameras.lens import distort
 from ..cameras.projective import homogeneous
 from ..field.transfer import transfer
 from ..measure.metrics import look_up
+from ..panorama.viewpoint import Viewpoint
 from ..pipeline import StitchResult
 from ..raster.arrays import Array
 from ..raster.colour import encode
@@ -66,7 +67,7 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
         "K_prime": np.linalg.inv(S_prime) @ view.K_prime, "R": view.R, "t": view.t, "model": view.model,
         "distortion": result.cameras[edge.i].distortion, "distortion_prime": result.cameras[edge.j].distortion,
         "S": shift @ S, "canvas": (canvas.width, canvas.height), "K_canvas": shift @ view.K,
-        "viewpoint": None if result.warp.viewpoint is None else asdict(result.warp.viewpoint),
+        "viewpoint": asdict(result.warp.viewpoint) if isinstance(result.warp.viewpoint, Viewpoint) else None,
     }  # fmt: skip
 
 
@@ -130,7 +131,7 @@ def displacement_px(result: StitchResult) -> NDArray[np.float32]:
     if not view.e_prime.any():
         return np.zeros(picture_map.shape, np.float32)
     infinite = warp.canvas.project_rows(view.H_inf, warp.canvas.xs, warp.canvas.ys, result.cameras[0])
-    if warp.slide is not None and warp.viewpoint is not None:
+    if warp.slide is not None and isinstance(warp.viewpoint, Viewpoint):
         away = whole(warp.slide) * warp.inverse_depth
         towards = view.H_inf @ result.views[0].K @ warp.viewpoint.c
         infinite = [part + away * step for part, step in zip(infinite, towards, strict=True)]

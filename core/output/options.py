@@ -29,4 +29,34 @@ class InspectionOptions:
     """Share of a reduced pixel that both pictures must cover to be compared: all of it, but for rounding."""
 
 
+@dataclass(frozen=True)
+class GraphOptions:
+    """The page about more than two pictures (`rig_graph`, `rig_page`)."""
+
+    thumbnail_px: int = 110
+    """px along the longer side of a thumbnail: sixty of them still fit on a page."""
+
+    apart: float = 1.55
+    """Distance of two thumbnails at least, in units of the longer side: the line between them has to be seen."""
+
+    px_per_radian: float = 260.0
+    """px by which two pictures stand apart that look one radian apart: a full turn is as wide as the page."""
+
+    rounds: int = 60
+    """Times that thumbnails which lie upon another are pushed apart, at most."""
+
+    thinnest_px: float = 1.0
+    """Width of the line of a pair without matches."""
+
+    thickest_px: float = 9.0
+    """Width of the line of the pair with the most."""
+
+    text_px: int = 12
+    """px from a thumbnail down to the line of its name."""
+
+    panorama_px: int = 1500
+    """px along the longer side of the panorama on the page, at most."""
+
+
 INSPECTION = InspectionOptions()
+GRAPH = GraphOptions()

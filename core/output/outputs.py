@@ -17,14 +17,18 @@ from numpy.typing import NDArray
 
 from ..measure.report import plain
 from ..panorama.layers import Layer
+from ..panorama.rig_viewpoint import RigViewpoint
 from ..pictures.encoding import encode_picture, output_bits
 from ..pipeline import StitchResult
 from ..raster.arrays import cut
 from ..raster.colour import decode
 from ..raster.lazy import whole
+from ..raster.picture_map import BoxedMap
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
+from .camera_file import camera_table
 from .match_table import match_file
+from .rig_page import rig_page
 
 # Versions of the layers' folder and of the warp's file (docs/formats.md).
 LAYERS_FORMAT, WARP_FORMAT = 2, 2
@@ -48,17 +52,20 @@ class OutputRequest:
     panorama : Path
         Its suffix says the format.
     report : Path, optional
-        .json; matches and seconds go beside it.
+        .json; matches and seconds go beside it, and of more than two pictures a page.
     layers : Path, optional
         A folder.
     warp : Path, optional
         .npz.
+    cameras : Path, optional
+        .json.
     """
 
     panorama: Path
     report: Path | None = None
     layers: Path | None = None
     warp: Path | None = None
+    cameras: Path | None = None
 
     @property
     def timing(self) -> Path | None:
@@ -66,9 +73,19 @@ class OutputRequest:
         return None if self.report is None else self.report.with_name(self.report.stem + ".timing.json")
 
     @property
+    def page(self) -> Path | None:
+        """The page about more than two pictures lies beside the report."""
+        return None if self.report is None else page_beside(self.report)
+
+    @property
     def matches(self) -> Path | None:
         """The matches lie beside the report, in the form that --matches takes."""
         return None if self.report is None else self.report.with_name(self.report.stem + ".matches.csv")
+
+
+def page_beside(report: Path) -> Path:
+    """Where the page about more than two pictures lies."""
+    return report.with_suffix(".html")
 
 
 def check(
@@ -97,17 +114,32 @@ def check(
     output_bits((8,), request.panorama.suffix)
     if request.warp is not None and request.warp.suffix.lower() != ".npz":
         raise BadRequest(f"the warp is written as .npz, not {request.warp.suffix or 'a file of no kind'}")
-    named = (request.panorama, request.report, request.timing, request.matches, request.warp)
-    single = [path for path in named if path is not None]
+    if request.cameras is not None and len(set(pictures)) < len(pictures):
+        twice = next(name for number, name in enumerate(pictures) if name in pictures[:number])
+        raise BadRequest(f"cameras are written by name, and two pictures are called {twice}: rename one of them")
+    named = (request.panorama, request.report, request.timing, request.matches, request.warp, request.cameras)
+    page = request.page if len(pictures) > 2 else None
+    single = [path for path in (*named, page) if path is not None]
     files.check(*single)
     if request.layers is not None:
         names = layer_files(pictures, (".png", ".exr"))
         files.check_folder(request.layers, names)
-        _refuse_other_files(request.layers, layer_files(pictures, (".png", ".exr"), seam, inpainted, slides))
+        _refuse_other_files(request.layers, _possible_files(pictures, seam, inpainted, slides))
         taken = {(request.layers / name).resolve() for name in names}
         for path in single:
             if path.resolve() in taken:
                 raise BadRequest(f"{path}: named for two outputs, a layer is one; give each its own name")
+
+
+def _possible_files(pictures: Sequence[str], seam: bool, inpainted: bool, slides: bool) -> list[str]:
+    """Files that a folder of layers may hold: of more than two pictures any may come first, or be left out."""
+    exact = layer_files(pictures, (".png", ".exr"), seam, inpainted, slides)
+    if len(pictures) == 2:
+        return exact
+    return [*exact, f"{SEAM}.png"] + [
+        layer_stem(number, name) + suffix for number in range(len(pictures)) for name in pictures
+        for suffix in (".png", ".exr")
+    ]  # fmt: skip
 
 
 def _refuse_other_files(folder: Path, names: Sequence[str]) -> None:
@@ -137,7 +169,7 @@ def layer_files(
     the files that only a stitch with a seam, with filled holes, or with a viewpoint that may slide has."""
     out = [layer_stem(number, name) + suffix for number, name in enumerate(pictures) for suffix in suffixes]
     masks = [_occluded(number) for number in range(0 if slides else 1, len(pictures))] + [CONFIDENCE]
-    masks += [LABELS, SEAM] if seam else []
+    masks += [LABELS, SEAM][: 2 if len(pictures) == 2 else 1] if seam else []
     masks += [INPAINTED] if inpainted else []
     return out + [f"{mask}.png" for mask in masks] + [CANVAS]
 
@@ -176,6 +208,8 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
         _add_layers(result, request.layers, files)
     if request.warp is not None:
         files.add(request.warp, warp_bytes(result))
+    if request.cameras is not None:
+        files.add(request.cameras, json_bytes(camera_table(result)))
     if request.report is not None and request.timing is not None and request.matches is not None:
         add_report(result, [*result.warnings, *warnings], request.report, request.matches, request.timing, files)
     return warnings
@@ -184,15 +218,20 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
 def add_report(
     result: StitchResult, warnings: list[str], report: Path, matches: Path, timing: Path, files: OutputFiles
 ) -> None:
-    """Stages the report, with these warnings in place of its own; the matches; and the seconds."""
+    """Stages the report, with these warnings in place of its own; the matches; the seconds; and of more than two
+    pictures the page."""
     files.add(report, json_bytes({**result.report, "warnings": warnings}))
     files.add(matches, match_file(result))
     files.add(timing, json_bytes({"seconds": result.seconds}))
+    if result.rig is not None:
+        files.add(page_beside(report), rig_page(result).encode(errors="replace"))
 
 
 def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
     """Stages everything of a layers' folder."""
-    place = result.spread
+    place, names = result.spread, [picture.name for picture in result.pictures]
+    if result.rig is not None:
+        _refuse_other_files(folder, layer_files(names, (".png", ".exr")))
     for number, (picture, layer) in enumerate(zip(result.pictures, result.layers, strict=True)):
         _add_layer(files, folder, layer_stem(number, picture.name), layer.within(place), result)
     asked = result.report["options"]
@@ -207,12 +246,13 @@ def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
     if result.labels is not None:
         labels = cut(result.labels, place, -1)
         masks[LABELS] = _label_bytes(labels, len(result.pictures))
-        masks[SEAM] = _mask_bytes(labels > 0, result.panorama.alpha > 0)
+        if result.rig is None:
+            masks[SEAM] = _mask_bytes(labels > 0, result.panorama.alpha > 0)
     for name, data in masks.items():
         files.add_to_folder(folder, f"{name}.png", data)
     about = {
         "format": LAYERS_FORMAT, "size": [result.canvas.width, result.canvas.height],
-        "names": [picture.name for picture in result.pictures], "projection": result.report["canvas"]["projection"],
+        "names": names, "projection": result.report["canvas"]["projection"],
     }  # fmt: skip
     files.add_to_folder(folder, CANVAS, json_bytes(about))
 
@@ -249,7 +289,8 @@ def warp_bytes(result: StitchResult) -> bytes:
     ray r of the pixel instead; there is no offset, but `projection` (its name), `focal` (px per radian), `centre`
     (canvas px of the direction ahead) and `rotation` (from its axes to the reference camera's). Where the viewpoint
     slides, by `slide` s, which is `s1` at most, that ray starts at s c, c = −Rᵀ t of the target, and inverse_depth is
-    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). docs/formats.md lists every key.
+    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). Of more than two pictures, s c is s1 times
+    what `places` say. docs/formats.md lists every key.
 
     Parameters
     ----------
@@ -278,10 +319,10 @@ def warp_bytes(result: StitchResult) -> bytes:
     }  # fmt: skip
     for number, one in enumerate(warp.maps):
         if number or canvas.projection is not None:  # in a flat panorama the reference is only shifted, by `offset`
-            picture_map = one.arrays()
+            known = one.inner if isinstance(one, BoxedMap) else one.arrays()
+            box = one.box if isinstance(one, BoxedMap) else (0, 0, canvas.width, canvas.height)
             arrays |= {
-                f"map_x_{number:02d}": picture_map.x, f"map_y_{number:02d}": picture_map.y,
-                f"box_{number:02d}": np.array([0, 0, canvas.width, canvas.height]),
+                f"map_x_{number:02d}": known.x, f"map_y_{number:02d}": known.y, f"box_{number:02d}": np.array(box),
             }  # fmt: skip
     projection = canvas.projection
     if projection is not None:
@@ -292,6 +333,11 @@ def warp_bytes(result: StitchResult) -> bytes:
         }  # fmt: skip
     if warp.slide is not None and warp.viewpoint is not None:
         arrays |= {"slide": whole(warp.slide), "s1": np.array(warp.viewpoint.s1)}
+    elif isinstance(warp.viewpoint, RigViewpoint):
+        arrays |= {
+            "s1": np.array(warp.viewpoint.s1), "places": warp.viewpoint.places,
+            "places_rotation": warp.viewpoint.rotation,
+        }  # fmt: skip
     return npz_bytes(arrays)
 
 

@@ -101,6 +101,13 @@ class Canvas:
             return list(np.moveaxis(homogeneous(undistort(raw, camera)) @ rows.T, -1, 0))
         return [(row[0] * xs)[None, :] + (row[1] * ys[:, None] + row[2]) for row in rows]
 
+    def rays_at(self, K: Array, xs: Array, ys: Array, camera: Camera | None = None) -> tuple[Array, Array]:
+        """Unit rays (len(ys), len(xs), 3) in the reference's frame at columns xs and lines ys in px of the plane, and
+        the lengths of K⁻¹ p there; K (3, 3): of the reference; camera: see `project_rows`."""
+        rays = np.stack(self.project_rows(inverse_intrinsics(K), xs, ys, camera), axis=-1)
+        length = np.linalg.norm(rays, axis=-1)
+        return rays / length[..., None], length
+
     def on_reference(self, xs: Array, ys: Array, camera: Camera | None = None) -> tuple[Array, Array]:
         """Raw pixels (len(ys), len(xs), 2) of the reference at columns xs and lines ys in px of the plane, NaN behind
         its camera; and p_3 there."""
@@ -216,19 +223,19 @@ def expected_reach(
 
 
 def round_reach(
-    projection: Projection, planes: Sequence[Array], outlines: Sequence[Array], cameras: Sequence[Camera]
+    projection: Projection, outlines: Sequence[Array], shows: Sequence[Callable[[Array], bool]], camera: Camera
 ) -> tuple[Box, Array, bool]:
     """Where to look for the pictures in a round panorama.
 
     Parameters
     ----------
     projection : Projection
-    planes : sequence of (3, 3) arrays
-        Homographies from the reference to each further picture, of the plane in which the field continues.
     outlines : sequence of (N, 3) arrays
-        Of these pictures, as canvas points p on that plane.
-    cameras : sequence of Camera
-        Of all pictures, the reference's first.
+        Of all pictures, the reference's first: canvas points p in order.
+    shows : sequence of callables
+        For each, whether it shows a canvas point (3,).
+    camera : Camera
+        The reference's.
 
     Returns
     -------
@@ -241,26 +248,30 @@ def round_reach(
     """
     to_ray = inverse_intrinsics(projection.K)
 
-    def shows(matrix: Array, picture: Camera) -> Callable[[Array], bool]:
-        def shown(ray: Array) -> bool:
-            x, y = _raw(matrix @ projection.K @ ray, picture)
-            return bool(falls_inside(x, y, picture.size))
+    def on_ray(shown: Callable[[Array], bool]) -> Callable[[Array], bool]:
+        return lambda ray: shown(projection.K @ ray)
 
-        return shown
-
-    own = homogeneous(undistort(border(cameras[0].size), cameras[0]))
     extents = [
-        extent(projection, outline @ to_ray.T, shows(matrix, picture))
-        for outline, matrix, picture in zip((own, *outlines), (np.eye(3), *planes), cameras, strict=True)
+        extent(projection, outline @ to_ray.T, on_ray(shown)) for outline, shown in zip(outlines, shows, strict=True)
     ]
     limits = projection.limits
-    margin = CANVAS.margin * max(cameras[0].size) * projection.focal / focal_of(projection.K)
+    margin = CANVAS.margin * max(camera.size) * projection.focal / focal_of(projection.K)
     low, high = np.min(extents, axis=0)[:2], np.max(extents, axis=0)[2:]
     cut = projection.cuts and bool((low < limits[:2]).any() or (high > limits[2:]).any())
     reach = np.clip(np.concatenate([low - margin, high + margin]), np.tile(limits[:2], 2), np.tile(limits[2:], 2))
     left, top = np.floor(np.clip(extents[0][:2], limits[:2], limits[2:] - 1)).astype(int)
     right, bottom = np.ceil(np.clip(extents[0][2:], limits[:2], limits[2:] - 1)).astype(int) + 1
     return (int(left), int(top), int(right - left), int(bottom - top)), reach, cut
+
+
+def shown_by(matrix: Array, camera: Camera) -> Callable[[Array], bool]:
+    """Whether a picture shows a canvas point (3,), which matrix (3, 3) maps to its ideal px."""
+
+    def shown(point: Array) -> bool:
+        x, y = _raw(matrix @ point, camera)
+        return bool(falls_inside(x, y, camera.size))
+
+    return shown
 
 
 def border(size: tuple[int, int]) -> Array:

@@ -21,6 +21,7 @@ from ..cameras.view import View
 from ..raster.arrays import Array
 from .options import CHOICE
 from .own_depth import OwnDepth, Things
+from .rig_viewpoint import RigViewpoint
 from .slid_warp import slid_warp
 from .straightness import along, leans, planes_through
 from .upright_edges import StraightEdges
@@ -119,6 +120,38 @@ def choose_slide(
     return _least(tuple(costs))
 
 
+def choose_rig_slide(
+    base: Warp, views: Sequence[View], viewpoint: RigViewpoint, edges: Sequence[StraightEdges], down: Array | None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> SlideChoice:  # fmt: skip
+    """Choose how far the viewpoint slides among the places of N pictures, by their straight edges and what would be
+    enlarged or folded.
+
+    Parameters
+    ----------
+    base : Warp
+        Of all pictures, seen from the first one's place, on a cylinder or sphere that is coarse.
+    views : sequence of View
+        Of all pictures, the first one's R = I and t = 0.
+    viewpoint : RigViewpoint
+        How it slides (see `rig_viewpoint`).
+    edges, down, progress
+        See `choose_slide`.
+
+    Returns
+    -------
+    SlideChoice
+        Of candidates that cost about as much, the one that slides least.
+    """
+    samples = []
+    for number, (view, one) in enumerate(zip(views, edges, strict=True)):
+        progress(number / len(views))
+        samples.append(_samples(OwnDepth.of(base, view, number), one, down))
+    return _least(tuple(
+        _cost(s1, _geometry(samples, viewpoint.sliding(s1), down), 0.0, 0.0) for s1 in CHOICE.candidates
+    ))  # fmt: skip
+
+
 def _least(costs: tuple[SlideCost, ...]) -> SlideChoice:
     """The choice by the costs of candidates, which slide further and further."""
     still = costs[0]
@@ -203,7 +236,7 @@ def _level(rays: Array, d: Array, down: Array) -> NDArray[np.bool_]:
 
 
 def _geometry(
-    samples: Sequence[_Samples], viewpoint: Viewpoint, down: Array | None
+    samples: Sequence[_Samples], viewpoint: Viewpoint | RigViewpoint, down: Array | None
 ) -> tuple[float, float, float, float]:
     """Bend (px) and lean (degrees) of the edges of all pictures, and shares of their cells enlarged and folded."""
     bends, weights, lean, upright_weights, enlarged, folded = ([] for _ in range(6))
@@ -223,11 +256,13 @@ def _geometry(
     return _mean(bends, weights), _mean(lean, upright_weights, CHOICE.least_upright), shares[0], shares[1]
 
 
-def _twice(viewpoint: Viewpoint, things: Things) -> NDArray[np.bool_]:
+def _twice(viewpoint: Viewpoint | RigViewpoint, things: Things) -> NDArray[np.bool_]:
     """Which things (…) the panorama shows more than once: the slide goes back over them faster than they move on.
 
     A thing is seen wherever the viewpoint of the ray towards it is the one that the ray starts from.
     """
+    if isinstance(viewpoint, RigViewpoint):
+        return viewpoint.shows_twice(things.q, things.d)
     past = []
     for slide in np.linspace(0, viewpoint.s1, CHOICE.fold_steps):
         rays = things.q - (slide * things.d)[..., None] * viewpoint.c

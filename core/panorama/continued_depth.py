@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..cameras.camera import Camera
-from ..cameras.projective import inverse_intrinsics
 from ..field.fade import fading
 from ..field.field import FieldValues
 from ..raster.arrays import Array
@@ -35,10 +34,8 @@ class ContinuedDepth:
         """The continuation at the nodes of a grid; None without one."""
         if continuation is None:
             return None
-        to_ray = inverse_intrinsics(continuation.K)
-        rays = np.stack(canvas.project_rows(to_ray, grid.xs, grid.ys, camera), axis=-1)
-        length = np.linalg.norm(rays, axis=-1)
-        nodes = continuation.at(rays / length[..., None]) * length
+        rays, length = canvas.rays_at(continuation.K, grid.xs, grid.ys, camera)
+        nodes = continuation.at(rays) * length
         return ContinuedDepth(canvas, camera, grid, nodes, continuation.takeover_px)
 
     def strip(self, rows: slice, places: Array | None) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, LazyImage
 from .canvas import Canvas
 from .continued_depth import ContinuedDepth
+from .rig_viewpoint import RigViewpoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,19 @@ class OnCanvas(LazyImage):
     def shape(self) -> tuple[int, ...]:
         """(H, W)."""
         return self.canvas.height, self.canvas.width
+
+
+@dataclass(frozen=True, eq=False)
+class AtNodes(OnCanvas):
+    """Values (H, W) between those at the nodes of a grid."""
+
+    grid: Grid
+    nodes: Array
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        (rows, columns), (x, y) = within(part, self.shape), self.canvas.offset
+        size = columns.stop - columns.start, rows.stop - rows.start
+        return self.grid.to_pixels(self.nodes, columns.start - x, rows.start - y, *size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,13 +133,15 @@ class Nearness(OnCanvas):
     """Baselines per distance (H, W) from a view's camera (see `visibility.nearness_of`); camera: the reference's.
 
     slide (H, W): that of each pixel's viewpoint, None if all are seen from the reference's place; nearer: by how much
-    nearer the view's camera is to the place of the target than to that of the reference, along its axis.
+    nearer the view's camera is to the place of the target than to that of the reference, along its axis; viewpoint: of
+    more than two pictures, if it slides, and the first one's K.
     """
 
     view: View
     depth: AnyImage
     slide: AnyImage | None = None
     nearer: float = 0.0
+    viewpoint: tuple[Array, RigViewpoint] | None = None
 
     def __getitem__(self, part: Part) -> NDArray[np.float32]:
         rows, columns = within(part, self.shape)
@@ -134,6 +150,10 @@ class Nearness(OnCanvas):
         d = np.asarray(self.depth[part])
         with np.errstate(invalid="ignore", divide="ignore"):
             ahead = d * np.float32(self.view.e_prime[2]) + infinite.astype(np.float32)
+            if self.viewpoint is not None:
+                K, viewpoint = self.viewpoint
+                places = viewpoint.place(self.canvas.rays_at(K, xs, ys, self.camera)[0])
+                ahead += d * (places @ (K.T @ self.view.H_inf[2])).astype(np.float32)
             if self.slide is not None:
                 ahead += d * np.asarray(self.slide[part]) * np.float32(self.nearer)
             return nearness_of(d, ahead)

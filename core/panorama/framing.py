@@ -165,7 +165,9 @@ def _levelled(
     def frame(down: Array, more: float = 0.0) -> Projection:
         return _surface(asked, _centred(down, covered, more), edges, covered, K)
 
-    if down is not None and _believed(down) and not np.allclose(down, best):
+    # where there are many pictures, they know better than the first alone how it was held
+    believed = down is not None and (_believed(down) or (len(views) > 2 and _agree(down, best)))
+    if down is not None and believed and not np.allclose(down, best):
         room, room_by_edges = (_room(frame(one), covered)[0] for one in (best, down))
         best = down if room_by_edges >= FRAMING.least_kept * room else best
     frames = [frame(best, more) for more in FRAMING.more_kept_deg]
@@ -179,6 +181,11 @@ def _believed(down: Array) -> bool:
     return bool(abs(roll) <= FRAMING.max_roll_deg and abs(pitch) <= FRAMING.max_pitch_deg)
 
 
+def _agree(down: Array, other: Array) -> bool:
+    """Whether two directions (3,) down differ by less than anybody tilts a camera by mistake."""
+    return bool(down @ other >= np.cos(np.radians(FRAMING.max_roll_deg)))
+
+
 def _centred(down: Array, covered: Coverage, more: float) -> Array:
     """The rotation (3, 3) of a panorama that looks at the middle of what is shown, `down` (3,) being down; more:
     degrees of tilt that are kept beside what is always kept."""
@@ -186,7 +193,12 @@ def _centred(down: Array, covered: Coverage, more: float) -> Array:
     mean = covered.solid_angle @ covered.rays @ base
     ahead = np.arctan2(mean[0], mean[2])
     left, right = _ends(covered.rays @ base @ turned(np.degrees(-ahead), 0, 0))
-    level = base @ turned(-np.degrees(ahead + (left + right) / 2), 0, 0)
+    if np.degrees(right - left) > FRAMING.ring_fov_deg:  # what crosses the back may have its gap elsewhere
+        ahead = _away_from_gap(covered.rays @ base, ahead)
+        left, right = _ends(covered.rays @ base @ turned(np.degrees(-ahead), 0, 0))
+    level: Array = base @ turned(-np.degrees(ahead + (left + right) / 2), 0, 0)
+    if np.degrees(right - left) > FRAMING.ring_fov_deg:
+        return level  # what goes round has no side to be tilted to
     mean = covered.solid_angle @ covered.rays @ level
     pitch = np.degrees(np.arctan2(-mean[1], np.hypot(mean[0], mean[2])))
     kept = np.sign(pitch) * min(abs(pitch), max(0.0, abs(pitch) - FRAMING.full_pitch_deg) + more)
@@ -201,6 +213,17 @@ def _ends(rays: Array) -> tuple[float, float]:
     return float(left), float(right)
 
 
+def _away_from_gap(rays: Array, otherwise: float) -> float:
+    """The heading, in radians, opposite to the middle of the widest gap between rays (N, 3) in a panorama's axes; if
+    there is none, the other."""
+    headings = np.sort(angle_of(rays[:, 0], rays[:, 2]))
+    gaps = np.diff(np.append(headings, headings[0] + 2 * np.pi))
+    widest = int(np.argmax(gaps))
+    if np.degrees(gaps[widest]) < FRAMING.least_gap_deg:
+        return otherwise
+    return float(headings[widest] + gaps[widest] / 2 - np.pi)
+
+
 def _surface(asked: FrameRequest, rotation: Array, edges: Edges | None, covered: Coverage, K: Array) -> Projection:
     """The projection that suits what is shown, or that is asked for, turned by a rotation (3, 3)."""
     own = covered.rays @ rotation
@@ -210,7 +233,8 @@ def _surface(asked: FrameRequest, rotation: Array, edges: Edges | None, covered:
     kind = asked.kind
     if kind == "auto":
         kind = "cylindrical" if fov > FRAMING.cylinder_fov_deg else "pannini"
-        kind = "equirectangular" if steepest > FRAMING.sphere_elevation_deg else kind
+        round_about = steepest > FRAMING.sphere_elevation_deg or fov > FRAMING.ring_fov_deg
+        kind = "equirectangular" if round_about else kind
     if kind in ("cylindrical", "equirectangular"):
         return round_projection(kind, K, rotation)
     distance = 0.0 if kind == "perspective" else asked.distance

@@ -52,6 +52,13 @@ class FramingOptions:
     cylinder_fov_deg: float = 130.0
     """Degrees from left to right beyond which Pannini's projection stretches its ends, and a cylinder is taken."""
 
+    ring_fov_deg: float = 330.0
+    """Degrees from left to right beyond which a panorama counts as a ring, and is drawn on a sphere: one that closes
+    has no ends to be cut."""
+
+    least_gap_deg: float = 2.0
+    """Degrees of headings without any picture that count as a gap in such a ring, which then has its ends there."""
+
     sphere_elevation_deg: float = 60.0
     """Degrees up or down beyond which all of those stretch, and a sphere is taken."""
 

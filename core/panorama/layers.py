@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..raster.arrays import Box, Part, bounds, cut, shown_only
 from ..raster.lazy import AnyImage, Held, LazyImage, Placed, Weighed, extent, part_of, whole
-from ..raster.picture_map import CanvasMap, PictureMap
+from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap
 from ..raster.sampling import fetch
 from .options import LAYER
 from .reference_map import ReferenceMap
@@ -67,6 +67,8 @@ def layer_of(picture: Picture, picture_map: CanvasMap) -> Layer:
     """
     if isinstance(picture_map, ReferenceMap):
         return _pasted_layer(picture, picture_map)
+    if isinstance(picture_map, BoxedMap):
+        return _fetched_layer(picture, picture_map.inner).within(picture_map.canvas_box)
     return _fetched_layer(picture, picture_map.arrays())
 
 

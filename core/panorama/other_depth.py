@@ -17,6 +17,7 @@ from ..raster.picture_map import CanvasMap, PictureMap
 from .canvas import Canvas
 from .depth import Confidence
 from .reference_map import ReferenceMap
+from .viewpoint import Viewpoint
 from .warp import Warp
 
 
@@ -103,7 +104,7 @@ def seen_at(
     seen = warp.canvas.project_rows(
         view.H_inf, warp.canvas.xs[box[1]], warp.canvas.ys[box[0]], reference.camera
     )
-    if warp.slide is not None and warp.viewpoint is not None:
+    if warp.slide is not None and isinstance(warp.viewpoint, Viewpoint):
         moved = d * np.asarray(warp.slide[box], np.float64)
         seen = [part + moved * k for part, k in zip(seen, view.H_inf @ reference.K @ warp.viewpoint.c, strict=True)]
     x, y = transfer(view, seen, d)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import cv2
 import numpy as np
@@ -14,6 +15,9 @@ from ..pictures.picture import Picture
 from ..raster.arrays import Array
 from ..raster.resizing import resized_points
 from .options import EDGES
+
+# What was found in pictures that are still held: the focal length asks for it, and so do level and frame.
+_found: WeakKeyDictionary[Picture, tuple[Array, Array]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,21 @@ def straight_edges(picture: Picture, camera: Camera, K: Array) -> StraightEdges:
     ----------
     von Gioi et al., LSD: a Line Segment Detector, IPOL 2012.
     """
+    ends, lengths = _segments(picture)
+    rays = homogeneous(undistort(ends.reshape(-1, 2), camera)) @ np.linalg.inv(K).T
+    return StraightEdges(rays.reshape(-1, 2, 3), lengths)
+
+
+def _segments(picture: Picture) -> tuple[Array, Array]:
+    """Ends (N, 2, 2) px of the straight edges of a picture, the longest first, and lengths (N,) in shares of its longer
+    side."""
+    if picture not in _found:
+        _found[picture] = _detected(picture)
+    return _found[picture]
+
+
+def _detected(picture: Picture) -> tuple[Array, Array]:
+    """See `_segments`."""
     height, width = picture.view.shape[:2]
     scale = min(1.0, EDGES.side_px / max(width, height))
     size = (max(1, round(scale * width)), max(1, round(scale * height)))
@@ -79,10 +98,8 @@ def straight_edges(picture: Picture, camera: Camera, K: Array) -> StraightEdges:
         columns, rows = (np.clip(np.rint(ends.mean(axis=1)[:, k]).astype(int), 0, size[k] - 1) for k in (0, 1))
         used &= opaque[rows, columns] > 0
     longest = np.flatnonzero(used)[np.argsort(-lengths[used], kind="stable")[:EDGES.max_edges]]
-    ends, lengths = ends[longest], lengths[longest]
-    full = resized_points(ends.reshape(-1, 2), size, (width, height))
-    rays = homogeneous(undistort(full, camera)) @ np.linalg.inv(K).T
-    return StraightEdges(rays.reshape(-1, 2, 3), lengths)
+    full = resized_points(ends[longest].reshape(-1, 2), size, (width, height))
+    return full.reshape(-1, 2, 2), lengths[longest]
 
 
 def agreement(down: Array, normals: Array, lengths: Array, sigma: float) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,13 @@ from ..raster.options import GRID
 from ..raster.picture_map import CanvasMap, PictureMap
 from ..system.errors import BadRequest, NoOverlap
 from ..system.threads import each
-from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
+from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach, shown_by
 from .continued_depth import ContinuedDepth
 from .depth import Confidence, Depth, Nearness
 from .options import WARP
 from .projection import Projection, focal_of
 from .reference_map import ReferenceMap
+from .rig_viewpoint import RigViewpoint
 
 if TYPE_CHECKING:
     from ..continuation.continuation import Continuation
@@ -58,13 +59,15 @@ class Warp:
         are seen from the reference's place.
     behind : (H, W) bool array or None
         What the reference cannot see though its map falls inside it, likewise: something nearer hides it.
-    viewpoint : Viewpoint or None
-        How far it slides in any direction.
+    viewpoint : Viewpoint, RigViewpoint or None
+        How far it slides in any direction: of a pair (then `slide` says so too), or of more pictures.
     refilled : (H, W) bool array or None
         Where depth was taken from the background, since a border cuts what was there: nothing counts as hidden there.
     beside : (H, W, 3) float32 array or None
         px x and y (before the lens) by which picture 1 is seen beside its epipolar lines, and confidence; only where it
         was asked for, with all of depth.
+    deviation : (H, W) image or None
+        Standard deviation of inverse depth, of more than two pictures.
     """
 
     canvas: Canvas
@@ -73,9 +76,10 @@ class Warp:
     lazy_confidence: AnyImage | None = None
     slide: AnyImage | None = None
     behind: NDArray[np.bool_] | None = None
-    viewpoint: Viewpoint | None = None
+    viewpoint: Viewpoint | RigViewpoint | None = None
     refilled: NDArray[np.bool_] | None = None
     beside: NDArray[np.float32] | None = None
+    deviation: AnyImage | None = None
 
     @property
     def inverse_depth(self) -> NDArray[np.float32]:
@@ -102,18 +106,21 @@ class Warp:
             return Placed(values, (-top, -left), (height, width), beyond)
 
         depth = part(self.depth, np.nan)
-        confidence, slide = (
-            None if values is None else part(values, 0.0) for values in (self.lazy_confidence, self.slide)
+        confidence, slide, deviation = (
+            None if values is None else part(values, 0.0)
+            for values in (self.lazy_confidence, self.slide, self.deviation)
         )
         behind, refilled, beside = (
             None if values is None else cut(values, box) for values in (self.behind, self.refilled, self.beside)
         )
         canvas = self.canvas.within(box)
-        return Warp(canvas, maps, depth, confidence, slide, behind, self.viewpoint, refilled, beside)
+        return Warp(canvas, maps, depth, confidence, slide, behind, self.viewpoint, refilled, beside, deviation)
 
     def nearness(self, views: Sequence[View], number: int) -> AnyImage:
         """How near (H, W) each canvas point is to a picture's camera (see `visibility.nearness_of`)."""
         view = views[number]
+        if isinstance(self.viewpoint, RigViewpoint):
+            return Nearness(self.canvas, views[0].camera, view, self.depth, viewpoint=(views[0].K, self.viewpoint))
         if self.slide is None or self.viewpoint is None:
             return Nearness(self.canvas, views[0].camera, view, self.depth)
         nearer = float(view.H_inf[2] @ views[0].K @ self.viewpoint.c)
@@ -159,9 +166,11 @@ def build_warp(
     sizes = [view.size for view in further]
     if projection is None:
         reference: Box = (0, 0, *camera.size)
-        reach, cropped = expected_reach([_in_plane(outline) for outline in outlines], camera.size, sizes)
+        reach, cropped = expected_reach([in_plane(outline) for outline in outlines], camera.size, sizes)
     else:
-        reference, reach, cropped = round_reach(projection, planes, outlines, [view.camera for view in views])
+        own = homogeneous(undistort(border(camera.size), camera))
+        shows = [shown_by(plane, view.camera) for plane, view in zip((np.eye(3), *planes), views, strict=True)]
+        reference, reach, cropped = round_reach(projection, (own, *outlines), shows, camera)
     plane = Canvas(0, 0, (0, 0), projection=projection)
 
     def pictures_at(grid: Grid) -> list[Array]:
@@ -241,23 +250,19 @@ def build_map(
         if isinstance(own, PictureMap) and here.places is not None:
             own.x[part], own.y[part] = here.places[..., 0], here.places[..., 1]
         for number, (view, out) in enumerate(zip(views[1:], maps, strict=True), 1):
-            x, y = transfer(view, canvas.project_rows(view.H_inf, xs, ys[start:stop], camera), here.depth)
+            infinite = canvas.project_rows(view.H_inf, xs, ys[start:stop], camera)
             beside = []
             if values.shift is not None and values.picture == number:
                 beside.append([grid.to_pixels(values.shift[..., k], *strip) for k in (0, 1)])
             if refined is not None and here.sideways is not None and refined.picture == number:
                 beside.append([here.sideways[..., 0], here.sideways[..., 1]])
-            for across, down in beside:
-                if here.share is not None:
-                    across, down = here.share * across, here.share * down
-                x += across
-                y += down
-                if hold:
-                    held_beside[part, :, 0] += across
-                    held_beside[part, :, 1] += down
-            if view.camera.distortion.any():
-                x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
-            out.x[part], out.y[part] = x, y
+            if here.share is not None:
+                beside = [[here.share * along for along in one] for one in beside]
+            if hold:
+                for one in beside:
+                    held_beside[part, :, 0] += one[0]
+                    held_beside[part, :, 1] += one[1]
+            out.x[part], out.y[part] = raw_pixels(view, infinite, here.depth, beside)
 
     # depth that is worked out again where it is read takes the larger strips of `Depth`
     each(put, small_strips(shape) if held.size else strips(shape))
@@ -265,6 +270,20 @@ def build_map(
     return Warp(
         canvas, (own, *maps), held if held.size else depth, confidence, beside=held_beside if hold else None
     )
+
+
+def raw_pixels(
+    view: View, infinite: list[Array], depth: Array, beside: Sequence[Sequence[NDArray[Any]]] = ()
+) -> tuple[Array, Array]:
+    """Raw px x, y (h, w) of a picture at canvas points that were brought to infinity (see `transfer`) and their inverse
+    depth (h, w); beside: pairs of (h, w), px by which it is seen beside its epipolar lines."""
+    x, y = transfer(view, infinite, depth)
+    for across, down in beside:
+        x += across
+        y += down
+    if view.camera.distortion.any():
+        x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
+    return x, y
 
 
 def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> FieldValues:
@@ -280,6 +299,8 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     across, down = width + 2 * margin, height + 2 * margin
     share = min(WARP.max_node_factor, max(1.0, across * down / (2 * width * height)))
     step = WARP.node_share * grid.step * focal_of(canvas.projection.K) / canvas.projection.focal
+    # a power of two: canvases of one stitch are of similar size, and so share these nodes (see `Remembered`)
+    step = 2.0 ** np.floor(np.log2(step))
     flat = Grid.over(-margin, -margin, across, down, int(min(share * GRID.nodes, across * down / step**2)))
     ideal = undistort(flat.points, camera)
     values = field.on_grid(flat, ideal if camera.distortion.any() else None)
@@ -310,7 +331,7 @@ def _outline(H_plane: Array, view: View, continuation: Continuation | None) -> A
     return homogeneous(ideal) @ np.linalg.inv(H_plane).T
 
 
-def _in_plane(points: Array) -> Array:
+def in_plane(points: Array) -> Array:
     """Reference pixels (N, 2) of canvas points (N, 3), NaN behind the reference camera."""
     points = points.copy()
     points[~ahead_of_camera(*points.T)] = np.nan

@@ -69,6 +69,15 @@ class Picture:
         """All of its light as an array (H, W, C) float32."""
         return whole(self.light)
 
+    def shows(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which points (N, 2) px lie where it is not transparent (N,)."""
+        if self.alpha is None:
+            return np.ones(len(points), bool)
+        height, width = self.alpha.shape
+        column, row = np.clip(np.rint(points).astype(int), 0, (width - 1, height - 1)).T
+        opaque: NDArray[np.bool_] = self.alpha[row, column] > 0
+        return opaque
+
 
 def load_picture(path: str | Path, pixels_per_byte: int = READING.photograph_pixels_per_byte) -> Picture:
     """Read a PNG, JPEG, TIFF, EXR, WebP or BMP file of 8, 16 or 32 bits (float), gray or colour, with or without alpha.

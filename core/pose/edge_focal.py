@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,27 +87,39 @@ def focal_by_edges(
     side = max(cameras[0].size)
     shortest, longest = np.log(EDGE_FOCAL.sides)
     focals = side * np.exp(np.arange(shortest, longest, EDGE_FOCAL.log_step))
-    found = [candidate(float(focal / start.K[0, 0])) for focal in focals]
-    # a search may miss the best frame: that of the next focal length leads to it
-    for order in (range(1, len(found)), range(len(found) - 2, -1, -1)):
-        for number in order:
-            found[number] = found[number].with_frame_of(found[number - order.step])
-    nearest = found[int(np.argmin(np.abs(np.log(focals / start.K[0, 0]))))]
+    found = {number: candidate(float(focals[number] / start.K[0, 0])) for number in range(0, len(focals), 2)}
+    _share_frames(found)
+    # every other one tells where the best is, and its neighbours which it is
+    best = max(found, key=lambda number: found[number].score(cameras[0]))
+    around = [number for number in (best - 1, best + 1) if 0 <= number < len(focals)]
+    found |= {number: candidate(float(focals[number] / start.K[0, 0])) for number in around}
+    _share_frames(found)
+    nearest = found[min(found, key=lambda number: abs(np.log(focals[number] / start.K[0, 0])))]
     by_matches = candidate(1.0).with_frame_of(nearest)
-    scores = np.array([one.score(cameras[0]) for one in found])
-    best = int(np.argmax(scores))
+    scores = {number: one.score(cameras[0]) for number, one in found.items()}
+    best = max(scores, key=lambda number: scores[number])
     # matches and what is usual may speak for it, too, but edges alone have to suffice
     by_edges = EDGE_FOCAL.edge_weight * (found[best].evidence - by_matches.evidence)
-    gain = min(by_edges, float(scores[best]) - by_matches.score(cameras[0]))
-    if gain < EDGE_FOCAL.min_gain or best in (0, len(found) - 1):
+    gain = min(by_edges, scores[best] - by_matches.score(cameras[0]))
+    if gain < EDGE_FOCAL.min_gain or best in (0, len(focals) - 1):
         return None
-    factor = float(focals[best] * np.exp(EDGE_FOCAL.log_step * _peak(*scores[best - 1 : best + 2])) / start.K[0, 0])
+    peak = _peak(scores[best - 1], scores[best], scores[best + 1])
+    factor = float(focals[best] * np.exp(EDGE_FOCAL.log_step * peak) / start.K[0, 0])
     first, second = (
         replace(camera, K=zoomed(K, factor), source=EDGE_FOCAL.source, log_sigma=EDGE_FOCAL.log_sigma,
                 knowledge=Knowledge.EDGES)
         for camera, K in zip(cameras, (start.K, start.K_prime), strict=True)
     )  # fmt: skip
     return first, second
+
+
+def _share_frames(found: dict[int, _Candidate]) -> None:
+    """Give each candidate the frame of the next shorter or longer focal length where that is better: a search may miss
+    the best one."""
+    numbers = sorted(found)
+    for order in (numbers, numbers[::-1]):
+        for before, number in pairwise(order):
+            found[number] = found[number].with_frame_of(found[before])
 
 
 def _peak(before: float, at: float, after: float) -> float:

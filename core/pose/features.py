@@ -129,30 +129,38 @@ def match(a: Features, b: Features, ratio: float = FEATURES.ratio) -> Matches:
     Matches
         In px of the full pictures, each pair of places (to 0.1 px) once; `scale` is the larger one of a and b.
     """
-    scale = max(a.scale, b.scale)
+    which = match_index(a, b, ratio)
+    return Matches(a.points[which[:, 0]], b.points[which[:, 1]], max(a.scale, b.scale))
+
+
+def match_index(a: Features, b: Features, ratio: float = FEATURES.ratio) -> NDArray[np.intp]:
+    """Which features match (M, 2): numbers into a and b; see `match`."""
     if len(a.points) < 2 or len(b.points) < 2:
-        return Matches(np.empty((0, 2)), np.empty((0, 2)), scale)
+        return np.empty((0, 2), np.intp)
     nearest, nearest_score, second = (np.empty(len(a.points), t) for t in (np.intp, np.float32, np.float32))
     back_score = np.full(len(b.points), -2, np.float32)
-    back = np.zeros(len(b.points), np.intp)
+    back = np.full(len(b.points), -1, np.intp)
 
-    def best_of(start: int) -> tuple[int, NDArray[np.intp], NDArray[np.float32]]:
-        """Fills in what is nearest to some of a; which of them is nearest to each of b, and how near."""
+    def best_of(start: int) -> tuple[slice, NDArray[np.float32]]:
+        """Fills in what is nearest to some of a; which they are, and how near the nearest of them is to each of b."""
         rows = slice(start, start + FEATURES.rows_at_once)
         score = _products(a.descriptors[rows], b.descriptors)
-        best_row = score.argmax(axis=0)
-        best = score[best_row, np.arange(score.shape[1])]
+        best = score.max(axis=0)
         nearest[rows] = score.argmax(axis=1)
         index = np.arange(len(score))
         nearest_score[rows] = score[index, nearest[rows]]
         score[index, nearest[rows]] = -2
         second[rows] = score.max(axis=1)
-        return start, best_row, best
+        return rows, best
 
     # in slabs, so that memory stays bounded
-    for start, best_row, best in in_order(best_of, range(0, len(a.points), FEATURES.rows_at_once)):
+    for rows, best in in_order(best_of, range(0, len(a.points), FEATURES.rows_at_once)):
         better = best > back_score
-        back[better], back_score[better] = best_row[better] + start, best[better]
+        back[better], back_score[better] = -1, best[better]
+        # NumPy's argmax along columns takes many times as long as max: only who is nearest to its own nearest counts
+        to = nearest[rows]
+        mutual = np.flatnonzero(better[to] & (nearest_score[rows] == best[to]))[::-1]
+        back[to[mutual]] = mutual + rows.start
     # unit vectors: |a − b|² = 2 − 2 a·b
     distinct = 2 - 2 * nearest_score < ratio**2 * (2 - 2 * second)
     keep = np.flatnonzero(distinct & (back[nearest] == np.arange(len(a.points))))
@@ -160,7 +168,7 @@ def match(a: Features, b: Features, ratio: float = FEATURES.ratio) -> Matches:
     # one place may carry several orientations, hence several identical matches
     _, first = np.unique(np.round(np.hstack([x, y]), 1), axis=0, return_index=True)
     first.sort()
-    return Matches(x[first], y[first], scale)
+    return np.column_stack([keep, nearest[keep]])[first]
 
 
 def _products(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.matches import Matches
+from ..pictures.naming import number_of
 from ..raster.resizing import resized_points
 from ..system.errors import BadRequest
 from ..system.text_files import read_lines
@@ -29,7 +30,9 @@ USED, NOT_BY_GEOMETRY, NOT_BY_FIELD = STATES = "used", "left out by the geometry
 # The same points in px of the pictures that were worked on, where that was not their full size: there and back, the
 # last digit of a float may change.
 WORKED = ("worked_x", "worked_y", "worked_x2", "worked_y2")
-KNOWN = (*COLUMNS, WEIGHT, STATE, NOISE, *WORKED)
+# Names of the two pictures, in a file about more than two.
+PICTURES = ("picture", "picture2")
+KNOWN = (*PICTURES, *COLUMNS, WEIGHT, STATE, NOISE, *WORKED)
 # A point in px of the full picture that lies within this, px, of the one worked on has not been moved since.
 SAME_POINT = 1e-6
 _LAYOUT = "each line holds x,y,x2,y2 or x,y,x2,y2,weight"
@@ -39,7 +42,9 @@ Size = tuple[int, int]
 
 class _Table(NamedTuple):
     """The rows of a file or array: points (N, 4), weight (N,), state (N) of a file that has it, noise (N,), worked
-    (N, 4), NaN where the file has none; and what to call each row."""
+    (N, 4), NaN where the file has none; what to call each row; and the two pictures (N, 2) of each, by names or
+    numbers, of a file that has them.
+    """
 
     points: NDArray[np.float64]
     weight: NDArray[np.float64]
@@ -47,11 +52,75 @@ class _Table(NamedTuple):
     noise: NDArray[np.float64]
     worked: NDArray[np.float64]
     places: list[str]
+    pictures: NDArray[Any] | None = None
+
+    def between(self, first: str | int, second: str | int) -> _Table:
+        """The rows of two pictures, with the points of the first one first, whichever way a row has them."""
+        if self.pictures is None:
+            return self
+        turned = (self.pictures == (second, first)).all(axis=1)
+        rows = np.flatnonzero(turned | (self.pictures == (first, second)).all(axis=1))
+
+        def straight(values: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.where(turned[rows, None], values[rows][:, [2, 3, 0, 1]], values[rows])
+
+        state = None if self.state is None else [self.state[row] for row in rows]
+        return _Table(
+            straight(self.points), self.weight[rows], state, self.noise[rows], straight(self.worked),
+            [self.places[row] for row in rows],
+        )  # fmt: skip
+
+
+def read_matches_of_pairs(
+    source: str | Path | NDArray[Any], names: Sequence[str], sizes: Sequence[Size], worked: Sequence[Size]
+) -> dict[tuple[int, int], Matches]:
+    """Matches between several pictures, from a file whose columns `picture` and `picture2` name them.
+
+    Parameters
+    ----------
+    source : str or path
+        As for `read_matches`.
+    names : sequence of str
+        Of all pictures; in the file, with or without their suffix.
+    sizes, worked : sequence of (int, int)
+        (W, H) px of the pictures, and of those in which the matches are wanted.
+
+    Returns
+    -------
+    dict
+        Matches by the numbers i < j of their pictures.
+
+    Raises
+    ------
+    BadRequest
+        For the content, with the line.
+    UnreadableImage
+        For the file.
+    """
+    columns = " and ".join(PICTURES)
+    if isinstance(source, np.ndarray):
+        raise BadRequest(f"matches of {len(names)} pictures are given as a file whose columns {columns} name them")
+    table = _from_file(Path(source))
+    if table.pictures is None:
+        raise BadRequest(f"{source}: of {len(names)} pictures, a header must name the columns {columns} as well")
+    numbers = {}
+    for place, named in zip(table.places, table.pictures.tolist(), strict=True):
+        i, j = (number_of(name, names, place) for name in named)
+        if i == j:
+            raise BadRequest(f"{place}: both points lie in {names[i]}; a match is of two pictures")
+        numbers[named[0]], numbers[named[1]] = i, j
+    pairs = np.array([[numbers[name] for name in named] for named in table.pictures.tolist()])
+    table = table._replace(pictures=pairs)
+    return {
+        (i, j): _matches_in(table.between(i, j), source, (sizes[i], sizes[j]), (worked[i], worked[j]))
+        for i, j in np.unique(np.sort(pairs, axis=1), axis=0).tolist()
+    }
 
 
 def read_matches(
-    source: str | Path | NDArray[Any], size: Size, size_prime: Size, worked: tuple[Size, Size] | None = None
-) -> Matches:
+    source: str | Path | NDArray[Any], size: Size, size_prime: Size, worked: tuple[Size, Size] | None = None,
+    names: tuple[str, str] | None = None,
+) -> Matches:  # fmt: skip
     """Matches from a file or an array: the user's own, or those that a stitch found and reported.
 
     Parameters
@@ -65,6 +134,8 @@ def read_matches(
         (W, H) px of the reference and of the target.
     worked : ((int, int), (int, int)), optional
         Sizes that the matches are wanted in, if the pictures were resized.
+    names : (str, str), optional
+        Of the pictures: of a file about more than two, only their matches are read.
 
     Returns
     -------
@@ -81,7 +152,18 @@ def read_matches(
         For the file.
     """
     table = _from_array(source) if isinstance(source, np.ndarray) else _from_file(Path(source))
-    _check(table, size, size_prime)
+    if names is not None:
+        table = table.between(*names)
+    return _matches_in(table, source, (size, size_prime), worked)
+
+
+def _matches_in(
+    table: _Table, source: str | Path | NDArray[Any], sizes: tuple[Size, Size], worked: tuple[Size, Size] | None
+) -> Matches:
+    """The matches of two pictures; see `read_matches`."""
+    if not len(table.points):
+        raise BadRequest(f"{_whole(source)}: no matches between these two pictures in it; it names others")
+    _check(table, *sizes)
     if table.state is None:
         weight = table.weight
         kept = np.flatnonzero(weight > 0)
@@ -96,7 +178,7 @@ def read_matches(
     if worked is not None:
         points = np.hstack([
             resized_points(points[:, part], full, small)
-            for part, full, small in zip((slice(2), slice(2, 4)), (size, size_prime), worked, strict=True)
+            for part, full, small in zip((slice(2), slice(2, 4)), sizes, worked, strict=True)
         ])  # fmt: skip
         exact = table.worked[kept]
         points = np.where(np.abs(points - exact) < SAME_POINT, exact, points)
@@ -108,8 +190,9 @@ def read_matches(
 
 
 def matches_csv(
-    matches: Matches, states: Sequence[str] | None = None, worked: Matches | None = None
-) -> bytes:
+    matches: Matches, states: Sequence[str] | None = None, worked: Matches | None = None,
+    pictures: Sequence[tuple[str, str]] | None = None,
+) -> bytes:  # fmt: skip
     """The matches as a CSV file that `read_matches` reads back to the same floats.
 
     Parameters
@@ -121,6 +204,8 @@ def matches_csv(
         know no states.
     worked : Matches, optional
         The same matches in px of the pictures that were worked on, if these were resized.
+    pictures : sequence of (str, str), optional
+        Names of the pictures of each match, of more than two.
 
     Returns
     -------
@@ -138,8 +223,16 @@ def matches_csv(
     if worked is not None:
         names += WORKED
         cells += [[repr(value) for value in column] for column in (*worked.x.T.tolist(), *worked.y.T.tolist())]
+    if pictures is not None:
+        names = [*PICTURES, *names]
+        cells = [*([_quoted(name) for name in column] for column in zip(*pictures, strict=True)), *cells]
     lines = [",".join(names), *map(",".join, zip(*cells, strict=True))]
     return ("\n".join(lines) + "\n").encode()
+
+
+def _quoted(name: str) -> str:
+    """A name as a cell of a CSV file."""
+    return '"' + name.replace('"', '""') + '"' if any(mark in name for mark in ',;"#') else name
 
 
 def _whole(source: str | Path | NDArray[Any]) -> str:
@@ -162,6 +255,7 @@ def _from_file(path: Path) -> _Table:
     rows: list[list[float]] = []
     places: list[str] = []
     states: list[str] = []
+    pictures: list[list[str]] = []
     columns: tuple[str, ...] = ()
     for number, cells in _lines(path):
         place = f"{path}, line {number}"
@@ -180,10 +274,13 @@ def _from_file(path: Path) -> _Table:
         places.append(place)
         if STATE in named:
             states.append(_state(named[STATE], place))
+        if all(name in named for name in PICTURES):
+            pictures.append([named[name] for name in PICTURES])
     if not rows:
         raise BadRequest(f"{path}: no matches in it; {_LAYOUT}, one line for each match")
     table = np.array(rows, np.float64)
-    return _Table(table[:, :4], table[:, 4], states or None, table[:, 5], table[:, 6:], places)
+    named_in = np.array(pictures) if pictures else None
+    return _Table(table[:, :4], table[:, 4], states or None, table[:, 5], table[:, 6:], places, named_in)
 
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:

@@ -24,6 +24,8 @@ class FeatureOptions:
     scarce_points: int = 100
     # Features of a picture; matching takes time with the square of it.
     budget: int = 8000
+    # The same of each of more than two pictures, which are matched with many others.
+    budget_of_many: int = 4000
     # px and features for a preview: a third of the time, and at 1 MP the map's error grows by 3 to 19 %.
     preview_pixels: int = 400_000
     preview_budget: int = 3000

@@ -87,6 +87,56 @@ class PictureMap:
         return PictureMap(x, y, self.size)
 
 
+@dataclass(frozen=True)
+class BoxedMap:
+    """A map that is known in a box of the canvas only: beyond, the picture is not shown.
+
+    inner: in that box, whose first pixel lies at `corner` (x, y) of the canvas; shape: (H, W) of the canvas.
+    """
+
+    inner: PictureMap
+    corner: tuple[int, int]
+    shape: tuple[int, int]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(W, H) px of the picture."""
+        return self.inner.size
+
+    @property
+    def box(self) -> Box:
+        """The box (left, top, width, height) of the canvas."""
+        return *self.corner, self.inner.shape[1], self.inner.shape[0]
+
+    @property
+    def canvas_box(self) -> Box:
+        """The canvas as a box of the inner map."""
+        return -self.corner[0], -self.corner[1], self.shape[1], self.shape[0]
+
+    def arrays(self) -> PictureMap:
+        """The map of the whole canvas as arrays, NaN beyond the box."""
+        return self.inner.within(self.canvas_box)
+
+    def inside(self) -> NDArray[np.bool_]:
+        """Where (H, W) the map falls inside the picture."""
+        return cut(self.inner.inside(), self.canvas_box)
+
+    def within(self, box: Box, in_place: bool = False) -> BoxedMap:
+        """The part in a box (left, top, width, height) of the canvas; nothing is copied.
+
+        in_place: see `PictureMap.within`.
+        """
+        (x, y), (left, top, width, height) = self.corner, box
+        moved = x - left, y - top
+        right, bottom = (
+            min(corner + side, end)
+            for corner, side, end in zip(moved, self.inner.shape[::-1], (width, height), strict=True)
+        )
+        first = max(moved[0], 0), max(moved[1], 0)
+        inner = (first[0] - moved[0], first[1] - moved[1], max(0, right - first[0]), max(0, bottom - first[1]))
+        return BoxedMap(self.inner.within(inner), first, (height, width))
+
+
 def falls_inside(x: NDArray[Any], y: NDArray[Any], size: tuple[int, int]) -> NDArray[np.bool_]:
     """Where pixels x, y (…) lie inside a picture of (W, H) px; NaN lies outside."""
     with np.errstate(invalid="ignore"):

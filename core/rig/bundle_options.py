@@ -161,8 +161,6 @@ class JudgeOptions:
     # pair in σ from which it has a baseline at all.
     three_view_points: int = 4
     parallax_sigmas: float = 3.0
-    # Inliers below which a link that no loop checks is called ambiguous.
-    weak_link: int = 40
     # px: where costs are weighed against numbers of parameters, noise is never taken to be less.
     least_noise_px: float = 0.1
 

@@ -14,12 +14,12 @@ from ..cameras.rig import FocalGuess, Observations, PictureMatches, Registration
 from ..raster.arrays import Array
 from ..raster.robust import sigma_of_lengths
 from ..system.errors import NoOverlap
-from ..system.progress import Progress
+from ..system.progress import Progress, ReportProgress
 from .averaged import Verified
 from .averaging import hypotheses
 from .baselines import baselines
 from .bundle_options import JUDGE
-from .graph import components, is_bridge
+from .graph import components
 from .options import PAIRS
 from .pairs import verified as verify
 from .polishing import Polished
@@ -36,7 +36,8 @@ def register(
     matches: Sequence[PictureMatches],
     scale: float = 1.0,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: ReportProgress | None = None,
+    names: Sequence[str] = (),
 ) -> Registration:
     """Find the cameras of all pictures that connect, in the frame of the first of them.
 
@@ -54,8 +55,10 @@ def register(
         px by which thresholds are multiplied: full pixels per pixel of the picture that features were found in.
     seed : int
         Of every random choice.
-    progress : Progress, optional
+    progress : callable
         Told of the stage "geometry"; raises `Cancelled` when it was asked to.
+    names : sequence of str, optional
+        What pictures are called where it is said why one is left out; by default their numbers from 1.
 
     Returns
     -------
@@ -70,7 +73,7 @@ def register(
     ideal = [undistort(p, camera) if camera.distortion.any() else p for p, camera in zip(points, cameras, strict=True)]
     plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
     verified = verify(ideal, matches, scale, seed)
-    progress("geometry")
+    progress("geometry", 0.0)
     averages = hypotheses(plain, ideal, verified)
     found = []
     for k, rotated in enumerate(averages):
@@ -80,19 +83,20 @@ def register(
     if not found:
         raise NoOverlap(_nothing_connects(verified))
     found.sort(key=lambda solved: solved.cost)
-    return _registration_of(cameras, points, verified, found)
+    names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
+    return _registration_of(cameras, points, verified, found, names)
 
 
 def _registration_of(
-    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, found: Sequence[Solved]
-) -> Registration:
+    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, found: Sequence[Solved],
+    names: Sequence[str],
+) -> Registration:  # fmt: skip
     best = found[0]
     framed = replace(best.found, solution=best.found.solution.seen_from(0).rescaled())
     edges = _edges(best, framed)
     rig = _rig(cameras, points, best, framed, edges, _guesses(found))
     members = best.averaged.members
-    left_out = _left_out(len(cameras), members, verified)
-    return Registration(rig, members, left_out, tuple(_warnings(rig, members, best)))
+    return Registration(rig, members, _left_out(names, members, verified))
 
 
 def _rig(
@@ -170,9 +174,9 @@ def _guesses(found: Sequence[Solved]) -> tuple[FocalGuess, ...]:
     return tuple(guesses)
 
 
-def _left_out(count: int, members: Sequence[int], verified: Verified) -> dict[int, str]:
+def _left_out(names: Sequence[str], members: Sequence[int], verified: Verified) -> dict[int, str]:
     """Why each other picture is not in the rig."""
-    pairs = [(pair.i, pair.j) for pair in verified.pairs]
+    count, pairs = len(names), [(pair.i, pair.j) for pair in verified.pairs]
     groups = {k: group for group in components(count, pairs) for k in group}
     told = {}
     for k in sorted(set(range(count)) - set(members)):
@@ -185,8 +189,8 @@ def _left_out(count: int, members: Sequence[int], verified: Verified) -> dict[in
             )
         elif set(others).isdisjoint(members):
             told[k] = (
-                f"connects only with {_named(others)}, and that group with none of the others (at best {best} matches "
-                "agree): take a picture in between"
+                f"connects only with {_listed([names[other] for other in others])}, and that group with none of the "
+                f"others (at best {best} matches agree): take a picture in between"
             )
         else:
             told[k] = f"its pairs contradict the others' ({best} matches agree in the best of them)"
@@ -201,32 +205,6 @@ def _nothing_connects(verified: Verified) -> str:
     )
 
 
-def _warnings(rig: Rig, members: Sequence[int], best: Solved) -> list[str]:
-    """What is not known, and what helps."""
-    told = []
-    links = [(edge.i, edge.j) for edge in rig.edges]
-    for edge in rig.edges:
-        between = _named([members[edge.i], members[edge.j]])
-        bridge = is_bridge(len(rig), links, (edge.i, edge.j))
-        if edge.baseline == "continuity" and bridge:
-            told.append(
-                f"The distance between {between} is only guessed, from depths that go on: no point is seen by a third "
-                "picture too. Take more pictures between them."
-            )
-        if bridge and edge.inliers < JUDGE.weak_link:
-            told.append(
-                f"How {between} stand to each other is ambiguous: {edge.inliers} matches agree, and no loop of "
-                "pictures checks them. Take more pictures between them."
-            )
-    if len(rig.guesses) > 1:
-        lengths = ", ".join(f"{guess.focal:.0f}" for guess in rig.guesses)
-        told.append(f"Focal lengths of {lengths} px explain the pictures about equally well; the first was taken.")
-    return told
-
-
-def _named(numbers: Sequence[int]) -> str:
-    """Pictures by their numbers, counted from 1."""
-    names = [str(number + 1) for number in numbers]
-    if len(names) == 1:
-        return f"picture {names[0]}"
-    return f"pictures {', '.join(names[:-1])} and {names[-1]}"
+def _listed(names: Sequence[str]) -> str:
+    """Names in words."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from .errors import Cancelled
 
@@ -23,6 +23,21 @@ STAGES: dict[str, float] = {
     "blend": 0.04,
     "write": 0.08,
 }
+# The same of more than two pictures. Seams and blends take turns, picture by picture: both are told as seam.
+STAGES_OF_MANY: dict[str, float] = {
+    "read": 0.03,
+    "features": 0.12,
+    "matches": 0.25,
+    "geometry": 0.16,
+    "field": 0.04,
+    "dense": 0.04,
+    "warp": 0.08,
+    "occlusion": 0.03,
+    "exposure": 0.03,
+    "seam": 0.16,
+    "write": 0.06,
+}
+TOLD_AS = {"blend": "seam"}
 
 
 @dataclass(frozen=True)
@@ -30,16 +45,18 @@ class Progress:
     """Turns (stage, fraction of the stage) into (stage, fraction of everything), and stops the work when asked to.
 
     `report(stage, total_fraction)` is called from the thread that stitches; `cancelled()` is asked at every step and
-    raises `Cancelled` when it says True.
+    raises `Cancelled` when it says True. stages: shares of the total time of each stage, in their order.
     """
 
     report: Callable[[str, float], None] | None = None
     cancelled: Callable[[], bool] | None = None
+    stages: Mapping[str, float] = field(default_factory=lambda: STAGES)
 
     def __call__(self, stage: str, fraction: float = 0.0) -> None:
         if self.cancelled is not None and self.cancelled():
             raise Cancelled()
         if self.report is not None:
-            names = list(STAGES)
-            done = sum(STAGES[name] for name in names[: names.index(stage)])
-            self.report(stage, min(1.0, round(done + STAGES[stage] * fraction, 6)))
+            names = list(self.stages)
+            stage = stage if stage in names else TOLD_AS.get(stage, stage)
+            done = sum(self.stages[name] for name in names[: names.index(stage)])
+            self.report(stage, min(1.0, round(done + self.stages[stage] * fraction, 6)))

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core import alignment
-from edf_stitch.core.alignment import Alignment, Frame, align, prepare, size_of
+from edf_stitch.core.alignment import Alignment, align
 from edf_stitch.core.cameras.projective import rotation_angle
+from edf_stitch.core.frames.frame import Frame, size_of
+from edf_stitch.core.frames.reading import prepare
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.picture import picture_from_array, resized
 from edf_stitch.core.pipeline import Stopwatch, compose

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from edf_stitch.core import mapping
-from edf_stitch.core.alignment import Frame, align, estimate_geometry, fit_and_warp, prepare
+from edf_stitch.core.alignment import align, estimate_geometry, fit_and_warp
 from edf_stitch.core.continuation.continuation import continue_beyond
+from edf_stitch.core.frames.frame import Frame
+from edf_stitch.core.frames.reading import prepare
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.synthetic_scenes.two_planes import Pair

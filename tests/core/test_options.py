@@ -9,7 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
-from edf_stitch.core.choices import BLENDS, CROPS, EXPOSURES, FADES, FIELDS, HOLES, PROJECTIONS, ROUND_FIELDS, SEAMS
+from edf_stitch.core.choices import (
+    BLENDS,
+    CENTRE,
+    CROPS,
+    EXPOSURES,
+    FADES,
+    FIELDS,
+    HOLES,
+    PROJECTIONS,
+    ROUND_FIELDS,
+    SEAMS,
+)
 from edf_stitch.core.options import LEAST_SCALE, StitchOptions
 from edf_stitch.core.system.errors import BadRequest
 
@@ -20,6 +31,7 @@ def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "continue", "camera": CameraRequest(), "matches": None, "ignore": (),
+        "ignore_in": (), "viewpoint": None, "require_all": False,
         "slide": "auto", "projection": "auto", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
         "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": "auto",
         "holes": "auto", "seed": 0, "measure": True, "cache": None,
@@ -139,3 +151,45 @@ def test_a_crop_is_chosen_only_where_something_may_be_lost() -> None:
         assert StitchOptions(projection=projection, crop="auto").kept == kept
         assert StitchOptions(projection=projection, crop="inscribed").kept == "inscribed"
     assert StitchOptions(projection="auto", field="rew", crop="auto").kept == "full"
+
+
+# --- more than two pictures -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("asked", "words"), [
+    ({"field": "homography"}, "'homography' is for two pictures only, and 3 are given: choose from: slack, strict"),
+    ({"mask": Path("m.png")}, "painted mask .* --ignore NAME=MASK"),
+    ({"fade": "infinity"}, "fade to infinity .* --fade continue"),
+    ({"camera": CameraRequest(focal_px=(900, 950))}, "one for all pictures, or each its own by --cameras"),
+    ({"camera": CameraRequest(principal=(90, 95, 96, 97))}, "one for all pictures"),
+])  # fmt: skip
+def test_what_only_a_pair_knows_is_refused_of_more(asked: dict, words: str) -> None:
+    options = StitchOptions(**asked)
+    options.check_goes_with(2)
+    with pytest.raises(BadRequest, match=words):
+        options.check_goes_with(3)
+
+
+@pytest.mark.parametrize("viewpoint", [None, 1, 2, "b", "b.png", CENTRE])
+def test_of_two_pictures_the_first_is_the_viewpoint(viewpoint: int | str | None) -> None:
+    options = StitchOptions(viewpoint=viewpoint)
+    options.check_goes_with(3)
+    if viewpoint in (None, 1, CENTRE):
+        options.check_goes_with(2)
+    else:
+        with pytest.raises(BadRequest, match="name the other one first"):
+            options.check_goes_with(2)
+
+
+def test_pictures_are_counted_from_one() -> None:
+    with pytest.raises(BadRequest, match="counted from 1"):
+        StitchOptions(viewpoint=0)
+
+
+def test_masks_are_found_by_number_and_by_name() -> None:
+    one, other = Path("m1.png"), Path("m2.png")
+    options = StitchOptions(ignore=(None, one), ignore_in=(("c", other),))
+    assert options.ignored_in(["a.png", "b.png", "c.jpg"]) == [None, one, other]
+    assert options.files_read == [one, other]
+    with pytest.raises(BadRequest, match=r"no picture is called 'c'; there are: a\.png, b\.png"):
+        options.ignored_in(["a.png", "b.png"])

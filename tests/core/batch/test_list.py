@@ -43,7 +43,7 @@ def test_lists_as_people_and_spreadsheets_write_them(listed, tmp_path: Path, tex
     items = listed(text)
     assert simple(items, tmp_path) == [("one", "a/l.jpg", "a/r.jpg"), ("two", "a/m.jpg", "r.jpg")]
     assert all(item.frames is None and item.camera is None and item.missing == () for item in items)
-    assert items[0].pair() == (tmp_path / "a/l.jpg", tmp_path / "a/r.jpg")
+    assert items[0].files() == (tmp_path / "a/l.jpg", tmp_path / "a/r.jpg")
 
 
 def test_names_come_from_the_reference_and_paths_may_hold_anything(listed, tmp_path: Path) -> None:
@@ -80,8 +80,8 @@ def test_all_frames_that_both_sides_have(listed, tmp_path: Path, reference: str,
         (tmp_path / other).touch()
     item = listed(f"{reference},{target}")[0]
     assert (item.name, item.frames, item.missing) == ("a", (3, 4, 10, 12345), (2, 5))
-    assert item.pair(4) == (tmp_path / "a_0004.png", tmp_path / "b_0004.png")
-    assert item.pair(12345)[0] == tmp_path / "a_12345.png"
+    assert item.files(4) == (tmp_path / "a_0004.png", tmp_path / "b_0004.png")
+    assert item.files(12345)[0] == tmp_path / "a_12345.png"
     assert item.numbered(4) == "a_0004" and item.numbered(12345) == "a_12345"
 
 
@@ -178,3 +178,29 @@ def test_what_is_no_text_and_what_cannot_be_read(listed, tmp_path: Path) -> None
 
 def test_names_that_are_one_file_on_some_computers() -> None:
     assert same_name("Größe") == same_name("GRO\u0308SSE")
+
+
+# --- more than two pictures -------------------------------------------------------------------------------------------
+
+
+def test_further_columns_are_further_pictures(listed) -> None:
+    items = listed("reference,target,picture3,name,picture4\na.jpg,b.jpg,c.jpg,walk,d.jpg\ne.jpg,f.jpg\n")
+    assert [path.name for path in items[0].files()] == ["a.jpg", "b.jpg", "c.jpg", "d.jpg"]
+    assert items[0].name == "walk" and [path.name for path in items[1].files()] == ["e.jpg", "f.jpg"]
+
+
+def test_a_folder_or_a_pattern_stands_for_its_pictures(listed, tmp_path: Path) -> None:
+    (tmp_path / "yard").mkdir()
+    for name in ("p10.png", "p2.png", "p1.jpg", "notes.txt"):
+        (tmp_path / "yard" / name).touch()
+    folder, pattern, named = listed("yard\nyard/p*.png\nyard,,court\n")
+    assert folder.name == "yard" and [path.name for path in folder.files()] == ["p1.jpg", "p2.png", "p10.png"]
+    assert pattern.name == "p2" and [path.name for path in pattern.files()] == ["p2.png", "p10.png"]
+    assert named.name == "court" and named.frames is None
+    with pytest.raises(BadRequest, match="line 1: .*only one picture"):
+        listed("yard/p*.jpg\n")
+
+
+def test_clips_of_more_than_two_cameras_are_refused(listed) -> None:
+    with pytest.raises(BadRequest, match="a clip has two cameras"):
+        listed("reference,target,picture3\na_%04d.png,b_%04d.png,c_%04d.png\n")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.choices import BLENDS, CROPS, EXPOSURES, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS
-from edf_stitch.core.commands.arguments import add_options, options_from
+from edf_stitch.core.commands.arguments import add_options, options_from, refuse_roles
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.system.errors import BadRequest
 
@@ -60,6 +60,10 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--matches", "m.csv", "--ignore-ref", "a.png", "--ignore-target", "b.png"],
      {"matches": Path("m.csv"), "ignore": (Path("a.png"), Path("b.png"))}),
     (["--ignore-target", "b.png"], {"ignore": (None, Path("b.png"))}),
+    (["--ignore", "a.jpg=m.png", "--ignore", "b=c=n.png"],
+     {"ignore_in": (("a.jpg", Path("m.png")), ("b=c", Path("n.png")))}),
+    (["--viewpoint", "3"], {"viewpoint": 3}), (["--viewpoint", "3.png"], {"viewpoint": "3.png"}),
+    (["--viewpoint", "centre"], {"viewpoint": "centre"}), (["--require-all"], {"require_all": True}),
     (["--scale", "0.5", "--crop", "inscribed"], {"scale": 0.5, "crop": "inscribed"}),
     (["--crop", "3,4,50,60"], {"crop": (3, 4, 50, 60)}), (["--crop", "reference"], {"crop": "reference"}),
     (["--dense"], {}),
@@ -136,3 +140,18 @@ def test_reading_them_loads_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
     assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize("words", ["a.png", "=m.png", "a.png="])
+def test_a_mask_needs_the_name_of_its_picture(words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parsed("--ignore", words)
+    assert "is not like NAME=MASK" in capsys.readouterr().err
+
+
+def test_masks_of_ref_and_target_are_for_two_pictures() -> None:
+    for words in (["--ignore-ref", "m.png"], ["--ignore-target", "m.png"]):
+        refuse_roles(parsed(*words), 2)
+        with pytest.raises(BadRequest, match="--ignore NAME=MASK"):
+            refuse_roles(parsed(*words), 3)
+    refuse_roles(parsed("--ignore", "a=m.png"), 3)

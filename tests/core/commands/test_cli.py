@@ -21,6 +21,9 @@ from edf_stitch.core import pipeline
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.commands import cli
 from edf_stitch.core.commands.cli import main
+from edf_stitch.core.commands.messages import shortened
+from edf_stitch.core.output.camera_file import camera_table
+from edf_stitch.core.output.outputs import json_bytes
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import load_picture, picture_from_array
 from edf_stitch.core.pipeline import StitchOptions, StitchResult
@@ -91,6 +94,32 @@ def test_a_stitch_from_files_to_files(
     assert report["measured"] == small_result.report["measured"] and report["pictures"][0]["name"] == "reference.png"
     with np.load(tmp_path / "warp.npz") as warp:
         assert np.array_equal(warp["map_x_01"], small_result.warp.maps[1].x)
+
+
+def test_a_folder_stands_for_its_pictures_which_are_counted(
+    folder: Path, tmp_path: Path, said: Callable, quick: list
+) -> None:
+    assert main(["stitch", str(folder), "-o", str(tmp_path / "out.png")]) == 0
+    assert [path.name for path in quick[0][:-1]] == ["reference.png", "target.png"]
+    assert said()[1].splitlines()[0] == "edf: 2 pictures: reference.png, target.png"
+    assert main(["stitch", str(folder / "*e*.png"), "-o", str(tmp_path / "other.png"), "--quiet"]) == 0
+    assert [path.name for path in quick[1][:-1]] == ["reference.png", "target.png"] and said() == ("", "")
+    assert main(["stitch", str(folder / "z*.png"), "-o", str(tmp_path / "none.png")]) == 2
+    assert "no pictures of that name" in said()[1]
+
+
+def test_many_names_are_shortened() -> None:
+    names = [f"{number}.png" for number in range(1, 19)]
+    assert shortened(names[:6]) == "1.png, 2.png, 3.png, 4.png, 5.png, 6.png"
+    assert shortened(names) == "1.png, 2.png, 3.png, 4.png, 5.png, …, 18.png"
+
+
+def test_the_cameras_that_were_found_are_written(
+    pictures: list[str], tmp_path: Path, quick: list, small_result: StitchResult
+) -> None:
+    file = tmp_path / "cameras.json"
+    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), "--cameras-out", str(file)]) == 0
+    assert json.loads(file.read_text("utf-8")) == json.loads(json_bytes(camera_table(small_result)))
 
 
 def test_progress_is_plain_lines_where_there_is_no_terminal(

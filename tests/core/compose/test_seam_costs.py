@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from edf_stitch.core.compose.overlap import overlap_of
 from edf_stitch.core.compose.seam import find_seam, known_labels
 from edf_stitch.core.compose.seam_costs import averaged_costs, means, seam_costs
@@ -139,6 +140,18 @@ def test_what_one_picture_cannot_see_comes_from_the_other() -> None:
     assert not cut(layer(LEFT, gray()), layer(RIGHT, other), hidden=place)[place].any()
     place[:, 200:] = False
     assert cut(layer(LEFT, gray()), layer(RIGHT, other), behind=place)[place].all()
+
+
+def test_what_is_placed_better_is_shown() -> None:
+    """The seam runs where the added picture begins to be placed better than the panorama before."""
+    both = layer(LEFT, gray()), layer(RIGHT, gray())
+    across = np.zeros((H, W), np.float32)
+    across[:] = np.linspace(20, -20, W)  # px, equal in the middle
+    seam = np.flatnonzero(borders(cut(*both, misplaced=across)).any(axis=0))
+    assert np.abs(seam - W / 2).max() <= 3
+    far = [priced(misplaced=np.full((H, W), px, np.float32))[1].mean() for px in (0, 1, 2, 40, 80)]
+    assert far[2] - far[1] == pytest.approx(far[1] - far[0], rel=1e-3) and far[1] > far[0]
+    assert far[3] == far[4] > far[2], "beyond some px neither fits"
 
 
 def test_frames_of_a_clip_share_the_mean_of_their_costs() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
-from edf_stitch.core.compose.composition import Composition, composed, pooled_decision
+from edf_stitch.core.compose.composition import Composition, composed
+from edf_stitch.core.compose.pooling import pooled_decision
 from edf_stitch.core.compose.wraparound import WrappedImage, roll_for, rolled, rolled_map
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer

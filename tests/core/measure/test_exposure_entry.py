@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.compose.clipped import ClippedLight
-from edf_stitch.core.compose.composition import Decided
+from edf_stitch.core.compose.decided import Decided
 from edf_stitch.core.compose.exposure import Exposure, unchanged
 from edf_stitch.core.compose.toned import ToneCurve, Vignetting
 from edf_stitch.core.measure.exposure_entry import exposure_entry, exposure_warnings
@@ -25,7 +25,7 @@ def test_all_that_was_done_is_told() -> None:
     first = Exposure(np.float32([0.5, 0.5, 0.5]), np.zeros(3, np.float32), 9, lens, overexposed=0.25)
     table = ClippedLight((None, None, None))
     second = replace(first, gain=np.float32([2, 4, 8]), curve=ToneCurve(-0.2, -4, -1), overexposed=0, clipped=table)
-    entry = exposure_entry(pictures, [Decided(NOTHING, NOTHING, one, one) for one in (first, second)])
+    entry = exposure_entry(pictures, [Decided(NOTHING, NOTHING, one) for one in (first, second)])
     assert [gain.tolist() for gain in entry.pop("gain")] == [[0.5, 0.5, 0.5], [2, 4, 8]]
     assert entry == {
         "stops": [-1, 2], "vignetting": [-0.1, -0.3], "curve": [None, [-0.2, -4, -1]],

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.compose.exposure import unchanged
-from edf_stitch.core.measure.verdict import Look, Verdict, judge, look_at
+from edf_stitch.core.measure.look import Look, look_at
+from edf_stitch.core.measure.verdict import Verdict, judge
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.synthetic_scenes.two_planes import Pair
@@ -117,6 +118,11 @@ def test_a_large_part_that_is_bent_is_a_place_unless_the_frame_was_asked_for() -
     assert judge(bent, (0, 0), {**RIGHT, "options": {"projection": "perspective"}}).rating == "good"
     elsewhere = replace(bent, maps=(bent.maps[1], bent.maps[0]))
     assert judged(elsewhere).rating == "good", "the reference is not shown there"
+    assert found.what_to_do.startswith("give the focal length"), "no mask mends that"
+    blank = [tones.copy() for tones in good.tones]
+    for tones in blank:
+        tones[80:240, 240:400] = 200
+    assert judged(replace(bent, tones=tuple(blank))).rating == "good", "of a blank sky nobody sees how it is mapped"
     small = good.maps[1].x.copy()
     small[100:115, 300:315] += 0.8 * (good.maps[1].y[100:115, 300:315] - 107)
     assert judged(replace(good, maps=(good.maps[0], replace(good.maps[1], x=small)))).rating == "good", "outlines"
@@ -125,11 +131,14 @@ def test_a_large_part_that_is_bent_is_a_place_unless_the_frame_was_asked_for() -
 def test_light_that_is_lost_is_a_place() -> None:
     good = look()
     sky = np.s_[:60, 250:]
-    for taken, shown, what in ((240, 255, "blown"), (255, 220, "too bright")):
+    for taken, shown, what, helps in (
+        (240, 255, "blown", "--exposure=-1"), (255, 220, "too bright", "--exposure=1"),
+    ):  # fmt: skip
         before, now = good.taken[1].copy(), good.tones[1].copy()
         before[sky], now[sky] = taken, shown
         found = judged(replace(good, tones=(good.tones[0], now), taken=(good.taken[0], before)))
         assert [what in place.what for place in found.places] == [True] and found.places[0].box == (250, 0, 150, 60)
+        assert helps in found.what_to_do and "--mask" not in found.what_to_do
         alike = replace(good, tones=(np.where(now == shown, now, good.tones[0]), now), taken=(good.taken[0], before))
         assert (judged(alike).rating == "good") == (what == "too bright"), "darker, as the other picture has it"
         elsewhere = replace(good, tones=(now, good.tones[1]), taken=(before, good.taken[1]))
@@ -215,3 +224,61 @@ def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> N
     seams = [[one["box"] for one in told["places"] if "seam" in one["what"]] for told in (found, cropped)]
     for (x, y, wide, high), left, top in ((seams[0][0], 120, 96), (seams[1][0], 120 - 60, 96 - 10)):
         assert abs(x + wide / 2 - left) <= 2 and y <= top + 20 and top <= y + high, "where the changed rows are"
+
+
+# --- more than two pictures -------------------------------------------------------------------------------------------
+
+SURE = {
+    **RIGHT, "pictures": [{"name": name} for name in ("a.png", "b.png", "c.png")], "left_out": [],
+    "rig": {"scale": "measured", "focal_spread": 0.002}, "field": {"leave_one_out_px": 0.4},
+}  # fmt: skip
+
+
+def look_of_three() -> Look:
+    """As `look`, with a third picture from column 300 on."""
+    good = look()
+    labels = good.labels.copy()
+    labels[:, 300:] = 2
+    three = {name: (*getattr(good, name), getattr(good, name)[0]) for name in ("maps", "tones", "taken", "shows")}
+    return replace(good, labels=labels, **three)
+
+
+def test_of_three_pictures_only_those_that_meet_are_compared() -> None:
+    good = look_of_three()
+    assert judge(good, (0, 0), SURE).rating == "good"
+    stripes = np.where(np.arange(300) % 8 < 4, 110, 0).astype(np.uint8)[100:140, None, None]
+    tones = good.tones[2].copy()
+    tones[100:140, 180:220] += stripes
+    away = replace(good, tones=(*good.tones[:2], tones))
+    assert judge(away, (0, 0), SURE).rating == "good", "the third is not shown at the seam of the first two"
+    tones = good.tones[2].copy()
+    tones[100:140, 280:320] += stripes
+    found = judge(replace(good, tones=(*good.tones[:2], tones)), (0, 0), SURE)
+    assert found.rating == "look" and "--ignore NAME=MASK" in found.what_to_do
+    x, y, width, height = found.places[0].box
+    assert 296 <= x and x + width <= 304 and 98 <= y and y + height <= 142
+
+
+def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:
+    good = look_of_three()
+    tones, shows = good.tones[2].copy(), good.shows[2].copy()
+    tones[100:140, 280:320] += np.where(np.arange(300) % 8 < 4, 110, 0).astype(np.uint8)[100:140, None, None]
+    shows[:, :297] = False
+    cut = replace(good, tones=(*good.tones[:2], tones), shows=(*good.shows[:2], shows))
+    assert judge(cut, (0, 0), SURE).places[0].what == "a thing is cut by the border of c.png"
+
+
+@pytest.mark.parametrize(("changes", "why", "advice"), [
+    ({"left_out": [{"name": "d.png", "why": ""}]}, "left out: d.png", "take more pictures"),
+    ({"rig": {"scale": "none", "focal_spread": 0.0}}, "how far apart", "take more pictures"),
+    ({"rig": {"scale": "measured", "focal_spread": 0.03}}, "focal length is not sure", "--focal35"),
+    ({"measured": {"alignment_p95_px": 1.0, "folds": 0.2}}, "folds over in 20%", "take more pictures"),
+    ({"field": {"leave_one_out_px": 2.5}}, "too near and deep", "take more pictures"),
+])  # fmt: skip
+def test_what_is_doubtful_about_the_cameras_is_said(changes: dict, why: str, advice: str) -> None:
+    found = judge(look_of_three(), (0, 0), {**SURE, **changes})
+    assert found.rating == "look" and why in found.because and advice in found.what_to_do and not found.places
+
+
+def test_without_a_seam_nothing_is_compared_and_nothing_crashes() -> None:
+    assert judge(replace(look_of_three(), labels=None), (0, 0), SURE).rating == "good"

@@ -264,3 +264,33 @@ def test_a_field_of_view_beyond_the_surface_ends_where_that_does(kind: str, fov:
     frame = framed(rig((0, 0, 0), (35, 0, 0)), kind=kind, centre=(20.0, 0.0), fov=fov)
     whole = replace(frame, window=None).limits
     assert frame.limits[2] == whole[2] and (kind == "cylindrical" or frame.limits[0] == whole[0])
+
+
+def test_a_ring_is_drawn_on_a_sphere_level_and_without_a_tilt_to_any_side() -> None:
+    """All looked up by the same angle: what goes round has no middle that a tilt would be kept for."""
+    views = rig(*[(yaw, 18.0, 0.0) for yaw in range(0, 360, 30)])
+    projection = framed(views)
+    assert projection.kind == "equirectangular"
+    assert np.degrees(np.arccos(projection.rotation[:, 1] @ turned(0, 18, 0)[:, 1])) < 0.5
+    almost = framed(rig(*[(yaw, 18.0, 0.0) for yaw in range(0, 240, 30)]))
+    assert almost.kind == "cylindrical"
+
+
+@pytest.mark.parametrize("first", [-170, 10, 100, 160])
+def test_a_ring_with_a_gap_has_its_ends_there(first: int) -> None:
+    """The middle of what is seen is no mean of directions: three pictures more look one way than the other."""
+    yaws = [first + yaw for yaw in (0, 5, 10, 15, 40, 80, 120, 160, 200, 240, 279)]
+    views = rig(*[(float(yaw), 0.0, 0.0) for yaw in yaws])
+    projection = framed(views)
+    # pictures are 2 · 29.7 degrees wide: the gap is what is left of the circle between the outermost
+    middle = np.radians(first + 279 / 2)
+    ahead = projection.rotation @ np.array([0.0, 0, 1])
+    expected = turned(*(float(first), 0, 0)) @ np.array([np.sin(middle), 0, np.cos(middle)])
+    assert np.degrees(np.arccos(ahead @ expected)) < 1.5
+
+
+def test_many_pictures_are_levelled_however_the_first_was_held() -> None:
+    """Edges say what all cameras together do, within a degree; the first was turned by 20 degrees."""
+    views = rig((0, 0, 20), (30, 0, 0), (-30, 0, 0), (60, 0, 0), (-60, 0, 0))
+    down = turned(0, 0, 20) @ np.array([0.0, 1, 0])
+    assert framed(views, down).rotation[:, 1] == pytest.approx(down, abs=1e-6)

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 from edf_stitch.core.system.errors import Cancelled
-from edf_stitch.core.system.progress import STAGES, Progress
+from edf_stitch.core.system.progress import STAGES, STAGES_OF_MANY, Progress
 
 
 def test_the_shares_of_the_stages_make_a_whole() -> None:
@@ -29,6 +29,19 @@ def test_shares_of_stages_become_shares_of_everything() -> None:
     assert totals[::3] == pytest.approx(starts[:-1]) and totals[2::3] == pytest.approx(starts[1:])
     progress("geometry")
     assert said[-1] == ("geometry", pytest.approx(STAGES["read"] + STAGES["features"])), "a stage begins at 0"
+
+
+def test_of_many_pictures_seams_and_blends_are_one_stage() -> None:
+    assert sum(STAGES_OF_MANY.values()) == pytest.approx(1) and min(STAGES_OF_MANY.values()) > 0
+    said: list[tuple[str, float]] = []
+    progress = Progress(lambda stage, total: said.append((stage, total)), stages=STAGES_OF_MANY)
+    for stage, share in (("exposure", 1.0), ("seam", 0.0), ("blend", 0.25), ("seam", 0.5), ("blend", 1.0)):
+        progress(stage, share)
+    assert [stage for stage, _ in said] == ["exposure"] + ["seam"] * 4
+    totals = [total for _, total in said]
+    assert totals == sorted(totals) and totals[-1] == pytest.approx(1 - STAGES_OF_MANY["write"])
+    with pytest.raises(ValueError):
+        Progress(lambda *_: None, stages=STAGES_OF_MANY)("nonsense")
 
 
 def test_nobody_has_to_listen() -> None:

@@ -1,0 +1,4 @@
+"""From what a user names to the pictures of one panorama: read, in one colour space, scaled, without what is masked.
+
+May import system, raster, pictures, cameras and the options.
+"""

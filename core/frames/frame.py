@@ -1,0 +1,54 @@
+"""The pictures of one panorama, made ready."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pictures.picture import Picture
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The pictures of one panorama, made ready.
+
+    Attributes
+    ----------
+    pictures : tuple of Picture
+        Scaled, and without what is masked; of two the reference first.
+    full_sizes : tuple of (W, H)
+        px of the pictures as they came.
+    painted : ndarray (H, W) int8 or None
+        What was painted over the panorama (see `masks.read_painted`).
+    warnings : tuple of str
+        About what was given, in plain words.
+    shown_by : tuple of int
+        Of each picture that was given the number of the one here that is used for it: copies are used once.
+    """
+
+    pictures: tuple[Picture, ...]
+    full_sizes: tuple[tuple[int, int], ...]
+    painted: NDArray[np.int8] | None = None
+    warnings: tuple[str, ...] = ()
+    shown_by: tuple[int, ...] = ()
+
+    @property
+    def names(self) -> list[str]:
+        """What the pictures are called."""
+        return [picture.name for picture in self.pictures]
+
+    def only(self, numbers: Sequence[int]) -> Frame:
+        """The same with some of the pictures, in the order of these numbers."""
+        if list(numbers) == list(range(len(self.pictures))):
+            return self
+        pictures = tuple(self.pictures[number] for number in numbers)
+        return replace(self, pictures=pictures, full_sizes=tuple(self.full_sizes[number] for number in numbers))
+
+
+def size_of(picture: Picture) -> tuple[int, int]:
+    """(W, H) px of a picture."""
+    height, width = picture.light.shape[:2]
+    return width, height

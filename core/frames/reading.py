@@ -1,0 +1,130 @@
+"""Reads what is to be stitched into a Frame, and refuses what cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.sources import called
+from ..options import StitchOptions
+from ..pictures.masks import read_mask, read_painted, without
+from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
+from ..system.errors import BadRequest, NoOverlap
+from ..system.threads import in_order
+from .frame import Frame, size_of
+
+# What can be stitched: a file's name, an array, or a Picture that was read already.
+Source = str | Path | NDArray[Any] | Picture
+# Beyond this, pairs and memory were never tried.
+MOST_PICTURES = 60
+
+
+def check_count(count: int, options: StitchOptions) -> None:
+    """Refuses (BadRequest) as many pictures as cannot be stitched, and options that do not go with so many."""
+    if count < 2:
+        raise BadRequest("one picture alone makes no panorama: give two that were taken from different places")
+    if count > MOST_PICTURES:
+        raise BadRequest(
+            f"{count} pictures given, at most {MOST_PICTURES} make one panorama: leave out those that show nothing new"
+        )
+    options.check_goes_with(count)
+
+
+def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
+    """Reads the pictures of one panorama and brings them into one colour space.
+
+    Parameters
+    ----------
+    sources : sequence of (str, Path, ndarray or Picture)
+        Of two the reference first.
+    options : StitchOptions
+        Their scale and masks.
+
+    Returns
+    -------
+    Frame
+        Of several copies of a picture the first.
+
+    Raises
+    ------
+    UnreadableImage
+        A file is no picture, or damaged.
+    BadRequest
+        A wrong number of pictures, or a mask that does not fit.
+    NoOverlap
+        The same picture twice, and no other.
+    """
+    check_count(len(sources), options)
+    pictures = in_same_colour_space(list(in_order(_picture, sources)))
+    copies = dict(_copies(pictures))
+    if len(pictures) - len(copies) == 1:
+        which = "the two pictures are" if len(pictures) == 2 else "all pictures are"
+        raise NoOverlap(f"{which} the same picture: choose two photographs taken from different places")
+    if copies:
+        check_count(len(pictures) - len(copies), options)
+    return prepare(pictures, options, copies)
+
+
+def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[int, int] | None = None) -> Frame:
+    """A frame of full pictures in one colour space.
+
+    Parameters
+    ----------
+    pictures : sequence of Picture
+    options : StitchOptions
+        Their scale and masks.
+    copies : dict, optional
+        Numbers of pictures that are left out since they are the same as another one: its number.
+
+    Returns
+    -------
+    Frame
+
+    Raises
+    ------
+    BadRequest, UnreadableImage
+        About a mask.
+    """
+    copies, names = copies or {}, [picture.name for picture in pictures]
+    masks = options.ignored_in(names)
+    worked_on: list[Picture] = []
+    sizes: list[tuple[int, int]] = []
+    shown_by: list[int] = []
+    for number, picture in enumerate(pictures):
+        shown_by.append(shown_by[copies[number]] if number in copies else len(worked_on))
+        if number in copies:
+            continue
+        mask, shown = masks[number], picture
+        if mask is not None:
+            shown = without(picture, read_mask(mask, size_of(picture), called(number, names)))
+        worked_on.append(resized(shown, options.scale))
+        sizes.append(size_of(picture))
+    warnings = tuple(
+        f"{names[number]} is the same picture as {names[first]}: it is used once" for number, first in copies.items()
+    )
+    painted = None if options.mask is None else read_painted(options.mask)
+    return Frame(tuple(worked_on), tuple(sizes), painted, warnings, tuple(shown_by))
+
+
+def _picture(source: Source) -> Picture:
+    """A picture, read where it is not one yet."""
+    if isinstance(source, Picture):
+        return source
+    return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
+
+
+def _copies(pictures: Sequence[Picture]) -> Iterator[tuple[int, int]]:
+    """The number of each picture that looks like one before it, and the number of the first such."""
+    found: set[int] = set()
+    sums = [int(picture.view.sum(dtype=np.int64)) for picture in pictures]  # most differ in it, which is quickly seen
+    for first, other in combinations(range(len(pictures)), 2):
+        if other in found or sums[first] != sums[other]:
+            continue
+        if np.array_equal(pictures[first].view, pictures[other].view):
+            found.add(other)
+            yield other, first

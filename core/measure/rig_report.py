@@ -1,0 +1,186 @@
+"""The report of more than two pictures: the same keys as a pair's where they mean the same, and what a rig adds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.rig import Rig
+from ..compose.inpaint import closed_holes
+from ..field.sphere_field import SphereField
+from ..panorama.canvas import Canvas
+from .exposure_entry import exposure_entry, exposure_warnings
+from .options import RIG, WARNING
+from .report import (
+    SCHEMA,
+    canvas_entry,
+    how_holes_are_shown,
+    left_out_entry,
+    options_entry,
+    picture_entry,
+    plain,
+    slide_entry,
+)
+from .rig_figures import focal_spread, map_errors, residuals, scale_kind, shares, weak_links
+
+if TYPE_CHECKING:
+    from ..alignment import Alignment
+    from ..compose.decided import Decided
+    from ..options import StitchOptions
+    from ..pictures.picture import Picture
+
+
+def make_rig_report(
+    options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment, canvas: Canvas,
+    decided: Sequence[Decided], appearance: dict[str, float], shows: NDArray[np.bool_], inpainted: int,
+    open_px: int, labels: NDArray[np.int16] | None,
+) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
+    """The report of a stitch of more than two pictures.
+
+    Parameters
+    ----------
+    options, pictures, alignment, canvas, decided, appearance, shows, inpainted, open_px
+        As for `make_report`; the alignment has a rig.
+    labels : (H, W) int array, optional
+        Which picture each pixel of the panorama comes from.
+
+    Returns
+    -------
+    report : dict
+        JSON-ready values.
+    warnings : list of str
+        In plain words, for the user.
+    """
+    rig, field, warp = alignment.rig, alignment.field, alignment.warp
+    assert rig is not None and isinstance(field, SphereField)
+    names = [picture.name for picture in pictures]
+    holes, folds = sum(one.holes for one in decided), max(one.folds for one in decided)
+    error = map_errors(warp, alignment.edges)
+    report = {
+        "schema": SCHEMA,
+        "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum()))),
+        "left_out": left_out_entry(alignment.left_out),
+        "options": options_entry(options, alignment) | {"viewpoint": options.viewpoint},
+        "matches": {
+            "found": sum(len(edge.matches) for edge in alignment.edges),
+            "inliers": sum(int(edge.two_view.inliers.sum()) for edge in alignment.edges), "noise_px": rig.noise_px,
+        },
+        "rig": _rig_entry(rig, names),
+        "field": {
+            "kind": options.field, "smoothing": field.depth.smoothing, "centres": len(field.depth.inner.centres),
+            "leave_one_out_px": field.leave_one_out_px,
+            "negative_share": float((rig.inverse_ranges < 0).mean()) if len(rig.inverse_ranges) else 0.0,
+            "dense": {"used": False, "why": "more than two pictures have the smooth field, for now"},
+        },
+        "slide": slide_entry(alignment.slide),
+        "canvas": canvas_entry(canvas, rig.cameras[0].K),
+        "composition": {
+            "light": exposure_entry(pictures, decided), "occluded_px": sum(int(one.hidden.sum()) for one in decided),
+            "hole_px": holes, "inpainted_px": inpainted, "holes": closed_holes(shows, small=False)[1],
+        },
+        "measured": {
+            "alignment_median_px": _percentile(error, 50), "alignment_p95_px": _percentile(error, 95),
+            "folds": folds, **appearance,
+        },
+    }  # fmt: skip
+    warnings = [*_rig_warnings(rig, names), *exposure_warnings(pictures, [one.exposure for one in decided])]
+    if canvas.cropped and canvas.projection is not None:
+        warnings.append(
+            f"the pictures reach too far for a {canvas.projection.kind} panorama and were cropped there; "
+            "--projection equirectangular shows them whole"
+        )
+    if folds > WARNING.fold_share:
+        warnings.append(f"the warp folds over in {folds:.1%} of a picture: look for doubled or torn things there")
+    open_holes = open_px if options.holes == "auto" else holes
+    if open_holes > WARNING.hole_share * shows.size:
+        warnings.append(
+            f"{open_holes} pixels were seen by no camera, hidden behind something near: the panorama is "
+            f"{how_holes_are_shown(options)}"
+        )
+    return plain(report), warnings
+
+
+def _pictures(
+    pictures: Sequence[Picture], rig: Rig, decided: Sequence[Decided], share: Sequence[float]
+) -> list[dict[str, Any]]:
+    """What is known of each picture, and what became of it; `place` in units of the longest baseline."""
+    seen, error = rig.observations, residuals(rig)
+    entries = []
+    for number, (picture, camera) in enumerate(zip(pictures, rig.cameras, strict=True)):
+        own = (seen.picture == number) & seen.used
+        entry = picture_entry(picture, camera)
+        entry["camera"] |= {
+            "focal_deviation": _of(rig.focal_deviation, number), "lens": _of(rig.lenses, number),
+            "principal": camera.K[:2, 2], "R": rig.R[number], "t": rig.t[number],
+        }  # fmt: skip
+        entries.append(entry | {
+            "place": rig.centres[number], "place_deviation": _of(rig.position_deviation, number),
+            "inliers": int(own.sum()), "residual_px": float(np.median(error[own])) if own.any() else None,
+            "hidden_px": int(decided[number].hidden.sum()), "share": share[number],
+        })  # fmt: skip
+    return entries
+
+
+def _rig_entry(rig: Rig, names: Sequence[str]) -> dict[str, Any]:
+    """How the pictures hang together."""
+    return {
+        "edges": [
+            {
+                "pictures": [names[edge.i], names[edge.j]], "numbers": [edge.i, edge.j], "matches": edge.matches,
+                "inliers": edge.inliers, "noise_px": edge.noise_px, "parallax_px": edge.parallax_px,
+                "off_degrees": edge.off_degrees, "baseline": edge.baseline,
+            }
+            for edge in rig.edges
+        ],
+        "points": len(rig.rays), "loop_degrees": rig.loop_degrees, "scale": scale_kind(rig),
+        "stations": [[names[number] for number in station] for station in rig.stations],
+        "focal_guesses": [
+            {"focal_px": guess.focal, "k1": guess.k1, "cost": guess.cost} for guess in rig.guesses
+        ],
+        "focal_spread": focal_spread(rig),
+    }  # fmt: skip
+
+
+def _rig_warnings(rig: Rig, names: Sequence[str]) -> list[str]:
+    """What is doubtful, and what to do about it."""
+    out = []
+    for edge in weak_links(rig):
+        between = f"{names[edge.i]} and {names[edge.j]}"
+        out.append(
+            f"only {edge.inliers} matches hold {between} together, and with them all that hangs on either: take more "
+            f"pictures between {between}"
+        )
+    kind = scale_kind(rig)
+    if kind in ("continuity", "none"):
+        loose = [edge for edge in rig.edges if edge.baseline != "measured"]
+        pairs = ", ".join(f"{names[edge.i]} and {names[edge.j]}" for edge in loose[: RIG.most_named])
+        how = "only guessed by depth going on from one to the other" if kind == "continuity" else "not known"
+        out.append(
+            f"how far apart some pictures were taken is {how} ({pairs}), since no three of them show the same things: "
+            "take more pictures between them, so that each thing is in three"
+        )
+    if focal_spread(rig) > RIG.same_focal:
+        listed = ", ".join(f"{guess.focal:.0f} px" for guess in rig.guesses)
+        out.append(
+            f"the focal length is not sure: {listed} explain the pictures almost alike, and the first is used; give it "
+            "(--focal35, --focal-px) if you know it"
+        )
+    negative = float((rig.inverse_ranges < 0).mean()) if len(rig.inverse_ranges) else 0.0
+    if negative > WARNING.behind_infinity_share and rig.t.any():
+        out.append(
+            f"{negative:.0%} of the points lie beyond infinity: the places of the pictures or the focal length "
+            f"({rig.cameras[0].focal:.0f} px) are doubtful, and with them depth"
+        )
+    return out
+
+
+def _of(values: Sequence[Any] | NDArray[Any], number: int) -> Any:
+    """What is said of one picture, None where nothing is."""
+    return values[number] if len(values) else None
+
+
+def _percentile(values: NDArray[np.float64], share: float) -> float:
+    return float(np.percentile(values, share)) if values.size else float("nan")

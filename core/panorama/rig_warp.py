@@ -1,0 +1,292 @@
+"""The maps of N pictures, from one field of inverse range on the sphere (docs/method.md, 6).
+
+As in `warp`, only d and slack are interpolated between the nodes of a grid, and H_inf p + d e' is evaluated at every
+pixel. A picture's map is known in the box of the canvas that shows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.lens import distort, undistort
+from ..cameras.projective import ahead_of_camera, homogeneous, inverse_intrinsics
+from ..cameras.view import View
+from ..field.sphere_field import SphereField
+from ..raster.arrays import Array, Box, bounds, small_strips
+from ..raster.grid import Grid
+from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap, falls_inside
+from ..system.threads import each
+from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
+from .depth import AtNodes
+from .projection import Projection
+from .reference_map import ReferenceMap
+from .rig_options import RIG_WARP
+from .rig_viewpoint import CarriedDepth, RigViewpoint
+from .warp import Warp, in_plane, raw_pixels, trimmed
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A field on the sphere as its pictures see it, from one place or from where a viewpoint slides to.
+
+    carried: what is seen from there; None if all is seen from the first picture's place.
+    """
+
+    field: SphereField
+    views: Sequence[View]
+    carried: CarriedDepth | None
+
+    @staticmethod
+    def by(field: SphereField, views: Sequence[View], viewpoint: RigViewpoint | None) -> Seen:
+        """The field from a viewpoint; None: from the first picture's place."""
+        slides = viewpoint is not None and viewpoint.s1 > 0
+        return Seen(field, views, CarriedDepth.of(field, views, viewpoint) if viewpoint and slides else None)
+
+    @property
+    def viewpoint(self) -> RigViewpoint | None:
+        """Where it slides to."""
+        return None if self.carried is None else self.carried.viewpoint
+
+    def depth(self, rays: Array) -> tuple[Array, Array | None]:
+        """Inverse range d (…) along unit rays (…, 3), and d C (…, 3) where the viewpoint slides."""
+        return (self.field.at(rays), None) if self.carried is None else self.carried.at(rays)
+
+    def brought_along(self, view: View, infinite: list[Array], moved: Array | None) -> list[Array]:
+        """H_inf p + K R d C (three (…) arrays) for d C (…, 3); H_inf p if nothing moved."""
+        if moved is None:
+            return infinite
+        matrix = view.H_inf @ self.views[0].K
+        return [part + moved @ row for part, row in zip(infinite, matrix, strict=True)]
+
+    def outline(self, view: View) -> Array:
+        """Unit rays (N, 3) that show a picture's border, in order."""
+        rays = outline_of(self.field, view)
+        if self.viewpoint is None:
+            return rays
+        return self.viewpoint.seen_from(rays, np.maximum(self.field.at(rays), 0.0))[0]
+
+
+@dataclass(frozen=True, eq=False)
+class RigValues:
+    """A field on the sphere at the nodes of a grid over a canvas.
+
+    inverse_depth (rows, columns): of canvas points p, d(r) · |K⁻¹ p|; moved (rows, columns, 3): d C where the viewpoint
+    slides, else None; places: raw px (rows, columns, 2) of each picture, NaN behind its camera; slacks: px (rows,
+    columns, 2) of each, None without; both in the pictures' order.
+    """
+
+    inverse_depth: Array
+    moved: Array | None
+    places: tuple[Array, ...]
+    slacks: tuple[Array | None, ...]
+
+    @staticmethod
+    def over(seen: Seen, canvas: Canvas, grid: Grid) -> RigValues:
+        """A field's values at a grid's nodes."""
+        field, views = seen.field, seen.views
+        camera = views[0].camera
+        rays, length = canvas.rays_at(views[0].K, grid.xs, grid.ys, camera)
+        depth, moved = seen.depth(rays)
+        depth = depth * length
+        if moved is not None:
+            rays = rays + moved
+            rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+        places, slacks = [], []
+        for number, view in enumerate(views):
+            infinite = seen.brought_along(view, canvas.project_rows(view.H_inf, grid.xs, grid.ys, camera), moved)
+            slack = field.slack(number, rays) if number or canvas.projection is not None else None
+            slacks.append(slack)
+            beside = [] if slack is None else [(slack[..., 0], slack[..., 1])]
+            places.append(np.stack(raw_pixels(view, infinite, depth, beside), axis=-1))
+        return RigValues(depth, moved, tuple(places), tuple(slacks))
+
+
+def build_rig_warp(
+    field: SphereField, views: Sequence[View], projection: Projection | None = None,
+    viewpoint: RigViewpoint | None = None,
+) -> Warp:  # fmt: skip
+    """Lay out a canvas that holds all pictures, and map them onto it.
+
+    Parameters
+    ----------
+    field : SphereField
+    views : sequence of View
+        Of all pictures, the viewpoint's first.
+    projection : Projection, optional
+        Of a round panorama; by default the panorama lies in the plane of the viewpoint's picture, pixel for pixel.
+    viewpoint : RigViewpoint, optional
+        Where a round panorama is seen from, if that slides.
+
+    Returns
+    -------
+    Warp
+
+    Raises
+    ------
+    NoOverlap, OutputTooLarge, BadRequest
+        See `build_warp`.
+    """
+    camera, sizes = views[0].camera, [view.size for view in views]
+    plane, seen = Canvas(0, 0, (0, 0), projection=projection), Seen.by(field, views, viewpoint)
+    outlines = [seen.outline(view) @ views[0].K.T for view in views]
+    reference: Box = (0, 0, *camera.size)
+    if projection is None:
+        reach, cropped = expected_reach([in_plane(one) for one in outlines[1:]], camera.size, sizes[1:])
+    else:
+        shows = [_shows(field, views, number) for number in range(len(views))]
+        reference, reach, cropped = round_reach(projection, outlines, shows, camera)
+
+    def pictures_at(grid: Grid) -> Sequence[Array]:
+        return RigValues.over(seen, plane, grid).places
+
+    canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
+    return trimmed(_mapped(seen, replace(canvas, cropped=canvas.cropped or cropped)))
+
+
+def build_rig_map(field: SphereField, views: Sequence[View], canvas: Canvas) -> Warp:
+    """Map all pictures onto a given canvas, strip by strip.
+
+    Parameters
+    ----------
+    field : SphereField
+    views : sequence of View
+        Of all pictures, the viewpoint's first.
+    canvas : Canvas
+
+    Returns
+    -------
+    Warp
+    """
+    return _mapped(Seen.by(field, views, None), canvas)
+
+
+def _mapped(seen: Seen, canvas: Canvas) -> Warp:
+    """The maps of all pictures on a canvas."""
+    field, views = seen.field, seen.views
+    left, top = -canvas.offset[0], -canvas.offset[1]
+    shape = canvas.height, canvas.width
+    grid = Grid.over(left, top, canvas.width, canvas.height, RIG_WARP.nodes)
+    values = RigValues.over(seen, canvas, grid)
+    maps: list[CanvasMap] = [
+        _empty_map(places, view.size, canvas, grid) for places, view in zip(values.places, views, strict=True)
+    ]
+    if canvas.projection is None:
+        maps[0] = ReferenceMap(canvas, views[0].camera)
+    depth = np.empty(shape, np.float32)
+
+    def put(part: slice) -> None:
+        start, stop = part.start, part.stop
+        rows = (left, top + start, canvas.width, stop - start)
+        depth[part] = grid.to_pixels(values.inverse_depth, *rows)
+        moved = None
+        if values.moved is not None:
+            moved = np.stack([grid.to_pixels(values.moved[..., k], *rows) for k in range(3)], axis=-1)
+        strip = _Strip(seen, canvas, grid, start, depth[part], moved)
+        for view, slack, one in zip(views, values.slacks, maps, strict=True):
+            if isinstance(one, BoxedMap):
+                strip.put(one, view, slack)
+
+    each(put, small_strips(shape))
+    return Warp(
+        canvas, tuple(maps), depth, viewpoint=seen.viewpoint, deviation=_deviation(field, views, canvas)
+    )
+
+
+def _deviation(field: SphereField, views: Sequence[View], canvas: Canvas) -> AtNodes:
+    """The standard deviation (H, W) of inverse depth on a canvas."""
+    camera, (left, top) = views[0].camera, canvas.offset
+    grid = Grid.over(-left, -top, canvas.width, canvas.height, RIG_WARP.deviation_nodes)
+    rays, length = canvas.rays_at(views[0].K, grid.xs, grid.ys, camera)
+    return AtNodes(canvas, camera, grid, field.deviation(rays) * length)
+
+
+@dataclass(frozen=True, eq=False)
+class _Strip:
+    """Rows of a canvas from `start` on, of which inverse depth (h, W) is known, and d C (h, W, 3) where the viewpoint
+    slides; grid: the nodes of a field."""
+
+    seen: Seen
+    canvas: Canvas
+    grid: Grid
+    start: int
+    depth: NDArray[np.float32]
+    moved: NDArray[np.float32] | None
+
+    def put(self, one: BoxedMap, view: View, slack: Array | None) -> None:
+        """Writes where a picture is seen in these rows into its map; slack (rows, columns, 2): px at the nodes."""
+        canvas, (left, top, width, height) = self.canvas, one.box
+        low, high = max(self.start, top), min(self.start + len(self.depth), top + height)
+        if low >= high or not width:
+            return
+        columns = slice(left, left + width)
+        beside = []
+        if slack is not None:
+            strip = (left - canvas.offset[0], low - canvas.offset[1], width, high - low)
+            beside.append([self.grid.to_pixels(slack[..., k], *strip) for k in (0, 1)])
+        camera = self.seen.views[0].camera
+        infinite = canvas.project_rows(view.H_inf, canvas.xs[columns], canvas.ys[low:high], camera)
+        part = slice(low - self.start, high - self.start), columns
+        # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
+        depth = self.depth[part].astype(np.float64)
+        moved = None if self.moved is None else self.moved[part].astype(np.float64)
+        infinite = self.seen.brought_along(view, infinite, moved)
+        rows = slice(low - top, high - top)
+        one.inner.x[rows], one.inner.y[rows] = raw_pixels(view, infinite, depth, beside)
+
+
+def _empty_map(places: Array, size: tuple[int, int], canvas: Canvas, grid: Grid) -> BoxedMap:
+    """A map to be filled in, in the box of the canvas that may show a picture of (W, H) px, by where it is seen at the
+    nodes."""
+    part = bounds(falls_inside(places[..., 0], places[..., 1], size))
+    if part is None:
+        left, top, right, bottom = 0, 0, 0, 0
+    else:
+        # the picture ends somewhere between its last node and the next, and its corner may lie between two rows
+        margin = 2 * grid.step
+        ends = [
+            (int(axis[some.start] + offset) - margin, int(axis[some.stop - 1] + offset) + margin + 1)
+            for axis, some, offset in zip((grid.xs, grid.ys), part[::-1], canvas.offset, strict=True)
+        ]
+        sides = canvas.width, canvas.height
+        (left, right), (top, bottom) = (
+            (max(0, low), min(side, high)) for (low, high), side in zip(ends, sides, strict=True)
+        )
+    shape = max(0, bottom - top), max(0, right - left)
+    inner = PictureMap(np.empty(shape, np.float32), np.empty(shape, np.float32), size)
+    return BoxedMap(inner, (left, top), (canvas.height, canvas.width))
+
+
+def outline_of(field: SphereField, view: View) -> Array:
+    """Unit rays (N, 3) from the viewpoint to what a picture shows along its border, in order."""
+    seen = homogeneous(undistort(border(view.size), view.camera)) @ inverse_intrinsics(view.K).T
+    seen /= np.linalg.norm(seen, axis=1, keepdims=True)
+    rays = seen @ view.R
+    # |s b − t| = 1 / d for the range s from the picture's camera: 1 / s is what its place moves the ray by
+    along, offset = seen @ view.t, float(view.t @ view.t)
+    for _ in range(RIG_WARP.outline_steps):
+        d = np.maximum(field.at(rays), 0.0)
+        share = d * along + np.sqrt(np.maximum(1 + d**2 * (along**2 - offset), 0))
+        inverse = d / np.maximum(share, RIG_WARP.least_share)
+        rays = (seen - inverse[:, None] * view.t) @ view.R
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    return rays
+
+
+def _shows(field: SphereField, views: Sequence[View], number: int) -> Callable[[Array], bool]:
+    """Whether picture `number` shows a canvas point (3,)."""
+    view, to_ray = views[number], inverse_intrinsics(views[0].K)
+
+    def shown(point: Array) -> bool:
+        ray = to_ray @ point
+        length = float(np.linalg.norm(ray))
+        a, b, c = view.H_inf @ point + float(field.at(ray[None] / length)[0]) * length * view.e_prime
+        if not ahead_of_camera(a, b, c):
+            return False
+        x, y = distort(np.array([a / c, b / c]), view.camera)
+        return bool(falls_inside(x, y, view.size))
+
+    return shown

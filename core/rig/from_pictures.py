@@ -1,0 +1,108 @@
+"""From pictures in any order to their rig: features, matches, registration; each kept in the cache."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..cameras.camera import Camera
+from ..cameras.rig import PictureMatches, Registration, Rig
+from ..pictures.picture import Picture
+from ..system.cache import Cache
+from ..system.progress import ReportProgress
+from .matching import Matched, content_key, found_features, found_matches
+from .pairs import chosen_pairs
+from .reframing import reordered
+from .registration import register
+
+
+def matched_pictures(pictures: Sequence[Picture], quick: bool, cache: Cache, progress: ReportProgress) -> Matched:
+    """What pictures have in common.
+
+    Parameters
+    ----------
+    pictures : sequence of Picture
+    quick : bool
+        Whether a preview's few features will do.
+    cache : Cache
+    progress : callable
+        progress(stage, share of that stage that is done).
+
+    Returns
+    -------
+    Matched
+        The same in whatever order the pictures are given, but for their numbers.
+    """
+    order = sorted(range(len(pictures)), key=lambda number: content_key(pictures[number]))
+    progress("features", 0.0)
+    seen = found_features(
+        [pictures[number] for number in order], quick, cache, lambda share: progress("features", share)
+    )
+    progress("matches", 0.0)
+    found = found_matches(seen, chosen_pairs(seen), cache, lambda share: progress("matches", share))
+    return renumbered(found, order)
+
+
+def registered(
+    pictures: Sequence[Picture], cameras: Sequence[Camera], matched: Matched, seed: int, cache: Cache,
+    progress: ReportProgress,
+) -> Registration:  # fmt: skip
+    """The rig of pictures.
+
+    Parameters
+    ----------
+    pictures : sequence of Picture
+    cameras : sequence of Camera
+        What is known of them.
+    matched : Matched
+        What they have in common.
+    seed : int
+        Of random choices.
+    cache : Cache
+    progress : callable
+        progress(stage, share of that stage that is done).
+
+    Returns
+    -------
+    Registration
+        The same in whatever order the pictures are given, but for their numbers: those that connect come in the order
+        that they were given in, and the first one's frame is the rig's.
+    """
+    order = sorted(range(len(pictures)), key=lambda number: content_key(pictures[number]))
+    inner = renumbered(matched, np.argsort(order).tolist())
+    cameras = tuple(cameras[number] for number in order)
+    names = tuple(pictures[number].name for number in order)
+
+    def found() -> _Kept:
+        one = register(cameras, inner.points, inner.matches, inner.scale, seed, progress, names)
+        return _Kept(one.rig, one.numbers, tuple(one.left_out.items()))
+
+    progress("geometry", 0.0)
+    kept = cache.remember("registration", (cameras, inner.points, inner.matches, inner.scale, seed, names), found)
+    numbers = [order[number] for number in kept.numbers]
+    ascending = np.argsort(numbers).tolist()
+    return Registration(
+        reordered(kept.rig, ascending), tuple(sorted(numbers)),
+        {order[number]: why for number, why in sorted(kept.left_out, key=lambda one: order[one[0]])},
+    )  # fmt: skip
+
+
+def renumbered(matched: Matched, numbers: Sequence[int]) -> Matched:
+    """What was matched with other numbers of the pictures: numbers[n] is the new one of picture n."""
+    points = [matched.points[old] for old in np.argsort(numbers)]
+    matches = []
+    for one in matched.matches:
+        i, j = numbers[one.i], numbers[one.j]
+        matches.append(PictureMatches(i, j, one.index) if i < j else PictureMatches(j, i, one.index[:, ::-1]))
+    return replace(matched, points=tuple(points), matches=tuple(sorted(matches, key=lambda one: (one.i, one.j))))
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A Registration in a form that the cache holds; left_out: numbers, and why."""
+
+    rig: Rig
+    numbers: tuple[int, ...]
+    left_out: tuple[tuple[int, str], ...]

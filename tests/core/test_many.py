@@ -1,0 +1,206 @@
+"""stitch() of more than two pictures, against the cameras that took them."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.cameras.lens import distort
+from edf_stitch.core.cameras.projective import distance_to_line, project, rotation_angle
+from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.measure.report import plain
+from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.output.camera_file import camera_table
+from edf_stitch.core.output.match_table import match_file
+from edf_stitch.core.output.outputs import OutputRequest, check, warp_bytes, write
+from edf_stitch.core.pictures.picture import picture_from_array
+from edf_stitch.core.pipeline import StitchResult, stitch
+from edf_stitch.core.system.errors import Cancelled, NoOverlap
+from edf_stitch.core.system.output_files import OutputFiles
+
+from ..conftest import camera_of
+from ..sets import FOCAL, PictureSet, make_set
+
+KNOWN = StitchOptions(camera=CameraRequest(focal_px=(FOCAL,)), blend="feather", dense=False)
+
+
+@pytest.fixture(scope="session")
+def four() -> PictureSet:
+    return make_set()
+
+
+@pytest.fixture(scope="session")
+def set_result(four: PictureSet) -> StitchResult:
+    return stitch(four.pictures, KNOWN)
+
+
+def numbers_of(result: StitchResult) -> list[int]:
+    """The pictures of a result by their numbers in the set."""
+    return [int(picture.name.removesuffix(".png")) - 1 for picture in result.pictures]
+
+
+def pose_errors(four: PictureSet, result: StitchResult) -> tuple[float, float]:
+    """The largest error of a rotation, in degrees, and of a place, as a share of the longest baseline."""
+    cameras = [four.cameras[number] for number in numbers_of(result)]
+    first, rig = cameras[0], result.rig
+    assert rig is not None
+    true = np.array([first.R @ (camera.place - first.place) for camera in cameras])
+    turns = [rotation_angle(view.R, camera.R @ first.R.T) for view, camera in zip(result.views, cameras, strict=True)]
+    scale = (rig.centres * true).sum() / (rig.centres**2).sum()
+    off = np.linalg.norm(scale * rig.centres - true, axis=1).max()
+    return float(np.max(turns)), float(off / np.linalg.norm(true, axis=1).max())
+
+
+def test_cameras_are_found_as_they_stood(four: PictureSet, set_result: StitchResult) -> None:
+    turned, moved = pose_errors(four, set_result)
+    assert turned < 0.2 and moved < 0.02
+
+
+def test_one_panorama_shows_all_and_misses_no_match(set_result: StitchResult) -> None:
+    assert {len(part) for part in (set_result.pictures, set_result.views, set_result.layers, set_result.decided)} == {4}
+    assert set(np.unique(set_result.labels)) >= {0, 1, 2, 3}
+    measured = set_result.report["measured"]
+    assert measured["alignment_median_px"] < 0.5 and measured["folds"] < 0.01
+    assert set_result.report["verdict"]["is"] == "good" and not set_result.warnings
+
+
+def test_every_edge_has_the_rigs_geometry_and_the_matches_that_agree(set_result: StitchResult) -> None:
+    assert len(set_result.edges) >= 3
+    for edge in set_result.edges:
+        inliers = edge.inliers
+        assert len(inliers) > 30
+        assert np.median(distance_to_line(edge.two_view.F, inliers.x, inliers.y)) < 0.5
+        assert set_result.used_of(edge).sum() == len(inliers)
+
+
+def test_the_order_changes_names_only(four: PictureSet, set_result: StitchResult) -> None:
+    order = [2, 0, 3, 1]
+    other = stitch([four.pictures[number] for number in order], replace(KNOWN, viewpoint="1.png"))
+    assert numbers_of(other) == [0, 2, 3, 1], "the viewpoint first, the others as given"
+    assert pose_errors(four, other) == pytest.approx(pose_errors(four, set_result), abs=1e-6)
+    back = [numbers_of(other).index(number) for number in range(4)]
+    np.testing.assert_allclose(np.stack([view.R for view in other.views])[back], set_result.rig.R, atol=1e-9)
+    np.testing.assert_allclose(other.rig.t[back], set_result.rig.t, atol=1e-9)
+    assert len(other.rig.rays) == len(set_result.rig.rays)
+
+
+def test_it_is_seen_from_the_picture_that_is_asked_for(four: PictureSet) -> None:
+    third = stitch(four.pictures, replace(KNOWN, viewpoint=3))
+    assert numbers_of(third) == [2, 0, 1, 3]
+    assert not third.rig.t[0].any()
+    turned, moved = pose_errors(four, third)
+    assert turned < 0.2 and moved < 0.02
+    assert third.report["options"]["viewpoint"] == 3
+
+
+def test_a_picture_that_does_not_belong_is_left_out_and_named(four: PictureSet) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (60, 80, 3)).astype(np.uint8)
+    stranger = picture_from_array(cv2.resize(noise, (320, 240), interpolation=cv2.INTER_CUBIC), "stranger.png")
+    given = [stranger, *four.pictures[:3], four.pictures[1]]
+    result = stitch(given, KNOWN)
+    assert numbers_of(result) == [0, 1, 2]
+    assert [entry["name"] for entry in result.report["left_out"]] == ["stranger.png"]
+    assert any("stranger.png is left out" in warning for warning in result.warnings)
+    assert any("2.png is the same picture as 2.png" in warning for warning in result.warnings)
+    assert result.report["verdict"]["is"] == "look" and "stranger.png" in result.report["verdict"]["because"]
+    with pytest.raises(NoOverlap, match="stranger.png: connects to no other picture"):
+        stitch(given, replace(KNOWN, require_all=True))
+    with pytest.raises(NoOverlap, match="stranger.png cannot be the viewpoint"):
+        stitch(given, replace(KNOWN, viewpoint=1))
+    only_two = stitch([stranger, *four.pictures[:2]], KNOWN)
+    assert only_two.rig is None and numbers_of(only_two) == [0, 1], "two that connect are a pair"
+    assert only_two.report["left_out"][0]["name"] == "stranger.png" and "two_view" in only_two.report
+    with pytest.raises(NoOverlap):
+        stitch([stranger, picture_from_array(stranger.view[::-1].copy(), "s.png"), four.pictures[0]], KNOWN)
+
+
+def test_cameras_that_were_written_are_held(four: PictureSet, set_result: StitchResult) -> None:
+    table = plain(camera_table(set_result))
+    again = stitch(four.pictures, replace(KNOWN, camera=CameraRequest(cameras=table)))
+    for view, before in zip(again.views, set_result.views, strict=True):
+        np.testing.assert_allclose(view.K, before.K, rtol=1e-12)
+        np.testing.assert_allclose(view.R, before.R, atol=1e-9)
+        np.testing.assert_allclose(view.t, before.t, atol=1e-9)
+    assert all(one["camera"]["source"] == "camera file" for one in again.report["pictures"])
+
+
+def test_matches_that_were_written_make_the_same_rig(
+    four: PictureSet, set_result: StitchResult, tmp_path: Path
+) -> None:
+    (tmp_path / "m.csv").write_bytes(match_file(set_result))
+    again = stitch(four.pictures, replace(KNOWN, matches=tmp_path / "m.csv"))
+    np.testing.assert_allclose(again.rig.R, set_result.rig.R, atol=1e-3)
+    np.testing.assert_allclose(again.rig.t, set_result.rig.t, atol=1e-2)
+    assert len(again.edges) == len(set_result.edges)
+
+
+def test_warp_and_layers_hold_every_picture(set_result: StitchResult, tmp_path: Path) -> None:
+    with np.load(io.BytesIO(warp_bytes(set_result))) as warp:
+        assert warp["R"].shape == (4, 3, 3) and warp["t"].shape == (4, 3) and warp["dist"].shape == (4, 5)
+        assert warp["F"].shape == (len(set_result.edges), 3, 3)
+        assert warp["edges"].tolist() == [[edge.i, edge.j] for edge in set_result.edges]
+        for number in range(4):
+            x, y, width, height = warp[f"box_{number:02d}"]
+            assert warp[f"map_x_{number:02d}"].shape == (height, width)
+            whole = set_result.warp.maps[number].arrays().x[y : y + height, x : x + width]
+            np.testing.assert_array_equal(warp[f"map_x_{number:02d}"], whole)
+    request = OutputRequest(tmp_path / "o.png", tmp_path / "r.json", tmp_path / "layers")
+    with OutputFiles() as files:
+        check(request, files, [picture.name for picture in set_result.pictures])
+        write(set_result, request, files)
+    named = {path.name for path in (tmp_path / "layers").iterdir()}
+    assert {"00_1.png", "03_4.png", "labels.png", "occluded_03.png", "canvas.json"} <= named
+    assert "seam.png" not in named, "it says reference or target"
+    labels = cv2.imread(str(tmp_path / "layers" / "labels.png"), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(labels, set_result.labels + 1)
+    page = (tmp_path / "r.html").read_text("utf-8")
+    assert page.count("<image ") == 4 and page.count("<line ") == len(set_result.edges)
+
+
+@pytest.mark.parametrize("slide", [0.0, 1.0])
+def test_the_maps_can_be_made_again_from_the_warps_file(four: PictureSet, slide: float) -> None:
+    """By the equation that docs/formats.md gives, wherever the viewpoint is."""
+    options = replace(KNOWN, field="strict", slide=slide, projection="cylindrical")
+    with np.load(io.BytesIO(warp_bytes(stitch(four.pictures[:3], options)))) as file:
+        warp = dict(file)
+    width, height = warp["canvas"]
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    x, y = (x - warp["centre"][0]) / warp["focal"], (y - warp["centre"][1]) / warp["focal"]
+    rays = np.stack([np.sin(x), y, np.cos(x)], axis=-1)
+    rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True) @ warp["rotation"].T
+    moved = rays
+    assert ("places" in warp) == bool(slide)
+    if slide:
+        assert warp["s1"] == slide and "slide" not in warp
+        own = rays @ warp["places_rotation"]
+        at = (np.arctan2(own[..., 0], own[..., 2]) + np.pi) * len(warp["places"]) / (2 * np.pi)
+        before = np.floor(at).astype(int)
+        share, places = (at - before)[..., None], warp["places"]
+        near, far = places[before % len(places)], places[(before + 1) % len(places)]
+        moved = rays + warp["inverse_depth"][..., None] * slide * (near + share * (far - near))
+    for number in range(3):
+        left, top, w, h = warp[f"box_{number:02d}"]
+        part = np.s_[top : top + h, left : left + w]
+        q = moved[part] @ warp["R"][number].T + warp["inverse_depth"][part][..., None] * warp["t"][number]
+        camera = replace(camera_of((320, 240), 1.0, tuple(warp["dist"][number])), K=warp["K"][number])
+        made = distort(project(q @ camera.K.T), camera)
+        values = np.stack([warp[f"map_{axis}_{number:02d}"] for axis in "xy"], axis=-1)
+        known = np.isfinite(values).all(axis=-1) & (q[..., 2] > 0.1)
+        assert known.mean() > 0.5
+        np.testing.assert_allclose(made[known], values[known], atol=0.02)
+
+
+def test_it_stops_soon_after_it_is_asked_to(four: PictureSet) -> None:
+    for wanted in ("features", "matches", "geometry", "field", "warp", "seam"):
+        stage = ""
+
+        def tell(name: str, _: float) -> None:
+            nonlocal stage
+            stage = name
+
+        with pytest.raises(Cancelled):
+            stitch(four.pictures[:3], KNOWN, tell, lambda wanted=wanted: stage == wanted)  # type: ignore[misc]  # noqa: B023
