@@ -161,6 +161,9 @@ class JudgeOptions:
     # pair in σ from which it has a baseline at all.
     three_view_points: int = 4
     parallax_sigmas: float = 3.0
+    # Parallax is little where this percentile of errors of rotations alone is below so many σ.
+    little_parallax_percentile: float = 80.0
+    little_parallax_sigmas: float = 6.0
     # px: where costs are weighed against numbers of parameters, noise is never taken to be less.
     least_noise_px: float = 0.1
 
