@@ -53,8 +53,8 @@ def test_a_slide_is_chosen_on_a_coarse_map(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.parametrize(("yaws", "moves", "options", "why"), [
     (WALK, 1.0, {"slide": 0}, "as asked for"),
     (WALK, 0.0, {}, "taken from one place"),
-    (WALK, 1.0, {"projection": "equirectangular"}, "a sphere is seen from one place"),
-    (RING, 1.0, {}, "a ring is seen from one place"),
+    (WALK, 1.0, {"projection": "equirectangular"}, "is seen from one place"),
+    (RING, 1.0, {"projection": "equirectangular"}, "is seen from one place"),
     (WALK, 1.0, {"projection": "reference", "slide": "auto"}, "own plane has one viewpoint"),
 ])  # fmt: skip
 def test_elsewhere_the_viewpoint_stays(yaws: tuple[int, ...], moves: float, options: dict, why: str) -> None:
