@@ -9,7 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.projective import distance_to_line, rotation_angle
+from edf_stitch.core.cameras.lens import distort
+from edf_stitch.core.cameras.projective import distance_to_line, project, rotation_angle
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.measure.report import plain
 from edf_stitch.core.options import StitchOptions
@@ -21,6 +22,7 @@ from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import Cancelled, NoOverlap
 from edf_stitch.core.system.output_files import OutputFiles
 
+from ..conftest import camera_of
 from ..sets import FOCAL, PictureSet, make_set
 
 KNOWN = StitchOptions(camera=CameraRequest(focal_px=(FOCAL,)), blend="feather", dense=False)
@@ -157,6 +159,39 @@ def test_warp_and_layers_hold_every_picture(set_result: StitchResult, tmp_path: 
     np.testing.assert_array_equal(labels, set_result.labels + 1)
     page = (tmp_path / "r.html").read_text("utf-8")
     assert page.count("<image ") == 4 and page.count("<line ") == len(set_result.edges)
+
+
+@pytest.mark.parametrize("slide", [0.0, 1.0])
+def test_the_maps_can_be_made_again_from_the_warps_file(four: PictureSet, slide: float) -> None:
+    """By the equation that docs/formats.md gives, wherever the viewpoint is."""
+    options = replace(KNOWN, field="strict", slide=slide, projection="cylindrical")
+    with np.load(io.BytesIO(warp_bytes(stitch(four.pictures[:3], options)))) as file:
+        warp = dict(file)
+    width, height = warp["canvas"]
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    x, y = (x - warp["centre"][0]) / warp["focal"], (y - warp["centre"][1]) / warp["focal"]
+    rays = np.stack([np.sin(x), y, np.cos(x)], axis=-1)
+    rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True) @ warp["rotation"].T
+    moved = rays
+    assert ("places" in warp) == bool(slide)
+    if slide:
+        assert warp["s1"] == slide and "slide" not in warp
+        own = rays @ warp["places_rotation"]
+        at = (np.arctan2(own[..., 0], own[..., 2]) + np.pi) * len(warp["places"]) / (2 * np.pi)
+        before = np.floor(at).astype(int)
+        share, places = (at - before)[..., None], warp["places"]
+        near, far = places[before % len(places)], places[(before + 1) % len(places)]
+        moved = rays + warp["inverse_depth"][..., None] * slide * (near + share * (far - near))
+    for number in range(3):
+        left, top, w, h = warp[f"box_{number:02d}"]
+        part = np.s_[top : top + h, left : left + w]
+        q = moved[part] @ warp["R"][number].T + warp["inverse_depth"][part][..., None] * warp["t"][number]
+        camera = replace(camera_of((320, 240), 1.0, tuple(warp["dist"][number])), K=warp["K"][number])
+        made = distort(project(q @ camera.K.T), camera)
+        values = np.stack([warp[f"map_{axis}_{number:02d}"] for axis in "xy"], axis=-1)
+        known = np.isfinite(values).all(axis=-1) & (q[..., 2] > 0.1)
+        assert known.mean() > 0.5
+        np.testing.assert_allclose(made[known], values[known], atol=0.02)
 
 
 def test_it_stops_soon_after_it_is_asked_to(four: PictureSet) -> None:
