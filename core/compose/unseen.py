@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,9 +29,11 @@ class Unseen:
 
 
 def unseen_by_each(
-    layers: Sequence[Layer], warp: Warp, views: Sequence[View], windows: Sequence[Window | None]
+    layers: Sequence[Layer], warp: Warp, views: Sequence[View], windows: Sequence[Window | None],
+    progress: Callable[[float], None],
 ) -> list[Unseen]:
-    """What each picture cannot see; windows: where they show anything, of more than two.
+    """What each picture cannot see; windows: where they show anything, of more than two; progress is called with the
+    share that is done.
 
     Of a pair, the reference cannot see what is `behind`, and all else is judged beside it. Of a larger set, the depth
     order counts only where dense refinement knows it: a smooth field through sparse points hides what is seen. What no
@@ -39,6 +41,7 @@ def unseen_by_each(
     """
     nothing = np.broadcast_to(np.False_, layers[0].alpha.shape)
     if len(layers) == 2:
+        progress(0.0)
         behind = nothing if warp.behind is None else warp.behind & (layers[0].alpha > 0)
         shown = layers[0].alpha > 0
         if warp.behind is not None:
@@ -51,6 +54,7 @@ def unseen_by_each(
             count[there] += layer.alpha[there] > 0
     found = []
     for number, (layer, tight) in enumerate(zip(layers, windows, strict=True)):
+        progress(number / len(layers))
         if tight is None:
             found.append(Unseen(nothing, nothing))
             continue

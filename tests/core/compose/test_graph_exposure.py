@@ -25,7 +25,8 @@ def exposures(
 ) -> tuple[Exposure, ...]:
     cameras = [view.camera for view in views_at([np.zeros(3)] * len(layers), places)]
     return graph_exposures(
-        layers, maps_of(places), cameras, hidden or [NOTHING] * len(layers), [floats] * len(layers), wanted
+        layers, maps_of(places), cameras, hidden or [NOTHING] * len(layers), [floats] * len(layers), wanted,
+        lambda share: None,
     )
 
 
