@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,12 @@ from ..cameras.view import View
 from ..field.folding import folds, turned_over, turning
 from ..field.visibility import by_agreement, occluded
 from ..panorama.layers import Layer
-from ..panorama.warp import Warp
 from ..raster.lazy import AnyImage
 from .graph_options import WINDOW
 from .window import Window
+
+if TYPE_CHECKING:
+    from ..panorama.warp import Warp
 
 
 @dataclass(frozen=True)
