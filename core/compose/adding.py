@@ -43,7 +43,6 @@ class Added:
     picture_map : PictureMap
     window : Window
     canvas : Canvas
-        All of it.
     hidden, hidden_by_depth : (h, w) bool arrays
         See `Decided`.
     behind : (h, w) bool array or None
@@ -113,7 +112,7 @@ def add(before: Layer, added: Added, so_far: Decided, is_decided: bool, keep: bo
         holes |= behind & (before.alpha > 0) & (hidden | (layer.alpha == 0))
         before = _without(before, holes)
     visible, fetched = (_without(one, holes) if holes.any() else one for one in (layer, fetched))
-    roll = so_far.roll if is_decided else roll_for(added.window.canvas(added.canvas), before, visible)
+    roll = so_far.roll if is_decided or not added.window.is_whole else roll_for(added.canvas, before, visible)
     before, visible, rolled_hidden = rolled_layer(before, roll), rolled_layer(visible, roll), rolled(by_depth, roll)
     behind = None if behind is None else rolled(behind, roll)
     unseen = rolled_hidden if behind is None else rolled_hidden | behind
@@ -123,7 +122,7 @@ def add(before: Layer, added: Added, so_far: Decided, is_decided: bool, keep: bo
     if not is_decided:
         start = replace(so_far, window=added.window, roll=roll, holes=int(holes.sum()))
         found = _with_seam(start, before, visible, overlap, added, rolled_hidden, behind)
-        chosen = None if found.chosen is None else rolled(found.chosen, -roll)
+        chosen = None if found.chosen is None else added.window.closed(rolled(found.chosen, -roll))
         found = replace(found, chosen=chosen)
         if not keep:
             found = replace(found, hidden_by_depth=found.hidden, known=None, costs=None)

@@ -170,7 +170,7 @@ class SetPanorama(Panorama):
 
     def _mark(self, number: int, window: Window, chosen: NDArray[np.bool_] | None) -> None:
         """Remembers what (h, w) a picture shows."""
-        for there, here in window.parts:
+        for there, here in window.own_parts:
             if chosen is not None:
                 self._labels[there][chosen[here]] = number
             if self._count.size:

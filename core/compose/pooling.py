@@ -40,4 +40,5 @@ def _pooled(decisions: Sequence[Decided]) -> Decided:
     ]  # fmt: skip
     costs = averaged_costs(alike)
     chosen = rolled(find_seam(first.known, costs), -first.roll)
+    chosen = chosen if first.window is None else first.window.closed(chosen)
     return replace(first, costs=costs, chosen=chosen)

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from ..panorama.canvas import Canvas
 from ..panorama.layers import Layer
-from ..raster.arrays import Box, Part
-from ..raster.lazy import AnyImage, Placed
+from ..raster.arrays import Box, Part, within
+from ..raster.lazy import AnyImage, LazyImage
 from ..raster.picture_map import CanvasMap, PictureMap
-from .wraparound import WrappedImage
 
 
 @dataclass(frozen=True)
@@ -54,30 +53,37 @@ class Window:
         return self.box[3], self.box[2]
 
     @property
+    def overhang(self) -> int:
+        """Columns at either end that show again what the other end shows, of a window that goes all round."""
+        return max(0, (self.box[2] - self.size[0]) // 2)
+
+    @property
     def parts(self) -> list[tuple[Part, Part]]:
-        """Rows and columns of the canvas, and which of the window's they are: one pair, or two across ±180°."""
-        left, top, width, height = self.box
-        rows, first = slice(top, top + height), min(width, self.size[0] - left)
-        found = [((rows, slice(left, left + first)), (slice(0, height), slice(0, first)))]
-        if first < width:
-            found.append(((rows, slice(0, width - first)), (slice(0, height), slice(first, width))))
-        return found
+        """Rows and columns of the canvas, and which of the window's they are: more than one pair across ±180°."""
+        return self._parts(0, self.box[2])
+
+    @property
+    def own_parts(self) -> list[tuple[Part, Part]]:
+        """The same, each column of the canvas once."""
+        return self._parts(self.overhang, self.box[2] - self.overhang)
+
+    def _parts(self, first: int, last: int) -> list[tuple[Part, Part]]:
+        """The same of some columns of the window."""
+        left, top, _, height = self.box
+        return [
+            ((slice(top, top + height), there), (slice(0, height), here))
+            for there, here in pieces(left, slice(first, last), self.size[0])
+        ]
 
     def plane(self, values: NDArray[Any]) -> NDArray[Any]:
         """The part of an array (H, W, …); a view of it, but not across ±180°."""
-        found = [values[there] for there, _ in self.parts]
-        return found[0] if len(found) == 1 else np.concatenate(found, axis=1)
+        return _joined([values[there] for there, _ in self.parts])
 
     def image(self, values: AnyImage) -> AnyImage:
         """The part of an image (H, W, …)."""
-        left, top, width, _ = self.box
         if self.is_whole:
             return values
-        if isinstance(values, np.ndarray):
-            return self.plane(values)
-        if left + width <= self.size[0]:
-            return Placed(values, (-top, -left), self.shape)
-        return Placed(WrappedImage(values, left), (-top, 0), self.shape)
+        return self.plane(values) if isinstance(values, np.ndarray) else WindowImage(values, self)
 
     def layer(self, layer: Layer) -> Layer:
         """The part of a layer."""
@@ -92,19 +98,20 @@ class Window:
             for (rows, columns), _ in self.parts
         ]
         found = [picture_map.within(box).arrays() for box in boxes]
-        if len(found) == 1:
-            return found[0]
-        x, y = (np.concatenate([getattr(one, name) for one in found], axis=1) for name in ("x", "y"))
-        return PictureMap(x, y, picture_map.size)
-
-    def canvas(self, canvas: Canvas) -> Canvas:
-        """The part of the canvas; across ±180° only its size means anything."""
-        return canvas if self.is_whole else canvas.within(self.box)
+        return PictureMap(_joined([one.x for one in found]), _joined([one.y for one in found]), picture_map.size)
 
     def put(self, values: NDArray[Any], out: NDArray[Any]) -> None:
         """Writes the window's values (h, w, …) into an array (H, W, …)."""
-        for there, here in self.parts:
+        for there, here in self.own_parts:
             out[there] = values[here]
+
+    def closed(self, values: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """A mask (h, w) whose overhangs show the same as the other end."""
+        if self.overhang:
+            values = values.copy()
+            for there, here in ((self.size[0], 0), (self.overhang, self.size[0] + self.overhang)):
+                values[:, here : here + self.overhang] = values[:, there : there + self.overhang]
+        return values
 
     def spread(self, values: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """A mask (h, w) as one of the whole canvas."""
@@ -115,17 +122,52 @@ class Window:
         return out
 
     def with_margin(self, margin: int) -> Window:
-        """The same with so many px more on every side: all columns where it goes round, none beyond the edges else."""
+        """The same with so many px more on every side, none beyond the canvas's edges; all round, and so far beyond its
+        own ends, where that leaves no gap on a canvas that goes round."""
         (left, top, width, height), (across, down) = self.box, self.size
         first, last = max(0, top - margin), min(down, top + height + margin)
         if not self.round:
             begin, end = max(0, left - margin), min(across, left + width + margin)
-        elif width + 2 * margin < across:
-            begin = (left - margin) % across
-            end = begin + width + 2 * margin
         else:
-            begin, end = 0, across
+            begin = (left - margin) % across
+            end = begin + 2 * margin + (width if width + 2 * margin < across else across)
         return replace(self, box=(begin, first, end - begin, last - first))
+
+
+@dataclass(frozen=True, eq=False)
+class WindowImage(LazyImage):
+    """An image (H, W, …) in a window, read where it is asked for."""
+
+    image: AnyImage
+    window: Window
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(h, w, …)."""
+        return *self.window.shape, *self.image.shape[2:]
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        (rows, columns), (left, top, _, _) = within(part, self.shape), self.window.box
+        lines = slice(top + rows.start, top + rows.stop)
+        return _joined([self.image[lines, there] for there, _ in pieces(left, columns, self.window.size[0])])
+
+
+def pieces(left: int, columns: slice, width: int) -> list[tuple[slice, slice]]:
+    """Some columns of a window that begins at `left` of a canvas of so many columns: those of the canvas, and of the
+    window, in one pair or more. No columns are one pair, too."""
+    found: list[tuple[slice, slice]] = []
+    first = columns.start
+    while first < columns.stop or not found:
+        there = (left + first) % width
+        count = min(columns.stop - first, width - there)
+        found.append((slice(there, there + count), slice(first, first + count)))
+        first += count
+    return found
+
+
+def _joined(values: list[NDArray[Any]]) -> NDArray[Any]:
+    """Arrays (h, …, …) side by side; a single one itself."""
+    return values[0] if len(values) == 1 else np.concatenate(values, axis=1)
 
 
 def window_of(canvas: Canvas, shows: NDArray[np.bool_]) -> Window | None:

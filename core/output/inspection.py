@@ -67,7 +67,7 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
         "K_prime": np.linalg.inv(S_prime) @ view.K_prime, "R": view.R, "t": view.t, "model": view.model,
         "distortion": result.cameras[edge.i].distortion, "distortion_prime": result.cameras[edge.j].distortion,
         "S": shift @ S, "canvas": (canvas.width, canvas.height), "K_canvas": shift @ view.K,
-        "viewpoint": None if result.warp.viewpoint is None else asdict(result.warp.viewpoint),
+        "viewpoint": asdict(result.warp.viewpoint) if isinstance(result.warp.viewpoint, Viewpoint) else None,
     }  # fmt: skip
 
 

@@ -12,11 +12,11 @@ from ..cameras.camera import Camera
 from ..cameras.rig import PictureMatches
 from ..raster.arrays import Array
 from .averaged import Averaged, PairGeometry, Verified
-from .candidates import Candidates, at_other_lens, candidates, noise_of
+from .candidates import Candidates, at_other_lens, belonging, candidates, noise_of, with_inliers_of
 from .focal_starts import log_sigma, starts
 from .graph import components, heaviest_component
 from .matched_rays import MatchedRays, SharedLens, matched_rays
-from .options import AVERAGING, CANDIDATES, PAIR_FIT
+from .options import AVERAGING, PAIR_FIT
 from .pair_models import EpipolarModel, Poses
 from .pair_refinement import LensPrior, Together, refine_each, refine_together
 from .pure_rotations import PairRotations, as_rotations, each_as_rotation
@@ -114,9 +114,12 @@ def _fitted(matched: MatchedRays, start: SharedLens, prior: LensPrior, verified:
     rotate = turning.share > PAIR_FIT.rotation_share
     lens = turning.lens if rotate else together.lens
     evidence = PAIR_FIT.rotation_log_focal**-2 if rotate else AVERAGING.focal_evidence * together.focal_information
-    if not rotate and _near(lens, start):
+    if not rotate and _near(lens, start, PAIR_FIT.repeat_log_focal, PAIR_FIT.repeat_k1):
         return _Fitted(found, together, evidence)
-    again = candidates(matched, lens, verified.scale, verified.seed)
+    if not rotate and _near(lens, start, PAIR_FIT.follow_log_focal, PAIR_FIT.follow_k1):
+        again = with_inliers_of(found, matched, together.poses, lens, verified.scale)
+    else:
+        again = candidates(matched, lens, verified.scale, verified.seed)
     if not len(again.numbers):
         return _Fitted(found, together, evidence)
     if rotate:
@@ -125,9 +128,8 @@ def _fitted(matched: MatchedRays, start: SharedLens, prior: LensPrior, verified:
     return _Fitted(again, together, evidence if rotate else AVERAGING.focal_evidence * together.focal_information)
 
 
-def _near(lens: SharedLens, other: SharedLens) -> bool:
-    same_focal = abs(np.log(lens.factor / other.factor)) < PAIR_FIT.repeat_log_focal
-    return bool(same_focal and abs(lens.k1 - other.k1) < PAIR_FIT.repeat_k1)
+def _near(lens: SharedLens, other: SharedLens, log_focal: float, k1: float) -> bool:
+    return bool(abs(np.log(lens.factor / other.factor)) < log_focal and abs(lens.k1 - other.k1) < k1)
 
 
 def _together(found: Candidates, lens: SharedLens, prior: LensPrior, scale: float) -> Together:
@@ -224,10 +226,8 @@ def _chosen(
     poses = refine_each(EpipolarModel(few, width), Poses(R, t), lens, AVERAGING.pose_iterations)
     whole = matched.of_pairs(numbers)
     squares = EpipolarModel(whole, width).squares(poses, lens)
-    inliers = squares < (CANDIDATES.inlier_px * scale) ** 2
     before = np.concatenate([found.inliers[matched.starts[k] : matched.starts[k + 1]] for k in numbers])
-    scarce = whole.sums(inliers.astype(np.intp)) < CANDIDATES.min_inliers
-    inliers |= before & scarce[whole.owner]
+    inliers = belonging(whole, squares, before, scale)
     rays = whole.where(inliers)
     model = EpipolarModel(rays, width)
     noise = noise_of(model.residuals(poses, lens), scale)

@@ -102,6 +102,33 @@ def at_other_lens(found: Candidates, lens: SharedLens, scale: float) -> Candidat
     return _refined(found.numbers, found.inliers, found.rays, found.turned, list(found.poses), lens, scale)
 
 
+def with_inliers_of(
+    found: Candidates, matched: MatchedRays, poses: Poses, lens: SharedLens, scale: float
+) -> Candidates:
+    """The same with poses (P) that were refined with the lens instead of each pair's best, and those verified matches
+    that belong to them; refined, judged and ordered anew."""
+    whole = matched.of_pairs(found.numbers)
+    squares = EpipolarModel(whole, PAIR_FIT.cauchy_px * scale).squares(poses, lens)
+    rows = np.concatenate([np.arange(matched.starts[k], matched.starts[k + 1]) for k in found.numbers])
+    inliers = found.inliers.copy()
+    inliers[rows] = belonging(whole, squares, found.inliers[rows], scale)
+    starts = [
+        Poses(np.concatenate([R[None], others.R[1:]]), np.concatenate([t[None], others.t[1:]]))
+        for R, t, others in zip(poses.R, poses.t, found.poses, strict=True)
+    ]
+    rays = _of_inliers(matched, found.numbers, inliers)
+    return _refined(found.numbers, inliers, rays, found.turned, starts, lens, scale)
+
+
+def belonging(matched: MatchedRays, squares: Array, before: NDArray[np.bool_], scale: float) -> NDArray[np.bool_]:
+    """Which matches (O,) with such squared distances, px², belong to their pair's pose; those that did before too where
+    that leaves few."""
+    inliers = squares < (CANDIDATES.inlier_px * scale) ** 2
+    scarce = matched.sums(inliers.astype(np.intp)) < CANDIDATES.min_inliers
+    out: NDArray[np.bool_] = inliers | before & scarce[matched.owner]
+    return out
+
+
 def _of_inliers(matched: MatchedRays, kept: NDArray[np.intp], inliers: NDArray[np.bool_]) -> MatchedRays:
     masks = [inliers[matched.starts[k] : matched.starts[k + 1]] for k in kept]
     return matched.of_pairs(kept).where(np.concatenate(masks))
@@ -114,14 +141,22 @@ def _refined(
     width = PAIR_FIT.cauchy_px * scale
     owner = np.repeat(np.arange(len(starts)), [len(poses.R) for poses in starts])
     poses = Poses(np.concatenate([p.R for p in starts]), np.concatenate([p.t for p in starts]))
-    many = rays.of_pairs(owner)
-    model = EpipolarModel(many, width)
-    poses = refine_each(model, poses, lens, CANDIDATES.iterations_refining)
-    first = np.flatnonzero(np.diff(owner, prepend=-1))
-    residual = model.residuals(poses, lens)
+    # a few iterations tell which starts are worth more
+    for iterations, most in CANDIDATES.refining:
+        many = rays.of_pairs(owner)
+        model = EpipolarModel(many, width)
+        poses = refine_each(model, poses, lens, iterations)
+        residual = model.residuals(poses, lens)
+        fit = cauchy_costs(many, residual**2, width)
+        order = np.lexsort((fit, owner))
+        rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
+        first = order[rank == 0]
+        if (rank >= most).any():
+            best = np.sort(order[rank < most])
+            owner, poses = owner[best], Poses(poses.R[best], poses.t[best])
     noise = noise_of(residual[np.isin(many.owner, first)], scale)
     behind, poses = _facing(many, residual, poses, lens, width)
-    cost = (cauchy_costs(many, residual**2, width) + behind) / noise**2
+    cost = (fit + behind) / noise**2
     chosen, costs = [], []
     for k in range(len(starts)):
         of_pair = np.flatnonzero(owner == k)

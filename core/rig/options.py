@@ -52,8 +52,8 @@ class CandidateOptions:
     rotation_px: float = 4.0
     rotation_samples: int = 100
     rotation_rounds: int = 15
-    # Iterations of refining every start.
-    iterations_refining: int = 12
+    # Refining starts: iterations, after which so many of each pair stay.
+    refining: tuple[tuple[int, int], ...] = ((4, 6), (8, 6))
     # Candidates: at most so many, so much apart, less likely than the best by at most so much (log), and so far from
     # the best pure rotation: parallax does not turn a picture further.
     most: int = 5
@@ -88,6 +88,9 @@ class PairFitOptions:
     # A change of log f or of k1 from which candidates are sought once more, with the new lens.
     repeat_log_focal: float = 0.02
     repeat_k1: float = 0.02
+    # Changes up to which those found before are followed; beyond, RANSAC starts anew.
+    follow_log_focal: float = 0.1
+    follow_k1: float = 0.06
     # Share of the matches that pure rotations must explain better before the focal length is taken from them: that of
     # poses without parallax is arbitrary.
     rotation_share: float = 0.3
@@ -153,6 +156,9 @@ class AveragingOptions:
     # Candidates are switched one at a time if the cost (log likelihood) falls by more than this, so often at most.
     switch_gain: float = 1.0
     most_switches: int = 200
+    # Switches are tried unless linear theory says that the cost rises by more than this.
+    switch_slack: float = 5.0
+    switch_iterations: int = 14
     # The pairs' own evidence on f counts a quarter: errors of neighbouring matches go together.
     focal_evidence: float = 0.25
     # A change of log f that needs no further round, and rounds at most.

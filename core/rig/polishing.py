@@ -60,6 +60,7 @@ def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polish
     """The same for pictures that were all taken from one place: every point is at infinity."""
     solution = replace(solution, centres=np.zeros_like(solution.centres)).seen_from(0)
     solution = _points_anew(problem, solution)
+    solution = replace(solution, inverse_ranges=np.zeros_like(solution.inverse_ranges))
     for kernel in POLISHING.rotation_kernels_px:
         settings = Settings(kernel, POLISHING.rotation_iterations, POLISHING.rotation_tolerance, depths=False)
         bundled = bundle(problem, solution, settings, 0, None, tick)

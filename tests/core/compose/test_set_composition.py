@@ -217,3 +217,32 @@ def test_soft_edges_stay_soft_and_the_canvas_keeps_its_kind() -> None:
     assert alpha.dtype == np.float32 and (alpha[alone] == 0.5).all()
     assert compose(ring(), warp_of(), exposure="none").panorama.alpha.dtype == bool
     assert CANVAS.width == WIDTH
+
+
+# --- around a pole --------------------------------------------------------------------------------------------------
+
+
+def capped(turn: int, gain: float) -> Composition:
+    """The ring with a picture of all that lies above it, brighter by a gain; cut open `turn` columns further on."""
+    cap = np.zeros((HEIGHT, WIDTH), bool)
+    cap[: ROWS.start + 40] = True
+    layers = [*layers_of([wall()] * 6, RING[:6]), Layer(np.where(cap[..., None], wall() * np.float32(gain), 0), cap)]
+    x, y = np.meshgrid(np.arange(WIDTH, dtype=np.float32), np.arange(HEIGHT, dtype=np.float32))
+    warp = warp_of()
+    maps = [*warp.maps[:6], PictureMap(x, y, (WIDTH, HEIGHT))]
+    maps = [PictureMap(rolled(at.x, turn), rolled(at.y, turn), at.size) for at in maps]
+    layers = [Layer(rolled(one.pixels, turn), rolled(one.alpha, turn)) for one in layers]
+    return compose(layers, replace(warp, maps=tuple(maps)), exposure="none")
+
+
+@pytest.mark.parametrize("turn", [0, 100, 400])
+def test_what_goes_round_a_pole_has_no_step_where_it_closes(turn: int) -> None:
+    made = capped(turn, 1.2)
+    light = rolled(made.panorama.pixels, -turn)
+    rows = np.s_[2 : ROWS.start + 20]
+    tones = [log_encode(np.ascontiguousarray(one[rows], np.float32)).mean(axis=2) for one in (light, wall())]
+    assert (made.panorama.alpha[: ROWS.start + 40] > 0).all()
+    across = [np.abs(one - np.roll(one, -1, axis=1)).max(axis=0) for one in tones]
+    assert np.abs(across[0] - across[1]).max() < 0.01
+    window = made.decided[6].window
+    assert window is not None and window.overhang > 0

@@ -28,7 +28,7 @@ def test_a_window_holds_what_is_shown_and_no_more_than_a_margin(first: int, widt
     assert window.spread(window.plane(shows)).sum() == shows.sum()
     left, top, across, down = window.box
     assert 0 <= left < WIDTH and (top, down) == (max(0, 110 - margin), 140 + 2 * min(margin, 110))
-    assert across == (width + 2 * margin if WIDTH - width > 2 * margin else WIDTH)
+    assert across == 2 * margin + (width if WIDTH - width > 2 * margin else WIDTH)
 
 
 def test_a_canvas_that_ends_is_not_wrapped() -> None:
@@ -42,7 +42,9 @@ def test_a_canvas_that_ends_is_not_wrapped() -> None:
     assert goes_round(CANVAS) and window_of(CANVAS, np.zeros_like(shows)) is None
 
 
-@pytest.mark.parametrize("box", [(100, 20, 300, 90), (WIDTH - 130, 20, 300, 90), (0, 0, WIDTH, HEIGHT)])
+@pytest.mark.parametrize(
+    "box", [(100, 20, 300, 90), (WIDTH - 130, 20, 300, 90), (0, 0, WIDTH, HEIGHT), (600, 20, WIDTH + 60, 90)]
+)
 def test_all_that_lies_on_the_canvas_is_cut_alike(box: tuple[int, int, int, int]) -> None:
     window = Window(box, (WIDTH, HEIGHT))
     left, top, width, height = box
@@ -60,6 +62,7 @@ def test_all_that_lies_on_the_canvas_is_cut_alike(box: tuple[int, int, int, int]
     out = np.zeros_like(values)
     window.put(want, out)
     assert np.array_equal(window.plane(out), want)
-    assert np.count_nonzero(out) == np.count_nonzero(want), "nothing else is touched"
-    canvas = window.canvas(CANVAS)
-    assert (canvas.width, canvas.height) == (width, height)
+    own = want[:, window.overhang : width - window.overhang]
+    assert np.count_nonzero(out) == np.count_nonzero(own), "nothing else is touched"
+    closed = window.closed(np.random.default_rng(1).random((height, width)) > 0.5)
+    assert np.array_equal(window.plane(window.spread(closed)), closed)
