@@ -305,7 +305,7 @@ def test_a_kind_of_file_that_is_not_written_gives_2(
 def test_what_only_two_pictures_know_is_refused_of_more(pictures: list[str], tmp_path: Path, said: Callable) -> None:
     three = ["stitch", *pictures, pictures[0], "-o", str(tmp_path / "out.png")]
     for words, told in (
-        (["--field", "apap"], "3 are given: choose from: slack, strict"), (["--focal-px", "9,9"], "--cameras FILE.json"),
+        (["--field", "apap"], "3 are given: choose from: slack, strict"), (["--focal-px", "9,8"], "--cameras FILE"),
         (["--ignore-ref", pictures[0]], "--ignore NAME=MASK"), (["--mask", pictures[0]], "--ignore NAME=MASK"),
     ):  # fmt: skip
         assert main([*three, *words]) == 2
