@@ -107,18 +107,15 @@ def without_cut_things(
     cells = _Cells.of(coarse, rough, longer / step)
     kept: list[_Refill] = []
     for deepest in CUT_THINGS.deepest:
-        for spare in (True, False):
-            refills, cells = _better(cells, deepest, spare)
-            kept += refills
-            if refills:
-                break
+        refills, cells = _better(cells, deepest)
+        kept += refills
     return _enlarged(warp, views, kept, step) if kept else warp
 
 
-def _better(cells: _Cells, deepest: float, spare: bool) -> tuple[list[_Refill], _Cells]:
+def _better(cells: _Cells, deepest: float) -> tuple[list[_Refill], _Cells]:
     """The refills within a share of the overlap's shorter side from its border with which less is seen, and how all
-    looks with them; spare: see `_refill`."""
-    refills = _refills(cells, deepest, spare)
+    looks with them."""
+    refills = _refills(cells, deepest)
     after = cells.refilled(refills)
     kept = [one for one in refills if _is_better(one, cells, after)]
     if kept and len(kept) < len(refills):
@@ -127,9 +124,9 @@ def _better(cells: _Cells, deepest: float, spare: bool) -> tuple[list[_Refill], 
     return (kept, after) if kept else ([], cells)
 
 
-def _refills(cells: _Cells, share: float, spare: bool) -> list[_Refill]:
+def _refills(cells: _Cells, share: float) -> list[_Refill]:
     """Depth for each thing at the border of either picture, beyond which the other goes on, around which something is
-    seen; share: of the overlap's shorter side from the border; spare: see `_refill`."""
+    seen; share: of the overlap's shorter side from the border."""
     out: list[_Refill] = []
     first, second = cells.look.shown
     both = first & second
@@ -154,7 +151,7 @@ def _refills(cells: _Cells, share: float, spare: bool) -> list[_Refill]:
             part = around & dilated(mine[place], 1)  # small pictures end up to a cell early
             if cells.seen[place][_zone(part, cells.side)].sum() <= _least_gain(part):
                 continue
-            one = _refill(cells, place, part, around, from_rim[place], spare)
+            one = _refill(cells, place, part, around, from_rim[place])
             if one is not None:
                 out.append(one)
     return out
@@ -176,23 +173,17 @@ def _px(share: float, side: float) -> int:
 
 
 def _refill(
-    cells: _Cells, place: Part, part: NDArray[np.bool_], thing: NDArray[np.bool_], from_rim: Plane, spare: bool
+    cells: _Cells, place: Part, part: NDArray[np.bool_], thing: NDArray[np.bool_], from_rim: Plane
 ) -> _Refill | None:
     """What lies behind a part (h, w) of a place, by the farthest of what surrounds it and the thing (h, w) that it is
-    of; None where nothing tells. spare: whether what both pictures show alike, though near, keeps its depth, as a thing
-    of its own that no border cuts."""
+    of; None where nothing tells."""
     grown = _px(CUT_THINGS.grown, cells.side)
     shown = cells.look.shown[0][place] | cells.look.shown[1][place]
     around = dilated(part, _px(CUT_THINGS.ring, cells.side)) & ~thing & shown & ~cells.bad[place]
     if around.sum() < CUT_THINGS.least_ring:
         return None
     depth = cells.warp.inverse_depth[place]
-    farthest = np.percentile(depth[around], CUT_THINGS.far_percentile) + _one_px(cells, place, around)
-    far = around & (depth <= farthest)
-    if spare:
-        both = cells.look.shown[0][place] & cells.look.shown[1][place]
-        alike = (both & ~cells.bad[place] & (depth > farthest)).astype(np.uint8)
-        part = part & (cv2.morphologyEx(alike, cv2.MORPH_OPEN, np.ones((CUT_THINGS.spared_cells,) * 2, np.uint8)) == 0)
+    far = around & (depth <= np.percentile(depth[around], CUT_THINGS.far_percentile) + _one_px(cells, place, around))
     weight = np.where(far, np.float32(1), np.where(around, np.float32(CUT_THINGS.near_weight), np.float32(0)))
     behind = filled(np.where(around, depth, np.float32(0))[..., None], weight)[..., 0]
     # the border itself needs no gentle end: beyond it nothing of this picture goes on

@@ -132,9 +132,6 @@ class CutThingsOptions:
     near_weight: float = 1e-3
     """Weight of all else around it: it decides only where nothing counts as background."""
 
-    spared_cells: int = 3
-    """Cells, least width of a near thing that both pictures show alike, which keeps its depth."""
-
     zone: float = 0.006
     """Share around a refilled part in which it is judged."""
 

@@ -13,7 +13,6 @@ from edf_stitch.core.compose import cut_things
 from edf_stitch.core.compose.composition import Composition, composed
 from edf_stitch.core.compose.cut_things import without_cut_things
 from edf_stitch.core.compose.min_cut import FIRST, SECOND
-from edf_stitch.core.compose.rough_seam import RoughSeam
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import layer_of
@@ -30,8 +29,6 @@ FAR, NEAR = 0.02, 0.3
 # it that the picture shows. The other sees it 120 px further right, so that at the wall's depth it lies 112 px there.
 THING, CUT = (slice(110, 170), slice(390, 490)), np.s_[110:170, 390:440]
 ELSEWHERE = np.s_[112:168, 504:600]
-# Of a pole beside it that both pictures show whole.
-POLE = np.s_[110:170, 376:389]
 
 
 def wall(u: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -41,10 +38,10 @@ def wall(u: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 class World:
     """A dark thing before a wall. `by`: the number of the picture whose right border cuts it, and from whose place the
-    panorama is seen; size: how many times as large all of it is; pole: whether one stands beside the thing."""
+    panorama is seen; size: how many times as large all of it is."""
 
-    def __init__(self, by: int, size: int = 1, pole: bool = False) -> None:
-        self.by, self.size, self.pole = by, size, pole
+    def __init__(self, by: int, size: int = 1) -> None:
+        self.by, self.size = by, size
         self.pictures = tuple(self._picture(number) for number in (0, 1))
         self.views = tuple(self._view(number) for number in (0, 1))
 
@@ -68,8 +65,6 @@ class World:
         behind, before = ((u, u) if number == self.by else (u - FOCAL * d for d in (FAR, NEAR)))
         (top, bottom), (left, right) = ((part.start, part.stop) for part in THING)
         thing = (y >= top) & (y < bottom) & (before >= left) & (before < right)
-        if self.pole:
-            thing |= (y >= top) & (y < bottom) & (before >= POLE[1].start) & (before < POLE[1].stop)
         light = np.where(thing, 0.12 + 0.02 * np.sin(before), wall(behind, y))
         return picture_from_array(np.repeat((255 * light).astype(np.uint8)[..., None], 3, axis=2))
 
@@ -80,8 +75,6 @@ class World:
         rags = np.full((12, 10), 0.1, np.float32)
         rags[1:-1, 1:] = np.random.default_rng(4).choice(np.array([0.08, 0.1, 0.15, 0.2], np.float32), (10, 9))
         depth[tuple(slice(n * part.start, n * part.stop) for part in CUT)] = np.kron(rags, np.ones((5 * n, 5 * n)))
-        if self.pole:
-            depth[self.at(POLE)] = NEAR
         canvas = Canvas(depth.shape[1], depth.shape[0], (self.starts(0), 0))
         slide = np.ones(depth.shape, np.float32) if self.by else None
         viewpoint = Viewpoint(1.0, -self.views[1].t, np.eye(3), np.array([1.0, 0]), (-9.0, -8.0)) if self.by else None
@@ -139,31 +132,6 @@ def test_an_artists_mask_wins(by: int) -> None:
     painted = np.zeros(after.inverse_depth.shape, np.int8)
     painted[CUT] = SECOND if by else FIRST
     assert world.dark(world.composed(after, painted), CUT) == 1
-
-
-def test_a_near_thing_beside_it_that_both_show_keeps_its_depth_if_that_can_be() -> None:
-    world = World(0, pole=True)
-    rough = RoughSeam.of(world.pictures, world.views, FOCAL)
-    cells = cut_things._Cells.of(world.warp(), rough, W)
-    for spare in (True, False):
-        where = np.zeros(cells.bad.shape, bool)
-        for one in cut_things._refills(cells, 0.25, spare):
-            where[one.place] |= one.part
-        assert where[112:168, 392:438].mean() > 0.9
-        assert where[112:168, 386:389].any() != spare
-
-
-def test_what_both_show_is_tried_first_as_a_thing_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    tried = []
-
-    def better(cells: object, deepest: float, spare: bool) -> tuple[list[object], object]:
-        tried.append((deepest, spare))
-        return [], cells
-
-    monkeypatch.setattr(cut_things, "_better", better)
-    world = World(0)
-    without_cut_things(world.warp(), world.views, world.pictures)
-    assert tried == [(0.25, True), (0.25, False), (0.08, True), (0.08, False)]
 
 
 def test_what_is_shown_well_stays() -> None:
