@@ -20,12 +20,13 @@ from .transfer import slope_of
 class SpherePoints:
     """Points (N) of a rig.
 
-    rays (N, 3): unit; inverse_ranges (N,); sensitivity (N,): px per unit of inverse range, over all pictures that see a
-    point; error_px (N,): how far it is off in the worst of them.
+    rays (N, 3): unit; inverse_ranges, deviations (N,): and their standard deviations, in any unit; sensitivity (N,): px
+    per unit of inverse range, over all pictures that see a point; error_px (N,): how far it is off in the worst one.
     """
 
     rays: Array
     inverse_ranges: Array
+    deviations: Array
     sensitivity: Array
     error_px: Array
 
@@ -34,12 +35,15 @@ class SpherePoints:
 
     def subset(self, keep: NDArray[np.bool_] | NDArray[np.intp]) -> SpherePoints:
         """The points that a mask or index array selects."""
-        return SpherePoints(self.rays[keep], self.inverse_ranges[keep], self.sensitivity[keep], self.error_px[keep])
+        return SpherePoints(
+            self.rays[keep], self.inverse_ranges[keep], self.deviations[keep], self.sensitivity[keep],
+            self.error_px[keep],
+        )  # fmt: skip
 
     @property
     def noise(self) -> Array:
         """Noise (N,) of the inverse ranges, relative to the median point's, bounded."""
-        return np.clip(np.median(self.sensitivity) / self.sensitivity, *SPHERE.noise_range)
+        return np.clip(self.deviations / np.median(self.deviations), *SPHERE.noise_range)
 
 
 def points_of(rig: Rig) -> SpherePoints:
@@ -60,7 +64,10 @@ def points_of(rig: Rig) -> SpherePoints:
     usable = (seen >= 2) & (error < SPHERE.max_error_px * px_scale(rig)) & (sensitivity > 0)
     if usable.any():
         usable &= sensitivity > SPHERE.min_relative_sensitivity * np.median(sensitivity[usable])
-    return SpherePoints(rig.rays, rig.inverse_ranges, sensitivity, error).subset(usable)
+    # those of the bundle know that a point's direction is not known either; else from the sensitivity alone
+    known = bool((rig.deviations[usable] > 0).all())
+    deviations = rig.deviations if known else 1 / np.maximum(sensitivity, 1e-300)
+    return SpherePoints(rig.rays, rig.inverse_ranges, deviations, sensitivity, error).subset(usable)
 
 
 def seen_at(view: View, rays: Array, inverse_ranges: Array) -> Array:

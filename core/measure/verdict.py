@@ -121,7 +121,7 @@ def _doubts(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
     more = "take more pictures, from places closer together"
     if report.get("left_out"):
         names = ", ".join(entry["name"] for entry in report["left_out"])
-        yield f"not all pictures are shown: {names} connects with no others", more
+        yield f"what does not connect with the others is left out: {names}", more
     if "rig" not in report:
         return
     if report["rig"]["scale"] in ("continuity", "none"):

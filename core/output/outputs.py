@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..measure.report import plain
 from ..panorama.layers import Layer
+from ..panorama.rig_viewpoint import RigViewpoint
 from ..pictures.encoding import encode_picture, output_bits
 from ..pipeline import StitchResult
 from ..raster.arrays import cut
@@ -288,7 +289,8 @@ def warp_bytes(result: StitchResult) -> bytes:
     ray r of the pixel instead; there is no offset, but `projection` (its name), `focal` (px per radian), `centre`
     (canvas px of the direction ahead) and `rotation` (from its axes to the reference camera's). Where the viewpoint
     slides, by `slide` s, which is `s1` at most, that ray starts at s c, c = −Rᵀ t of the target, and inverse_depth is
-    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). docs/formats.md lists every key.
+    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). Of more than two pictures, `places` say
+    where it starts. docs/formats.md lists every key.
 
     Parameters
     ----------
@@ -331,6 +333,9 @@ def warp_bytes(result: StitchResult) -> bytes:
         }  # fmt: skip
     if warp.slide is not None and warp.viewpoint is not None:
         arrays |= {"slide": whole(warp.slide), "s1": np.array(warp.viewpoint.s1)}
+    elif isinstance(warp.viewpoint, RigViewpoint):
+        places = warp.viewpoint.s1 * warp.viewpoint.places
+        arrays |= {"s1": np.array(warp.viewpoint.s1), "places": places, "upright": warp.viewpoint.rotation}
     return npz_bytes(arrays)
 
 

@@ -12,11 +12,11 @@ from ..cameras.camera import Camera
 from ..cameras.rig import PictureMatches
 from ..raster.arrays import Array
 from .averaged import Averaged, PairGeometry, Verified
-from .candidates import Candidates, at_other_lens, candidates, noise_of
+from .candidates import Candidates, at_other_lens, belonging, candidates, noise_of
 from .focal_starts import log_sigma, starts
 from .graph import components, heaviest_component
 from .matched_rays import MatchedRays, SharedLens, matched_rays
-from .options import AVERAGING, CANDIDATES, PAIR_FIT
+from .options import AVERAGING, PAIR_FIT
 from .pair_models import EpipolarModel, Poses
 from .pair_refinement import LensPrior, Together, refine_each, refine_together
 from .pure_rotations import PairRotations, as_rotations, each_as_rotation
@@ -116,6 +116,7 @@ def _fitted(matched: MatchedRays, start: SharedLens, prior: LensPrior, verified:
     evidence = PAIR_FIT.rotation_log_focal**-2 if rotate else AVERAGING.focal_evidence * together.focal_information
     if not rotate and _near(lens, start):
         return _Fitted(found, together, evidence)
+    # anew, not followed from here: weak pairs find other minima at another lens
     again = candidates(matched, lens, verified.scale, verified.seed)
     if not len(again.numbers):
         return _Fitted(found, together, evidence)
@@ -224,10 +225,8 @@ def _chosen(
     poses = refine_each(EpipolarModel(few, width), Poses(R, t), lens, AVERAGING.pose_iterations)
     whole = matched.of_pairs(numbers)
     squares = EpipolarModel(whole, width).squares(poses, lens)
-    inliers = squares < (CANDIDATES.inlier_px * scale) ** 2
     before = np.concatenate([found.inliers[matched.starts[k] : matched.starts[k + 1]] for k in numbers])
-    scarce = whole.sums(inliers.astype(np.intp)) < CANDIDATES.min_inliers
-    inliers |= before & scarce[whole.owner]
+    inliers = belonging(whole, squares, before, scale)
     rays = whole.where(inliers)
     model = EpipolarModel(rays, width)
     noise = noise_of(model.residuals(poses, lens), scale)

@@ -29,9 +29,9 @@ DIRECTIONS = _CUBE / np.linalg.norm(_CUBE, axis=1, keepdims=True)
 class Candidates:
     """The poses of the pairs that have any, by one lens.
 
-    numbers (P,): which of all verified pairs they are; inliers (O,): of all verified matches; rays: those inliers;
-    turned (P, 3, 3): the best pure rotations; poses: of every pair the best first; costs: their negative log
-    likelihoods; noise: σ px of a Sampson distance.
+    numbers (P,): which of all verified pairs they are; inliers (O,): of all verified matches; rays: those inliers, of
+    pairs with very many only some; turned (P, 3, 3): the best pure rotations; poses: of every pair the best first;
+    costs: their negative log likelihoods; noise: σ px of a Sampson distance.
     """
 
     numbers: NDArray[np.intp]
@@ -102,9 +102,18 @@ def at_other_lens(found: Candidates, lens: SharedLens, scale: float) -> Candidat
     return _refined(found.numbers, found.inliers, found.rays, found.turned, list(found.poses), lens, scale)
 
 
+def belonging(matched: MatchedRays, squares: Array, before: NDArray[np.bool_], scale: float) -> NDArray[np.bool_]:
+    """Which matches (O,) with such squared distances, px², belong to their pair's pose; those that did before too where
+    that leaves few."""
+    inliers = squares < (CANDIDATES.inlier_px * scale) ** 2
+    scarce = matched.sums(inliers.astype(np.intp)) < CANDIDATES.min_inliers
+    out: NDArray[np.bool_] = inliers | before & scarce[matched.owner]
+    return out
+
+
 def _of_inliers(matched: MatchedRays, kept: NDArray[np.intp], inliers: NDArray[np.bool_]) -> MatchedRays:
     masks = [inliers[matched.starts[k] : matched.starts[k + 1]] for k in kept]
-    return matched.of_pairs(kept).where(np.concatenate(masks))
+    return matched.of_pairs(kept).where(np.concatenate(masks)).thinned(CANDIDATES.most_matches)
 
 
 def _refined(
@@ -114,14 +123,22 @@ def _refined(
     width = PAIR_FIT.cauchy_px * scale
     owner = np.repeat(np.arange(len(starts)), [len(poses.R) for poses in starts])
     poses = Poses(np.concatenate([p.R for p in starts]), np.concatenate([p.t for p in starts]))
-    many = rays.of_pairs(owner)
-    model = EpipolarModel(many, width)
-    poses = refine_each(model, poses, lens, CANDIDATES.iterations_refining)
-    first = np.flatnonzero(np.diff(owner, prepend=-1))
-    residual = model.residuals(poses, lens)
+    # a few iterations tell which starts are worth more
+    for iterations, most in CANDIDATES.refining:
+        many = rays.of_pairs(owner)
+        model = EpipolarModel(many, width)
+        poses = refine_each(model, poses, lens, iterations)
+        residual = model.residuals(poses, lens)
+        fit = cauchy_costs(many, residual**2, width)
+        order = np.lexsort((fit, owner))
+        rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
+        first = order[rank == 0]
+        if (rank >= most).any():
+            best = np.sort(order[rank < most])
+            owner, poses = owner[best], Poses(poses.R[best], poses.t[best])
     noise = noise_of(residual[np.isin(many.owner, first)], scale)
     behind, poses = _facing(many, residual, poses, lens, width)
-    cost = (cauchy_costs(many, residual**2, width) + behind) / noise**2
+    cost = (fit + behind) / noise**2
     chosen, costs = [], []
     for k in range(len(starts)):
         of_pair = np.flatnonzero(owner == k)

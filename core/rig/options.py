@@ -52,8 +52,10 @@ class CandidateOptions:
     rotation_px: float = 4.0
     rotation_samples: int = 100
     rotation_rounds: int = 15
-    # Iterations of refining every start.
-    iterations_refining: int = 12
+    # Inliers of a pair that take part in refining: more take time, and errors of neighbours go together.
+    most_matches: int = 500
+    # Refining starts: iterations, after which so many of each pair stay.
+    refining: tuple[tuple[int, int], ...] = ((4, 6), (8, 6))
     # Candidates: at most so many, so much apart, less likely than the best by at most so much (log), and so far from
     # the best pure rotation: parallax does not turn a picture further.
     most: int = 5
@@ -153,6 +155,9 @@ class AveragingOptions:
     # Candidates are switched one at a time if the cost (log likelihood) falls by more than this, so often at most.
     switch_gain: float = 1.0
     most_switches: int = 200
+    # Switches are tried unless linear theory says that the cost rises by more than this.
+    switch_slack: float = 5.0
+    switch_iterations: int = 14
     # The pairs' own evidence on f counts a quarter: errors of neighbouring matches go together.
     focal_evidence: float = 0.25
     # A change of log f that needs no further round, and rounds at most.

@@ -15,9 +15,10 @@ from ..raster.arrays import Array
 from ..raster.robust import sigma_of_lengths
 from ..system.errors import NoOverlap
 from ..system.progress import Progress, ReportProgress
-from .averaged import PairGeometry, Verified
+from .averaged import Verified
+from .averaging import hypotheses
+from .baselines import baselines
 from .bundle_options import JUDGE
-from .focal_starts import starts
 from .graph import components
 from .options import PAIRS
 from .pairs import verified as verify
@@ -73,20 +74,20 @@ def register(
     plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
     verified = verify(ideal, matches, scale, seed)
     progress("geometry", 0.0)
-    lenses = starts(plain, ideal, verified)
+    averages = hypotheses(plain, ideal, verified)
     found = []
-    for k, lens in enumerate(lenses):
-        solved = solve(plain, ideal, verified, lens, partial(progress, "geometry", k / len(lenses)))
+    for k, rotated in enumerate(averages):
+        solved = solve(plain, ideal, verified, rotated, partial(progress, "geometry", k / len(averages)))
         if solved is not None:
             found.append(solved)
     if not found:
         raise NoOverlap(_nothing_connects(verified))
     found.sort(key=lambda solved: solved.cost)
     names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
-    return _told(cameras, points, verified, found, names)
+    return _registration_of(cameras, points, verified, found, names)
 
 
-def _told(
+def _registration_of(
     cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, found: Sequence[Solved],
     names: Sequence[str],
 ) -> Registration:  # fmt: skip
@@ -148,32 +149,16 @@ def _stations(found: Polished) -> tuple[tuple[int, ...], ...]:
 
 
 def _edges(best: Solved, found: Polished) -> tuple[RigEdge, ...]:
-    solution = found.solution
-    place = {member: k for k, member in enumerate(best.averaged.members)}
+    R = found.solution.R
+    members = best.averaged.members
+    place = {member: k for k, member in enumerate(members)}
+    pairs = sorted(best.averaged.pairs, key=lambda pair: (pair.i, pair.j))
     told = []
-    for pair in sorted(best.averaged.pairs, key=lambda pair: (pair.i, pair.j)):
+    for pair, baseline in zip(pairs, baselines(pairs, members, found), strict=True):
         i, j = place[pair.i], place[pair.j]
-        off = float(degrees_between(pair.R, solution.R[j] @ solution.R[i].T))
-        baseline = _baseline(pair, i, j, found)
+        off = float(degrees_between(pair.R, R[j] @ R[i].T))
         told.append(RigEdge(i, j, pair.found, len(pair.index), pair.noise_px, pair.parallax_px, off, baseline))
     return tuple(told)
-
-
-def _baseline(pair: PairGeometry, i: int, j: int, found: Polished) -> str:
-    """How the length between two pictures is known."""
-    problem, solution = found.problem, found.solution
-    if problem.place[i] == problem.place[j] or pair.parallax_px < JUDGE.parallax_sigmas * problem.noise_px:
-        return "none"
-    if problem.pictures == 2:
-        return "measured"  # it is the unit
-    tracks = problem.tracks
-    used = solution.used & solution.solved[tracks.point]
-    seen = np.zeros((3, len(tracks)), np.intp)
-    seen[0] = np.bincount(tracks.point[used], minlength=len(tracks))
-    for row, picture in ((1, i), (2, j)):
-        seen[row] = np.bincount(tracks.point[used & (tracks.picture == picture)], minlength=len(tracks))
-    shared = (seen[0] > 2) & (seen[1] > 0) & (seen[2] > 0)
-    return "measured" if shared.sum() >= JUDGE.three_view_points else "continuity"
 
 
 def _guesses(found: Sequence[Solved]) -> tuple[FocalGuess, ...]:

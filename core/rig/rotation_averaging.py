@@ -62,11 +62,6 @@ class Links:
         """By how much each pair (P,) may be off and still agrees."""
         return np.maximum(AVERAGING.agrees_degrees, AVERAGING.agrees_sigmas * self.degrees)
 
-    def several(self) -> NDArray[np.bool_]:
-        """Which pairs have more than one candidate."""
-        out: NDArray[np.bool_] = (self.costs < NEVER).sum(axis=1) > 1
-        return out
-
 
 @dataclass(frozen=True, eq=False)
 class Rotations:
@@ -223,30 +218,61 @@ class _Problem:
         return state
 
     def _stepped(self, state: _State, used: NDArray[np.bool_], width: float) -> tuple[_State, float]:
+        system = self._system(state, used, width)
+        step = np.linalg.solve(system.A, system.right)
+        largest = float(np.abs(step[:-1]).max())
+        turn = step[:-1].reshape(-1, 3) * min(1.0, AVERAGING.most_step / max(largest, 1e-12))
+        change = float(np.clip(step[-1], -AVERAGING.most_focal_step, AVERAGING.most_focal_step))
+        return replace(state, R=rotations(turn) @ state.R, log_focal=state.log_focal + change), largest
+
+    def _system(self, state: _State, used: NDArray[np.bool_], width: float) -> _System:
         R, off = self._residuals(state)
-        # near the end Geman and McClure's weights: what disagrees by much must not pull at all
+        # near the end weights fall off faster: what disagrees by much must not pull at all
         power = 1.0 if width > AVERAGING.widths[-1] else 1.5
         weight = used / (1 + _squares(off, self.weights) / width**2) ** power
+        weights = self.weights * weight[:, None, None]
         count = self.links.count
         J = np.concatenate([R, np.tile(-np.eye(3), (len(R), 1, 1)), self.links.by_focal[:, :, None]], axis=2)
-        weighted = np.swapaxes(J, 1, 2) @ (self.weights * weight[:, None, None])
+        weighted = np.swapaxes(J, 1, 2) @ weights
         axes = np.arange(3)
-        rows = np.column_stack(
-            [3 * self.first[:, None] + axes, 3 * self.second[:, None] + axes, np.full(len(R), 3 * count)]
-        )
+        last = np.full(len(R), 3 * count)
+        rows = np.column_stack([3 * self.first[:, None] + axes, 3 * self.second[:, None] + axes, last])
         A, right = np.zeros((3 * count + 1, 3 * count + 1)), np.zeros(3 * count + 1)
         np.add.at(A, (rows[:, :, None], rows[:, None, :]), weighted @ J)
         np.add.at(right, rows, -np.einsum("pij,pj->pi", weighted, off))
         A[-1, -1] += self.focal_information
         right[-1] -= self.focal_information * (state.log_focal - self.before)
         # the world turned under all pictures changes nothing: it is held
-        world = state.R.reshape(-1, 3)
-        A[:-1, :-1] += np.trace(A[:-1, :-1]) / (3 * count) ** 2 * (world @ world.T)
-        step = np.linalg.solve(A + 1e-12 * np.trace(A[:-1, :-1]) / (3 * count) * np.eye(len(A)), right)
-        largest = float(np.abs(step[:-1]).max())
-        turn = step[:-1].reshape(count, 3) * min(1.0, AVERAGING.most_step / max(largest, 1e-12))
-        change = float(np.clip(step[-1], -AVERAGING.most_focal_step, AVERAGING.most_focal_step))
-        return replace(state, R=rotations(turn) @ state.R, log_focal=state.log_focal + change), largest
+        world, mean = state.R.reshape(-1, 3), np.trace(A[:-1, :-1]) / (3 * count)
+        A[:-1, :-1] += mean / (3 * count) * (world @ world.T)
+        A += 1e-12 * mean * np.eye(len(A))
+        return _System(A, right, J, rows, weights, off)
+
+    def gains(self, state: _State, used: NDArray[np.bool_]) -> Array:
+        """By how much the cost would fall (P, C) if a pair took another candidate and all gave way: linear theory."""
+        system = self._system(state, used, AVERAGING.widths[-1])
+        inverse = np.linalg.inv(system.A)
+        J, W = system.J, system.weights
+        give = W @ J @ inverse[system.rows[:, :, None], system.rows[:, None, :]] @ np.swapaxes(J, 1, 2) @ W
+        now = self.links.R[self.each, state.choice]
+        turn = rotation_vectors(self.links.R @ np.swapaxes(now, 1, 2)[:, None])
+        rise = np.einsum("pci,pij,pj->pc", turn, W, system.off)
+        rise += np.einsum("pci,pij,pcj->pc", turn, W - give, turn) / 2
+        gains: Array = self.links.costs[self.each, state.choice][:, None] - self.links.costs - rise
+        return gains
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """Equations A step = right of turns of all pictures and the log of the focal length; J (P, 3, 7) at rows (P, 7) of
+    A, weights (P, 3, 3) and residuals off (P, 3) of each pair."""
+
+    A: Array
+    right: Array
+    J: Array
+    rows: NDArray[np.intp]
+    weights: Array
+    off: Array
 
 
 def _squares(off: Array, weights: Array) -> Array:
@@ -255,27 +281,39 @@ def _squares(off: Array, weights: Array) -> Array:
 
 
 def _switched(problem: _Problem, state: _State, used: NDArray[np.bool_]) -> _State:
-    """Switch one pair's candidate at a time, the likeliest first, as long as the whole becomes likelier."""
-    costs, final = problem.links.costs, AVERAGING.widths[-1:]
-    several = np.flatnonzero(problem.links.several())
-    several = several[np.argsort(costs[several, 1], kind="stable")] if len(several) else several
-    best, tries, changed = problem.cost(state), 0, True
-    while changed:
-        changed = False
-        for pair in several:
-            for other in np.flatnonzero(costs[pair] < NEVER):
-                if other == state.choice[pair] or tries == AVERAGING.most_switches:
-                    continue
-                tries += 1
-                choice = state.choice.copy()
-                choice[pair] = other
-                tried = problem.followed(replace(state, choice=choice), used, 14, AVERAGING.switch_widths, False)
-                if problem.cost(tried) < best - AVERAGING.switch_gain:
-                    tried = problem.followed(tried, used, AVERAGING.again_iterations, final)
-                    cost = problem.cost(tried)
-                    if cost < best - AVERAGING.switch_gain:
-                        state, best, changed = tried, cost, True
+    """Switch one pair's candidate at a time, the most promising first, as long as the whole becomes likelier."""
+    costs = problem.links.costs
+    best, tries, improved = problem.cost(state), 0, True
+    while improved:
+        improved = False
+        gains = np.where(costs < NEVER, problem.gains(state, used), -np.inf)
+        gains[problem.each, state.choice] = -np.inf
+        order = np.argsort(-gains, axis=None, kind="stable")
+        for flat in order[gains.ravel()[order] > -AVERAGING.switch_slack][: AVERAGING.most_switches - tries]:
+            tries += 1
+            pair, other = np.unravel_index(flat, gains.shape)
+            tried = _with_choice(problem, state, used, int(pair), int(other), best)
+            if tried is not None:
+                state, best, improved = tried, problem.cost(tried), True
+                break
     return state
+
+
+def _with_choice(
+    problem: _Problem, state: _State, used: NDArray[np.bool_], pair: int, other: int, best: float
+) -> _State | None:
+    """Followed with another candidate of a pair; None if that does not lower the cost."""
+    choice = state.choice.copy()
+    choice[pair] = other
+    tried = replace(state, choice=choice)
+    for iterations, widths, choosing in (
+        (AVERAGING.switch_iterations, AVERAGING.switch_widths, False),
+        (AVERAGING.again_iterations, AVERAGING.widths[-1:], True),
+    ):
+        tried = problem.followed(tried, used, iterations, widths, choosing)
+        if problem.cost(tried) > best - AVERAGING.switch_gain:
+            return None
+    return tried
 
 
 def worst_loop(links: Links, rotations_of_pairs: Array, used: NDArray[np.bool_]) -> float:

@@ -36,26 +36,22 @@ class Solved:
 
 
 def solve(
-    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, lens: SharedLens, tick: Tick
+    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, rotated: Averaged | None, tick: Tick
 ) -> Solved | None:
-    """Follow a hypothesis to its end; None if it connects no two pictures.
+    """Follow a hypothesis, its averaged rotations, to its end; None if it connects no two pictures.
 
     Where the bundle moves the focal length much, pairs are estimated again with the bundle's: an error of some per cent
     turns every pair by degrees, and the tracks were chosen by that.
     """
-    tick()
-    rotated = averaged(cameras, points, verified, lens)
-    solved = None
-    for _ in range(JUDGE.passes):
-        if rotated is None or len(rotated.members) < 2:
-            break
-        solved = _bundled(cameras, points, verified, rotated, tick)
-        if solved.moved < JUDGE.most_log_focal:
-            break
+    found: list[Solved] = []
+    while rotated is not None and len(rotated.members) > 1:
         tick()
-        known, shared = _cameras_of(cameras, rotated, solved.found)
+        found.append(_bundled(cameras, points, verified, rotated, tick))
+        if found[-1].moved < JUDGE.most_log_focal or len(found) == JUDGE.passes:
+            break
+        known, shared = _cameras_of(cameras, rotated, found[-1].found)
         rotated = averaged(known, points, verified, shared, hold=True)
-    return solved
+    return min(found, key=lambda solved: solved.cost, default=None)
 
 
 def _bundled(
@@ -77,7 +73,7 @@ def _bundled(
     given = _Given(own, held)
     begun = start(problem, given.turned(rotated.R[list(members)]), lens)
     stations = proposed(pairs, members) or ([tuple(range(len(members)))] if rotated.one_place else [])
-    found = polish_best(problem, begun, stations, same_places(pairs, members), given.moved, tick)
+    found = polish_best(problem, begun, stations, same_places(pairs, members), given.placed, tick)
     moved = float(np.abs(found.solution.lens[:, 0] - lens[:, 0]).max())
     return Solved(rotated, pairs, found, _judged(found, pairs, verified), moved)
 
@@ -100,7 +96,7 @@ class _Given:
         turned[self.held] = self.R
         return turned
 
-    def moved(self, centres: Array) -> Array:
+    def placed(self, centres: Array) -> Array:
         """Places (N, 3) likewise; the scale is the given ones' where they are apart."""
         if not len(self.R):
             return centres

@@ -9,7 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.projective import distance_to_line, rotation_angle
+from edf_stitch.core.cameras.lens import distort
+from edf_stitch.core.cameras.projective import distance_to_line, project, rotation_angle, rotation_from_vector
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.measure.report import plain
 from edf_stitch.core.options import StitchOptions
@@ -21,6 +22,7 @@ from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import Cancelled, NoOverlap
 from edf_stitch.core.system.output_files import OutputFiles
 
+from ..conftest import camera_of
 from ..sets import FOCAL, PictureSet, make_set
 
 KNOWN = StitchOptions(camera=CameraRequest(focal_px=(FOCAL,)), blend="feather", dense=False)
@@ -126,6 +128,37 @@ def test_cameras_that_were_written_are_held(four: PictureSet, set_result: Stitch
     assert all(one["camera"]["source"] == "camera file" for one in again.report["pictures"])
 
 
+def test_poses_of_some_pictures_are_held_in_whatever_frame(four: PictureSet, set_result: StitchResult) -> None:
+    table = plain(camera_table(set_result))["cameras"]
+    turn, half = rotation_from_vector(np.array([0.1, 0.4, 0.2])), {}
+    for name in ("1.png", "3.png"):
+        R, t = np.array(table[name]["R"]) @ turn.T, np.array(table[name]["t"])
+        half[name] = {**table[name], "R": R, "t": 3 * (t - R @ [1, 2, 3])}
+    again = stitch(four.pictures, replace(KNOWN, camera=CameraRequest(cameras={"cameras": half})))
+    for number, (view, before) in enumerate(zip(again.views, set_result.views, strict=True)):
+        given = number in (0, 2)
+        np.testing.assert_allclose(view.R, before.R, atol=1e-9 if given else 5e-3)
+        np.testing.assert_allclose(view.t, before.t, atol=5e-3)
+        assert (view.camera.source == "camera file") == given
+
+
+def test_sizes_depths_and_colours_may_differ_in_one_set(four: PictureSet) -> None:
+    second, third, fourth = (picture.view for picture in four.pictures[1:])
+    mixed = [
+        four.pictures[0],
+        picture_from_array(cv2.resize(second, (480, 360), interpolation=cv2.INTER_CUBIC), "2.png"),
+        picture_from_array(third.astype(np.uint16) * 257, "3.png"),
+        picture_from_array(cv2.cvtColor(fourth, cv2.COLOR_RGB2GRAY), "4.png"),
+    ]
+    K = {"2.png": np.array([[1.5 * FOCAL, 0, 239.5], [0, 1.5 * FOCAL, 179.5], [0, 0, 1]]), "1.png": four.cameras[0].K}
+    known = {name: {"K": one.tolist()} for name, one in K.items()}
+    result = stitch(mixed, replace(KNOWN, camera=CameraRequest(cameras={"cameras": known}), blend="linear"))
+    turned, moved = pose_errors(four, result)
+    assert turned < 0.4 and moved < 0.03
+    assert result.bits == 16 and result.pixels.shape[2] == 3 and result.labels is None
+    assert result.report["measured"]["alignment_median_px"] < 0.5
+
+
 def test_matches_that_were_written_make_the_same_rig(
     four: PictureSet, set_result: StitchResult, tmp_path: Path
 ) -> None:
@@ -157,6 +190,39 @@ def test_warp_and_layers_hold_every_picture(set_result: StitchResult, tmp_path: 
     np.testing.assert_array_equal(labels, set_result.labels + 1)
     page = (tmp_path / "r.html").read_text("utf-8")
     assert page.count("<image ") == 4 and page.count("<line ") == len(set_result.edges)
+
+
+@pytest.mark.parametrize("slide", [0.0, 1.0])
+def test_the_maps_can_be_made_again_from_the_warps_file(four: PictureSet, slide: float) -> None:
+    """By the equation that docs/formats.md gives, wherever the viewpoint is."""
+    options = replace(KNOWN, field="strict", slide=slide, projection="cylindrical")
+    with np.load(io.BytesIO(warp_bytes(stitch(four.pictures[:3], options)))) as file:
+        warp = dict(file)
+    width, height = warp["canvas"]
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    x, y = (x - warp["centre"][0]) / warp["focal"], (y - warp["centre"][1]) / warp["focal"]
+    rays = np.stack([np.sin(x), y, np.cos(x)], axis=-1)
+    rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True) @ warp["rotation"].T
+    moved = rays
+    assert ("places" in warp) == bool(slide)
+    if slide:
+        assert warp["s1"] == slide and "slide" not in warp
+        own = rays @ warp["upright"]
+        at = (np.arctan2(own[..., 0], own[..., 2]) + np.pi) * len(warp["places"]) / (2 * np.pi)
+        before = np.floor(at).astype(int)
+        share, places = (at - before)[..., None], warp["places"]
+        near, far = places[before % len(places)], places[(before + 1) % len(places)]
+        moved = rays + warp["inverse_depth"][..., None] * (near + share * (far - near))
+    for number in range(3):
+        left, top, w, h = warp[f"box_{number:02d}"]
+        part = np.s_[top : top + h, left : left + w]
+        q = moved[part] @ warp["R"][number].T + warp["inverse_depth"][part][..., None] * warp["t"][number]
+        camera = replace(camera_of((320, 240), 1.0, tuple(warp["dist"][number])), K=warp["K"][number])
+        made = distort(project(q @ camera.K.T), camera)
+        values = np.stack([warp[f"map_{axis}_{number:02d}"] for axis in "xy"], axis=-1)
+        known = np.isfinite(values).all(axis=-1) & (q[..., 2] > 0.1)
+        assert known.mean() > 0.5
+        np.testing.assert_allclose(made[known], values[known], atol=0.02)
 
 
 def test_it_stops_soon_after_it_is_asked_to(four: PictureSet) -> None:

@@ -106,6 +106,22 @@ def test_sensitivity_is_how_far_a_point_moves_in_all_pictures(ring: Rig) -> None
     assert points.sensitivity == pytest.approx(np.sqrt(squared[index]), rel=1e-4)
 
 
+def test_points_count_by_the_deviation_that_the_bundle_gives_them(ring: Rig) -> None:
+    """Half of the points are wrong, and are known to be: without that the field is far off."""
+    random = np.random.default_rng(7)
+    wrong = random.random(len(ring.rays)) < 0.5
+    ranges = ring.inverse_ranges + np.where(wrong, 0.02, 0) * random.normal(size=len(wrong))
+    seen = ring.observations
+    pixels = np.empty_like(seen.pixels)
+    for number, view in enumerate(ring.views):
+        here = seen.picture == number
+        pixels[here] = seen_at(view, ring.rays[seen.point[here]], ranges[seen.point[here]])
+    noisy = with_pixels(replace(ring, inverse_ranges=ranges), pixels)
+    known = replace(noisy, deviations=np.where(wrong, 0.02, 0.001))
+    off = [np.median(px_off(ring, fit_sphere_field(one, with_slack=False))) for one in (known, noisy)]
+    assert off[0] < 0.6 * off[1]
+
+
 def test_scattered_wrong_ranges_do_not_bend_the_field(ring: Rig) -> None:
     """Ranges that lie on their epipolar lines pass every test but that of their neighbours."""
     random = np.random.default_rng(4)

@@ -269,7 +269,7 @@ def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:
 
 
 @pytest.mark.parametrize(("changes", "why", "advice"), [
-    ({"left_out": [{"name": "d.png", "why": ""}]}, "d.png connects with no others", "take more pictures"),
+    ({"left_out": [{"name": "d.png", "why": ""}]}, "left out: d.png", "take more pictures"),
     ({"rig": {"scale": "none", "focal_spread": 0.0}}, "how far apart", "take more pictures"),
     ({"rig": {"scale": "measured", "focal_spread": 0.03}}, "focal length is not sure", "--focal35"),
     ({"measured": {"alignment_p95_px": 1.0, "folds": 0.2}}, "folds over in 20%", "take more pictures"),
