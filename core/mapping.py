@@ -27,7 +27,6 @@ from .field.strict import StrictField
 from .options import StitchOptions
 from .panorama.choosing_slide import NO_WAY, SlideChoice, choose_rig_slide, choose_slide
 from .panorama.framing import FrameRequest, frame_for
-from .panorama.framing_options import FRAMING
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
@@ -208,8 +207,6 @@ def _rig_slide(
         return SlideChoice(float(asked), (), "as asked for"), viewpoint.sliding(float(asked))
     cylinder = round_projection("cylindrical", views[0].K, axes, CHOICE.base_px_per_radian)
     base = build_rig_warp(field, views, cylinder)
-    if base.canvas.width > np.radians(FRAMING.ring_fov_deg) * cylinder.focal:
-        return SlideChoice(0.0, (), "a ring is seen from one place, unless asked otherwise"), None
     choice = choose_rig_slide(base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None, progress)
     return choice, viewpoint.sliding(choice.s1) if choice.s1 else None
 
