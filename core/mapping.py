@@ -200,7 +200,7 @@ def _rig_slide(
     if not any(view.t.any() for view in views):
         return SlideChoice(0.0, (), "the pictures were taken from one place"), None
     if asked == "auto" and options.surface[0] == "equirectangular":
-        return SlideChoice(0.0, (), "a sphere is seen from one place, unless asked otherwise"), None
+        return SlideChoice(0.0, (), "a sphere that is asked for is seen from one place"), None
     axes = upright(lines.down)
     viewpoint = rig_viewpoint(views, [outline_of(field, view) for view in views], axes)
     if asked != "auto":

@@ -69,7 +69,7 @@ RENAMED = {
     "Sureness": "Confidence", "Shown": "CoverageSamples", "line_map": "epipolar_lines", "Lines": "EpipolarLines",
     "Ways": "ArcLengths", "line_search": "matching", "moved": "moving_things", "seen": "inspection",
     "around": "wraparound", "Rolled": "WrappedImage", "uprights": "upright_edges", "lay": "fit_and_warp",
-    "register": "estimate_geometry", "slid": "transfer", "sends": "predict", "through": "project_rows",
+    "slid": "transfer", "sends": "predict", "through": "project_rows",
     "beyond_infinity": "cheirality_residual", "steps": "progress", "tied": "strengthen", "broken": "cut_edges",
     "told": "trust", "raised": "build_refinement", "held": "keep", "third": "w_rate",
 }  # fmt: skip

@@ -6,8 +6,9 @@ far, the one that is placed best first: the seam to it, and the blend across it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,16 +90,14 @@ def composed(
     Composition
     """
     windows = [] if len(layers) == 2 else [window_of(warp.canvas, layer.alpha > 0) for layer in layers]
-    progress("occlusion", 0.0)
     unseen = (
         [Unseen(one.hidden, one.hidden_by_depth, one.folds) for one in decided] if decided
-        else unseen_by_each(layers, warp, views, windows)
+        else unseen_by_each(layers, warp, views, windows, partial(progress, "occlusion"))
     )  # fmt: skip
-    progress("exposure", 0.0)
     fetched: list[Layer] = []
     exposures = (
         [one.exposure for one in decided] if decided
-        else _exposures(layers, warp, views, unseen, floats, options, fetched)
+        else _exposures(layers, warp, views, unseen, floats, options, fetched, partial(progress, "exposure"))
     )  # fmt: skip
     if fetched and options.blend == "linear":
         layers = [layers[0], fetched[0]]
@@ -129,12 +128,14 @@ def composed(
 
 def _exposures(
     layers: Sequence[Layer], warp: Warp, views: Sequence[View], unseen: Sequence[Unseen], floats: Sequence[bool],
-    options: StitchOptions, fetched: list[Layer],
+    options: StitchOptions, fetched: list[Layer], progress: Callable[[float], None],
 ) -> Sequence[Exposure]:  # fmt: skip
     """What is done to the light of each picture; of a pair, `fetched` takes the second with its overlap kept."""
     if len(layers) != 2:
         hidden = [one.hidden for one in unseen]
-        return graph_exposures(layers, warp.maps, [view.camera for view in views], hidden, floats, options.exposure)
+        cameras = [view.camera for view in views]
+        return graph_exposures(layers, warp.maps, cameras, hidden, floats, options.exposure, progress)
+    progress(0.0)
     first, second = layers
     box = bounds((first.alpha > 0) & (second.alpha > 0))
     # Exposure and overlap both read it. It is dropped before the seam: fetching again costs less than its memory.

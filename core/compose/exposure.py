@@ -80,20 +80,17 @@ def unchanged(channels: int, gain: float = 1.0) -> Exposure:
 
 
 def exposures_for(
-    layers: tuple[Layer, Layer], maps: Sequence[CanvasMap], hidden: NDArray[np.bool_], floats: tuple[bool, bool],
-    wanted: Exposing,
+    layers: tuple[Layer, Layer], maps: tuple[CanvasMap, CanvasMap], hidden: NDArray[np.bool_],
+    floats: tuple[bool, bool], wanted: Exposing,
 ) -> tuple[Exposure, Exposure]:  # fmt: skip
-    """What is done to the light of the panorama before and of an added layer.
+    """What is done to the light of a pair; of more pictures, see `graph_exposure`.
 
     Parameters
     ----------
-    layers, hidden, floats
+    layers, maps, hidden, floats
         See `match_tones`.
-    maps : sequence of CanvasMap
-        Where the canvas shows the pictures so far, and the added one.
     wanted : str or float
-        See `StitchOptions.exposure`. Of more than two pictures, those after the second are matched to the panorama so
-        far.
+        See `StitchOptions.exposure`.
 
     Returns
     -------
@@ -104,9 +101,7 @@ def exposures_for(
         return nothing, nothing
     if wanted == "reference":
         return nothing, match_exposure(*layers, hidden, floats)
-    if len(maps) > 2:
-        return nothing, replace(match_exposure(*layers, hidden, floats), keeps_white=not any(floats))
-    return match_tones(layers, (maps[0], maps[1]), hidden, floats, 0.0 if isinstance(wanted, str) else wanted)
+    return match_tones(layers, maps, hidden, floats, 0.0 if isinstance(wanted, str) else wanted)
 
 
 def match_exposure(

@@ -10,7 +10,7 @@ over all overlaps, with n_ij blocks whose log ratio is q_ij in the median and sp
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,7 +47,7 @@ class _Ratio:
 
 def graph_exposures(
     layers: Sequence[Layer], maps: Sequence[CanvasMap], cameras: Sequence[Camera],
-    hidden: Sequence[NDArray[np.bool_]], floats: Sequence[bool], wanted: Exposing,
+    hidden: Sequence[NDArray[np.bool_]], floats: Sequence[bool], wanted: Exposing, progress: Callable[[float], None],
 ) -> tuple[Exposure, ...]:  # fmt: skip
     """What is done to the light of each picture of a set.
 
@@ -67,6 +67,8 @@ def graph_exposures(
     wanted : str or float
         See `StitchOptions.exposure`. By "auto", and by a number of stops beside it, all come to the median of the set,
         which does not depend on which picture is the reference.
+    progress : callable
+        Called with the share that is done.
 
     Returns
     -------
@@ -75,10 +77,10 @@ def graph_exposures(
     channels, radiance = layers[0].light.shape[2], any(floats)
     if wanted == "none":
         return (unchanged(channels),) * len(layers)
-    blocks = [
-        picture_blocks(layer, where, out, is_float)
-        for layer, where, out, is_float in zip(layers, maps, hidden, floats, strict=True)
-    ]
+    blocks = []
+    for number, about_one in enumerate(zip(layers, maps, hidden, floats, strict=True)):
+        progress(number / len(layers))
+        blocks.append(picture_blocks(*about_one))
     overlaps = overlaps_of(blocks)
     kept = radiance or wanted == "reference"
     lenses = fit_vignetting(overlaps, lenses_of(cameras)) if wanted != "reference" else (NO_VIGNETTING,) * len(layers)

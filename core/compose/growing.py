@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..options import StitchOptions
 from ..panorama.layers import Layer
-from ..panorama.warp import Warp
 from ..raster.arrays import shown_only
 from ..raster.lazy import part_of, whole
 from ..system.progress import ReportProgress
@@ -21,6 +21,9 @@ from .multiband import bands_for
 from .options import BANDS
 from .placing import Placing
 from .window import Window
+
+if TYPE_CHECKING:
+    from ..panorama.warp import Warp
 
 
 class Panorama:

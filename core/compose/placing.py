@@ -12,17 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..cameras.projective import inverse_intrinsics
 from ..cameras.view import View
 from ..panorama.layers import Layer
-from ..panorama.warp import Warp
 from ..raster.arrays import Array, Part, Plane
 from ..raster.lazy import AnyImage
 from .graph_options import PLACING
 from .window import Window
+
+if TYPE_CHECKING:
+    from ..panorama.warp import Warp
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,12 @@ from ..cameras.view import View
 from ..field.folding import folds, turned_over, turning
 from ..field.visibility import by_agreement, occluded
 from ..panorama.layers import Layer
-from ..panorama.warp import Warp
 from ..raster.lazy import AnyImage
 from .graph_options import WINDOW
 from .window import Window
+
+if TYPE_CHECKING:
+    from ..panorama.warp import Warp
 
 
 @dataclass(frozen=True)
@@ -29,9 +32,11 @@ class Unseen:
 
 
 def unseen_by_each(
-    layers: Sequence[Layer], warp: Warp, views: Sequence[View], windows: Sequence[Window | None]
+    layers: Sequence[Layer], warp: Warp, views: Sequence[View], windows: Sequence[Window | None],
+    progress: Callable[[float], None],
 ) -> list[Unseen]:
-    """What each picture cannot see; windows: where they show anything, of more than two.
+    """What each picture cannot see; windows: where they show anything, of more than two; progress is called with the
+    share that is done.
 
     Of a pair, the reference cannot see what is `behind`, and all else is judged beside it. Of a larger set, the depth
     order counts only where dense refinement knows it: a smooth field through sparse points hides what is seen. What no
@@ -39,6 +44,7 @@ def unseen_by_each(
     """
     nothing = np.broadcast_to(np.False_, layers[0].alpha.shape)
     if len(layers) == 2:
+        progress(0.0)
         behind = nothing if warp.behind is None else warp.behind & (layers[0].alpha > 0)
         shown = layers[0].alpha > 0
         if warp.behind is not None:
@@ -51,6 +57,7 @@ def unseen_by_each(
             count[there] += layer.alpha[there] > 0
     found = []
     for number, (layer, tight) in enumerate(zip(layers, windows, strict=True)):
+        progress(number / len(layers))
         if tight is None:
             found.append(Unseen(nothing, nothing))
             continue

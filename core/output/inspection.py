@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 
 from ..cameras.lens import distort
 from ..cameras.projective import homogeneous
+from ..cameras.view import View
 from ..field.transfer import transfer
 from ..measure.metrics import look_up
+from ..panorama.rig_viewpoint import RigViewpoint
 from ..panorama.viewpoint import Viewpoint
+from ..panorama.warp import Warp
 from ..pipeline import StitchResult
-from ..raster.arrays import Array
+from ..raster.arrays import Array, strips
 from ..raster.colour import encode
 from ..raster.lazy import whole
 from ..raster.resizing import size_change
@@ -135,10 +138,23 @@ def displacement_px(result: StitchResult) -> NDArray[np.float32]:
         away = whole(warp.slide) * warp.inverse_depth
         towards = view.H_inf @ result.views[0].K @ warp.viewpoint.c
         infinite = [part + away * step for part, step in zip(infinite, towards, strict=True)]
+    elif isinstance(warp.viewpoint, RigViewpoint):
+        _slide_along(infinite, warp, warp.viewpoint, view.H_inf @ result.views[0].K, result.views[0])
     far = distort(np.stack(transfer(view, infinite, np.zeros(1)), axis=-1), view.camera)
     moved = np.hypot(picture_map.x - far[..., 0], picture_map.y - far[..., 1])
     in_full_px: NDArray[np.float32] = (moved / scales(result)[number][0, 0]).astype(np.float32)
     return in_full_px
+
+
+def _slide_along(infinite: list[Array], warp: Warp, viewpoint: RigViewpoint, matrix: Array, first: View) -> None:
+    """Adds to canvas points that were brought to infinity (three (H, W) arrays) by what their viewpoint's place moves
+    them: a matrix (3, 3) times d C."""
+    canvas = warp.canvas
+    for rows in strips((canvas.height, canvas.width)):
+        rays, _ = canvas.rays_at(first.K, canvas.xs, canvas.ys[rows], first.camera)
+        away = np.asarray(warp.depth[rows, :])[..., None] * viewpoint.place(rays)
+        for part, row in zip(infinite, matrix, strict=True):
+            part[rows] += away @ row
 
 
 def heat_map(result: StitchResult) -> tuple[NDArray[np.uint8], tuple[float, float]]:

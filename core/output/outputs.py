@@ -289,8 +289,8 @@ def warp_bytes(result: StitchResult) -> bytes:
     ray r of the pixel instead; there is no offset, but `projection` (its name), `focal` (px per radian), `centre`
     (canvas px of the direction ahead) and `rotation` (from its axes to the reference camera's). Where the viewpoint
     slides, by `slide` s, which is `s1` at most, that ray starts at s c, c = −Rᵀ t of the target, and inverse_depth is
-    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). Of more than two pictures it starts at
-    `s1` times one of `places`. docs/formats.md lists every key.
+    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). Of more than two pictures `places` say
+    where it starts. docs/formats.md lists every key.
 
     Parameters
     ----------
@@ -334,10 +334,8 @@ def warp_bytes(result: StitchResult) -> bytes:
     if warp.slide is not None and warp.viewpoint is not None:
         arrays |= {"slide": whole(warp.slide), "s1": np.array(warp.viewpoint.s1)}
     elif isinstance(warp.viewpoint, RigViewpoint):
-        arrays |= {
-            "s1": np.array(warp.viewpoint.s1), "places": warp.viewpoint.places,
-            "places_rotation": warp.viewpoint.rotation,
-        }  # fmt: skip
+        places = warp.viewpoint.s1 * warp.viewpoint.places
+        arrays |= {"s1": np.array(warp.viewpoint.s1), "places": places, "upright": warp.viewpoint.rotation}
     return npz_bytes(arrays)
 
 

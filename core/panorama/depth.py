@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,9 @@ from ..raster.grid import Grid
 from ..raster.lazy import AnyImage, LazyImage
 from .canvas import Canvas
 from .continued_depth import ContinuedDepth
-from .rig_viewpoint import RigViewpoint
+
+if TYPE_CHECKING:
+    from .rig_viewpoint import RigViewpoint
 
 
 @dataclass(frozen=True, eq=False)

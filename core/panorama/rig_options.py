@@ -39,7 +39,7 @@ class RigSlideOptions:
     least_half: float = 1e-3
     """Radians of half a picture's width at least: what is divided by."""
 
-    looks: int = 360
+    looks: int = 180
     """Headings at which it is looked whether a point is seen more than once."""
 
     nodes: int = 60_000

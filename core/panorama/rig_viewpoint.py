@@ -10,18 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.view import View
 from ..field.fade import fading
-from ..field.sphere_field import SphereField
 from ..raster.arrays import Array, angle_of
 from ..raster.grid import Grid
 from .projection import Projection, round_projection
 from .rig_options import RIG_SLIDE
+
+if TYPE_CHECKING:
+    from ..field.sphere_field import SphereField
 
 
 @dataclass(frozen=True, eq=False)

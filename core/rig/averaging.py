@@ -13,7 +13,7 @@ from ..cameras.rig import PictureMatches
 from ..raster.arrays import Array
 from ..system.progress import Tick, unwatched
 from .averaged import Averaged, PairGeometry, Verified
-from .candidates import Candidates, at_other_lens, belonging, candidates, noise_of, with_inliers_of
+from .candidates import Candidates, at_other_lens, belonging, candidates, noise_of
 from .focal_starts import log_sigma, starts
 from .graph import components, heaviest_component
 from .matched_rays import MatchedRays, SharedLens, matched_rays
@@ -125,12 +125,10 @@ def _fitted(
     rotate = turning.share > PAIR_FIT.rotation_share
     lens = turning.lens if rotate else together.lens
     evidence = PAIR_FIT.rotation_log_focal**-2 if rotate else AVERAGING.focal_evidence * together.focal_information
-    if not rotate and _near(lens, start, PAIR_FIT.repeat_log_focal, PAIR_FIT.repeat_k1):
+    if not rotate and _near(lens, start):
         return _Fitted(found, together, evidence)
-    if not rotate and _near(lens, start, PAIR_FIT.follow_log_focal, PAIR_FIT.follow_k1):
-        again = with_inliers_of(found, matched, together.poses, lens, verified.scale)
-    else:
-        again = candidates(matched, lens, verified.scale, verified.seed, tick)
+    # anew, not followed from here: weak pairs find other minima at another lens
+    again = candidates(matched, lens, verified.scale, verified.seed, tick)
     if not len(again.numbers):
         return _Fitted(found, together, evidence)
     if rotate:
@@ -139,8 +137,9 @@ def _fitted(
     return _Fitted(again, together, evidence if rotate else AVERAGING.focal_evidence * together.focal_information)
 
 
-def _near(lens: SharedLens, other: SharedLens, log_focal: float, k1: float) -> bool:
-    return bool(abs(np.log(lens.factor / other.factor)) < log_focal and abs(lens.k1 - other.k1) < k1)
+def _near(lens: SharedLens, other: SharedLens) -> bool:
+    same_focal = abs(np.log(lens.factor / other.factor)) < PAIR_FIT.repeat_log_focal
+    return bool(same_focal and abs(lens.k1 - other.k1) < PAIR_FIT.repeat_k1)
 
 
 def _together(found: Candidates, lens: SharedLens, prior: LensPrior, scale: float) -> Together:

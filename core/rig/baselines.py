@@ -30,7 +30,7 @@ def baselines(pairs: Sequence[PairGeometry], members: Sequence[int], found: Poli
 
 def _rigid_groups(found: Polished) -> list[set[int]]:
     """Pictures between which all lengths are in one proportion: triples, joined where they share two pictures."""
-    seen = _seen(found)
+    seen = _visibility(found)
     count = len(seen)
     if count == 2:
         return [{0, 1}]  # the only length is the unit
@@ -45,7 +45,7 @@ def _rigid_groups(found: Polished) -> list[set[int]]:
     return [{k for node in group for k in divmod(node, count)} for group in groups]
 
 
-def _seen(found: Polished) -> NDArray[np.bool_]:
+def _visibility(found: Polished) -> NDArray[np.bool_]:
     """Which pictures see which points (N, P)."""
     tracks, solution = found.problem.tracks, found.solution
     used = solution.used & solution.solved[tracks.point]

@@ -177,7 +177,7 @@ def bundle(
         before = cost
         for _ in range(BUNDLE.tries):
             step = _solved(structure, normal, scale, damping)
-            moved = _moved(problem, solution, structure, bases, *step)
+            moved = _stepped(problem, solution, structure, bases, *step)
             moved_seen = reproject(problem, moved, structure.chosen)
             moved_cost = _cost(problem, moved, structure, moved_seen, settings, prior)
             if moved_cost < cost:
@@ -308,7 +308,7 @@ def _solved(structure: Structure, normal: Normal, scale: Array, damping: float) 
     return step, points
 
 
-def _moved(
+def _stepped(
     problem: Problem, solution: Solution, structure: Structure, bases: Array, step: Array, points: Array
 ) -> Solution:
     by_camera = (structure.chooser @ step).reshape(-1, CAMERA)

@@ -117,17 +117,19 @@ class PolishingOptions:
     # begin with all observations again.
     first_iterations: int = 15
     first_tolerance: float = 1e-4
-    iterations: tuple[int, ...] = (25, 30, 60, 60, 60, 60)
-    tolerances: tuple[float, ...] = (1e-4, 1e-4, 1e-5, 1e-6, 1e-7, 1e-7)
-    revived_rounds: int = 2
-    # Round from which the kernel is as wide as the noise.
-    sharp_round: int = 2
+    revived_iterations: tuple[int, ...] = (25, 30)
+    revived_tolerances: tuple[float, ...] = (1e-4, 1e-4)
+    iterations: int = 60
+    tolerances: tuple[float, ...] = (1e-6, 1e-7)
+    # Then once more with a kernel as wide as the noise, unless all observations cost so much more with it: where the
+    # model of the lens is not good enough, it would fit a part of the pictures and lose the rest.
+    sharp_loss: float = 0.1
     # Robust σ beyond which an observation is left out, and px below which none is.
     prune_sigmas: float = 4.0
     prune_px: float = 1.5
     # px from which a point's worst observation has it triangulated anew.
     retriangulate_px: float = 8.0
-    # After the first sharp round: done when so small a share was left out and the cost fell by less than this share.
+    # Done when so small a share was left out and the cost fell by less than this share.
     settled_pruned: float = 0.002
     settled_cost: float = 0.001
     # Rotations alone: px of the Cauchy cost in turn, iterations and σ at which observations are left out.
@@ -159,6 +161,9 @@ class JudgeOptions:
     # pair in σ from which it has a baseline at all.
     three_view_points: int = 4
     parallax_sigmas: float = 3.0
+    # Parallax is little where this percentile of errors of rotations alone is below so many σ.
+    little_parallax_percentile: float = 80.0
+    little_parallax_sigmas: float = 6.0
     # px: where costs are weighed against numbers of parameters, noise is never taken to be less.
     least_noise_px: float = 0.1
 

@@ -30,9 +30,9 @@ DIRECTIONS = _CUBE / np.linalg.norm(_CUBE, axis=1, keepdims=True)
 class Candidates:
     """The poses of the pairs that have any, by one lens.
 
-    numbers (P,): which of all verified pairs they are; inliers (O,): of all verified matches; rays: those inliers;
-    turned (P, 3, 3): the best pure rotations; poses: of every pair the best first; costs: their negative log
-    likelihoods; noise: σ px of a Sampson distance.
+    numbers (P,): which of all verified pairs they are; inliers (O,): of all verified matches; rays: those inliers, of
+    pairs with very many only some; turned (P, 3, 3): the best pure rotations; poses: of every pair the best first;
+    costs: their negative log likelihoods; noise: σ px of a Sampson distance.
     """
 
     numbers: NDArray[np.intp]
@@ -108,24 +108,6 @@ def at_other_lens(found: Candidates, lens: SharedLens, scale: float) -> Candidat
     return _refined(found.numbers, found.inliers, found.rays, found.turned, list(found.poses), lens, scale)
 
 
-def with_inliers_of(
-    found: Candidates, matched: MatchedRays, poses: Poses, lens: SharedLens, scale: float
-) -> Candidates:
-    """The same with poses (P) that were refined with the lens instead of each pair's best, and those verified matches
-    that belong to them; refined, judged and ordered anew."""
-    whole = matched.of_pairs(found.numbers)
-    squares = EpipolarModel(whole, PAIR_FIT.cauchy_px * scale).squares(poses, lens)
-    rows = np.concatenate([np.arange(matched.starts[k], matched.starts[k + 1]) for k in found.numbers])
-    inliers = found.inliers.copy()
-    inliers[rows] = belonging(whole, squares, found.inliers[rows], scale)
-    starts = [
-        Poses(np.concatenate([R[None], others.R[1:]]), np.concatenate([t[None], others.t[1:]]))
-        for R, t, others in zip(poses.R, poses.t, found.poses, strict=True)
-    ]
-    rays = _of_inliers(matched, found.numbers, inliers)
-    return _refined(found.numbers, inliers, rays, found.turned, starts, lens, scale)
-
-
 def belonging(matched: MatchedRays, squares: Array, before: NDArray[np.bool_], scale: float) -> NDArray[np.bool_]:
     """Which matches (O,) with such squared distances, px², belong to their pair's pose; those that did before too where
     that leaves few."""
@@ -137,7 +119,7 @@ def belonging(matched: MatchedRays, squares: Array, before: NDArray[np.bool_], s
 
 def _of_inliers(matched: MatchedRays, kept: NDArray[np.intp], inliers: NDArray[np.bool_]) -> MatchedRays:
     masks = [inliers[matched.starts[k] : matched.starts[k + 1]] for k in kept]
-    return matched.of_pairs(kept).where(np.concatenate(masks))
+    return matched.of_pairs(kept).where(np.concatenate(masks)).thinned(CANDIDATES.most_matches)
 
 
 def _refined(

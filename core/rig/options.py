@@ -52,6 +52,8 @@ class CandidateOptions:
     rotation_px: float = 4.0
     rotation_samples: int = 100
     rotation_rounds: int = 15
+    # Inliers of a pair that take part in refining: more take time, and errors of neighbours go together.
+    most_matches: int = 500
     # Refining starts: iterations, after which so many of each pair stay.
     refining: tuple[tuple[int, int], ...] = ((4, 6), (8, 6))
     # Candidates: at most so many, so much apart, less likely than the best by at most so much (log), and so far from
@@ -88,9 +90,6 @@ class PairFitOptions:
     # A change of log f or of k1 from which candidates are sought once more, with the new lens.
     repeat_log_focal: float = 0.02
     repeat_k1: float = 0.02
-    # Changes up to which those found before are followed; beyond, RANSAC starts anew.
-    follow_log_focal: float = 0.1
-    follow_k1: float = 0.06
     # Share of the matches that pure rotations must explain better before the focal length is taken from them: that of
     # poses without parallax is arbitrary.
     rotation_share: float = 0.3

@@ -37,23 +37,41 @@ def polish(problem: Problem, solution: Solution, tick: Tick) -> Polished:
     prior = depth_prior(solution)
     wide = Settings(BUNDLE.first_kernel_px, POLISHING.first_iterations, POLISHING.first_tolerance, lenses=False)
     solution = bundle(problem, solution, wide, reference, prior, tick).solution
-    last, kernel = np.inf, BUNDLE.kernel_px
-    for k, (iterations, tolerance) in enumerate(zip(POLISHING.iterations, POLISHING.tolerances, strict=True)):
-        if k < POLISHING.revived_rounds:
-            solution = _revived(problem, solution)
-        solution = solution.rescaled()
-        prior = depth_prior(solution)
-        settings = Settings(kernel, iterations, tolerance)
-        bundled = bundle(problem, solution, settings, reference, prior, tick)
-        solution, pruned = _pruned(problem, bundled, POLISHING.prune_sigmas)
-        settled = pruned < POLISHING.settled_pruned * len(bundled.chosen)
-        if k > POLISHING.sharp_round and settled and bundled.cost > (1 - POLISHING.settled_cost) * last:
-            break
-        last = bundled.cost
-        if k + 1 == POLISHING.sharp_round:
-            kernel = _as_wide_as_noise(problem, bundled)
+    for iterations, tolerance in zip(POLISHING.revived_iterations, POLISHING.revived_tolerances, strict=True):
+        solution = _revived(problem, solution).rescaled()
+        settings = Settings(BUNDLE.kernel_px, iterations, tolerance)
+        solution, kernel, _ = _round(problem, solution, reference, settings, tick)
+    solution = _settled(problem, solution, reference, BUNDLE.kernel_px, tick)
+    sharp = _settled(problem, solution, reference, kernel, tick)
+    if total_cost(problem, sharp) < (1 + POLISHING.sharp_loss) * total_cost(problem, solution):
+        solution = sharp
     solution = solution.rescaled()
     return Polished(problem, solution, total_cost(problem, solution), _behind(solution), False, depth_prior(solution))
+
+
+def _settled(problem: Problem, solution: Solution, reference: int, kernel_px: float, tick: Tick) -> Solution:
+    """Rounds with one kernel until hardly anything is left out any more and the cost does not fall."""
+    last = np.inf
+    for tolerance in POLISHING.tolerances:
+        settings = Settings(kernel_px, POLISHING.iterations, tolerance)
+        before = int(solution.used.sum())
+        solution, _, cost = _round(problem, solution.rescaled(), reference, settings, tick)
+        pruned = before - int(solution.used.sum())
+        if pruned < POLISHING.settled_pruned * before and cost > (1 - POLISHING.settled_cost) * last:
+            break
+        last = cost
+    return solution
+
+
+def _round(
+    problem: Problem, solution: Solution, reference: int, settings: Settings, tick: Tick
+) -> tuple[Solution, float, float]:
+    """One bundle, without the observations that it does not fit; px at the features' scale of a kernel as wide as the
+    noise; the cost."""
+    bundled = bundle(problem, solution, settings, reference, depth_prior(solution), tick)
+    sigma = sigma_of_lengths(bundled.lengths) / problem.scale if len(bundled.lengths) else np.inf
+    kernel = float(np.clip(BUNDLE.last_kernel_sigmas * sigma, BUNDLE.least_kernel_px, BUNDLE.kernel_px))
+    return _pruned(problem, bundled, POLISHING.prune_sigmas), kernel, bundled.cost
 
 
 def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polished:
@@ -64,7 +82,7 @@ def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polish
     for kernel in POLISHING.rotation_kernels_px:
         settings = Settings(kernel, POLISHING.rotation_iterations, POLISHING.rotation_tolerance, depths=False)
         bundled = bundle(problem, solution, settings, 0, None, tick)
-        solution, _ = _pruned(problem, bundled, POLISHING.rotation_prune_sigmas)
+        solution = _pruned(problem, bundled, POLISHING.rotation_prune_sigmas)
     return Polished(problem, solution, total_cost(problem, solution), 0.0, True, None)
 
 
@@ -111,22 +129,16 @@ def _revived(problem: Problem, solution: Solution) -> Solution:
     return replace(anew, rays=rays, inverse_ranges=inverse_ranges)
 
 
-def _pruned(problem: Problem, bundled: Bundled, sigmas: float) -> tuple[Solution, int]:
-    """Without the observations that are too far off, and how many these are."""
+def _pruned(problem: Problem, bundled: Bundled, sigmas: float) -> Solution:
+    """Without the observations that are too far off."""
     solution = bundled.solution
     if not len(bundled.lengths):
-        return solution, 0
+        return solution
     limit = max(sigmas * sigma_of_lengths(bundled.lengths), POLISHING.prune_px * problem.scale)
     bad = bundled.chosen[bundled.lengths > limit]
     used = solution.used.copy()
     used[bad] = False
-    return replace(solution, used=used), len(bad)
-
-
-def _as_wide_as_noise(problem: Problem, bundled: Bundled) -> float:
-    """A kernel in px at the features' scale."""
-    sigma = sigma_of_lengths(bundled.lengths) / problem.scale if len(bundled.lengths) else np.inf
-    return float(np.clip(BUNDLE.last_kernel_sigmas * sigma, BUNDLE.least_kernel_px, BUNDLE.kernel_px))
+    return replace(solution, used=used)
 
 
 def _behind(solution: Solution) -> float:

@@ -231,8 +231,8 @@ class _Positioning:
         regular, size = system.regular()
         held = np.outer(towards, towards) / max(float(towards @ towards), 1e-300)
         left = self.spread.T @ (regular + POSITIONS.scale_stiffness * size * held) @ self.spread
-        downhill: Array = np.linalg.solve(left, -(self.spread.T @ system.gradient))
-        step = (self.spread @ downhill).reshape(-1, 3)
+        free: Array = np.linalg.solve(left, self.spread.T @ system.gradient)
+        step: Array = -np.reshape(self.spread @ free, (-1, 3))
         z = self.depths_along(depths, self.centres)[depths.measured]
         change = np.abs(self.depths_along(depths, step)[depths.measured]) / np.maximum(np.abs(z), 1e-9)
         typical = float(np.percentile(change, POSITIONS.change_percentile)) if len(change) else 0.0

@@ -87,7 +87,7 @@ def register(
         raise NoOverlap(_nothing_connects(verified))
     found.sort(key=lambda solved: solved.cost)
     names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
-    return _told(cameras, points, verified, found, names)
+    return _registration_of(cameras, points, verified, found, names)
 
 
 def _watched(matches: Sequence[PictureMatches], progress: ReportProgress) -> Iterator[PictureMatches]:
@@ -97,7 +97,7 @@ def _watched(matches: Sequence[PictureMatches], progress: ReportProgress) -> Ite
         yield pair
 
 
-def _told(
+def _registration_of(
     cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, found: Sequence[Solved],
     names: Sequence[str],
 ) -> Registration:  # fmt: skip

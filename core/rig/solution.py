@@ -92,7 +92,7 @@ class Problem:
     def pictures(self) -> int:
         return len(self.place)
 
-    def tied(self, stations: Sequence[Sequence[int]]) -> Problem:
+    def with_stations(self, stations: Sequence[Sequence[int]]) -> Problem:
         """The same with the pictures of each station at one place."""
         place = np.arange(self.pictures)
         for station in stations:

@@ -73,7 +73,7 @@ def _bundled(
     given = _Given(own, held)
     begun = start(problem, given.turned(rotated.R[list(members)]), lens)
     stations = proposed(pairs, members) or ([tuple(range(len(members)))] if rotated.one_place else [])
-    found = polish_best(problem, begun, stations, same_places(pairs, members), given.moved, tick)
+    found = polish_best(problem, begun, stations, same_places(pairs, members), given.placed, tick)
     moved = float(np.abs(found.solution.lens[:, 0] - lens[:, 0]).max())
     return Solved(rotated, pairs, found, _judged(found, pairs, verified), moved)
 
@@ -96,7 +96,7 @@ class _Given:
         turned[self.held] = self.R
         return turned
 
-    def moved(self, centres: Array) -> Array:
+    def placed(self, centres: Array) -> Array:
         """Places (N, 3) likewise; the scale is the given ones' where they are apart."""
         if not len(self.R):
             return centres

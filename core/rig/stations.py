@@ -14,6 +14,7 @@ from .bundle_options import JUDGE
 from .graph import components
 from .polishing import Polished, polish, polish_rotations
 from .positions import SamePlace, place_pictures
+from .reprojection import lengths_of_errors
 from .solution import Problem, Solution
 
 Station = tuple[int, ...]
@@ -50,30 +51,33 @@ def polish_best(
     problem: Problem, start: Solution, stations: Sequence[Station], same: Sequence[SamePlace],
     framed: Callable[[Array], Array], tick: Tick,
 ) -> Polished:  # fmt: skip
-    """The cheapest of: every picture at a place of its own; those of each station at one place, and of the largest
-    alone; all at one place, where a station holds all. What it costs to have more places is counted (BIC).
+    """The cheapest of: every picture at a place of its own; those of each station at one place; all at one place, where
+    a station holds all. What more places cost is counted (BIC). Where there is little parallax, rotations bundled as if
+    at one place are better to start from than averaged ones, and are tried too.
 
     framed: brings places (N, 3) to where the start's poses stand.
     """
-    if any(len(station) == problem.pictures for station in stations):
-        candidates = [polish_rotations(problem.tied([tuple(range(problem.pictures))]), start, tick)]
-        stations = []
-    else:
-        candidates = []
-    for tied in _ties(stations):
-        assigned = problem.tied(tied)
-        placed = place_pictures(assigned, start, same)
-        candidates.append(polish(assigned, replace(start, centres=framed(placed.centres)), tick))
+    candidates = []
+    starts: list[tuple[Problem, Solution]] = [(problem, start)]
+    if stations and not problem.held.any():  # given poses say themselves what is at one place
+        turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
+        if _little_parallax(turned):
+            starts.append((problem, replace(start, R=turned.solution.R, lens=turned.solution.lens)))
+        if any(len(station) == problem.pictures for station in stations):
+            candidates.append(turned)
+        else:
+            starts.append((problem.with_stations(stations), start))
+    for assigned, begun in starts:
+        placed = place_pictures(assigned, begun, same)
+        candidates.append(polish(assigned, replace(begun, centres=framed(placed.centres)), tick))
     return min(candidates, key=information_criterion)
 
 
-def _ties(stations: Sequence[Station]) -> list[list[Station]]:
-    ties: list[list[Station]] = [[]]
-    if stations:
-        ties.append(list(stations))
-    if len(stations) > 1:
-        ties.append([max(stations, key=len)])
-    return ties
+def _little_parallax(turned: Polished) -> bool:
+    """Whether most observations are about where rotations alone have them."""
+    problem = turned.problem
+    off = np.nanpercentile(lengths_of_errors(problem, turned.solution), JUDGE.little_parallax_percentile)
+    return bool(off < JUDGE.little_parallax_sigmas * problem.noise_px)
 
 
 def information_criterion(found: Polished) -> float:

@@ -207,12 +207,12 @@ def test_the_maps_can_be_made_again_from_the_warps_file(four: PictureSet, slide:
     assert ("places" in warp) == bool(slide)
     if slide:
         assert warp["s1"] == slide and "slide" not in warp
-        own = rays @ warp["places_rotation"]
+        own = rays @ warp["upright"]
         at = (np.arctan2(own[..., 0], own[..., 2]) + np.pi) * len(warp["places"]) / (2 * np.pi)
         before = np.floor(at).astype(int)
         share, places = (at - before)[..., None], warp["places"]
         near, far = places[before % len(places)], places[(before + 1) % len(places)]
-        moved = rays + warp["inverse_depth"][..., None] * slide * (near + share * (far - near))
+        moved = rays + warp["inverse_depth"][..., None] * (near + share * (far - near))
     for number in range(3):
         left, top, w, h = warp[f"box_{number:02d}"]
         part = np.s_[top : top + h, left : left + w]

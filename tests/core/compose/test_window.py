@@ -27,7 +27,7 @@ def test_a_window_holds_what_is_shown_and_no_more_than_a_margin(first: int, widt
     window = tight.with_margin(margin)
     assert window.spread(window.plane(shows)).sum() == shows.sum()
     left, top, across, down = window.box
-    assert 0 <= left < WIDTH and (top, down) == (max(0, 110 - margin), 140 + 2 * min(margin, 110))
+    assert left == (first - margin) % WIDTH and (top, down) == (max(0, 110 - margin), 140 + 2 * min(margin, 110))
     assert across == 2 * margin + (width if WIDTH - width > 2 * margin else WIDTH)
 
 

@@ -7,13 +7,18 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.projective import homogeneous, project
+from edf_stitch.core.field.sphere_field import fit_sphere_field
 from edf_stitch.core.output import inspection
 from edf_stitch.core.output.outputs import json_bytes
+from edf_stitch.core.panorama.projection import round_projection
+from edf_stitch.core.panorama.rig_viewpoint import rig_viewpoint
+from edf_stitch.core.panorama.rig_warp import build_rig_warp, outline_of
 from edf_stitch.core.panorama.viewpoint import Viewpoint
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 from ...pairs import ON_REFERENCE, with_map, with_two_view
+from ..field.sphere_scenes import rig_of
 
 
 @pytest.fixture(scope="module")
@@ -126,3 +131,17 @@ def test_the_depth_grid_reaches_from_corner_to_corner(half: StitchResult):
     for y, x in ((0, 0), (-1, -1), (0, -1)):
         assert depth[y, x] == pytest.approx(half.warp.inverse_depth[y, x], rel=1e-4)
     assert len(grid["shows"]) == columns * rows and set(grid["shows"]) <= {0, 1}
+
+
+def test_what_is_infinitely_far_is_seen_from_where_a_viewpoint_slides_to_among_many() -> None:
+    rig = rig_of((0, 20, -20), 1, points=1200)
+    field = fit_sphere_field(rig, with_slack=False)
+    viewpoint = rig_viewpoint(rig.views, [outline_of(field, view) for view in rig.views], np.eye(3)).sliding(0.7)
+    projection = round_projection("cylindrical", rig.views[0].K, np.eye(3), 60.0)
+    warp = build_rig_warp(field, rig.views, projection, viewpoint)
+    canvas, view = warp.canvas, rig.views[1]
+    infinite = canvas.project_rows(view.H_inf, canvas.xs, canvas.ys)
+    inspection._slide_along(infinite, warp, viewpoint, view.H_inf @ rig.views[0].K, rig.views[0])
+    rays = projection.rays(np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1))
+    from_there = rays + warp.inverse_depth[..., None] * viewpoint.place(rays)
+    assert np.stack(infinite, axis=-1) == pytest.approx(from_there @ view.R.T @ view.K.T, abs=1e-6)

@@ -138,6 +138,22 @@ def test_a_slid_warp_shows_one_point_in_all_pictures(rig: Rig, field: SphereFiel
     assert shared > 4000
 
 
+def test_nearness_is_counted_from_where_a_pixel_is_seen(
+    rig: Rig, field: SphereField, viewpoint: RigViewpoint
+) -> None:
+    """Baselines per distance along a picture's axis: of the point C + r / d, as that picture sees it."""
+    projection = round_projection("cylindrical", rig.views[0].K, np.eye(3), 80.0)
+    warp = build_rig_warp(field, rig.views, projection, viewpoint)
+    canvas, d = warp.canvas, whole(warp.depth).astype(float)
+    rays = projection.rays(np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1))
+    for number in (0, 3):
+        view = rig.views[number]
+        point = (viewpoint.place(rays) + rays / d[..., None]) @ view.R[2] + view.t[2]
+        ahead = point > 0.5
+        assert ahead.mean() > 0.3
+        assert whole(warp.nearness(rig.views, number))[ahead] == pytest.approx(1 / point[ahead], rel=1e-3)
+
+
 def test_what_one_picture_shows_alone_is_shown_as_it_was_taken(
     rig: Rig, field: SphereField, viewpoint: RigViewpoint
 ) -> None:

@@ -130,6 +130,20 @@ def test_a_ring_covers_the_whole_sphere_around_and_goes_on_across_its_ends(ring:
     assert 0 < x[0] - x[-1] < 6
 
 
+@pytest.mark.parametrize("pitch", [90.0, -90.0])
+def test_pictures_around_a_pole_cover_it(pitch: float) -> None:
+    """Seen from straight below or above, they take the whole width and reach to the last row."""
+    rig = rig_of((0, 20, -20), 2)
+    projection = projection_of(rig, "equirectangular", turned(0, pitch, 0))
+    warp = build_rig_warp(strict(rig), rig.views, projection)
+    sphere = projection.sphere
+    assert sphere is not None
+    assert warp.canvas.width == sphere[2]
+    shown = np.logical_or.reduce([one.inside() for one in warp.maps])
+    last = shown[0] if pitch > 0 else shown[-1]
+    assert last.all()
+
+
 @dataclass(frozen=True)
 class OnPlane:
     """The same field for a pair, at the nodes of the reference's plane."""

@@ -164,7 +164,7 @@ def test_given_poses_stay() -> None:
 
 def test_pictures_of_one_place_stay_together() -> None:
     problem, true = _scene(7, noise_px=0.3)
-    tied = problem.tied([(1, 3)])
+    tied = problem.with_stations([(1, 3)])
     centres = true.centres.copy()
     centres[3] = centres[1]
     found = bundle(tied, replace(true, centres=centres), Settings(), 0).solution

@@ -103,6 +103,16 @@ def test_a_pair_is_refined_to_its_pose():
     assert degrees_between(found.R, poses.R).max() < 1e-4
 
 
+def test_wrong_matches_do_not_bend_a_pair():
+    """Cauchy: a sixth of the matches is off by 20 px, all to one side."""
+    rays, _, poses, _, _ = two_pairs(4, noise=0.1)
+    rays.y[::6, 1] += 20 / 600
+    start = Poses(rotations(np.full((2, 3), 0.01)) @ poses.R, poses.t)
+    robust, squared = (refine_each(EpipolarModel(rays, width), start, SharedLens(), 30) for width in (1.5, 1e6))
+    assert degrees_between(robust.R, poses.R).max() < 0.1
+    assert degrees_between(squared.R, poses.R).min() > 0.3
+
+
 def test_pairs_and_lens_are_refined_together():
     rays, _, poses, _, _ = two_pairs(3, k1=-0.1, noise=0.0)
     start = SharedLens(1.04, 0.0)

@@ -75,7 +75,7 @@ def test_a_chain_is_placed_by_depths_that_continue() -> None:
 def test_pictures_of_one_place_get_one() -> None:
     rig = make_rig("half", 2, points=4000)
     problem, begun = problem_of(rig)
-    placed = place_pictures(problem.tied([tuple(range(6))]), begun).centres
+    placed = place_pictures(problem.with_stations([tuple(range(6))]), begun).centres
     np.testing.assert_allclose(placed[:6], np.tile(placed[0], (6, 1)), atol=1e-9)
     assert off(placed, rig).max() < 0.2 * rig.extent
 

@@ -45,7 +45,7 @@ def ring() -> tuple[SyntheticRig, Registration]:
 
 def test_a_ring(ring: tuple[SyntheticRig, Registration]) -> None:
     rig, found = ring
-    assert found.numbers == tuple(range(11)) and not found.left_out and not found.warnings
+    assert found.numbers == tuple(range(11)) and not found.left_out
     assert turned_off(found, rig).max() < 0.35
     assert placed_off(found, rig).max() < 0.03
     assert abs(found.rig.cameras[0].focal / FOCAL - 1) < 0.003
@@ -120,11 +120,9 @@ def test_half_tripod_half_hand_held() -> None:
     assert placed_off(found, rig).max() < 0.2
 
 
-def test_a_chain_says_what_is_ambiguous() -> None:
+def test_lengths_along_a_chain_are_not_measured() -> None:
     found = registered(make_rig("chain", 1))
     assert {edge.baseline for edge in found.rig.edges} == {"continuity"}
-    assert sum("only guessed" in warning for warning in found.warnings) == len(found.rig.edges)
-    assert all("Take more pictures between" in warning for warning in found.warnings)
 
 
 def test_a_wrong_pair_changes_little() -> None:
@@ -194,7 +192,7 @@ def test_of_two_groups_the_larger_is_kept() -> None:
     matches = [pair for pair in rig.matches if (pair.i in apart) == (pair.j in apart)]
     found = register(rig.cameras, rig.points, matches)
     assert found.numbers == tuple(range(8))
-    assert set(found.left_out) == apart and "connects only with pictures 10 and 11" in found.left_out[8]
+    assert set(found.left_out) == apart and "connects only with picture 10 and picture 11" in found.left_out[8]
 
 
 def test_nothing_connects() -> None:
