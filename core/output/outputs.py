@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -19,7 +19,6 @@ from ..measure.report import plain
 from ..panorama.layers import Layer
 from ..panorama.rig_viewpoint import RigViewpoint
 from ..pictures.encoding import encode_picture, output_bits
-from ..pipeline import StitchResult
 from ..raster.arrays import cut
 from ..raster.colour import decode
 from ..raster.lazy import whole
@@ -29,6 +28,9 @@ from ..system.output_files import OutputFiles
 from .camera_file import camera_table
 from .match_table import match_file
 from .rig_page import rig_page
+
+if TYPE_CHECKING:
+    from ..pipeline import StitchResult
 
 # Versions of the layers' folder and of the warp's file (docs/formats.md).
 LAYERS_FORMAT, WARP_FORMAT = 2, 2
