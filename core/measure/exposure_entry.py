@@ -41,8 +41,8 @@ def exposure_warnings(pictures: Sequence[Picture], exposures: Sequence[Exposure]
             out.append(f"the exposure of {picture.name} could not be matched: {one.why_not}; its border may show")
         if one.overexposed > WARNING.overexposed_share:
             out.append(
-                f"{picture.name} is over-exposed beside the {other}: {one.overexposed:.0%} of what {both} show is clipped "
-                "in it alone; there, colours are guessed and detail is missing"
+                f"{picture.name} is over-exposed beside the {other}: {one.overexposed:.0%} of what {both} show is "
+                "clipped in it alone; there, colours are guessed and detail is missing"
             )
     return out
 
