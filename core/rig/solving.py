@@ -50,7 +50,7 @@ def solve(
         if found[-1].moved < JUDGE.most_log_focal or len(found) == JUDGE.passes:
             break
         known, shared = _cameras_of(cameras, rotated, found[-1].found)
-        rotated = averaged(known, points, verified, shared, hold=True)
+        rotated = averaged(known, points, verified, shared, hold=True, tick=tick)
     return min(found, key=lambda solved: solved.cost, default=None)
 
 
