@@ -41,9 +41,9 @@ from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
 from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
-from .rig.given import given_matches
+from .rig.averaging.pair_edges import edges_of
+from .rig.bundling.given import given_matches
 from .rig.left_out import check_connected
-from .rig.pair_edges import edges_of
 from .rig.reframing import seen_from
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, StitchError, TooFewMatches

@@ -15,8 +15,8 @@ import numpy as np
 
 from .cameras.rig import Rig
 from .cameras.view import View
-from .compose.cut_things import without_cut_things
-from .compose.rough_seam import RoughSeam
+from .compose.seams.cut_things import without_cut_things
+from .compose.seams.rough_seam import RoughSeam
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
 from .field.refined_depth import RefinedDepth

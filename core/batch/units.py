@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,10 +30,12 @@ from ..output.outputs import (
     write,
 )
 from ..pictures.encoding import output_bits
-from ..pipeline import StitchResult
 from ..system.errors import BadRequest, UnreadableImage, UnwritableOutput
 from ..system.output_files import OutputFiles
 from .list import BatchItem, same_name
+
+if TYPE_CHECKING:
+    from ..pipeline import StitchResult
 
 STAMPS = ".edf"
 

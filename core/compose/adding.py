@@ -21,11 +21,11 @@ from ..system.progress import ReportProgress
 from .blend import averaged, distance_labels, feathered, feathered_across, in_bands
 from .decided import Decided
 from .inpaint import holes_of
-from .min_cut import FREE, SECOND
-from .moving_things import moving_labels
-from .overlap import Overlap, overlap_of
-from .seam import find_seam, known_labels
-from .seam_costs import seam_costs
+from .seams.min_cut import FREE, SECOND
+from .seams.moving_things import moving_labels
+from .seams.overlap import Overlap, overlap_of
+from .seams.seam import find_seam, known_labels
+from .seams.seam_costs import seam_costs
 from .window import Window
 from .wraparound import roll_for, rolled, rolled_layer, rolled_map
 

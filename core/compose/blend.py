@@ -18,7 +18,7 @@ from ..raster.lazy import AnyImage, LazyImage, Retouched
 from ..raster.log_encoding import log_decode, log_encode
 from .multiband import bands_for, correction
 from .options import BANDS
-from .overlap import Overlap
+from .seams.overlap import Overlap
 
 
 def averaged(before: Layer, layer: Layer, count: NDArray[Any]) -> Layer:

@@ -20,12 +20,12 @@ from ..panorama.warp import Warp
 from ..raster.arrays import bounds, with_margin
 from ..system.progress import ReportProgress
 from .decided import Decided
-from .exposure import Exposure, exposures_for
-from .graph_exposure import graph_exposures
 from .growing import Panorama, SetPanorama
 from .inpaint import closed_holes, inpainted
 from .options import EXPOSURE
 from .placing import Placing, adding_order
+from .tone.exposure import Exposure, exposures_for
+from .tone.graph_exposure import graph_exposures
 from .unseen import Unseen, unseen_by_each
 from .window import window_of
 

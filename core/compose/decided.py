@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from .exposure import Exposure
-    from .seam_costs import SeamCosts
+    from .seams.seam_costs import SeamCosts
+    from .tone.exposure import Exposure
     from .window import Window
 
 

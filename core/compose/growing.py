@@ -16,10 +16,10 @@ from ..raster.lazy import part_of, whole
 from ..system.progress import ReportProgress
 from .adding import Added, add
 from .decided import Decided
-from .graph_options import PLACING, WINDOW
 from .multiband import bands_for
 from .options import BANDS
 from .placing import Placing
+from .tone.graph_options import PLACING, WINDOW
 from .window import Window
 
 if TYPE_CHECKING:

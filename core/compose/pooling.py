@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from .decided import Decided
-from .exposure import pooled
-from .seam import find_seam
-from .seam_costs import averaged_costs
+from .seams.seam import find_seam
+from .seams.seam_costs import averaged_costs
+from .tone.exposure import pooled
 from .wraparound import rolled
 
 

@@ -13,7 +13,7 @@ from .options import WARNING
 
 if TYPE_CHECKING:
     from ..compose.decided import Decided
-    from ..compose.exposure import Exposure
+    from ..compose.tone.exposure import Exposure
     from ..pictures.picture import Picture
 
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compose.rough_seam import map_to_small, small_picture
+from ..compose.seams.rough_seam import map_to_small, small_picture
 from ..panorama.layers import layer_of
 from ..raster.arrays import Box
 from ..raster.colour import encode
@@ -18,7 +18,7 @@ from ..raster.picture_map import CanvasMap, PictureMap
 from .options import VERDICT
 
 if TYPE_CHECKING:
-    from ..compose.exposure import Exposure
+    from ..compose.tone.exposure import Exposure
     from ..pictures.picture import Picture
 
 Levels = NDArray[np.uint8]

@@ -12,8 +12,8 @@ from ..cameras.rig import PictureMatches, Registration, Rig
 from ..pictures.picture import Picture
 from ..system.cache import Cache
 from ..system.progress import ReportProgress
+from .averaging.pairs import chosen_pairs
 from .matching import Matched, content_key, found_features, found_matches
-from .pairs import chosen_pairs
 from .reframing import reordered
 from .registration import register
 

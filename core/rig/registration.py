@@ -15,19 +15,19 @@ from ..raster.arrays import Array
 from ..raster.robust import sigma_of_lengths
 from ..system.errors import NoOverlap
 from ..system.progress import Progress, ReportProgress
-from .averaged import Verified
-from .averaging import hypotheses
-from .baselines import baselines
-from .bundle_options import JUDGE
-from .graph import components
-from .options import PAIRS
-from .pairs import verified as verify
-from .polishing import Polished
-from .reprojection import lengths_of_errors
-from .solution import lens_of
-from .solving import Solved, solve
-from .turns import degrees_between
-from .uncertainty import deviations
+from .averaging.averaged import Verified
+from .averaging.averaging import hypotheses
+from .averaging.graph import components
+from .averaging.options import PAIRS
+from .averaging.pairs import verified as verify
+from .averaging.turns import degrees_between
+from .bundling.baselines import baselines
+from .bundling.bundle_options import JUDGE
+from .bundling.polishing import Polished
+from .bundling.reprojection import lengths_of_errors
+from .bundling.solution import lens_of
+from .bundling.solving import Solved, solve
+from .bundling.uncertainty import deviations
 
 # Shares of the work that are done when pairs are verified, and when their rotations are averaged.
 _VERIFIED, _AVERAGED = 0.1, 0.4

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.choices import BLENDS
 from edf_stitch.core.compose.blend import averaged, distance_labels, feathered, in_bands
-from edf_stitch.core.compose.overlap import overlap_of
+from edf_stitch.core.compose.seams.overlap import overlap_of
 from edf_stitch.core.panorama.layers import Layer
 
 H, W = 60, 140

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from edf_stitch.core.compose.clipped import ClippedLight, clipped_light
-from edf_stitch.core.compose.tone_options import CLIPPED, TONE
+from edf_stitch.core.compose.tone.clipped import ClippedLight, clipped_light
+from edf_stitch.core.compose.tone.tone_options import CLIPPED, TONE
 
 H, W = 200, 160
 SKY = np.array([0.15, 0.3, 0.75])

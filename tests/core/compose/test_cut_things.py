@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
-from edf_stitch.core.compose import cut_things
 from edf_stitch.core.compose.composition import Composition, composed
-from edf_stitch.core.compose.cut_things import without_cut_things
-from edf_stitch.core.compose.min_cut import FIRST, SECOND
+from edf_stitch.core.compose.seams import cut_things
+from edf_stitch.core.compose.seams.cut_things import without_cut_things
+from edf_stitch.core.compose.seams.min_cut import FIRST, SECOND
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import layer_of

@@ -7,8 +7,8 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.compose.clipped import ClippedLight
-from edf_stitch.core.compose.exposure import (
+from edf_stitch.core.compose.tone.clipped import ClippedLight
+from edf_stitch.core.compose.tone.exposure import (
     Exposure,
     exposures_for,
     match_exposure,
@@ -16,8 +16,8 @@ from edf_stitch.core.compose.exposure import (
     pooled,
     unchanged,
 )
-from edf_stitch.core.compose.tone_options import TONE
-from edf_stitch.core.compose.toned import ToneCurve, Vignetting
+from edf_stitch.core.compose.tone.tone_options import TONE
+from edf_stitch.core.compose.tone.toned import ToneCurve, Vignetting
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.picture_map import PictureMap
 

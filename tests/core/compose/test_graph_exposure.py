@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
-from edf_stitch.core.compose.exposure import Exposure
-from edf_stitch.core.compose.graph_exposure import graph_exposures, lenses_of
-from edf_stitch.core.compose.picture_blocks import blocks_meet, overlaps_of, picture_blocks
-from edf_stitch.core.compose.toned import NO_VIGNETTING, Vignetting
+from edf_stitch.core.compose.tone.exposure import Exposure
+from edf_stitch.core.compose.tone.graph_exposure import graph_exposures, lenses_of
+from edf_stitch.core.compose.tone.picture_blocks import blocks_meet, overlaps_of, picture_blocks
+from edf_stitch.core.compose.tone.toned import NO_VIGNETTING, Vignetting
 from edf_stitch.core.panorama.layers import Layer
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
 from edf_stitch.core.compose.options import MIN_CUT
+from edf_stitch.core.compose.seams.min_cut import FIRST, FREE, NOWHERE, SECOND, min_cut
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.compose import moving_things
-from edf_stitch.core.compose.moving_things import moving_labels
-from edf_stitch.core.compose.overlap import overlap_of
-from edf_stitch.core.compose.seam import find_seam, known_labels
-from edf_stitch.core.compose.seam_costs import seam_costs
+from edf_stitch.core.compose.seams import moving_things
+from edf_stitch.core.compose.seams.moving_things import moving_labels
+from edf_stitch.core.compose.seams.overlap import overlap_of
+from edf_stitch.core.compose.seams.seam import find_seam, known_labels
+from edf_stitch.core.compose.seams.seam_costs import seam_costs
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.picture_map import PictureMap
 

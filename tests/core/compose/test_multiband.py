@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.compose.blend import cut_hard, feathered_across, in_bands, seam_region
 from edf_stitch.core.compose.multiband import bands_for, correction
-from edf_stitch.core.compose.overlap import overlap_of
+from edf_stitch.core.compose.seams.overlap import overlap_of
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.pull_push import filled
 

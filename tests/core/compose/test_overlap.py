@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from edf_stitch.core.compose.options import OVERLAP
-from edf_stitch.core.compose.overlap import overlap_of
+from edf_stitch.core.compose.seams.overlap import overlap_of
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.log_encoding import log_decode, log_encode
 

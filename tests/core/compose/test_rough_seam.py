@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.view import View, views_of
-from edf_stitch.core.compose import rough_seam
-from edf_stitch.core.compose.rough_seam import RoughSeam
+from edf_stitch.core.compose.seams import rough_seam
+from edf_stitch.core.compose.seams.rough_seam import RoughSeam
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.projection import round_projection
 from edf_stitch.core.panorama.warp import Warp

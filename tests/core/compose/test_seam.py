@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose import seam
-from edf_stitch.core.compose.min_cut import FIRST, FREE, NOWHERE, SECOND
-from edf_stitch.core.compose.overlap import overlap_of
-from edf_stitch.core.compose.seam import find_seam, known_labels
-from edf_stitch.core.compose.seam_costs import seam_costs
+from edf_stitch.core.compose.seams import seam
+from edf_stitch.core.compose.seams.min_cut import FIRST, FREE, NOWHERE, SECOND
+from edf_stitch.core.compose.seams.overlap import overlap_of
+from edf_stitch.core.compose.seams.seam import find_seam, known_labels
+from edf_stitch.core.compose.seams.seam_costs import seam_costs
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.picture_map import PictureMap
 

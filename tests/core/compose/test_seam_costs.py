@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.overlap import overlap_of
-from edf_stitch.core.compose.seam import find_seam, known_labels
-from edf_stitch.core.compose.seam_costs import averaged_costs, means, seam_costs
+from edf_stitch.core.compose.seams.overlap import overlap_of
+from edf_stitch.core.compose.seams.seam import find_seam, known_labels
+from edf_stitch.core.compose.seams.seam_costs import averaged_costs, means, seam_costs
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.picture_map import PictureMap
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.tears import contrast, tears
+from edf_stitch.core.compose.seams.tears import contrast, tears
 from edf_stitch.core.raster.picture_map import PictureMap
 
 SIZE = (80, 60)

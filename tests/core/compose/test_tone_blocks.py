@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from edf_stitch.core.compose.options import EXPOSURE
-from edf_stitch.core.compose.tone_blocks import shared_blocks
+from edf_stitch.core.compose.tone.tone_blocks import shared_blocks
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.picture_map import PictureMap
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from edf_stitch.core.compose.options import EXPOSURE
-from edf_stitch.core.compose.tone_blocks import Blocks
-from edf_stitch.core.compose.tone_fit import ToneFit, fit_tone
-from edf_stitch.core.compose.tone_options import TONE
-from edf_stitch.core.compose.toned import NO_VIGNETTING, ToneCurve, Vignetting
+from edf_stitch.core.compose.tone.tone_blocks import Blocks
+from edf_stitch.core.compose.tone.tone_fit import ToneFit, fit_tone
+from edf_stitch.core.compose.tone.tone_options import TONE
+from edf_stitch.core.compose.tone.toned import NO_VIGNETTING, ToneCurve, Vignetting
 
 GAIN = np.array([1.6, 1.2, 0.9])
 LENS = Vignetting(-0.15, -0.45)

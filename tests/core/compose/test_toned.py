@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.clipped import ClippedLight
 from edf_stitch.core.compose.options import EXPOSURE
-from edf_stitch.core.compose.tone_options import TONE
-from edf_stitch.core.compose.toned import NO_VIGNETTING, ToneCurve, Toned, Vignetting, near_white
+from edf_stitch.core.compose.tone.clipped import ClippedLight
+from edf_stitch.core.compose.tone.tone_options import TONE
+from edf_stitch.core.compose.tone.toned import NO_VIGNETTING, ToneCurve, Toned, Vignetting, near_white
 from edf_stitch.core.raster.colour import decode, encode
 from edf_stitch.core.raster.picture_map import PictureMap
 from hypothesis import given, settings

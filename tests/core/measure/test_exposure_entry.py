@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.clipped import ClippedLight
 from edf_stitch.core.compose.decided import Decided
-from edf_stitch.core.compose.exposure import Exposure, unchanged
-from edf_stitch.core.compose.toned import ToneCurve, Vignetting
+from edf_stitch.core.compose.tone.clipped import ClippedLight
+from edf_stitch.core.compose.tone.exposure import Exposure, unchanged
+from edf_stitch.core.compose.tone.toned import ToneCurve, Vignetting
 from edf_stitch.core.measure.exposure_entry import exposure_entry, exposure_warnings
 from edf_stitch.core.measure.options import WARNING
 from edf_stitch.core.pictures.picture import picture_from_array

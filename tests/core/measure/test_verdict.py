@@ -8,7 +8,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.compose.exposure import unchanged
+from edf_stitch.core.compose.tone.exposure import unchanged
 from edf_stitch.core.measure.look import Look, look_at
 from edf_stitch.core.measure.verdict import Verdict, judge
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch

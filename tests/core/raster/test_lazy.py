@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.compose.blend import Cut, Evened, Mixed
 from edf_stitch.core.compose.inpaint import Patch, Patched
-from edf_stitch.core.compose.toned import Exposed
+from edf_stitch.core.compose.tone.toned import Exposed
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.arrays import meet, with_margin, within
 from edf_stitch.core.raster.colour import decode, srgb_curve

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.rig.averaging import hypotheses
-from edf_stitch.core.rig.pairs import verified
-from edf_stitch.core.rig.polishing import Polished, polish, polish_rotations, start
-from edf_stitch.core.rig.solution import LENS
-from edf_stitch.core.rig.solving import Solved, solve
+from edf_stitch.core.rig.averaging.averaging import hypotheses
+from edf_stitch.core.rig.averaging.pairs import verified
+from edf_stitch.core.rig.bundling.polishing import Polished, polish, polish_rotations, start
+from edf_stitch.core.rig.bundling.solution import LENS
+from edf_stitch.core.rig.bundling.solving import Solved, solve
 
 from .rigs import SyntheticRig, make_rig
 

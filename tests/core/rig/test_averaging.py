@@ -7,12 +7,12 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.rig import PictureMatches
-from edf_stitch.core.rig.averaged import Averaged
-from edf_stitch.core.rig.averaging import averaged, hypotheses
-from edf_stitch.core.rig.focal_starts import starts
-from edf_stitch.core.rig.matched_rays import SharedLens
-from edf_stitch.core.rig.pairs import verified
-from edf_stitch.core.rig.turns import degrees_between
+from edf_stitch.core.rig.averaging.averaged import Averaged
+from edf_stitch.core.rig.averaging.averaging import averaged, hypotheses
+from edf_stitch.core.rig.averaging.averaging.focal_starts import starts
+from edf_stitch.core.rig.averaging.averaging.matched_rays import SharedLens
+from edf_stitch.core.rig.averaging.pairs import verified
+from edf_stitch.core.rig.averaging.turns import degrees_between
 
 from .rigs import SyntheticRig, camera_of, make_rig
 

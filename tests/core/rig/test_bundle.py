@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera, Knowledge
-from edf_stitch.core.rig.bundle import DepthPrior, Settings, bundle
-from edf_stitch.core.rig.polishing import start
-from edf_stitch.core.rig.reprojection import CAMERA, derivatives, lengths_of_errors, reproject, tangents
-from edf_stitch.core.rig.solution import LENS, Problem, Solution, lenses_of
-from edf_stitch.core.rig.tracks import Tracks
-from edf_stitch.core.rig.turns import degrees_between, rotations
+from edf_stitch.core.rig.averaging.turns import degrees_between, rotations
+from edf_stitch.core.rig.bundling.bundle import DepthPrior, Settings, bundle
+from edf_stitch.core.rig.bundling.polishing import start
+from edf_stitch.core.rig.bundling.reprojection import CAMERA, derivatives, lengths_of_errors, reproject, tangents
+from edf_stitch.core.rig.bundling.solution import LENS, Problem, Solution, lenses_of
+from edf_stitch.core.rig.bundling.tracks import Tracks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray

@@ -1,6 +1,6 @@
 """Pictures and pairs as a graph."""
 
-from edf_stitch.core.rig.graph import components, heaviest_component, is_bridge, strongest_tree, walk
+from edf_stitch.core.rig.averaging.graph import components, heaviest_component, is_bridge, strongest_tree, walk
 from hypothesis import given
 from hypothesis import strategies as st
 

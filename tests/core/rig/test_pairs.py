@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.rig import PictureMatches
 from edf_stitch.core.pose.features import Features
-from edf_stitch.core.rig.pairs import chosen_pairs, verified
+from edf_stitch.core.rig.averaging.pairs import chosen_pairs, verified
 
 from .rigs import make_rig
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.rig.averaged import PairGeometry
-from edf_stitch.core.rig.polishing import start
-from edf_stitch.core.rig.positions import place_pictures
-from edf_stitch.core.rig.reprojection import lengths_of_errors
-from edf_stitch.core.rig.solution import LENS, Problem, Solution, lenses_of
-from edf_stitch.core.rig.tracks import build_tracks
-from edf_stitch.core.rig.triangulation import triangulate
-from edf_stitch.core.rig.turns import rotations
+from edf_stitch.core.rig.averaging.averaged import PairGeometry
+from edf_stitch.core.rig.averaging.turns import rotations
+from edf_stitch.core.rig.bundling.polishing import start
+from edf_stitch.core.rig.bundling.positions import place_pictures
+from edf_stitch.core.rig.bundling.reprojection import lengths_of_errors
+from edf_stitch.core.rig.bundling.solution import LENS, Problem, Solution, lenses_of
+from edf_stitch.core.rig.bundling.tracks import build_tracks
+from edf_stitch.core.rig.bundling.triangulation import triangulate
 
 from .rigs import SyntheticRig, make_rig
 

@@ -9,8 +9,8 @@ import pytest
 from edf_stitch.core.cameras.projective import homogeneous
 from edf_stitch.core.cameras.rig import PictureMatches, Registration
 from edf_stitch.core.raster.arrays import Array
+from edf_stitch.core.rig.averaging.turns import degrees_between
 from edf_stitch.core.rig.registration import register
-from edf_stitch.core.rig.turns import degrees_between
 from edf_stitch.core.system.errors import Cancelled, NoOverlap
 from edf_stitch.core.system.progress import Progress
 

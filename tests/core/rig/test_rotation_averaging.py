@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from edf_stitch.core.rig.rotation_averaging import NEVER, Links, average, worst_loop
-from edf_stitch.core.rig.triplets import triangles, without_contradicted
-from edf_stitch.core.rig.turns import degrees_between, rotations
+from edf_stitch.core.rig.averaging.averaging.rotation_averaging import NEVER, Links, average, worst_loop
+from edf_stitch.core.rig.averaging.triplets import triangles, without_contradicted
+from edf_stitch.core.rig.averaging.turns import degrees_between, rotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from edf_stitch.core.rig.averaged import PairGeometry
-from edf_stitch.core.rig.tracks import build_tracks, fitting_pairs, pairs_within
+from edf_stitch.core.rig.averaging.averaged import PairGeometry
+from edf_stitch.core.rig.bundling.tracks import build_tracks, fitting_pairs, pairs_within
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -1,7 +1,7 @@
 """Many rotations at once, against SciPy's."""
 
 import numpy as np
-from edf_stitch.core.rig.turns import degrees_between, rotation_vectors, rotations
+from edf_stitch.core.rig.averaging.turns import degrees_between, rotation_vectors, rotations
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation

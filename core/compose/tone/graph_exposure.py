@@ -1,0 +1,186 @@
+"""One exposure for a set of pictures, over the graph of all their overlaps, before any of them is added.
+
+Matching each picture to the panorama so far would add up errors from one to the next, and the last would not meet the
+first. Here the logarithms of all gains are solved for at once:
+
+    g = argmin Σ n_ij / σ_ij² (g_i − g_j + q_ij)²
+
+over all overlaps, with n_ij blocks whose log ratio is q_ij in the median and spreads by σ_ij, channel by channel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ...cameras.camera import Camera
+from ...choices import Exposing
+from ...panorama.layers import Layer
+from ...raster.arrays import Array
+from ...raster.picture_map import CanvasMap
+from ..options import OVERLAP
+from .clipped import clipped_light
+from .exposure import TOO_LITTLE, Exposure, too_different, unchanged
+from .graph_options import GRAPH_EXPOSURE
+from .graph_vignetting import fit_vignetting
+from .picture_blocks import PictureBlocks, SharedBlocks, blocks_meet, overlaps_of, picture_blocks
+from .tone_blocks import block_weights, log_ratios, weighted_median
+from .tone_options import CLIPPED
+from .toned import NO_VIGNETTING, Vignetting
+
+
+@dataclass(frozen=True)
+class _Ratio:
+    """How much brighter picture i is than j, as logarithms (C,), their spread (C,), and by how many blocks."""
+
+    i: int
+    j: int
+    middle: Array
+    spread: Array
+    blocks: int
+
+
+def graph_exposures(
+    layers: Sequence[Layer], maps: Sequence[CanvasMap], cameras: Sequence[Camera],
+    hidden: Sequence[NDArray[np.bool_]], floats: Sequence[bool], wanted: Exposing, progress: Callable[[float], None],
+) -> tuple[Exposure, ...]:  # fmt: skip
+    """What is done to the light of each picture of a set.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        On the same canvas, the reference's first.
+    maps : sequence of CanvasMap
+        Where the canvas shows each picture.
+    cameras : sequence of Camera
+        Those with the same intrinsics share a lens, and its vignetting.
+    hidden : sequence of (H, W) bool arrays
+        What each picture cannot see, and so shows something else.
+    floats : sequence of bool
+        Whether they come from float pictures. With one among them radiance is kept: no highlight is rolled off, and all
+        come to the exposure of the reference.
+    wanted : str or float
+        See `StitchOptions.exposure`. By "auto", and by a number of stops beside it, all come to the median of the set,
+        which does not depend on which picture is the reference.
+    progress : callable
+        Called with the share that is done.
+
+    Returns
+    -------
+    tuple of Exposure
+    """
+    channels, radiance = layers[0].light.shape[2], any(floats)
+    if wanted == "none":
+        return (unchanged(channels),) * len(layers)
+    blocks = []
+    for number, about_one in enumerate(zip(layers, maps, hidden, floats, strict=True)):
+        progress(number / len(layers))
+        blocks.append(picture_blocks(*about_one))
+    overlaps = overlaps_of(blocks)
+    kept = radiance or wanted == "reference"
+    lenses = fit_vignetting(overlaps, lenses_of(cameras)) if wanted != "reference" else (NO_VIGNETTING,) * len(layers)
+    ratios = [_ratio(one, lenses) for one in overlaps]
+    usable = [one for one in ratios if np.abs(one.middle).max() <= np.log(GRAPH_EXPOSURE.max_gain)]
+    gains = _solved(usable, len(layers), channels, kept)
+    gains += np.log(2) * (0.0 if isinstance(wanted, str) else wanted)
+    exposures = []
+    for number in range(len(layers)):
+        own, all_own = ([one for one in some if number in (one.i, one.j)] for some in (usable, ratios))
+        why_not = ""
+        if not own and any(blocks_meet(blocks[number], one) for k, one in enumerate(blocks) if k != number):
+            why_not = too_different(np.exp(all_own[0].middle)) if all_own else TOO_LITTLE
+        counts = [one.blocks for one in own]
+        spread = np.average([one.spread for one in own], axis=0, weights=counts) if own else np.full(channels, np.nan)
+        exposures.append(Exposure(
+            np.exp(gains[number]).astype(np.float32), spread.astype(np.float32), sum(counts), lenses[number],
+            keeps_white=not kept, why_not=why_not,
+        ))  # fmt: skip
+    return tuple(exposures) if kept else _with_clipped(exposures, blocks, layers, maps, hidden)
+
+
+def lenses_of(cameras: Sequence[Camera]) -> list[int]:
+    """The number of each camera's lens: those of one size and the same intrinsics share one."""
+    numbers: dict[tuple[object, ...], int] = {}
+    return [
+        numbers.setdefault((one.size, one.K.tobytes(), one.distortion.tobytes()), len(numbers)) for one in cameras
+    ]
+
+
+def _ratio(shared: SharedBlocks, lenses: Sequence[Vignetting]) -> _Ratio:
+    """How much brighter one picture is than the other, without their vignetting."""
+    lost = [lenses[number].at(radii) for number, radii in zip((shared.i, shared.j), shared.radii, strict=True)]
+    ratios, weights = log_ratios(shared.blocks.means) - (lost[0] - lost[1])[:, None], block_weights(shared.blocks)
+    middle = np.array([weighted_median(column, weights) for column in ratios.T])
+    spread = np.maximum(np.median(np.abs(ratios - middle), axis=0), GRAPH_EXPOSURE.least_spread)
+    return _Ratio(shared.i, shared.j, middle, spread, len(shared.blocks))
+
+
+def _solved(ratios: Sequence[_Ratio], count: int, channels: int, to_reference: bool) -> Array:
+    """Logarithms (N, C) of the gains; the median of the pictures that hang together stays as it is, or the reference.
+    """
+    first, second = (np.array([getattr(one, name) for one in ratios], np.intp) for name in ("i", "j"))
+    links = coo_matrix((np.ones(len(ratios)), (first, second)), shape=(count, count))
+    groups, group = connected_components(links, directed=False)
+    # one picture of each group is held; which one is of no consequence
+    free = np.setdiff1d(np.arange(count), [np.flatnonzero(group == number)[0] for number in range(groups)])
+    gains, trust = np.zeros((count, channels)), np.ones(len(ratios))
+    for scale in (*GRAPH_EXPOSURE.outlier_logs, None):
+        for k in range(channels):
+            matrix, right = np.zeros((count, count)), np.zeros(count)
+            for one, share in zip(ratios, trust, strict=True):
+                weight, ends = share * one.blocks / one.spread[k] ** 2, [one.i, one.j]
+                matrix[np.ix_(ends, ends)] += weight * np.array([[1, -1], [-1, 1]])
+                right[ends] += weight * one.middle[k] * np.array([-1, 1])
+            gains[free, k] = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
+        if scale is not None:
+            left = [np.abs(gains[one.i] - gains[one.j] + one.middle).mean() for one in ratios]
+            trust = 1 / (1 + (np.array(left) / scale) ** 2) ** 2
+    for number in range(groups):
+        own = group == number
+        gains[own] -= gains[0] if to_reference and own[0] else np.median(gains[own], axis=0)
+    return gains
+
+
+def _with_clipped(
+    exposures: Sequence[Exposure], blocks: Sequence[PictureBlocks | None], layers: Sequence[Layer],
+    maps: Sequence[CanvasMap], hidden: Sequence[NDArray[np.bool_]],
+) -> tuple[Exposure, ...]:  # fmt: skip
+    """The same with how much of each picture is over-exposed, and what another tells of its clipped light."""
+    out = []
+    for number, one in enumerate(exposures):
+        share, other = _overexposed(blocks, number)
+        told = None
+        if share >= CLIPPED.least_share:
+            shown = np.logical_and.reduce([
+                (layers[k].alpha > OVERLAP.opaque_alpha) & ~hidden[k] for k in (number, other)
+            ])  # fmt: skip
+            toned, reference = (exposures[k].applied(layers[k], maps[k]).light for k in (number, other))
+            told = clipped_light(layers[number].light, toned, reference, shown)
+        out.append(replace(one, overexposed=share, clipped=told))
+    return tuple(out)
+
+
+def _overexposed(blocks: Sequence[PictureBlocks | None], number: int) -> tuple[float, int]:
+    """Share of what a picture and others show that is clipped in this one alone, and the other that tells most of it.
+    """
+    own = blocks[number]
+    if own is None:
+        return 0.0, number
+    alone, shown = (np.zeros(own.known.shape, np.float32) for _ in range(2))
+    most, teller = 0.0, number
+    for k, other in enumerate(blocks):
+        meeting = None if other is None or k == number else own.meeting(other)
+        if other is None or meeting is None:
+            continue
+        here, there = meeting
+        both = np.minimum(own.shown[here], other.shown[there])
+        unclipped = np.clip(own.clipped[here] - other.clipped[there], 0, both)
+        alone[here], shown[here] = np.maximum(alone[here], unclipped), np.maximum(shown[here], both)
+        if unclipped.sum() > most:
+            most, teller = float(unclipped.sum()), k
+    return float(alone.sum() / max(shown.sum(), 1.0)), teller

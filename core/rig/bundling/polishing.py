@@ -1,0 +1,155 @@
+"""From places that are nearly right to the bundle's result: bundling, leaving out what does not fit, bundling again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...raster.arrays import Array
+from ...raster.robust import sigma_of_lengths
+from .bundle import Bundled, DepthPrior, Settings, Tick, bundle, robust_cost
+from .bundle_options import BUNDLE, JUDGE, POLISHING
+from .reprojection import lengths_of_errors
+from .solution import Problem, Solution
+from .triangulation import triangulate
+
+
+@dataclass(frozen=True, eq=False)
+class Polished:
+    """problem: with the places as they were tied; solution: about the picture nearest to the middle, largest distance
+    of a place 1; cost: px², of all observations, also of those left out; behind: share of points with ρ < 0; one_place:
+    whether only rotations were solved for; prior: what held points without parallax."""
+
+    problem: Problem
+    solution: Solution
+    cost: float
+    behind: float
+    one_place: bool
+    prior: DepthPrior | None
+
+
+def polish(problem: Problem, solution: Solution, tick: Tick) -> Polished:
+    """All of it, from rotations and places on; points are triangulated here."""
+    reference = _middle(solution)
+    solution = _points_anew(problem, solution.seen_from(reference).rescaled())
+    prior = depth_prior(solution)
+    wide = Settings(BUNDLE.first_kernel_px, POLISHING.first_iterations, POLISHING.first_tolerance, lenses=False)
+    solution = bundle(problem, solution, wide, reference, prior, tick).solution
+    for iterations, tolerance in zip(POLISHING.revived_iterations, POLISHING.revived_tolerances, strict=True):
+        solution = _revived(problem, solution).rescaled()
+        settings = Settings(BUNDLE.kernel_px, iterations, tolerance)
+        solution, kernel, _ = _round(problem, solution, reference, settings, tick)
+    solution = _settled(problem, solution, reference, BUNDLE.kernel_px, tick)
+    sharp = _settled(problem, solution, reference, kernel, tick)
+    if total_cost(problem, sharp) < (1 + POLISHING.sharp_loss) * total_cost(problem, solution):
+        solution = sharp
+    solution = solution.rescaled()
+    return Polished(problem, solution, total_cost(problem, solution), _behind(solution), False, depth_prior(solution))
+
+
+def _settled(problem: Problem, solution: Solution, reference: int, kernel_px: float, tick: Tick) -> Solution:
+    """Rounds with one kernel until hardly anything is left out any more and the cost does not fall."""
+    last = np.inf
+    for tolerance in POLISHING.tolerances:
+        settings = Settings(kernel_px, POLISHING.iterations, tolerance)
+        before = int(solution.used.sum())
+        solution, _, cost = _round(problem, solution.rescaled(), reference, settings, tick)
+        pruned = before - int(solution.used.sum())
+        if pruned < POLISHING.settled_pruned * before and cost > (1 - POLISHING.settled_cost) * last:
+            break
+        last = cost
+    return solution
+
+
+def _round(
+    problem: Problem, solution: Solution, reference: int, settings: Settings, tick: Tick
+) -> tuple[Solution, float, float]:
+    """One bundle, without the observations that it does not fit; px at the features' scale of a kernel as wide as the
+    noise; the cost."""
+    bundled = bundle(problem, solution, settings, reference, depth_prior(solution), tick)
+    sigma = sigma_of_lengths(bundled.lengths) / problem.scale if len(bundled.lengths) else np.inf
+    kernel = float(np.clip(BUNDLE.last_kernel_sigmas * sigma, BUNDLE.least_kernel_px, BUNDLE.kernel_px))
+    return _pruned(problem, bundled, POLISHING.prune_sigmas), kernel, bundled.cost
+
+
+def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polished:
+    """The same for pictures that were all taken from one place: every point is at infinity."""
+    solution = replace(solution, centres=np.zeros_like(solution.centres)).seen_from(0)
+    solution = _points_anew(problem, solution)
+    solution = replace(solution, inverse_ranges=np.zeros_like(solution.inverse_ranges))
+    for kernel in POLISHING.rotation_kernels_px:
+        settings = Settings(kernel, POLISHING.rotation_iterations, POLISHING.rotation_tolerance, depths=False)
+        bundled = bundle(problem, solution, settings, 0, None, tick)
+        solution = _pruned(problem, bundled, POLISHING.rotation_prune_sigmas)
+    return Polished(problem, solution, total_cost(problem, solution), 0.0, True, None)
+
+
+def total_cost(problem: Problem, solution: Solution) -> float:
+    """The robust cost, px², of all observations: of points that could not be solved too, as if they were far off."""
+    kernel = BUNDLE.kernel_px * problem.scale
+    lengths = lengths_of_errors(problem, solution)
+    missed = np.sqrt(JUDGE.missed_kernels) * kernel
+    return float(robust_cost(np.where(np.isnan(lengths), missed, lengths), kernel).sum())
+
+
+def depth_prior(solution: Solution) -> DepthPrior | None:
+    """ρ near the median of its neighbours in direction, within the spread of all: weak where there is any parallax."""
+    points = np.flatnonzero(solution.solved)
+    if len(points) < POLISHING.prior_least_points or not solution.centres.any():
+        return None
+    rays, inverse_ranges = solution.rays[points], solution.inverse_ranges[points]
+    _, near = cKDTree(rays).query(rays, k=POLISHING.prior_neighbours + 1)
+    mean = np.zeros(len(solution.solved))
+    mean[points] = np.median(inverse_ranges[near[:, 1:]], axis=1)
+    spread = max(float(np.percentile(np.abs(inverse_ranges), POLISHING.prior_percentile)), 1e-9)
+    return DepthPrior(mean, np.full(len(mean), POLISHING.prior_share * spread))
+
+
+def _middle(solution: Solution) -> int:
+    """The picture whose place is nearest to the mean of all: rays from there are the best conditioned."""
+    centres = solution.centres
+    return int(np.argmin(np.linalg.norm(centres - centres.mean(axis=0), axis=1)))
+
+
+def _points_anew(problem: Problem, solution: Solution) -> Solution:
+    everything = np.ones(len(problem.tracks.point), bool)
+    return triangulate(problem, replace(solution, used=everything))
+
+
+def _revived(problem: Problem, solution: Solution) -> Solution:
+    """All observations again; points that they do not fit, or that had too few, are triangulated anew."""
+    anew = _points_anew(problem, solution)
+    lengths = lengths_of_errors(problem, solution)
+    worst = np.maximum.reduceat(np.nan_to_num(lengths, nan=np.inf), problem.tracks.starts)
+    bad = (worst > POLISHING.retriangulate_px * problem.scale) | ~solution.solved
+    rays = np.where(bad[:, None], anew.rays, solution.rays)
+    inverse_ranges = np.where(bad, anew.inverse_ranges, solution.inverse_ranges)
+    return replace(anew, rays=rays, inverse_ranges=inverse_ranges)
+
+
+def _pruned(problem: Problem, bundled: Bundled, sigmas: float) -> Solution:
+    """Without the observations that are too far off."""
+    solution = bundled.solution
+    if not len(bundled.lengths):
+        return solution
+    limit = max(sigmas * sigma_of_lengths(bundled.lengths), POLISHING.prune_px * problem.scale)
+    bad = bundled.chosen[bundled.lengths > limit]
+    used = solution.used.copy()
+    used[bad] = False
+    return replace(solution, used=used)
+
+
+def _behind(solution: Solution) -> float:
+    ranges = solution.inverse_ranges[solution.solved]
+    return float((ranges < 0).mean()) if len(ranges) else 0.0
+
+
+def start(problem: Problem, R: Array, lens: Array) -> Solution:
+    """Where the bundle begins before places are known, lens (L, LENS): no points, all places the origin."""
+    points, observations = len(problem.tracks), len(problem.tracks.point)
+    ahead = np.tile([0.0, 0, 1], (points, 1))
+    nowhere = np.zeros((problem.pictures, 3))
+    none = np.zeros(points, bool)
+    return Solution(R, nowhere, lens, ahead, np.zeros(points), none, np.ones(observations, bool))

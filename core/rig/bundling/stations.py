@@ -1,0 +1,95 @@
+"""Which pictures were taken from one place: proposed by pairs that rotate, decided by what the bundle costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...raster.arrays import Array
+from ..averaging.averaged import PairGeometry
+from ..averaging.graph import components
+from .bundle import Tick
+from .bundle_options import JUDGE
+from .polishing import Polished, polish, polish_rotations
+from .positions import SamePlace, place_pictures
+from .reprojection import lengths_of_errors
+from .solution import Problem, Solution
+
+Station = tuple[int, ...]
+
+
+def proposed(pairs: Sequence[PairGeometry], members: Sequence[int]) -> list[Station]:
+    """Stations that pairs join which a rotation explains, pictures counted among the members.
+
+    A picture is taken out again as long as all its pairs inside together prefer a pose.
+    """
+    place = {member: k for k, member in enumerate(members)}
+    gain = {(place[pair.i], place[pair.j]): pair.rotation_gain * len(pair.index) for pair in pairs}
+    turning = [(place[pair.i], place[pair.j]) for pair in pairs if pair.rotates]
+    found = []
+    for group in components(len(members), turning):
+        station = set(group)
+        while len(station) > 1:
+            inside = {k: sum(g for ends, g in gain.items() if k in ends and station.issuperset(ends)) for k in station}
+            least = min(inside, key=lambda k: inside[k])
+            if inside[least] >= 0:
+                found.append(tuple(sorted(station)))
+                break
+            station.remove(least)
+    return found
+
+
+def same_places(pairs: Sequence[PairGeometry], members: Sequence[int]) -> list[SamePlace]:
+    """Pairs that a rotation explains, pictures counted among the members."""
+    place = {member: k for k, member in enumerate(members)}
+    return [SamePlace(place[pair.i], place[pair.j], len(pair.index)) for pair in pairs if pair.rotates]
+
+
+def polish_best(
+    problem: Problem, start: Solution, stations: Sequence[Station], same: Sequence[SamePlace],
+    framed: Callable[[Array], Array], tick: Tick,
+) -> Polished:  # fmt: skip
+    """The cheapest of: every picture at a place of its own; those of each station at one place; all at one place, where
+    a station holds all. What more places cost is counted (BIC). Where there is little parallax, rotations bundled as if
+    at one place are better to start from than averaged ones, and are tried too.
+
+    framed: brings places (N, 3) to where the start's poses stand.
+    """
+    candidates = []
+    starts: list[tuple[Problem, Solution]] = [(problem, start)]
+    if stations and not problem.held.any():  # given poses say themselves what is at one place
+        turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
+        if _little_parallax(turned):
+            starts.append((problem, replace(start, R=turned.solution.R, lens=turned.solution.lens)))
+        if any(len(station) == problem.pictures for station in stations):
+            candidates.append(turned)
+        else:
+            starts.append((problem.with_stations(stations), start))
+    for assigned, begun in starts:
+        placed = place_pictures(assigned, begun, same)
+        candidates.append(polish(assigned, replace(begun, centres=framed(placed.centres)), tick))
+    return min(candidates, key=information_criterion)
+
+
+def _little_parallax(turned: Polished) -> bool:
+    """Whether most observations are about where rotations alone have them."""
+    problem = turned.problem
+    off = np.nanpercentile(lengths_of_errors(problem, turned.solution), JUDGE.little_parallax_percentile)
+    return bool(off < JUDGE.little_parallax_sigmas * problem.noise_px)
+
+
+def information_criterion(found: Polished) -> float:
+    """Schwarz's criterion: the cost in nats, and half the log of the number of observations for each free parameter.
+
+    A point that is seen from one place only has no depth: that is most of what a station saves.
+    """
+    problem = found.problem
+    tracks = problem.tracks
+    places = len(np.unique(problem.place)) - 1
+    place = problem.place[tracks.picture]
+    several = np.maximum.reduceat(place, tracks.starts) > np.minimum.reduceat(place, tracks.starts)
+    depths = 0 if found.one_place else int((several & found.solution.solved).sum())
+    noise = max(problem.noise_px, JUDGE.least_noise_px * problem.scale)
+    return float(found.cost / (2 * noise**2) + (3 * places + depths) * np.log(len(tracks.point)) / 2)
