@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.panorama.levelling import turned
 from edf_stitch.core.panorama.projection import Projection, round_projection
+from edf_stitch.core.panorama.rig_options import RIG_WARP
 from edf_stitch.core.panorama.rig_warp import build_rig_map, build_rig_warp, outline_of
 from edf_stitch.core.panorama.warp import build_map
 from edf_stitch.core.pictures.picture import picture_from_array
@@ -164,8 +164,7 @@ def test_two_pictures_have_the_maps_of_a_pair(lens: tuple[float, ...], monkeypat
     field = strict(rig)
     canvas = Canvas(460, 300, (40, 30))
     # both on the same nodes
-    options = SimpleNamespace(nodes=20_000)
-    monkeypatch.setattr("edf_stitch.core.panorama.rig_warp.RIG_WARP", options)
+    monkeypatch.setattr("edf_stitch.core.panorama.rig_warp.RIG_WARP", replace(RIG_WARP, nodes=20_000))
     found = build_rig_map(field, rig.views, canvas)
     pair = build_map(OnPlane(field, rig.views[0].K), rig.views, canvas)  # type: ignore[arg-type]
     for one, other in zip(found.maps, pair.maps, strict=True):
