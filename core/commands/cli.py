@@ -148,8 +148,8 @@ stitched, 4 a file can't be read or written, 130 interrupted."""
 _BATCH = """Stitch every line of LIST.csv: pictures, a folder of them, or a clip of two cameras that stand still
 (a_%04d.png or a_####.png), whose frames share one alignment. A line holds reference,target and, if wanted, a name; a
 header may name picture3 and so on, first, last, step, focal_px and focal35 as well. A bad one is reported and the rest
-goes on; DIR/batch.json says what became of each. Exit codes: 0 all done, 2 the call is wrong, 3 a pair can't be stitched, 4 a file can't be read or
-written, 130 interrupted."""
+goes on; DIR/batch.json says what became of each. Exit codes: 0 all done, 2 the call is wrong, 3 one can't be stitched,
+4 a file can't be read or written, 130 interrupted."""
 _COMPARE = """Stitch every pair with every field, features and geometry found once, and put the figures side by side:
 OUTDIR gets compare.html, .md, .csv and .json, pictures, and the seconds in timing.md and .json. A PATH is a folder of
 two pictures, a folder of such folders (also OUTDIR/pictures of `edf validate`: then the truth is asked too), or a

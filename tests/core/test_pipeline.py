@@ -353,11 +353,11 @@ def test_the_same_field_gives_the_same_map_wherever_memory_lies(small_result: St
         assert np.array_equal(again.inverse_depth, first.inverse_depth, equal_nan=True)
 
 
-def test_pictures_come_as_a_list_of_two(small_pair: Pair) -> None:
+def test_pictures_come_as_a_list_of_two_to_sixty(small_pair: Pair) -> None:
     for alone in ("left.jpg", Path("left.jpg"), small_pair.reference):
         with pytest.raises(BadRequest, match=r"as a list: stitch\(\[left, right\], options\)"):
             stitch(alone)  # type: ignore[arg-type]
-    for count, words in ((1, "one picture alone"), (3, "3 pictures given: two at a time for now")):
+    for count, words in ((1, "one picture alone"), (61, "61 pictures given, at most 60")):
         with pytest.raises(BadRequest, match=words):
             stitch([small_pair.reference] * count)
 
