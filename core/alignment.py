@@ -41,7 +41,6 @@ from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
 from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
-from .rig.from_pictures import matched_pictures, registered
 from .rig.given import given_matches
 from .rig.left_out import check_connected
 from .rig.pair_edges import edges_of
@@ -201,6 +200,8 @@ def _of_many(
     progress: ReportProgress,
 ) -> Geometry:  # fmt: skip
     """The geometry of more than two pictures; of two of them, if no more connect."""
+    from .rig.from_pictures import matched_pictures, registered  # a pair starts sooner without it
+
     pictures, cache = frame.pictures, Cache(options.cache)
     if options.matches is None:
         matched = matched_pictures(pictures, options.preview, cache, progress)

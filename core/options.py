@@ -92,7 +92,8 @@ class StitchOptions:
         or transparent = the seam decides.
     exposure : str or float, default "auto"
         What becomes of the pictures' light: one of EXPOSURES, or stops that are added to "auto" (docs/method.md). At
-        "auto" both meet at one exposure between theirs, and of float pictures at the reference's.
+        "auto" both meet at one exposure between theirs, many at the median of all, and float pictures at the
+        reference's.
     holes : str, default "auto"
         What becomes of pixels that no camera saw, one of HOLES: "auto" fills small closed holes, "inpaint" all that
         something near hid. `linear` blending has none of the latter.

@@ -80,7 +80,8 @@ def _add_control(parser: argparse.ArgumentParser) -> None:
     control = parser.add_argument_group("control")
     control.add_argument(
         "--matches", type=Path, metavar="FILE.csv",
-        help="x,y,x2,y2[,weight] in px: used as given, nothing is searched; a report's own: as they were found",
+        help="x,y,x2,y2[,weight] in px: used as given, nothing is searched; a report's own: as they were found; of more "
+        "than two pictures the columns picture and picture2 name them",
     )  # fmt: skip
     control.add_argument(
         "--ignore-ref", type=Path, metavar="MASK", help="a picture, white where REF is to be ignored altogether"
@@ -113,8 +114,8 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
     )  # fmt: skip
     how.add_argument(
         "--slide", default="auto", type=_slide, metavar="SLIDE",
-        help="how far the viewpoint slides from REF's place to TARGET's across the overlap: auto (default), or a share "
-        "from 0 (not at all) to 1",
+        help="how far the viewpoint slides from REF's place to TARGET's across the overlap, or among the places of more "
+        "pictures: auto (default), or a share from 0 (not at all) to 1",
     )  # fmt: skip
     how.add_argument(
         "--projection", default="auto", type=_projection, metavar="PROJECTION",

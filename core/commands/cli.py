@@ -121,7 +121,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_stitch(commands.add_parser("stitch", help="stitch pictures into one panorama", description=_STITCH))
-    _add_batch(commands.add_parser("batch", help="stitch a list of pairs and clips", description=_BATCH))
+    _add_batch(commands.add_parser("batch", help="stitch a list of panoramas and clips", description=_BATCH))
     _add_compare(
         commands.add_parser("compare", help="every field on every pair, in one table", description=_COMPARE)
     )
@@ -145,9 +145,9 @@ slides along its epipolar lines to meet it; more may come in any order, and thos
 out and named. Messages go to stderr; the last line says whether the panorama is good, where to look at it, or why it is
 not usable. Exit codes: 0 done, 1 not usable (with --strict-verdict), 2 the call is wrong, 3 the pictures can't be
 stitched, 4 a file can't be read or written, 130 interrupted."""
-_BATCH = """Stitch every line of LIST.csv: a pair of pictures, or a clip of two cameras that stand still (a_%04d.png or
-a_####.png), whose frames share one alignment. A line holds reference,target and, if wanted, a name; a header may name
-first, last, step, focal_px and focal35 as well. A bad pair is reported and the rest goes on; DIR/batch.json says what
+_BATCH = """Stitch every line of LIST.csv: pictures, a folder of them, or a clip of two cameras that stand still
+(a_%04d.png or a_####.png), whose frames share one alignment. A line holds reference,target and, if wanted, a name; a
+header may name picture3 and so on, first, last, step, focal_px and focal35 as well. A bad one is reported and the rest goes on; DIR/batch.json says what
 became of each. Exit codes: 0 all done, 2 the call is wrong, 3 a pair can't be stitched, 4 a file can't be read or
 written, 130 interrupted."""
 _COMPARE = """Stitch every pair with every field, features and geometry found once, and put the figures side by side:
@@ -195,7 +195,7 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
 
 def _add_batch(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_batch)
-    parser.add_argument("list", metavar="LIST.csv", type=Path, help="the pairs; relative paths start at its folder")
+    parser.add_argument("list", metavar="LIST.csv", type=Path, help="the list; relative paths start at its folder")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for all outputs")
     add_options(parser)
     files = parser.add_argument_group("files")

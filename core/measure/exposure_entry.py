@@ -35,13 +35,14 @@ def exposure_entry(pictures: Sequence[Picture], decided: Sequence[Decided]) -> d
 def exposure_warnings(pictures: Sequence[Picture], exposures: Sequence[Exposure]) -> list[str]:
     """What of the light could not be matched, and which picture is over-exposed beside the other."""
     out = []
+    other, both = ("other", "both") if len(pictures) == 2 else ("others", "others too")
     for picture, one in zip(pictures, exposures, strict=True):
         if one.why_not:
             out.append(f"the exposure of {picture.name} could not be matched: {one.why_not}; its border may show")
         if one.overexposed > WARNING.overexposed_share:
             out.append(
-                f"{picture.name} is over-exposed beside the other: {one.overexposed:.0%} of what both show is clipped "
-                "in it alone; there, colours are guessed and detail is missing"
+                f"{picture.name} is over-exposed beside the {other}: {one.overexposed:.0%} of what {both} show is "
+                "clipped in it alone; there, colours are guessed and detail is missing"
             )
     return out
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..pipeline import StitchResult
+if TYPE_CHECKING:
+    from ..pipeline import StitchResult
+
 
 
 def camera_table(result: StitchResult) -> dict[str, Any]:

@@ -8,7 +8,7 @@ panorama's size.
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -22,13 +22,15 @@ from ..measure.metrics import look_up
 from ..panorama.rig_viewpoint import RigViewpoint
 from ..panorama.viewpoint import Viewpoint
 from ..panorama.warp import Warp
-from ..pipeline import StitchResult
 from ..raster.arrays import Array, strips
 from ..raster.colour import encode
 from ..raster.lazy import whole
 from ..raster.resizing import size_change
 from .match_table import match_file
 from .options import INSPECTION
+
+if TYPE_CHECKING:
+    from ..pipeline import StitchResult
 
 # What the window is told of each match: the field stands on it, or it contradicts the others.
 USED, LEFT_OUT = "USED", "LEFT_OUT"

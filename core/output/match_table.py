@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..cameras.edge import Edge
 from ..cameras.matches import Matches
-from ..pipeline import StitchResult
 from ..pose.match_files import NOT_BY_FIELD, NOT_BY_GEOMETRY, USED, matches_csv
+
+if TYPE_CHECKING:
+    from ..pipeline import StitchResult
 
 
 def match_file(result: StitchResult) -> bytes:

@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -19,7 +19,6 @@ from ..measure.report import plain
 from ..panorama.layers import Layer
 from ..panorama.rig_viewpoint import RigViewpoint
 from ..pictures.encoding import encode_picture, output_bits
-from ..pipeline import StitchResult
 from ..raster.arrays import cut
 from ..raster.colour import decode
 from ..raster.lazy import whole
@@ -29,6 +28,9 @@ from ..system.output_files import OutputFiles
 from .camera_file import camera_table
 from .match_table import match_file
 from .rig_page import rig_page
+
+if TYPE_CHECKING:
+    from ..pipeline import StitchResult
 
 # Versions of the layers' folder and of the warp's file (docs/formats.md).
 LAYERS_FORMAT, WARP_FORMAT = 2, 2
@@ -289,7 +291,7 @@ def warp_bytes(result: StitchResult) -> bytes:
     ray r of the pixel instead; there is no offset, but `projection` (its name), `focal` (px per radian), `centre`
     (canvas px of the direction ahead) and `rotation` (from its axes to the reference camera's). Where the viewpoint
     slides, by `slide` s, which is `s1` at most, that ray starts at s c, c = −Rᵀ t of the target, and inverse_depth is
-    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). Of more than two pictures, `places` say
+    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). Of more than two pictures `places` say
     where it starts. docs/formats.md lists every key.
 
     Parameters

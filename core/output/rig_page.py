@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 
-from ..pipeline import StitchResult
 from ..raster.colour import encode
 from .embedded import jpeg_uri
 from .options import GRAPH
 from .page import STYLE, table
 from .rig_graph import rig_graph
+
+if TYPE_CHECKING:
+    from ..pipeline import StitchResult
 
 _GRAPH_STYLE = """
 .graph { max-width: 100%; height: auto; background: var(--soft); border-radius: 6px; }

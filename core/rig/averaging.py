@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..cameras.camera import Camera
 from ..cameras.rig import PictureMatches
 from ..raster.arrays import Array
+from ..system.progress import Tick, unwatched
 from .averaged import Averaged, PairGeometry, Verified
 from .candidates import Candidates, at_other_lens, belonging, candidates, noise_of
 from .focal_starts import log_sigma, starts
@@ -34,12 +35,14 @@ class _Fitted:
     focal_information: float
 
 
-def hypotheses(cameras: Sequence[Camera], points: Sequence[Array], verified: Verified) -> list[Averaged]:
+def hypotheses(
+    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, tick: Tick = unwatched
+) -> list[Averaged]:
     """Average from every start that is worth it (`focal_starts.starts`).
 
     Parameters
     ----------
-    cameras, points, verified
+    cameras, points, verified, tick
         As for `averaged`.
 
     Returns
@@ -47,7 +50,8 @@ def hypotheses(cameras: Sequence[Camera], points: Sequence[Array], verified: Ver
     list of Averaged
         The cheapest first. Of those that end at the same lens and rotations only one.
     """
-    found = [averaged(cameras, points, verified, start) for start in starts(cameras, points, verified)]
+    begun = starts(cameras, points, verified, tick)
+    found = [averaged(cameras, points, verified, start, tick=tick) for start in begun]
     distinct: list[Averaged] = []
     for each in sorted((each for each in found if each is not None), key=lambda each: each.cost):
         if not any(_alike(each, other) for other in distinct):
@@ -70,8 +74,9 @@ def _alike(first: Averaged, second: Averaged) -> bool:
 
 
 def averaged(
-    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, start: SharedLens, hold: bool = False
-) -> Averaged | None:
+    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, start: SharedLens, hold: bool = False,
+    tick: Tick = unwatched,
+) -> Averaged | None:  # fmt: skip
     """Find the rotations of all pictures that connect, and one factor on their focal lengths and one k1.
 
     Parameters
@@ -86,6 +91,8 @@ def averaged(
         Where to start (`focal_starts.starts`).
     hold : bool
         Whether the start's focal length and k1 stay: those of a bundle, which knows better than pairs do.
+    tick : callable
+        Called between steps.
 
     Returns
     -------
@@ -96,20 +103,24 @@ def averaged(
         return None
     matched, ends = matched_rays(cameras, points, verified)
     prior = LensPrior(log_sigma(cameras) or 1.0, (False, False) if hold else matched.anything_free)
-    fitted = _fitted(matched, matched.within_limits(start), prior, verified)
+    fitted = _fitted(matched, matched.within_limits(start), prior, verified, tick)
     if fitted is None:
         return None
-    return _averaged(cameras, verified, matched, ends, fitted)
+    return _averaged(cameras, verified, matched, ends, fitted, tick)
 
 
-def _fitted(matched: MatchedRays, start: SharedLens, prior: LensPrior, verified: Verified) -> _Fitted | None:
+def _fitted(
+    matched: MatchedRays, start: SharedLens, prior: LensPrior, verified: Verified, tick: Tick
+) -> _Fitted | None:
     """Candidates and lens; sought a second time where the lens changed much, or where it comes from rotations."""
-    found = candidates(matched, start, verified.scale, verified.seed)
+    found = candidates(matched, start, verified.scale, verified.seed, tick)
     if not len(found.numbers):
         return None
+    tick()
     together = _together(found, start, prior, verified.scale)
     if not any(prior.free):
         return _Fitted(found, together, AVERAGING.held_information)
+    tick()
     turning = as_rotations(found, together, prior, start, verified.scale)
     rotate = turning.share > PAIR_FIT.rotation_share
     lens = turning.lens if rotate else together.lens
@@ -117,7 +128,7 @@ def _fitted(matched: MatchedRays, start: SharedLens, prior: LensPrior, verified:
     if not rotate and _near(lens, start):
         return _Fitted(found, together, evidence)
     # anew, not followed from here: weak pairs find other minima at another lens
-    again = candidates(matched, lens, verified.scale, verified.seed)
+    again = candidates(matched, lens, verified.scale, verified.seed, tick)
     if not len(again.numbers):
         return _Fitted(found, together, evidence)
     if rotate:
@@ -137,12 +148,14 @@ def _together(found: Candidates, lens: SharedLens, prior: LensPrior, scale: floa
 
 
 def _averaged(
-    cameras: Sequence[Camera], verified: Verified, matched: MatchedRays, ends: NDArray[np.intp], fitted: _Fitted
-) -> Averaged:
+    cameras: Sequence[Camera], verified: Verified, matched: MatchedRays, ends: NDArray[np.intp], fitted: _Fitted,
+    tick: Tick,
+) -> Averaged:  # fmt: skip
     """Average, and again with the new lens as long as closing loops moves the focal length: rotations of pairs follow
     it linearly over some per cent only."""
     by_pairs = fitted.together.lens
     for _ in range(AVERAGING.lens_rounds):
+        tick()
         found, together = fitted.found, fitted.together
         pairs = [(int(i), int(j)) for i, j in ends[found.numbers]]
         members = heaviest_component(len(cameras), pairs, found.rays.counts.tolist())

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..pose.rotation import nearest_rotation
 from ..raster.arrays import Array
 from ..raster.robust import sigma_of
+from ..system.progress import Tick, unwatched
 from .matched_rays import MatchedRays, Rays, SharedLens
 from .options import CANDIDATES, PAIR_FIT
 from .pair_models import EpipolarModel, Poses, cauchy_costs
@@ -48,7 +49,9 @@ class Candidates:
         return Poses(np.array([poses.R[0] for poses in self.poses]), np.array([poses.t[0] for poses in self.poses]))
 
 
-def candidates(matched: MatchedRays, lens: SharedLens, scale: float, seed: int) -> Candidates:
+def candidates(
+    matched: MatchedRays, lens: SharedLens, scale: float, seed: int, tick: Tick = unwatched
+) -> Candidates:
     """Poses of all pairs, the best first.
 
     Starts are RANSAC's pose and, where matches are few, those of other seeds and the best pure rotation with directions
@@ -64,6 +67,8 @@ def candidates(matched: MatchedRays, lens: SharedLens, scale: float, seed: int) 
         px by which thresholds are multiplied.
     seed : int
         Of RANSAC.
+    tick : callable
+        Called before each pair.
 
     Returns
     -------
@@ -74,6 +79,7 @@ def candidates(matched: MatchedRays, lens: SharedLens, scale: float, seed: int) 
     numbers, turned, starts = [], [], []
     inliers = np.zeros(len(seen.a), bool)
     for k in range(len(matched)):
+        tick()
         rows = slice(matched.starts[k], matched.starts[k + 1])
         part = Rays(seen.a[rows], seen.b[rows], seen.focal[:, rows])
         poses, agree = _ransac(part, scale, seed)

@@ -9,13 +9,16 @@ import poselib
 
 from ..cameras.camera import Camera
 from ..raster.arrays import Array
+from ..system.progress import Tick, unwatched
 from .averaged import Verified
 from .matched_rays import MatchedRays, SharedLens, matched_rays
 from .options import CANDIDATES, LADDER
 from .pair_models import EpipolarModel, Poses
 
 
-def starts(cameras: Sequence[Camera], points: Sequence[Array], verified: Verified) -> list[SharedLens]:
+def starts(
+    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, tick: Tick = unwatched
+) -> list[SharedLens]:
     """Hypotheses of the shared lens that are worth following to the end, the likeliest first.
 
     Parameters
@@ -26,6 +29,8 @@ def starts(cameras: Sequence[Camera], points: Sequence[Array], verified: Verifie
         The features of every picture, raw px.
     verified : Verified
         Their matches.
+    tick : callable
+        Called between steps.
 
     Returns
     -------
@@ -39,7 +44,10 @@ def starts(cameras: Sequence[Camera], points: Sequence[Array], verified: Verifie
     matched, _ = matched_rays(cameras, points, verified)
     few = matched.of_pairs(np.arange(min(len(matched), LADDER.pairs))).thinned(LADDER.matches)
     factors = np.geomspace(*LADDER.factors, LADDER.rungs)
-    cost = np.array([_cost(few, SharedLens(float(factor)), verified) for factor in factors])
+    cost = np.empty(len(factors))
+    for rung, factor in enumerate(factors):
+        tick()
+        cost[rung] = _cost(few, SharedLens(float(factor)), verified)
     cost += 0.5 * (np.log(factors) / sigma) ** 2
     before, after = np.concatenate([[np.inf], cost[:-1]]), np.concatenate([cost[1:], [np.inf]])
     minima = np.flatnonzero((cost <= before) & (cost <= after))

@@ -53,7 +53,7 @@ class CandidateOptions:
     rotation_samples: int = 100
     rotation_rounds: int = 15
     # Inliers of a pair that take part in refining: more take time, and errors of neighbours go together.
-    most_matches: int = 500
+    most_matches: int = 1000
     # Refining starts: iterations, after which so many of each pair stay.
     refining: tuple[tuple[int, int], ...] = ((4, 6), (8, 6))
     # Candidates: at most so many, so much apart, less likely than the best by at most so much (log), and so far from

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -28,6 +28,9 @@ from .solution import lens_of
 from .solving import Solved, solve
 from .turns import degrees_between
 from .uncertainty import deviations
+
+# Shares of the work that are done when pairs are verified, and when their rotations are averaged.
+_VERIFIED, _AVERAGED = 0.1, 0.4
 
 
 def register(
@@ -72,12 +75,12 @@ def register(
     progress = progress or Progress()
     ideal = [undistort(p, camera) if camera.distortion.any() else p for p, camera in zip(points, cameras, strict=True)]
     plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
-    verified = verify(ideal, matches, scale, seed)
-    progress("geometry", 0.0)
-    averages = hypotheses(plain, ideal, verified)
+    verified = verify(ideal, _watched(matches, progress), scale, seed)
+    averages = hypotheses(plain, ideal, verified, partial(progress, "geometry", _VERIFIED))
     found = []
     for k, rotated in enumerate(averages):
-        solved = solve(plain, ideal, verified, rotated, partial(progress, "geometry", k / len(averages)))
+        share = _AVERAGED + (1 - _AVERAGED) * k / len(averages)
+        solved = solve(plain, ideal, verified, rotated, partial(progress, "geometry", share))
         if solved is not None:
             found.append(solved)
     if not found:
@@ -85,6 +88,13 @@ def register(
     found.sort(key=lambda solved: solved.cost)
     names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
     return _registration_of(cameras, points, verified, found, names)
+
+
+def _watched(matches: Sequence[PictureMatches], progress: ReportProgress) -> Iterator[PictureMatches]:
+    """The same matches; each is told before it is looked at."""
+    for number, pair in enumerate(matches):
+        progress("geometry", _VERIFIED * number / len(matches))
+        yield pair
 
 
 def _registration_of(

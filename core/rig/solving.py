@@ -50,7 +50,7 @@ def solve(
         if found[-1].moved < JUDGE.most_log_focal or len(found) == JUDGE.passes:
             break
         known, shared = _cameras_of(cameras, rotated, found[-1].found)
-        rotated = averaged(known, points, verified, shared, hold=True)
+        rotated = averaged(known, points, verified, shared, hold=True, tick=tick)
     return min(found, key=lambda solved: solved.cost, default=None)
 
 
@@ -124,8 +124,14 @@ def _cameras_of(cameras: Sequence[Camera], rotated: Averaged, found: Polished) -
 
 
 def _judged(found: Polished, pairs: Sequence[PairGeometry], verified: Verified) -> float:
-    """The robust misfit of all that was verified, px² a match: matches that no track took cost as if far off."""
+    """The robust misfit of all that was verified, px² a match: matches that no track took cost as if far off, and focal
+    lengths far from what was believed raise the cost by a share, as matches err together and tell less than they are.
+    """
     matches = sum(len(pair) for pair in verified.pairs)
     took = sum(len(pair.index) for pair in pairs)
     missed = BUNDLE.kernel_px**2 * np.log1p(JUDGE.missed_kernels) * max(matches - took, 0)
-    return float((found.cost / found.problem.scale**2 + missed) / max(matches, 1))
+    lenses = found.problem.lenses
+    believed = np.where(lenses.free[:, 0], lenses.sigma[:, 0], np.inf)
+    sigmas = found.solution.lens[:, 0] / believed
+    doubt = 1 + JUDGE.prior_share * float((sigmas**2).mean())
+    return float((found.cost / found.problem.scale**2 + missed) / max(matches, 1)) * doubt

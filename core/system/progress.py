@@ -9,6 +9,8 @@ from .errors import Cancelled
 
 # Called with a stage's name and how much of it is done.
 ReportProgress = Callable[[str, float], None]
+# Called between the steps of long work that tells no share of it; raises Cancelled where asked to stop.
+Tick = Callable[[], None]
 # Shares of the total time of each stage, in the order of the data; measured on 3 MP pairs, good enough for a bar.
 STAGES: dict[str, float] = {
     "read": 0.05,
@@ -38,6 +40,10 @@ STAGES_OF_MANY: dict[str, float] = {
     "write": 0.06,
 }
 TOLD_AS = {"blend": "seam"}
+
+
+def unwatched() -> None:
+    """The tick of work that nobody waits for."""
 
 
 @dataclass(frozen=True)
