@@ -31,8 +31,9 @@ class SphereOptions:
     max_error_px: float = 4.0
     """px by which a point may be off in the worst of its pictures."""
 
-    min_relative_sensitivity: float = 0.05
-    """px per unit of inverse range, relative to the median point: below, a point says nothing about its range."""
+    min_relative_sensitivity: float = 0.005
+    """px per unit of inverse range, relative to the median point: below, a point says nothing about its range. Pictures
+    close to the viewpoint have far less than others, and are the only ones there."""
 
     noise_range: tuple[float, float] = (0.2, 20.0)
     """Bounds of a point's noise relative to the median point's: a few points with long baselines shall not decide."""
