@@ -183,7 +183,8 @@ def test_the_wheel_holds_every_package():
     """The list in pyproject.toml names them one by one; a room that it lacks is missing wherever pip installs."""
     listed = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]["packages"]
     folders = {path.parent for package in PACKAGES for path in (ROOT / package).rglob("__init__.py")}
-    assert sorted(listed) == sorted(["edf_stitch", *(".".join(("edf_stitch", *f.relative_to(ROOT).parts)) for f in folders)])
+    names = [".".join(("edf_stitch", *folder.relative_to(ROOT).parts)) for folder in folders]
+    assert sorted(listed) == sorted(["edf_stitch", *names])
 
 
 def test_every_module_of_core_stands_in_a_room():
