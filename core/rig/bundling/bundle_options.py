@@ -159,10 +159,8 @@ class JudgeOptions:
     # Relative cost within which hypotheses are reported as possible, and log f within which two are the same.
     possible: float = 0.05
     same_log_focal: float = 0.002
-    # Points that three pictures see from which the lengths between them are in a measured proportion, and parallax of a
-    # pair in σ from which it has a baseline at all.
+    # Points that three pictures see from which the lengths between them are in a measured proportion.
     three_view_points: int = 4
-    parallax_sigmas: float = 3.0
     # Parallax is little where this percentile of errors of rotations alone is below so many σ.
     little_parallax_percentile: float = 80.0
     little_parallax_sigmas: float = 6.0
