@@ -25,7 +25,7 @@ from .bundling.baselines import baselines
 from .bundling.bundle_options import JUDGE
 from .bundling.polishing import Polished
 from .bundling.reprojection import lengths_of_errors
-from .bundling.solution import lens_of
+from .bundling.solution import lens_of, with_lens
 from .bundling.solving import Solved, solve
 from .bundling.uncertainty import deviations
 
@@ -125,7 +125,7 @@ def _rig(
     raw = np.array([points[members[j]][k] for j, k in zip(tracks.picture[rows], tracks.feature[rows], strict=True)])
     seen = Observations(tracks.picture[rows], number[tracks.point[rows]], raw.reshape(-1, 2), used[rows])
     return Rig(
-        tuple(_camera(cameras[member], found, k) for k, member in enumerate(members)),
+        tuple(with_lens(cameras[member], solution.lens[lens[k]]) for k, member in enumerate(members)),
         solution.R,
         solution.t,
         solution.rays[whole],
@@ -141,15 +141,6 @@ def _rig(
         noise,
         best.averaged.loop_degrees,
     )
-
-
-def _camera(camera: Camera, found: Polished, picture: int) -> Camera:
-    """As estimated; what was given stays to the last bit."""
-    log_factor, k1, *shift = found.solution.lens[found.problem.lenses.of[picture]]
-    K = camera.scaled(float(np.exp(log_factor)))
-    K[:2, 2] += shift
-    distortion = camera.distortion if camera.distortion.any() else np.array([k1, 0, 0, 0, 0])
-    return replace(camera, K=K, distortion=distortion)
 
 
 def _stations(found: Polished) -> tuple[tuple[int, ...], ...]:

@@ -14,14 +14,15 @@ from .polishing import Polished
 
 
 def baselines(pairs: Sequence[PairGeometry], members: Sequence[int], found: Polished) -> list[str]:
-    """For each pair "measured", "continuity" or "none" (see `cameras.rig.RigEdge`)."""
+    """For each pair "measured", "continuity" or "none" (see `cameras.rig.RigEdge`): none where a pure rotation is the
+    better model of its matches, so that they say of no baseline that there is one."""
     place = {member: k for k, member in enumerate(members)}
     groups = _rigid_groups(found)
     told = []
     for pair in pairs:
         i, j = place[pair.i], place[pair.j]
         station = found.problem.place[i] == found.problem.place[j]
-        if station or pair.parallax_px < JUDGE.parallax_sigmas * found.problem.noise_px:
+        if station or pair.rotation_gain >= 0:
             told.append("none")
         else:
             told.append("measured" if any({i, j} <= group for group in groups) else "continuity")

@@ -152,18 +152,15 @@ class JudgeOptions:
     # Log f by which the bundle may move it before pairs are estimated again with the bundle's, and passes at most.
     most_log_focal: float = 0.01
     passes: int = 3
-    # Kernel widths squared of a match that no track took: as if it were 5 kernels off.
+    # Kernel widths squared beyond which nothing costs more: 5 kernels off.
     missed_kernels: float = 25.0
-    # Share by which the cost of a hypothesis is raised for each squared σ that its focal length is off the believed:
-    # a chain of pictures costs about the same at half and at twice its focal length.
-    prior_share: float = 0.1
+    # px: kernel of the cost that hypotheses are compared by, about as wide as the noise of features is.
+    kernel_px: float = 0.5
     # Relative cost within which hypotheses are reported as possible, and log f within which two are the same.
     possible: float = 0.05
     same_log_focal: float = 0.002
-    # Points that three pictures see from which the lengths between them are in a measured proportion, and parallax of a
-    # pair in σ from which it has a baseline at all.
+    # Points that three pictures see from which the lengths between them are in a measured proportion.
     three_view_points: int = 4
-    parallax_sigmas: float = 3.0
     # Parallax is little where this percentile of errors of rotations alone is below so many σ.
     little_parallax_percentile: float = 80.0
     little_parallax_sigmas: float = 6.0

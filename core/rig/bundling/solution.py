@@ -72,6 +72,15 @@ def _sigma_of(camera: Camera) -> tuple[float, ...]:
     return camera.log_sigma, BUNDLE.k1_sigma if camera.log_sigma or shift else 0.0, shift, shift
 
 
+def with_lens(camera: Camera, change: Array) -> Camera:
+    """The camera with what was solved for of its lens (LENS,); what was given stays to the last bit."""
+    log_factor, k1, *shift = change
+    K = camera.scaled(float(np.exp(log_factor)))
+    K[:2, 2] += shift
+    distortion = camera.distortion if camera.distortion.any() else np.array([k1, 0, 0, 0, 0])
+    return replace(camera, K=K, distortion=distortion)
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """What is seen, and what is not solved for.

@@ -15,7 +15,8 @@ from ..averaging.averaged import Averaged, PairGeometry, Verified
 from ..averaging.averaging import averaged
 from ..averaging.matched_rays import SharedLens
 from .bundle import Tick
-from .bundle_options import BUNDLE, JUDGE
+from .bundle_options import JUDGE
+from .judging import judged
 from .polishing import Polished, start
 from .solution import LENS, Problem, lenses_of
 from .stations import polish_best, proposed, same_places
@@ -75,7 +76,7 @@ def _bundled(
     stations = proposed(pairs, members) or ([tuple(range(len(members)))] if rotated.one_place else [])
     found = polish_best(problem, begun, stations, same_places(pairs, members), given.placed, tick)
     moved = float(np.abs(found.solution.lens[:, 0] - lens[:, 0]).max())
-    return Solved(rotated, pairs, found, _judged(found, pairs, verified), moved)
+    return Solved(rotated, pairs, found, judged(cameras, points, verified, members, pairs, found), moved)
 
 
 class _Given:
@@ -121,17 +122,3 @@ def _cameras_of(cameras: Sequence[Camera], rotated: Averaged, found: Polished) -
     ]
     free = lenses.free[:, 1]
     return known, SharedLens(1.0, float(np.median(solution.lens[free, 1])) if free.any() else 0.0)
-
-
-def _judged(found: Polished, pairs: Sequence[PairGeometry], verified: Verified) -> float:
-    """The robust misfit of all that was verified, px² a match: matches that no track took cost as if far off, and focal
-    lengths far from what was believed raise the cost by a share, as matches err together and tell less than they are.
-    """
-    matches = sum(len(pair) for pair in verified.pairs)
-    took = sum(len(pair.index) for pair in pairs)
-    missed = BUNDLE.kernel_px**2 * np.log1p(JUDGE.missed_kernels) * max(matches - took, 0)
-    lenses = found.problem.lenses
-    believed = np.where(lenses.free[:, 0], lenses.sigma[:, 0], np.inf)
-    sigmas = found.solution.lens[:, 0] / believed
-    doubt = 1 + JUDGE.prior_share * float((sigmas**2).mean())
-    return float((found.cost / found.problem.scale**2 + missed) / max(matches, 1)) * doubt

@@ -51,9 +51,10 @@ def polish_best(
     problem: Problem, start: Solution, stations: Sequence[Station], same: Sequence[SamePlace],
     framed: Callable[[Array], Array], tick: Tick,
 ) -> Polished:  # fmt: skip
-    """The cheapest of: every picture at a place of its own; those of each station at one place; all at one place, where
-    a station holds all. What more places cost is counted (BIC). Where there is little parallax, rotations bundled as if
-    at one place are better to start from than averaged ones, and are tried too.
+    """The cheapest of: every picture at a place of its own and, where there are stations, those of each at one place,
+    and all at one place: pairs with few matches do not show that they rotate. What more places cost is counted (BIC).
+    Where there is little parallax, rotations bundled as if at one place are better to start from than averaged ones,
+    and are tried too.
 
     framed: brings places (N, 3) to where the start's poses stand.
     """
@@ -63,9 +64,8 @@ def polish_best(
         turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
         if _little_parallax(turned):
             starts.append((problem, replace(start, R=turned.solution.R, lens=turned.solution.lens)))
-        if any(len(station) == problem.pictures for station in stations):
-            candidates.append(turned)
-        else:
+        candidates.append(turned)
+        if not any(len(station) == problem.pictures for station in stations):
             starts.append((problem.with_stations(stations), start))
     for assigned, begun in starts:
         placed = place_pictures(assigned, begun, same)
