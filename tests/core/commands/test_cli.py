@@ -432,7 +432,7 @@ def test_one_thread_is_set_before_numpy_loads(tmp_path: Path) -> None:
     env = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True,
                           timeout=120)  # fmt: skip
-    assert done.stdout == "True 1\n" and "a.png: no such file" in done.stderr
+    assert done.stdout == "True 1\n" and "a.png, b.png: no such file" in done.stderr
 
 
 # `edf` that stops to think where a stage begins, or with all its files written and none in place yet ("written"): so it
