@@ -323,6 +323,13 @@ def test_what_cannot_be_stitched_gives_3(pictures: list[str], tmp_path: Path, sa
     assert "same picture" in said()[1] and set(files(tmp_path)) == {"noise.png"}
 
 
+def test_a_wrong_name_is_told_before_the_work(pictures: list[str], tmp_path: Path, said: Callable, quick: list) -> None:
+    for option in (["--viewpoint", "nobody"], ["--ignore", f"nobody={pictures[0]}"]):
+        assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *option]) == 2
+        assert "no picture is called 'nobody'; there are: reference.png, target.png" in said()[1]
+    assert not quick
+
+
 def test_what_cannot_be_read_gives_4(pictures: list[str], tmp_path: Path, said: Callable) -> None:
     (tmp_path / "no.png").write_bytes(b"not a picture")
     (tmp_path / "c.json").write_text("{", "utf-8")
