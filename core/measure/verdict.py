@@ -227,7 +227,10 @@ def _seam_places(look: Look, pair: _Pair, names: Sequence[str], shift: tuple[int
     """Where a seam is seen."""
     apart = VERDICT.together_share * look.side
     least = 2 * max(VERDICT.seam_px, VERDICT.seam_share * look.side)
+    across = VERDICT.many_seams_share * look.side if len(look.shows) > 2 else 0.0
     for part in _parts(pair.seam > VERDICT.step, least, apart):
+        if max(cv2.boundingRect(part.astype(np.uint8))[2:]) < across:
+            continue
         near = dilated(part, max(1, round(VERDICT.rim_share * look.side)))
         cut_by = [
             called(number, names) for number, other in (pair.numbers, pair.numbers[::-1])

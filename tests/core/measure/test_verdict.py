@@ -262,6 +262,18 @@ def test_of_three_pictures_only_those_that_meet_are_compared() -> None:
     assert 296 <= x and x + width <= 304 and 98 <= y and y + height <= 142
 
 
+def test_a_speck_at_one_of_many_seams_is_no_place() -> None:
+    def rated(rows: int, good: Look, seam: int) -> str:
+        part = np.s_[100 : 100 + rows, seam - 20 : seam + 20]
+        tones = good.tones[1].copy()
+        tones[part] = np.where(tones[part] < 128, 255, 0)
+        shown = replace(good, tones=(good.tones[0], tones, *good.tones[2:]))
+        return judge(shown, (0, 0), SURE if len(good.shows) > 2 else RIGHT).rating
+
+    assert [rated(rows, look_of_three(), 200) for rows in (2, 12)] == ["good", "look"]
+    assert rated(2, look(), 200) == "look", "of the one seam of two pictures it is"
+
+
 def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:
     good = look_of_three()
     tones, shows = good.tones[2].copy(), good.shows[2].copy()
