@@ -110,8 +110,9 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
         "does), plane (it fades to the one that carries on beyond the border), or infinity",
     )  # fmt: skip
     how.add_argument(
-        "--dense", action=argparse.BooleanOptionalAction, default=True,
-        help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
+        "--dense", action=argparse.BooleanOptionalAction, default=None,
+        help="of two pictures, seek every pixel of the overlap along its epipolar line (default; --no-dense: the "
+        "smooth field alone)",
     )  # fmt: skip
     how.add_argument(
         "--slide", default="auto", type=_slide, metavar="SLIDE",
@@ -203,7 +204,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         fov=args.fov,
         scale=args.scale,
         crop=parse_crop(args.crop),
-        dense=args.dense,
+        dense=args.dense is not False,
         blend=args.blend,
         seam=args.seam,
         mask=args.mask,

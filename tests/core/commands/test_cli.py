@@ -312,6 +312,17 @@ def test_what_only_two_pictures_know_is_refused_of_more(pictures: list[str], tmp
         assert told in said()[1]
 
 
+def test_dense_is_said_to_be_for_two_pictures_where_it_is_asked_for(
+    pictures: list[str], tmp_path: Path, said: Callable, quick: list
+) -> None:
+    for number, (given, words, told) in enumerate((
+        ([*pictures, pictures[0]], ["--dense"], True), ([*pictures, pictures[0]], [], False),
+        (pictures, ["--dense"], False),
+    )):  # fmt: skip
+        assert main(["stitch", *given, "-o", str(tmp_path / f"{number}.png"), "--quiet", *words]) == 0
+        assert ("--dense has no effect" in said()[1]) == told and quick[-1][-1].dense
+
+
 def test_what_cannot_be_stitched_gives_3(pictures: list[str], tmp_path: Path, said: Callable) -> None:
     random = np.random.default_rng(0).integers(0, 256, (90, 120, 3), dtype=np.uint8)
     data, _ = encode_picture(picture_from_array(random).pixels, None, 8, ".png")
