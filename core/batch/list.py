@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from ..cameras.sources import CameraRequest
 from ..pictures.listing import listed
-from ..system.errors import BadRequest
+from ..system.errors import BadRequest, StitchError
 from ..system.text_files import read_lines
 from .options import CLIP
 
@@ -35,8 +35,9 @@ class BatchItem:
 
     name: of its outputs; reference, target: files, or for clips patterns like a_%04d.png or a_####.png; frames: the
     numbers that both sides have, None for pictures; missing: expected numbers that one side or both lack; camera: what
-    this line says about the cameras, instead of the options; more: pictures beyond two. Raises BadRequest for a name
-    that no file can have.
+    this line says about the cameras, instead of the options; more: pictures beyond two; trouble: why a folder or a
+    pattern stands for no panorama, which is then in place of both files. Raises BadRequest for a name that no file can
+    have.
     """
 
     name: str
@@ -46,6 +47,7 @@ class BatchItem:
     missing: tuple[int, ...] = ()
     camera: CameraRequest | None = None
     more: tuple[Path, ...] = ()
+    trouble: StitchError | None = None
 
     def __post_init__(self) -> None:
         found = _NOT_IN_NAMES.search(self.name)
@@ -91,7 +93,7 @@ def read_list(path: str | Path) -> list[BatchItem]:
     Returns
     -------
     list of BatchItem
-        Whether the pictures of pairs exist is not checked.
+        Whether the pictures of pairs exist is not checked; a folder or pattern without pictures is in trouble.
 
     Raises
     ------
@@ -109,6 +111,8 @@ def read_list(path: str | Path) -> list[BatchItem]:
             item = _item(row, path.parent, folders)
         except BadRequest as error:
             raise BadRequest(f"{path}, line {number}: {error}") from None
+        except OSError as error:
+            raise BadRequest(f"{path}, line {number}: no name that files can have: {error.strerror}") from error
         before = lines.setdefault(same_name(item.name), number)
         if before != number:
             raise BadRequest(
@@ -248,12 +252,17 @@ def _item(row: dict[str, str], folder: Path, folders: _Folders) -> BatchItem:
 
 
 def _set(row: dict[str, str], source: Path) -> BatchItem:
-    """The item of a folder or pattern that stands for all its pictures."""
-    files = listed([source])
-    if len(files) < 2:
-        raise BadRequest(f"{source}: only one picture ({files[0].name}); a panorama needs two or more")
+    """The item of a folder or pattern that stands for all its pictures; in trouble where these are fewer than two."""
+    camera = _camera(row)
+    try:
+        files = listed([source])
+        if len(files) < 2:
+            raise BadRequest(f"{source}: only one picture ({files[0].name}); a panorama needs two or more")
+    except StitchError as trouble:
+        called = source.resolve().name if source.is_dir() else _NOT_IN_NAMES.sub("_", row["reference"]).strip(" ._")
+        return BatchItem(row.get("name") or called or "pictures", source, source, camera=camera, trouble=trouble)
     name = row.get("name") or (source.resolve().name if source.is_dir() else files[0].stem)
-    return BatchItem(name, files[0], files[1], camera=_camera(row), more=tuple(files[2:]))
+    return BatchItem(name, files[0], files[1], camera=camera, more=tuple(files[2:]))
 
 
 def _clip_name(reference: Path) -> str:

@@ -216,6 +216,8 @@ def _weight(job: Job) -> float:
 def _outcome(job: Job, meter: _Meter) -> Outcome:
     """Processes an item. Raises Cancelled only: any other failure becomes its outcome."""
     try:
+        if job.item.trouble is not None:
+            raise job.item.trouble
         return _pair(job, meter) if job.item.frames is None else _clip(job, meter)
     except Cancelled:
         raise

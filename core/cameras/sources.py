@@ -98,7 +98,7 @@ def cameras_for(
     -------
     cameras : list of Camera
     warnings : list of str
-        Where EXIF contradicts itself.
+        Where EXIF contradicts itself, or a camera file names what is no picture.
 
     Raises
     ------
@@ -110,7 +110,10 @@ def cameras_for(
     warnings: list[str] = []
     held: Sequence[Camera | None] = [None] * len(names)
     if request.cameras is not None:
-        held = read_camera_file(request.cameras, names, sizes)
+        table = _camera_table(request.cameras)
+        held = read_camera_file({"cameras": table}, names, sizes)
+        if len(names) > 2 and set(table) - set(names):
+            warnings.append(f"the camera file names what is none of the pictures: {_strangers(table, names)}")
     cameras = [
         camera or _one_camera(request, called(number, names), number, size, exif, warnings)
         for number, (camera, size, exif) in enumerate(zip(held, sizes, exifs, strict=True))
@@ -232,16 +235,7 @@ def read_camera_file(
     UnreadableImage
         For the file.
     """
-    if not isinstance(source, dict):
-        try:
-            source = json.loads(Path(source).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise UnreadableImage(f"the camera file cannot be read: {error}") from error
-        except (ValueError, RecursionError) as error:
-            raise BadRequest(f"the camera file is not JSON: {error}") from error
-    table = source.get("cameras", source) if isinstance(source, dict) else None
-    if not isinstance(table, dict):
-        raise BadRequest('a camera file holds {"cameras": {"NAME": {"K": [[…]], "R": [[…]], "t": […]}}}')
+    table = _camera_table(source)
     out: list[Camera | None] = []
     several = len(names) > 2
     for number, (name, size) in enumerate(zip(names, sizes, strict=True)):
@@ -265,8 +259,34 @@ def read_camera_file(
         )
     posed = sum(camera.pose is not None for camera in named)
     if posed == 1 or (posed and not several and posed < len(named)):
+        if several and set(table) - set(names):
+            raise BadRequest(
+                "the camera file gives R and t for one of the pictures only; it also names what is none of them: "
+                f"{_strangers(table, names)}; check the spelling"
+            )
         raise BadRequest("the camera file gives R and t for one picture only: give both or neither")
     return out
+
+
+def _camera_table(source: str | Path | dict[str, Any]) -> dict[str, Any]:
+    """What a camera file, or its content, holds by the names of pictures. Raises as `read_camera_file` does."""
+    if not isinstance(source, dict):
+        try:
+            source = json.loads(Path(source).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise UnreadableImage(f"the camera file cannot be read: {error}") from error
+        except (ValueError, RecursionError) as error:
+            raise BadRequest(f"the camera file is not JSON: {error}") from error
+    table = source.get("cameras", source) if isinstance(source, dict) else None
+    if not isinstance(table, dict):
+        raise BadRequest('a camera file holds {"cameras": {"NAME": {"K": [[…]], "R": [[…]], "t": […]}}}')
+    return table
+
+
+def _strangers(table: dict[str, Any], names: Sequence[str]) -> str:
+    """What a camera file names and is none of the pictures, the first few of many."""
+    strangers = [str(name) for name in table if name not in names]
+    return ", ".join(strangers[:5]) + (", …" if len(strangers) > 5 else "")
 
 
 def _camera_from_entry(entry: dict[str, Any], name: str, size: tuple[int, int]) -> Camera:

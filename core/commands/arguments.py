@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..choices import BLENDS, EXPOSURES, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS, Exposing, Slide
+from ..choices import BLENDS, CENTRE, EXPOSURES, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS, Exposing, Slide
 
 if TYPE_CHECKING:
     from ..options import StitchOptions
@@ -109,8 +110,9 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
         "does), plane (it fades to the one that carries on beyond the border), or infinity",
     )  # fmt: skip
     how.add_argument(
-        "--dense", action=argparse.BooleanOptionalAction, default=True,
-        help="seek every pixel of the overlap along its epipolar line (--no-dense: the smooth field alone)",
+        "--dense", action=argparse.BooleanOptionalAction, default=None,
+        help="of two pictures, seek every pixel of the overlap along its epipolar line (default; --no-dense: the "
+        "smooth field alone)",
     )  # fmt: skip
     how.add_argument(
         "--slide", default="auto", type=_slide, metavar="SLIDE",
@@ -202,7 +204,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         fov=args.fov,
         scale=args.scale,
         crop=parse_crop(args.crop),
-        dense=args.dense,
+        dense=args.dense is not False,
         blend=args.blend,
         seam=args.seam,
         mask=args.mask,
@@ -214,12 +216,30 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
     )
 
 
-def refuse_roles(args: argparse.Namespace, count: int) -> None:
-    """Raises BadRequest where a mask is meant for REF or TARGET, of more than two pictures."""
+def numbered(options: StitchOptions, pictures: Sequence[Path]) -> StitchOptions:
+    """The options with the numbers of the pictures that they name, which may be called by any end of their paths.
+
+    Raises BadRequest where no picture has that name, where one gets two masks, and where a mask is meant for REF or
+    TARGET, of more than two pictures.
+    """
+    from ..pictures.naming import number_of
     from ..system.errors import BadRequest
 
-    if count > 2 and (args.ignore_ref or args.ignore_target):
+    count, names = len(pictures), [str(path) for path in pictures]
+    if count > 2 and options.ignore:
         raise BadRequest(f"{count} pictures are given, none of them REF or TARGET: name them, as --ignore NAME=MASK")
+    masks = [options.ignored(number) for number in range(count)]
+    for name, mask in options.ignore_in:
+        number = number_of(name, names, "--ignore")
+        if masks[number] is not None:
+            raise BadRequest(f"--ignore: {name} has another mask already: paint both into one")
+        masks[number] = mask
+    viewpoint = options.viewpoint
+    if isinstance(viewpoint, int) and viewpoint > count:
+        raise BadRequest(f"the viewpoint is picture {viewpoint}, and only {count} are given")
+    if isinstance(viewpoint, str) and viewpoint != CENTRE:
+        viewpoint = number_of(viewpoint, names, "--viewpoint") + 1
+    return replace(options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint)
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -230,6 +250,8 @@ def _numbers(text: str) -> tuple[float, ...]:
 
 
 def _viewpoint(text: str) -> int | str:
+    if text.casefold() in (CENTRE, "center"):
+        return CENTRE
     return int(text) if text.isdecimal() else text
 
 

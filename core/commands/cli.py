@@ -16,7 +16,7 @@ from typing import NoReturn
 
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
-from .arguments import add_options, options_from, refuse_roles
+from .arguments import add_options, numbered, options_from
 from .messages import print_summary, progress_shown, say, shortened, verdict_line
 from .options import MESSAGES
 
@@ -272,16 +272,17 @@ def _stitch(args: argparse.Namespace) -> int:
         from ..frames.reading import check_count
         from ..output.outputs import OutputRequest, check, write
         from ..pictures.listing import listed
+        from ..pictures.naming import told_apart
         from ..pipeline import stitch
         from ..system.memory import use_again
 
     use_again()
     pictures = listed(args.pictures)
     if pictures != args.pictures and not args.quiet:
-        print(f"edf: {len(pictures)} pictures: {shortened([path.name for path in pictures])}", file=sys.stderr)
-    options = options_from(args, measure=bool(args.report or args.verbose))
+        names = told_apart([str(path) for path in pictures])
+        print(f"edf: {len(pictures)} pictures: {shortened(names)}", file=sys.stderr)
+    options = numbered(options_from(args, measure=bool(args.report or args.verbose)), pictures)
     check_count(len(pictures), options)
-    refuse_roles(args, len(pictures))
     outputs = OutputRequest(args.output, args.report, args.layers, args.warp, args.cameras_out)
     with OutputFiles(args.overwrite, [*pictures, *options.files_read]) as files:
         names = [path.name for path in pictures]
@@ -291,6 +292,8 @@ def _stitch(args: argparse.Namespace) -> int:
             show("write", MESSAGES.written_share)
             warnings = [*result.warnings, *write(result, outputs, files)]
         _too_late_to_interrupt()
+    if args.dense and len(pictures) > 2:
+        warnings.append("--dense has no effect: more than two pictures have the smooth field, for now")
     for warning in warnings:
         print(f"edf: warning: {warning}", file=sys.stderr)
     if not args.quiet:

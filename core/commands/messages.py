@@ -63,10 +63,11 @@ def _seconds_line(seconds: dict[str, float]) -> str:
 def _rig_lines(report: dict[str, Any], seconds: dict[str, float]) -> list[str]:
     """The same of more than two pictures."""
     rig, field, measured, pictures = (report[key] for key in ("rig", "field", "measured", "pictures"))
+    loop = "" if rig["loop_degrees"] is None else f", worst loop {rig['loop_degrees']:.2f}°"
     lines = [
         f"{len(pictures)} pictures, {len(report['left_out'])} left out; {len(rig['edges'])} pairs, "
         f"{rig['points']} points, "
-        f"noise {said(report['matches']['noise_px'], '.2f')} px, worst loop {said(rig['loop_degrees'], '.2f')}°",
+        f"noise {said(report['matches']['noise_px'], '.2f')} px{loop}",
     ]
     for one in pictures:
         camera = one["camera"]

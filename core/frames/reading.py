@@ -14,7 +14,7 @@ from ..cameras.sources import called
 from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_painted, without
 from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
-from ..system.errors import BadRequest, NoOverlap
+from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
 from .frame import Frame, size_of
 
@@ -53,14 +53,14 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
     Raises
     ------
     UnreadableImage
-        A file is no picture, or damaged.
+        Files are no pictures, or damaged; all of them are named.
     BadRequest
         A wrong number of pictures, or a mask that does not fit.
     NoOverlap
         The same picture twice, and no other.
     """
     check_count(len(sources), options)
-    pictures = in_same_colour_space(list(in_order(_picture, sources)))
+    pictures = in_same_colour_space(_all_read(sources))
     copies = dict(_copies(pictures))
     if len(pictures) - len(copies) == 1:
         which = "the two pictures are" if len(pictures) == 2 else "all pictures are"
@@ -109,6 +109,29 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     )
     painted = None if options.mask is None else read_painted(options.mask)
     return Frame(tuple(worked_on), tuple(sizes), painted, warnings, tuple(shown_by))
+
+
+def _all_read(sources: Sequence[Source]) -> list[Picture]:
+    """The pictures. Raises UnreadableImage about all that cannot be read at once."""
+    pictures: list[Picture] = []
+    troubles: list[UnreadableImage] = []
+    for one in in_order(_picture_or_trouble, sources):
+        if isinstance(one, UnreadableImage):
+            troubles.append(one)
+        else:
+            pictures.append(one)
+    if len(troubles) > 1:
+        raise UnreadableImage(f"{len(troubles)} files cannot be used: {'; '.join(map(str, troubles))}")
+    if troubles:
+        raise troubles[0]
+    return pictures
+
+
+def _picture_or_trouble(source: Source) -> Picture | UnreadableImage:
+    try:
+        return _picture(source)
+    except UnreadableImage as trouble:
+        return trouble
 
 
 def _picture(source: Source) -> Picture:

@@ -154,6 +154,10 @@ class VerdictOptions:
     seam_px: float = 3.0
     """px of the copy, the least length of such a part: what is smaller is noise of the resampling."""
 
+    many_seams_share: float = 0.012
+    """The same as `seam_share` among more than two pictures, across a part: of many seams one always has a speck, and
+    2 × 4 px of a good panorama of 430 or 890 px, up to 0.0095 of its side, are nothing to look at."""
+
     together_share: float = 0.008
     """Of the longer side: what is less than twice that apart is one place."""
 

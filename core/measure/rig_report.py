@@ -63,7 +63,7 @@ def make_rig_report(
         "schema": SCHEMA,
         "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum()))),
         "left_out": left_out_entry(alignment.left_out),
-        "options": options_entry(options, alignment) | {"viewpoint": options.viewpoint},
+        "options": options_entry(options, alignment) | {"fade": options.fade, "viewpoint": options.viewpoint},
         "matches": {
             "found": sum(len(edge.matches) for edge in alignment.edges),
             "inliers": sum(int(edge.two_view.inliers.sum()) for edge in alignment.edges), "noise_px": rig.noise_px,

@@ -31,7 +31,8 @@ CLIPPED = (
     "make the panorama brighter (--exposure=1), so that this light is white again; the next time expose for the "
     "brightest part, or merge bracketed pictures into one EXR"
 )
-FOCAL = "give the focal length (--focal35, --focal-px) if it is known, or keep the reference's place (--slide 0)"
+FOCAL = "give the focal length (--focal35, --focal-px) if it is known"
+FOCAL_OR_STAY = f"{FOCAL}, or keep the reference's place (--slide 0)"
 FILL = "fill holes (--holes inpaint)"
 
 
@@ -111,8 +112,10 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
     if not places and not doubts:
         return Verdict(GOOD, "the pictures agree where the seam changes from one to the other", "")
     kinds = dict.fromkeys([*doubts, *(place.what for place in places)])
-    of_places = [LEAVE_OUT if one.help == PAINT and len(look.shows) > 2 else one.help for one in places]
-    helps = dict.fromkeys([*of_places, *doubts.values()])
+    instead = {PAINT: LEAVE_OUT} if len(look.shows) > 2 else {}
+    if report["options"]["slide"] == 0:
+        instead[FOCAL_OR_STAY] = FOCAL
+    helps = dict.fromkeys([*(instead.get(place.help, place.help) for place in places), *doubts.values()])
     return Verdict(LOOK, "; ".join(kinds), "; ".join(helps), tuple(places[: VERDICT.most_places]))
 
 
@@ -224,7 +227,10 @@ def _seam_places(look: Look, pair: _Pair, names: Sequence[str], shift: tuple[int
     """Where a seam is seen."""
     apart = VERDICT.together_share * look.side
     least = 2 * max(VERDICT.seam_px, VERDICT.seam_share * look.side)
+    across = VERDICT.many_seams_share * look.side if len(look.shows) > 2 else 0.0
     for part in _parts(pair.seam > VERDICT.step, least, apart):
+        if max(cv2.boundingRect(part.astype(np.uint8))[2:]) < across:
+            continue
         near = dilated(part, max(1, round(VERDICT.rim_share * look.side)))
         cut_by = [
             called(number, names) for number, other in (pair.numbers, pair.numbers[::-1])
@@ -274,7 +280,7 @@ def _bent_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         opened = cv2.morphologyEx(bent.astype(np.uint8), cv2.MORPH_OPEN, np.ones((side // 2,) * 2, np.uint8)) > 0
         for part in _parts(opened, VERDICT.bent_share * opened.size):
             what = "the picture is bent or stretched: depth or the focal length is doubtful"
-            yield Place(look.box(part, shift), what, float(part.sum()), FOCAL)
+            yield Place(look.box(part, shift), what, float(part.sum()), FOCAL_OR_STAY)
 
 
 def _detailed(tones: Levels) -> NDArray[np.bool_]:

@@ -31,11 +31,15 @@ def listed(paths: Sequence[Path]) -> list[Path]:
     Raises
     ------
     UnreadableImage
-        A folder that cannot be read.
+        Files that do not exist, all of them named, or a folder that cannot be read.
     BadRequest
         A folder or a pattern that stands for no picture.
     """
-    return [file for path in paths for file in _meant_by(path)]
+    files = [file for path in paths for file in _meant_by(path)]
+    missing = [str(file) for file in files if not file.exists()]
+    if missing:
+        raise UnreadableImage(f"{', '.join(missing)}: no such file or folder; check the name")
+    return files
 
 
 def natural(path: Path) -> tuple[list[tuple[int, str]], str]:

@@ -92,8 +92,12 @@ def painted_over(painted: NDArray[np.int8], size: tuple[int, int]) -> NDArray[np
 
 
 def has_shape(mask: NDArray[Any], size: tuple[int, int]) -> bool:
-    """Whether a mask (H, W) has the shape of `size` (W, H), to within a pixel of the smaller of the two."""
+    """Whether a mask (H, W) has the shape of `size` (W, H), to within a pixel of the smaller of the two, and about the
+    same aspect."""
     own = mask.shape[1], mask.shape[0]
+    across = own[0] * size[1], own[1] * size[0]
+    if max(across) > MASKS.same_aspect * min(across):
+        return False
     (w, h), (small_w, small_h) = sorted([own, size], reverse=True, key=lambda s: s[0] * s[1])
     # some scale brings both sides together
     return max((small_w - 1) / w, (small_h - 1) / h) <= min((small_w + 1) / w, (small_h + 1) / h)

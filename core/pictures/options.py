@@ -50,6 +50,9 @@ class MaskOptions:
     painted: float = 0.25
     # Share of white by which colours may differ and still be one: rounding, and compression that is not lossless.
     one_colour: float = 8 / 255
+    # Factor by which the aspect of a mask may differ from the picture's, at most: whole pixels alone would let one of a
+    # few pixels fit pictures of every shape.
+    same_aspect: float = 1.05
 
 
 READING = ReadingOptions()

@@ -81,6 +81,7 @@ def test_files_of_matches(content: str | bytes) -> None:
 @example("reference,target\na.png,b.png")
 @example("a_%04d.png,b_%04d.png\n")
 @example("a_%0999999999d.png,b_%0999999999d.png\n")
+@example("x" * 5000)
 @example("reference,target,first,last,step\na_####.png,b_####.png,0,99999999999,1")
 def test_lists_of_pairs(content: str | bytes) -> None:
     items = ends(lambda: read_list(text_file(content)))

@@ -94,7 +94,7 @@ def test_it_is_seen_from_the_picture_that_is_asked_for(four: PictureSet) -> None
     assert not third.rig.t[0].any()
     turned, moved = pose_errors(four, third)
     assert turned < 0.2 and moved < 0.02
-    assert third.report["options"]["viewpoint"] == 3
+    assert third.report["options"]["viewpoint"] == 3 and third.report["options"]["fade"] == KNOWN.fade
 
 
 def test_a_picture_that_does_not_belong_is_left_out_and_named(four: PictureSet) -> None:

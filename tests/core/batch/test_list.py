@@ -197,8 +197,22 @@ def test_a_folder_or_a_pattern_stands_for_its_pictures(listed, tmp_path: Path) -
     assert folder.name == "yard" and [path.name for path in folder.files()] == ["p1.jpg", "p2.png", "p10.png"]
     assert pattern.name == "p2" and [path.name for path in pattern.files()] == ["p2.png", "p10.png"]
     assert named.name == "court" and named.frames is None
-    with pytest.raises(BadRequest, match="line 1: .*only one picture"):
-        listed("yard/p*.jpg\n")
+
+
+def test_a_folder_or_pattern_without_pictures_is_an_item_in_trouble(listed, tmp_path: Path) -> None:
+    for name in ("empty", "yard", "one"):
+        (tmp_path / name).mkdir()
+    for name in ("yard/a.png", "yard/b.png", "one/a.png"):
+        (tmp_path / name).touch()
+    empty, pattern, everything, one, yard = listed("empty\nnowhere/*.png\nempty/*,,court\none\nyard\n")
+    assert [item.name for item in (empty, pattern, everything, one)] == ["empty", "nowhere__.png", "court", "one"]
+    assert yard.trouble is None and all(item.trouble for item in (empty, pattern, everything, one))
+    assert "no pictures in this folder" in str(empty.trouble) and "only one picture" in str(one.trouble)
+
+
+def test_a_path_that_no_file_can_have_is_told_with_its_line(listed) -> None:
+    with pytest.raises(BadRequest, match="line 2: no name that files can have"):
+        listed("a.png,b.png\n" + "x" * 5000 + "\n")
 
 
 def test_clips_of_more_than_two_cameras_are_refused(listed) -> None:

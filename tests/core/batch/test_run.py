@@ -76,6 +76,16 @@ def test_the_exit_code_is_that_of_the_failure_that_matters_most(
         f"reference{n}" not in troubles for n in (1, 2, 3)]
 
 
+def test_a_folder_without_pictures_is_told_in_its_turn(work: Path, said: Callable, quick: list) -> None:
+    (work / "empty").mkdir()
+    (work / "sets.csv").write_text("in/[rt]*1.png,,one\nempty\nnowhere/*.png\nin/[rt]*2.png,,two\n", "utf-8")
+    assert run(work, "--layers", items="sets.csv") == 2 and quick == ["reference1", "reference2"]
+    lines = said()
+    assert lines[1].startswith("edf: [2/4] empty: failed: ") and "no pictures in this folder" in lines[1]
+    assert lines[2].startswith("edf: [3/4] nowhere__.png: failed: ") and "no pictures of that name" in lines[2]
+    assert [item["status"] for item in summary(work / "out")["items"]] == ["done", "failed", "failed", "done"]
+
+
 def test_a_missing_file_is_told_in_its_turn(
     work: Path, said: Callable, quick: list, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.choices import BLENDS, CROPS, EXPOSURES, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS
-from edf_stitch.core.commands.arguments import add_options, options_from, refuse_roles
+from edf_stitch.core.commands.arguments import add_options, numbered, options_from
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.system.errors import BadRequest
 
@@ -149,9 +149,36 @@ def test_a_mask_needs_the_name_of_its_picture(words: str, capsys: pytest.Capture
     assert "is not like NAME=MASK" in capsys.readouterr().err
 
 
+PLACES = [Path("A/1.png"), Path("A/2.png"), Path("B/1.png")]
+
+
+def numbers(*words: str, of: int = 3) -> StitchOptions:
+    return numbered(options_from(parsed(*words), measure=False), PLACES[:of])
+
+
 def test_masks_of_ref_and_target_are_for_two_pictures() -> None:
     for words in (["--ignore-ref", "m.png"], ["--ignore-target", "m.png"]):
-        refuse_roles(parsed(*words), 2)
+        assert numbers(*words, of=2).ignore == options_from(parsed(*words), measure=False).ignore
         with pytest.raises(BadRequest, match="--ignore NAME=MASK"):
-            refuse_roles(parsed(*words), 3)
-    refuse_roles(parsed("--ignore", "a=m.png"), 3)
+            numbers(*words)
+
+
+def test_pictures_are_named_by_any_end_of_their_paths() -> None:
+    options = numbers("--viewpoint", "B/1", "--ignore", "A/1.png=m.png", "--ignore", "2.PNG=n.png")
+    assert options.viewpoint == 3 and options.ignore == (Path("m.png"), Path("n.png"), None) and not options.ignore_in
+    assert options.files_read == [Path("m.png"), Path("n.png")]
+    assert numbers().ignore == () and numbers().viewpoint is None and numbers("--viewpoint", "2").viewpoint == 2
+    for words in ("centre", "Centre", "center"):
+        assert numbers("--viewpoint", words).viewpoint == "centre"
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    ("--viewpoint 1.png", r"2 pictures are called '1\.png' \(A/1\.png, B/1\.png\)"),
+    ("--viewpoint 4", "only 3 are given"),
+    ("--viewpoint C/1.png", "--viewpoint: no picture is called"),
+    ("--ignore 3=m.png", "--ignore: no picture is called"),
+    ("--ignore 2=m.png --ignore A/2.png=n.png", "A/2.png has another mask already"),
+])  # fmt: skip
+def test_names_that_are_not_clear_are_refused(words: str, said: str) -> None:
+    with pytest.raises(BadRequest, match=said):
+        numbers(*words.split())

@@ -312,6 +312,17 @@ def test_what_only_two_pictures_know_is_refused_of_more(pictures: list[str], tmp
         assert told in said()[1]
 
 
+def test_dense_is_said_to_be_for_two_pictures_where_it_is_asked_for(
+    pictures: list[str], tmp_path: Path, said: Callable, quick: list
+) -> None:
+    for number, (given, words, told) in enumerate((
+        ([*pictures, pictures[0]], ["--dense"], True), ([*pictures, pictures[0]], [], False),
+        (pictures, ["--dense"], False),
+    )):  # fmt: skip
+        assert main(["stitch", *given, "-o", str(tmp_path / f"{number}.png"), "--quiet", *words]) == 0
+        assert ("--dense has no effect" in said()[1]) == told and quick[-1][-1].dense
+
+
 def test_what_cannot_be_stitched_gives_3(pictures: list[str], tmp_path: Path, said: Callable) -> None:
     random = np.random.default_rng(0).integers(0, 256, (90, 120, 3), dtype=np.uint8)
     data, _ = encode_picture(picture_from_array(random).pixels, None, 8, ".png")
@@ -321,6 +332,13 @@ def test_what_cannot_be_stitched_gives_3(pictures: list[str], tmp_path: Path, sa
     assert out == "" and "at least 16 needed" in err.splitlines()[-1] and err.splitlines()[-1].startswith("edf: ")
     assert main(["stitch", pictures[0], pictures[0], "-o", str(tmp_path / "out.png"), "--quiet"]) == 3
     assert "same picture" in said()[1] and set(files(tmp_path)) == {"noise.png"}
+
+
+def test_a_wrong_name_is_told_before_the_work(pictures: list[str], tmp_path: Path, said: Callable, quick: list) -> None:
+    for option in (["--viewpoint", "nobody"], ["--ignore", f"nobody={pictures[0]}"]):
+        assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), *option]) == 2
+        assert "no picture is called 'nobody'; there are: reference.png, target.png" in said()[1]
+    assert not quick
 
 
 def test_what_cannot_be_read_gives_4(pictures: list[str], tmp_path: Path, said: Callable) -> None:
@@ -432,7 +450,7 @@ def test_one_thread_is_set_before_numpy_loads(tmp_path: Path) -> None:
     env = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True,
                           timeout=120)  # fmt: skip
-    assert done.stdout == "True 1\n" and "a.png: no such file" in done.stderr
+    assert done.stdout == "True 1\n" and "a.png, b.png: no such file" in done.stderr
 
 
 # `edf` that stops to think where a stage begins, or with all its files written and none in place yet ("written"): so it

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from edf_stitch.core.frames.frame import size_of
 from edf_stitch.core.frames.reading import MOST_PICTURES, check_count, read_frame
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
-from edf_stitch.core.system.errors import BadRequest, NoOverlap
+from edf_stitch.core.system.errors import BadRequest, NoOverlap, UnreadableImage
 
 PLAIN = StitchOptions()
 
@@ -39,6 +41,17 @@ def test_a_picture_that_is_there_twice_is_used_once_and_said() -> None:
     assert frame.names == ["0.png", "1.png", "2.png"] and len(frame.full_sizes) == 3
     assert frame.shown_by == (0, 1, 0, 2)
     assert frame.warnings == ("copy.png is the same picture as 0.png: it is used once",)
+
+
+def test_all_files_that_cannot_be_read_are_named_at_once(tmp_path: Path) -> None:
+    (tmp_path / "empty.png").touch()
+    (tmp_path / "text.jpg").write_text("no picture", "utf-8")
+    good, empty, text = picture(0, "a.png"), tmp_path / "empty.png", tmp_path / "text.jpg"
+    with pytest.raises(UnreadableImage, match=r"^2 files cannot be used: .*empty\.png: .*; .*text\.jpg: not a picture"):
+        read_frame([empty, good, text], PLAIN)
+    with pytest.raises(UnreadableImage, match=r"empty\.png: ") as caught:
+        read_frame([good, empty, picture(1, "b.png")], PLAIN)
+    assert "files cannot" not in str(caught.value)
 
 
 def test_what_is_left_is_counted_without_copies() -> None:

@@ -17,7 +17,7 @@ from edf_stitch.synthetic_scenes.two_planes import Pair
 
 RIGHT = {
     "measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []},
-    "options": {"projection": "auto"},
+    "options": {"projection": "auto", "slide": "auto"},
 }  # fmt: skip
 # Rows and columns across the seam, which runs down the middle (column 200).
 PATCH = np.s_[100:140, 180:220]
@@ -115,10 +115,13 @@ def test_a_large_part_that_is_bent_is_a_place_unless_the_frame_was_asked_for() -
     assert found.rating == "look" and len(found.places) == 1 and "bent" in found.places[0].what
     left, top, width, height = found.places[0].box
     assert 240 <= left and left + width <= 400 and 80 <= top and top + height <= 240 and min(width, height) > 70
-    assert judge(bent, (0, 0), {**RIGHT, "options": {"projection": "perspective"}}).rating == "good"
+    assert judge(bent, (0, 0), {**RIGHT, "options": {"projection": "perspective", "slide": "auto"}}).rating == "good"
     elsewhere = replace(bent, maps=(bent.maps[1], bent.maps[0]))
     assert judged(elsewhere).rating == "good", "the reference is not shown there"
     assert found.what_to_do.startswith("give the focal length"), "no mask mends that"
+    assert found.what_to_do.endswith("(--slide 0)")
+    stays = judge(bent, (0, 0), {**RIGHT, "options": {"projection": "auto", "slide": 0}})
+    assert "--focal-px" in stays.what_to_do and "--slide" not in stays.what_to_do, "it stays there already"
     blank = [tones.copy() for tones in good.tones]
     for tones in blank:
         tones[80:240, 240:400] = 200
@@ -257,6 +260,18 @@ def test_of_three_pictures_only_those_that_meet_are_compared() -> None:
     assert found.rating == "look" and "--ignore NAME=MASK" in found.what_to_do
     x, y, width, height = found.places[0].box
     assert 296 <= x and x + width <= 304 and 98 <= y and y + height <= 142
+
+
+def test_a_speck_at_one_of_many_seams_is_no_place() -> None:
+    def rated(rows: int, good: Look, seam: int) -> str:
+        part = np.s_[100 : 100 + rows, seam - 20 : seam + 20]
+        tones = good.tones[1].copy()
+        tones[part] = np.where(tones[part] < 128, 255, 0)
+        shown = replace(good, tones=(good.tones[0], tones, *good.tones[2:]))
+        return judge(shown, (0, 0), SURE if len(good.shows) > 2 else RIGHT).rating
+
+    assert [rated(rows, look_of_three(), 200) for rows in (2, 12)] == ["good", "look"]
+    assert rated(2, look(), 200) == "look", "of the one seam of two pictures it is"
 
 
 def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:

@@ -77,11 +77,22 @@ def test_those_that_are_given_are_held_and_the_others_found() -> None:
     ]  # fmt: skip
 
 
+def test_names_that_are_none_of_the_pictures_are_told() -> None:
+    def told(*more: str) -> list[str]:
+        request = CameraRequest(cameras={"cameras": {name: {"K": K} for name in (*NAMES, *more)}})
+        return cameras_for(request, NAMES, [(400, 300)] * 3, [Exif()] * 3)[1]
+
+    assert told() == []
+    assert told("A.png", "x") == ["the camera file names what is none of the pictures: A.png, x"]
+    assert told(*"123456")[0].endswith(": 1, 2, 3, 4, 5, …")
+
+
 @pytest.mark.parametrize(("table", "words"), [
     ({"z.png": {"K": K}}, "names none of the pictures"),
     ({"reference": {"K": K}, "target": {"K": K}}, "names none of the pictures"),
     ({"a.png": 3}, r"the camera of a\.png: an object"),
     ({"a.png": {"K": K, "R": EYE, "t": [0, 0, 0]}}, "one picture only"),
+    ({name: {"K": K, "R": EYE, "t": [0, 0, 0]} for name in ("a.png", "B.png")}, r"none of them: B\.png; check the sp"),
 ])  # fmt: skip
 def test_a_file_that_does_not_fit_is_refused(table: dict, words: str) -> None:
     with pytest.raises(BadRequest, match=words):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from edf_stitch.core.pictures.listing import listed, natural
-from edf_stitch.core.system.errors import BadRequest
+from edf_stitch.core.system.errors import BadRequest, UnreadableImage
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -33,7 +33,7 @@ def test_a_pattern_stands_for_the_pictures_it_matches(folder: Path) -> None:
 
 
 def test_files_are_taken_as_they_are_named_and_in_that_order(folder: Path) -> None:
-    odd = [folder / "notes.txt", folder / "no such file.png", folder / "c.exr"]
+    odd = [folder / "notes.txt", folder / "c.exr", folder / "a.png"]
     assert listed(odd) == odd
     assert names(listed([folder / "c.exr", folder / "b*"])) == ["c.exr", "b2.JPG", "b10.jpg"]
 
@@ -42,6 +42,11 @@ def test_a_file_whose_name_looks_like_a_pattern_is_that_file(folder: Path) -> No
     (folder / "a[1].png").touch()
     (folder / "a1.png").touch()
     assert names(listed([folder / "a[1].png"])) == ["a[1].png"]
+
+
+def test_what_does_not_exist_is_refused_and_all_of_it_named(folder: Path) -> None:
+    with pytest.raises(UnreadableImage, match=r"nodir, .*b3\.jpg: no such file or folder"):
+        listed([folder / "nodir", folder / "a.png", folder / "b3.jpg"])
 
 
 @pytest.mark.parametrize("named", ["empty", "z*.png", "*.txt"])

@@ -153,6 +153,12 @@ def test_another_shape_is_refused_with_both_sizes(own: tuple[int, int]) -> None:
         read(np.zeros((own[1], own[0]), bool), (640, 480))
 
 
+def test_a_mask_of_a_few_pixels_does_not_fit_every_picture() -> None:
+    with pytest.raises(BadRequest, match="has 4×3 pixels.* has 452×300:"):
+        read(np.zeros((3, 4), bool), (452, 300))
+    assert read(np.zeros((4, 6), bool), (452, 300)).shape == (300, 452)
+
+
 # --- refusals -------------------------------------------------------------------------------------------------------
 
 
