@@ -28,6 +28,7 @@ from .bundling.reprojection import lengths_of_errors
 from .bundling.solution import lens_of
 from .bundling.solving import Solved, solve
 from .bundling.uncertainty import deviations
+from .given_poses import check_given_poses
 
 # Shares of the work that are done when pairs are verified, and when their rotations are averaged.
 _VERIFIED, _AVERAGED = 0.1, 0.4
@@ -71,11 +72,15 @@ def register(
     ------
     NoOverlap
         If no two pictures connect.
+    DegenerateGeometry
+        If given cameras do not fit the matches.
     """
     progress = progress or Progress()
     ideal = [undistort(p, camera) if camera.distortion.any() else p for p, camera in zip(points, cameras, strict=True)]
     plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
+    names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
     verified = verify(ideal, _watched(matches, progress), scale, seed)
+    check_given_poses(plain, ideal, verified, names)
     averages = hypotheses(plain, ideal, verified, partial(progress, "geometry", _VERIFIED))
     found = []
     for k, rotated in enumerate(averages):
@@ -86,7 +91,6 @@ def register(
     if not found:
         raise NoOverlap(_nothing_connects(verified))
     found.sort(key=lambda solved: solved.cost)
-    names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
     return _registration_of(cameras, points, verified, found, names)
 
 

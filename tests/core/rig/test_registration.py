@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.projective import homogeneous
 from edf_stitch.core.cameras.rig import PictureMatches, Registration
 from edf_stitch.core.raster.arrays import Array
 from edf_stitch.core.rig.averaging.turns import degrees_between
 from edf_stitch.core.rig.registration import register
-from edf_stitch.core.system.errors import Cancelled, NoOverlap
+from edf_stitch.core.system.errors import Cancelled, DegenerateGeometry, NoOverlap
 from edf_stitch.core.system.progress import Progress
 
 from .rigs import FOCAL, SyntheticRig, camera_of, make_rig
@@ -153,6 +155,26 @@ def test_given_poses_stay() -> None:
     between, true = (c[7] - c[4] for c in (found.rig.centres, (rig.centres - rig.centres[0]) @ rig.R[0].T))
     np.testing.assert_allclose(between / np.linalg.norm(between), true / np.linalg.norm(true), atol=1e-9)
     assert placed_off(found, rig).max() < 0.05
+
+
+def given(rig: SyntheticRig, order: Sequence[int]) -> list[Camera]:
+    """True cameras with their poses; picture k is given that of picture order[k]."""
+    return [replace(camera_of(FOCAL, log_sigma=0.0), pose=(rig.R[k], rig.t[k])) for k in order]
+
+
+@pytest.mark.parametrize("kind", ["ring", "tripod"])
+def test_given_cameras_of_swapped_pictures_are_refused(kind: str) -> None:
+    rig = make_rig(kind, 2, points=4000)
+    with pytest.raises(DegenerateGeometry, match="do not fit the matches.* hardly any of picture 2 and picture 5:"):
+        register(given(rig, (0, 4, 2, 3, 1, 5, 6, 7, 8, 9, 10)), rig.points, rig.matches)
+
+
+def test_given_cameras_of_one_place_are_taken() -> None:
+    rig = make_rig("tripod", 2, points=4000)
+    turned = [replace(camera, pose=(R, np.zeros(3))) for camera, R in zip(given(rig, range(11)), rig.R, strict=True)]
+    found = register(turned, rig.points, rig.matches)
+    assert not found.rig.t.any()
+    np.testing.assert_allclose(found.rig.R, rig.R @ rig.R[0].T, atol=1e-9)
 
 
 def test_two_lenses() -> None:
