@@ -14,6 +14,10 @@ from ..raster.arrays import Array
 from ..system.errors import DegenerateGeometry
 from .averaging.averaged import Verified
 
+# Share of a picture's longer side by which near things may be off where cameras are given at one place: a head that is
+# off the lens's centre, or a hand, moves them. Cameras of other pictures are further off, as those overlap in part.
+PARALLAX_SHARE = 0.05
+
 
 def check_given_poses(
     cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, names: Sequence[str]
@@ -59,7 +63,7 @@ def check_given_poses(
 
 
 def _explained(cameras: Sequence[Camera], points: Sequence[Array], pair: PictureMatches, px: float) -> int:
-    """How many matches of a pair lie within so many px of where two given cameras have them."""
+    """How many matches of a pair two given cameras explain: within so many px of their lines."""
     first, second = cameras[pair.i], cameras[pair.j]
     assert first.pose is not None and second.pose is not None
     (R1, t1), (R2, t2) = first.pose, second.pose
@@ -70,6 +74,7 @@ def _explained(cameras: Sequence[Camera], points: Sequence[Array], pair: Picture
         seen = homogeneous(x) @ infinite_homography(first.K, second.K, R).T
         ahead = seen[:, 2] > 0
         off = np.linalg.norm(project(seen[ahead]) - y[ahead], axis=1)
+        px = max(px, PARALLAX_SHARE * max(second.size))
     else:
         off = np.abs(sampson_residuals(fundamental_from_pose(first.K, second.K, R, t), x, y))
     return int((off < px).sum())
