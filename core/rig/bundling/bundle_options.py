@@ -167,6 +167,12 @@ class JudgeOptions:
     # Parallax is little where this percentile of errors of rotations alone is below so many σ.
     little_parallax_percentile: float = 80.0
     little_parallax_sigmas: float = 6.0
+    # No parallax can be seen where this percentile of them is below so many px: matches of pixels err by that much in
+    # a few of a hundred, and nothing is shown wrong by more.
+    no_parallax_percentile: float = 95.0
+    no_parallax_px: float = 1.0
+    # px that rotations leave of half of all matches up to which that is tried: with a wrong focal length, too.
+    hardly_apart_px: float = 3.0
     # px: where costs are weighed against numbers of parameters, noise is never taken to be less.
     least_noise_px: float = 0.1
 

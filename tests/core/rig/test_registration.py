@@ -177,6 +177,19 @@ def test_given_cameras_of_one_place_are_taken() -> None:
     np.testing.assert_allclose(found.rig.R, rig.R @ rig.R[0].T, atol=1e-9)
 
 
+@pytest.mark.parametrize(("pictures", "seed"), [(7, 0), (7, 1), (13, 2)])
+def test_sharp_matches_of_a_tripod_are_of_one_place(pictures: int, seed: int) -> None:
+    """Most are right to a twentieth of a px, and some err by half a px: no depth is to explain these."""
+    rig = make_rig("tripod", seed, points=5000, noise_px=0.05, outliers=0.01, pictures=pictures)
+    rng = np.random.default_rng(seed)
+    points = [p + rng.normal(0, 0.4, p.shape) * (rng.random((len(p), 1)) < 0.1) for p in rig.points]
+    believed = [camera_of(FOCAL * 0.86, log_sigma=0.25) for _ in rig.cameras]
+    found = register(believed, points, rig.matches)
+    assert found.numbers == tuple(range(pictures))
+    assert not found.rig.t.any() and found.rig.stations == (found.numbers,)
+    assert abs(found.rig.cameras[0].focal / FOCAL - 1) < 0.003
+
+
 def test_two_lenses() -> None:
     """Half the pictures are twice as large: their focal length is their own."""
     rig = make_rig("ring", 3)
