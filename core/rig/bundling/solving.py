@@ -18,7 +18,7 @@ from .bundle import Tick
 from .bundle_options import BUNDLE, JUDGE
 from .polishing import Polished, start
 from .solution import LENS, Problem, lenses_of
-from .stations import hardly_apart, polish_best, proposed, same_places
+from .stations import polish_best, proposed, same_places, without_parallax
 from .tracks import build_tracks, fitting_pairs
 
 
@@ -72,9 +72,10 @@ def _bundled(
     lens[~lenses.free] = 0
     given = _Given(own, held)
     begun = start(problem, given.turned(rotated.R[list(members)]), lens)
-    one = rotated.one_place or hardly_apart(pairs, verified.scale)
-    stations = proposed(pairs, members) or ([tuple(range(len(members)))] if one else [])
-    found = polish_best(problem, begun, stations, same_places(pairs, members), given.placed, tick)
+    found = without_parallax(problem, begun, pairs, tick)
+    if found is None:
+        stations = proposed(pairs, members) or ([tuple(range(len(members)))] if rotated.one_place else [])
+        found = polish_best(problem, begun, stations, same_places(pairs, members), given.placed, tick)
     moved = float(np.abs(found.solution.lens[:, 0] - lens[:, 0]).max())
     return Solved(rotated, pairs, found, _judged(found, pairs, verified), moved)
 

@@ -47,11 +47,16 @@ def same_places(pairs: Sequence[PairGeometry], members: Sequence[int]) -> list[S
     return [SamePlace(place[pair.i], place[pair.j], len(pair.index)) for pair in pairs if pair.rotates]
 
 
-def hardly_apart(pairs: Sequence[PairGeometry], scale: float) -> bool:
-    """Whether rotations leave so little of most matches that all may be from one place, whatever pairs prefer: matches
-    err by more than their noise tells, and depth explains such errors better than a rotation."""
+def without_parallax(problem: Problem, start: Solution, pairs: Sequence[PairGeometry], tick: Tick) -> Polished | None:
+    """All at one place, where rotations leave nothing to be seen, whatever pairs prefer: matches err by more than their
+    noise tells, and places and depth would only explain how. None elsewhere, or where poses are given."""
     left = np.repeat([pair.parallax_px for pair in pairs], [len(pair.index) for pair in pairs])
-    return bool(np.median(left) < JUDGE.hardly_apart_px * scale)
+    if problem.held.any() or np.median(left) > JUDGE.hardly_apart_px * problem.scale:
+        return None
+    turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
+    errors = lengths_of_errors(turned.problem, turned.solution)
+    seen = np.nanpercentile(errors, JUDGE.no_parallax_percentile) > JUDGE.no_parallax_px * problem.scale
+    return None if seen else turned
 
 
 def polish_best(
@@ -59,8 +64,7 @@ def polish_best(
     framed: Callable[[Array], Array], tick: Tick,
 ) -> Polished:  # fmt: skip
     """The cheapest of: every picture at a place of its own; those of each station at one place; all at one place, where
-    a station holds all. What more places cost is counted (BIC). All are at one place, too, where no parallax can be
-    seen: places and depth would only explain how matches err. Where there is little parallax, rotations bundled as if
+    a station holds all. What more places cost is counted (BIC). Where there is little parallax, rotations bundled as if
     at one place are better to start from than averaged ones, and are tried too.
 
     framed: brings places (N, 3) to where the start's poses stand.
@@ -69,9 +73,7 @@ def polish_best(
     starts: list[tuple[Problem, Solution]] = [(problem, start)]
     if stations and not problem.held.any():  # given poses say themselves what is at one place
         turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
-        if _errors(turned, JUDGE.no_parallax_percentile) < JUDGE.no_parallax_px * problem.scale:
-            return turned
-        if _errors(turned, JUDGE.little_parallax_percentile) < JUDGE.little_parallax_sigmas * problem.noise_px:
+        if _little_parallax(turned):
             starts.append((problem, replace(start, R=turned.solution.R, lens=turned.solution.lens)))
         if any(len(station) == problem.pictures for station in stations):
             candidates.append(turned)
@@ -83,9 +85,11 @@ def polish_best(
     return min(candidates, key=information_criterion)
 
 
-def _errors(turned: Polished, percentile: float) -> float:
-    """px: a percentile of how far observations are from where rotations alone have them."""
-    return float(np.nanpercentile(lengths_of_errors(turned.problem, turned.solution), percentile))
+def _little_parallax(turned: Polished) -> bool:
+    """Whether most observations are about where rotations alone have them."""
+    problem = turned.problem
+    off = np.nanpercentile(lengths_of_errors(problem, turned.solution), JUDGE.little_parallax_percentile)
+    return bool(off < JUDGE.little_parallax_sigmas * problem.noise_px)
 
 
 def information_criterion(found: Polished) -> float:
