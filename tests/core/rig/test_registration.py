@@ -89,6 +89,15 @@ def test_deviations_are_those_of_the_errors() -> None:
     assert 0.2 < np.median(places) < 4
 
 
+def test_what_the_observations_do_not_tell_has_a_large_deviation() -> None:
+    """Half are from one place: in which direction they are apart is not told, and rounding may not make it negative."""
+    rig = make_rig("half", 0, points=2000, noise_px=0.1, pictures=7)
+    found = register([camera_of(FOCAL * 1.05, log_sigma=0.25)] * 7, rig.points, rig.matches)
+    sure = found.rig.position_deviation
+    assert np.isfinite(sure).all() and np.isfinite(found.rig.deviations).all()
+    assert (sure[1:] > 0).all()
+
+
 def test_the_order_of_the_pictures_does_not_matter(ring: tuple[SyntheticRig, Registration]) -> None:
     rig, found = ring
     order = np.random.default_rng(1).permutation(11)
