@@ -11,6 +11,7 @@ import numpy as np
 from ..cameras.camera import Camera
 from ..cameras.lens import undistort
 from ..cameras.rig import FocalGuess, Observations, PictureMatches, Registration, Rig, RigEdge
+from ..pose.options import FOCAL
 from ..raster.arrays import Array
 from ..raster.robust import sigma_of_lengths
 from ..system.errors import NoOverlap
@@ -123,13 +124,14 @@ def _rig(
     used = solution.used & np.isfinite(lengths)
     noise = sigma_of_lengths(lengths[used]) if used.any() else float("nan")
     sure = deviations(found, noise)
+    log_focal = np.where(sure.log_focal > 0, np.hypot(sure.log_focal, _apart(guesses)), 0.0)
     whole = solution.solved & (np.bincount(tracks.point[used], minlength=len(tracks)) >= 2)
     number = np.cumsum(whole) - 1
     rows = np.flatnonzero(whole[tracks.point])
     raw = np.array([points[members[j]][k] for j, k in zip(tracks.picture[rows], tracks.feature[rows], strict=True)])
     seen = Observations(tracks.picture[rows], number[tracks.point[rows]], raw.reshape(-1, 2), used[rows])
     return Rig(
-        tuple(_camera(cameras[member], found, k) for k, member in enumerate(members)),
+        tuple(_camera(cameras[member], found, k, log_focal[k]) for k, member in enumerate(members)),
         solution.R,
         solution.t,
         solution.rays[whole],
@@ -139,7 +141,7 @@ def _rig(
         edges,
         _stations(found),
         tuple(int(k) for k in lens),
-        sure.log_focal,
+        log_focal,
         sure.places,
         guesses,
         noise,
@@ -147,13 +149,22 @@ def _rig(
     )
 
 
-def _camera(camera: Camera, found: Polished, picture: int) -> Camera:
-    """As estimated; what was given stays to the last bit."""
+def _apart(guesses: Sequence[FocalGuess]) -> float:
+    """Root mean square of the log of the focal lengths that explain the pictures almost alike, by the best one's."""
+    return float(np.sqrt(np.mean([np.log(guess.focal / guesses[0].focal) ** 2 for guess in guesses])))
+
+
+def _camera(camera: Camera, found: Polished, picture: int, log_focal: float) -> Camera:
+    """As estimated, log_focal: the deviation of that; what was given stays to the last bit."""
     log_factor, k1, *shift = found.solution.lens[found.problem.lenses.of[picture]]
     K = camera.scaled(float(np.exp(log_factor)))
     K[:2, 2] += shift
     distortion = camera.distortion if camera.distortion.any() else np.array([k1, 0, 0, 0, 0])
-    return replace(camera, K=K, distortion=distortion)
+    source = camera.source
+    if camera.assumed:
+        told = log_focal <= FOCAL.undetermined
+        source = f"{'the matches, from' if told else 'not determined by the matches,'} {source}"
+    return replace(camera, K=K, distortion=distortion, source=source)
 
 
 def _stations(found: Polished) -> tuple[tuple[int, ...], ...]:

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.projective import homogeneous
-from edf_stitch.core.cameras.rig import PictureMatches, Registration
+from edf_stitch.core.cameras.rig import FocalGuess, PictureMatches, Registration
 from edf_stitch.core.raster.arrays import Array
+from edf_stitch.core.rig import registration
 from edf_stitch.core.rig.averaging.turns import degrees_between
 from edf_stitch.core.rig.registration import register
 from edf_stitch.core.system.errors import Cancelled, DegenerateGeometry, NoOverlap
@@ -150,6 +151,26 @@ def test_a_fixed_focal_length_stays() -> None:
     found = register(fixed, rig.points, rig.matches)
     assert all((camera.K == fixed[0].K).all() for camera in found.rig.cameras)
     assert not found.rig.focal_deviation.any()
+
+
+def test_it_is_said_that_the_matches_told_the_focal_length() -> None:
+    rig = make_rig("ring", 1, points=3000)
+    for knowledge, source in ((Knowledge.ASSUMED, "the matches, from a guess"), (Knowledge.EXIF, "a guess")):
+        believed = [replace(camera, source="a guess", knowledge=knowledge) for camera in rig.cameras]
+        found = register(believed, rig.points, rig.matches).rig
+        assert {camera.source for camera in found.cameras} == {source}
+
+
+def test_focal_lengths_that_cost_almost_the_same_make_it_unsure(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = make_rig("ring", 1, points=3000)
+    before = register(rig.cameras, rig.points, rig.matches).rig
+    others = tuple(FocalGuess(factor * FOCAL, 0.0, 1.0) for factor in (1.0, 1.3, 1.3))
+    monkeypatch.setattr(registration, "_guesses", lambda found: others)
+    assumed = [replace(camera, knowledge=Knowledge.ASSUMED) for camera in rig.cameras]
+    found = register(assumed, rig.points, rig.matches).rig
+    apart = np.sqrt(2 / 3) * np.log(1.3)
+    np.testing.assert_allclose(found.focal_deviation, np.hypot(before.focal_deviation, apart), rtol=1e-6)
+    assert found.cameras[0].source.startswith("not determined by the matches, ")
 
 
 def test_given_poses_stay() -> None:
