@@ -9,8 +9,8 @@ from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.rig import PictureMatches
 from edf_stitch.core.rig.averaging.averaged import Averaged
 from edf_stitch.core.rig.averaging.averaging import averaged, hypotheses
-from edf_stitch.core.rig.averaging.averaging.focal_starts import starts
-from edf_stitch.core.rig.averaging.averaging.matched_rays import SharedLens
+from edf_stitch.core.rig.averaging.focal_starts import starts
+from edf_stitch.core.rig.averaging.matched_rays import SharedLens
 from edf_stitch.core.rig.averaging.pairs import verified
 from edf_stitch.core.rig.averaging.turns import degrees_between
 

@@ -7,10 +7,10 @@ from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.projective import fundamental_from_pose, sampson_residuals, skew
 from edf_stitch.core.cameras.rig import PictureMatches
 from edf_stitch.core.rig.averaging.averaged import Verified
-from edf_stitch.core.rig.averaging.averaging.matched_rays import SharedLens, matched_rays
-from edf_stitch.core.rig.averaging.averaging.pair_models import EpipolarModel, Poses, RotationModel
-from edf_stitch.core.rig.averaging.averaging.pair_refinement import LensPrior, refine_each, refine_together
-from edf_stitch.core.rig.averaging.averaging.pure_rotations import each_as_rotation
+from edf_stitch.core.rig.averaging.matched_rays import SharedLens, matched_rays
+from edf_stitch.core.rig.averaging.pair_models import EpipolarModel, Poses, RotationModel
+from edf_stitch.core.rig.averaging.pair_refinement import LensPrior, refine_each, refine_together
+from edf_stitch.core.rig.averaging.pure_rotations import each_as_rotation
 from edf_stitch.core.rig.averaging.turns import degrees_between, rotations
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from edf_stitch.core.rig.averaging.averaging.rotation_averaging import NEVER, Links, average, worst_loop
+from edf_stitch.core.rig.averaging.rotation_averaging import NEVER, Links, average, worst_loop
 from edf_stitch.core.rig.averaging.triplets import triangles, without_contradicted
 from edf_stitch.core.rig.averaging.turns import degrees_between, rotations
 from hypothesis import given, settings
