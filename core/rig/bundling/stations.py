@@ -55,8 +55,8 @@ def without_parallax(problem: Problem, start: Solution, pairs: Sequence[PairGeom
         return None
     turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
     errors = lengths_of_errors(turned.problem, turned.solution)
-    seen = np.nanpercentile(errors, JUDGE.no_parallax_percentile) > JUDGE.no_parallax_px * problem.scale
-    return None if seen else turned
+    most = np.array(JUDGE.no_parallax_px) * problem.scale
+    return turned if (np.nanpercentile(errors, JUDGE.no_parallax_percentiles) < most).all() else None
 
 
 def polish_best(
