@@ -69,6 +69,8 @@ def _rig_lines(report: dict[str, Any], seconds: dict[str, float]) -> list[str]:
         f"{rig['points']} points, "
         f"noise {said(report['matches']['noise_px'], '.2f')} px{loop}",
     ]
+    if rig["scale"] == "one place":
+        lines.append("taken from one place: rotations alone join the pictures, there is no depth")
     for one in pictures:
         camera = one["camera"]
         lines.append(

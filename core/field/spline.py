@@ -212,6 +212,8 @@ class Inverse:
 def spread_points(points: Array, cost: Array, budget: int, spacing: float) -> NDArray[np.intp]:
     """Indices of at most `budget` of the points (N, n): of each cell of `spacing`, in their unit, the one of the least
     `cost` (N,)."""
+    if not len(points):
+        return np.zeros(0, dtype=np.intp)
     cells = np.floor(points / spacing).astype(np.int64)
     order = np.lexsort((cost, *cells.T))
     first = np.r_[True, np.any(np.diff(cells[order], axis=0) != 0, axis=1)]

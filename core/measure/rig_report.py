@@ -33,6 +33,19 @@ if TYPE_CHECKING:
     from ..pictures.picture import Picture
 
 
+# Of a kind of scale: how sure it is, why, and what to do.
+_UNSURE_SCALE = {
+    "continuity": (
+        "only guessed by depth going on from one to the other", "no three of them show the same things",
+        "take more pictures between them, so that each thing is in three",
+    ),
+    "none": (
+        "not known", "near and far hardly move against each other from one to the other",
+        "this does no harm to what they show; with other places of the viewpoint depth is doubtful there",
+    ),
+}  # fmt: skip
+
+
 def make_rig_report(
     options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment, canvas: Canvas,
     decided: Sequence[Decided], appearance: dict[str, float], shows: NDArray[np.bool_], inpainted: int,
@@ -86,7 +99,7 @@ def make_rig_report(
             "folds": folds, **appearance,
         },
     }  # fmt: skip
-    warnings = [*_rig_warnings(rig, names), *exposure_warnings(pictures, [one.exposure for one in decided])]
+    warnings = [*rig_warnings(rig, names), *exposure_warnings(pictures, [one.exposure for one in decided])]
     if canvas.cropped and canvas.projection is not None:
         warnings.append(
             f"the pictures reach too far for a {canvas.projection.kind} panorama and were cropped there; "
@@ -144,7 +157,7 @@ def _rig_entry(rig: Rig, names: Sequence[str]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _rig_warnings(rig: Rig, names: Sequence[str]) -> list[str]:
+def rig_warnings(rig: Rig, names: Sequence[str]) -> list[str]:
     """What is doubtful, and what to do about it."""
     out = []
     for edge in weak_links(rig):
@@ -157,11 +170,8 @@ def _rig_warnings(rig: Rig, names: Sequence[str]) -> list[str]:
     if kind in ("continuity", "none"):
         loose = [edge for edge in rig.edges if edge.baseline != "measured"]
         pairs = ", ".join(f"{names[edge.i]} and {names[edge.j]}" for edge in loose[: RIG.most_named])
-        how = "only guessed by depth going on from one to the other" if kind == "continuity" else "not known"
-        out.append(
-            f"how far apart some pictures were taken is {how} ({pairs}), since no three of them show the same things: "
-            "take more pictures between them, so that each thing is in three"
-        )
+        how, why, help_ = _UNSURE_SCALE[kind]
+        out.append(f"how far apart some pictures were taken is {how} ({pairs}), since {why}: {help_}")
     if focal_spread(rig) > RIG.same_focal:
         listed = ", ".join(f"{guess.focal:.0f} px" for guess in rig.guesses)
         out.append(

@@ -151,7 +151,8 @@ def _cause(look: Look, pairs: Sequence[_Pair], missed: float, folded: float) -> 
     both = np.sum(look.shows, axis=0, dtype=np.int16) > 1
     unlike = np.logical_or.reduce([pair.unlike > VERDICT.step for pair in pairs])
     hidden, differ = ((both & part).sum() / max(1, both.sum()) for part in (look.hidden, unlike))
-    if missed > (VERDICT.missed if seen else VERDICT.missed_by_far):
+    # of more than two pictures no single one can hide that the others are wrong
+    if missed > (VERDICT.missed if seen or len(look.shows) > 2 else VERDICT.missed_by_far):
         why = f"5 % of the matches are missed by more than {missed:.0%} of the panorama: the geometry is wrong"
     elif not seen:
         return None

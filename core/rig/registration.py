@@ -11,6 +11,7 @@ import numpy as np
 from ..cameras.camera import Camera
 from ..cameras.lens import undistort
 from ..cameras.rig import FocalGuess, Observations, PictureMatches, Registration, Rig, RigEdge
+from ..pose.options import FOCAL
 from ..raster.arrays import Array
 from ..raster.robust import sigma_of_lengths
 from ..system.errors import NoOverlap
@@ -28,6 +29,7 @@ from .bundling.reprojection import lengths_of_errors
 from .bundling.solution import lens_of, with_lens
 from .bundling.solving import Solved, solve
 from .bundling.uncertainty import deviations
+from .given_poses import check_given_poses
 
 # Shares of the work that are done when pairs are verified, and when their rotations are averaged.
 _VERIFIED, _AVERAGED = 0.1, 0.4
@@ -71,11 +73,15 @@ def register(
     ------
     NoOverlap
         If no two pictures connect.
+    DegenerateGeometry
+        If given cameras do not fit the matches.
     """
     progress = progress or Progress()
     ideal = [undistort(p, camera) if camera.distortion.any() else p for p, camera in zip(points, cameras, strict=True)]
     plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
+    names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
     verified = verify(ideal, _watched(matches, progress), scale, seed)
+    check_given_poses(plain, ideal, verified, names)
     averages = hypotheses(plain, ideal, verified, partial(progress, "geometry", _VERIFIED))
     found = []
     for k, rotated in enumerate(averages):
@@ -86,7 +92,6 @@ def register(
     if not found:
         raise NoOverlap(_nothing_connects(verified))
     found.sort(key=lambda solved: solved.cost)
-    names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
     return _registration_of(cameras, points, verified, found, names)
 
 
@@ -119,13 +124,16 @@ def _rig(
     used = solution.used & np.isfinite(lengths)
     noise = sigma_of_lengths(lengths[used]) if used.any() else float("nan")
     sure = deviations(found, noise)
+    log_focal = np.where(sure.log_focal > 0, np.hypot(sure.log_focal, _apart(guesses)), 0.0)
     whole = solution.solved & (np.bincount(tracks.point[used], minlength=len(tracks)) >= 2)
     number = np.cumsum(whole) - 1
     rows = np.flatnonzero(whole[tracks.point])
     raw = np.array([points[members[j]][k] for j, k in zip(tracks.picture[rows], tracks.feature[rows], strict=True)])
     seen = Observations(tracks.picture[rows], number[tracks.point[rows]], raw.reshape(-1, 2), used[rows])
     return Rig(
-        tuple(with_lens(cameras[member], solution.lens[lens[k]]) for k, member in enumerate(members)),
+        tuple(
+            _camera(cameras[member], solution.lens[lens[k]], log_focal[k]) for k, member in enumerate(members)
+        ),
         solution.R,
         solution.t,
         solution.rays[whole],
@@ -135,12 +143,26 @@ def _rig(
         edges,
         _stations(found),
         tuple(int(k) for k in lens),
-        sure.log_focal,
+        log_focal,
         sure.places,
         guesses,
         noise,
         best.averaged.loop_degrees,
     )
+
+
+def _apart(guesses: Sequence[FocalGuess]) -> float:
+    """Root mean square of the log of the focal lengths that explain the pictures almost alike, by the best one's."""
+    return float(np.sqrt(np.mean([np.log(guess.focal / guesses[0].focal) ** 2 for guess in guesses])))
+
+
+def _camera(camera: Camera, lens: Array, log_focal: float) -> Camera:
+    """As estimated, log_focal: the deviation of that; and where its focal length comes from, in words."""
+    source = camera.source
+    if camera.assumed:
+        told = log_focal <= FOCAL.undetermined
+        source = f"{'the matches, from' if told else 'not determined by the matches,'} {source}"
+    return replace(with_lens(camera, lens), source=source)
 
 
 def _stations(found: Polished) -> tuple[tuple[int, ...], ...]:

@@ -164,6 +164,12 @@ class JudgeOptions:
     # Parallax is little where this percentile of errors of rotations alone is below so many σ.
     little_parallax_percentile: float = 80.0
     little_parallax_sigmas: float = 6.0
+    # No parallax can be seen where these percentiles of them are below so many px each: matches of pixels err by that
+    # much, a few of a hundred by more. A skyline from places far apart has 0.55 and 0.9 px, and keeps its places.
+    no_parallax_percentiles: tuple[float, ...] = (80.0, 95.0)
+    no_parallax_px: tuple[float, ...] = (0.4, 1.0)
+    # px that rotations leave of half of all matches up to which that is tried: with a wrong focal length, too.
+    hardly_apart_px: float = 3.0
     # px: where costs are weighed against numbers of parameters, noise is never taken to be less.
     least_noise_px: float = 0.1
 

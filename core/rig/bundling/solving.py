@@ -19,7 +19,7 @@ from .bundle_options import JUDGE
 from .judging import judged
 from .polishing import Polished, start
 from .solution import LENS, Problem, lenses_of
-from .stations import polish_best, proposed, same_places
+from .stations import polish_best, proposed, same_places, without_parallax
 from .tracks import build_tracks, fitting_pairs
 
 
@@ -73,8 +73,10 @@ def _bundled(
     lens[~lenses.free] = 0
     given = _Given(own, held)
     begun = start(problem, given.turned(rotated.R[list(members)]), lens)
-    stations = proposed(pairs, members) or ([tuple(range(len(members)))] if rotated.one_place else [])
-    found = polish_best(problem, begun, stations, same_places(pairs, members), given.placed, tick)
+    found = without_parallax(problem, begun, pairs, tick)
+    if found is None:
+        stations = proposed(pairs, members) or ([tuple(range(len(members)))] if rotated.one_place else [])
+        found = polish_best(problem, begun, stations, same_places(pairs, members), given.placed, tick)
     moved = float(np.abs(found.solution.lens[:, 0] - lens[:, 0]).max())
     return Solved(rotated, pairs, found, judged(cameras, points, verified, members, pairs, found), moved)
 

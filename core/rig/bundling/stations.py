@@ -47,6 +47,18 @@ def same_places(pairs: Sequence[PairGeometry], members: Sequence[int]) -> list[S
     return [SamePlace(place[pair.i], place[pair.j], len(pair.index)) for pair in pairs if pair.rotates]
 
 
+def without_parallax(problem: Problem, start: Solution, pairs: Sequence[PairGeometry], tick: Tick) -> Polished | None:
+    """All at one place, where rotations leave nothing to be seen, whatever pairs prefer: matches err by more than their
+    noise tells, and places and depth would only explain how. None elsewhere, or where poses are given."""
+    left = np.repeat([pair.parallax_px for pair in pairs], [len(pair.index) for pair in pairs])
+    if problem.held.any() or np.median(left) > JUDGE.hardly_apart_px * problem.scale:
+        return None
+    turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
+    errors = lengths_of_errors(turned.problem, turned.solution)
+    most = np.array(JUDGE.no_parallax_px) * problem.scale
+    return turned if (np.nanpercentile(errors, JUDGE.no_parallax_percentiles) < most).all() else None
+
+
 def polish_best(
     problem: Problem, start: Solution, stations: Sequence[Station], same: Sequence[SamePlace],
     framed: Callable[[Array], Array], tick: Tick,

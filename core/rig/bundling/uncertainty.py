@@ -53,9 +53,15 @@ def _of_unknowns(structure: Structure, normal: Normal, inverses: Array, scale: A
     information = normal.cameras - fill
     size = len(information)
     usual = np.trace(information) / max(size, 1)
-    information += usual * (BUNDLE.scale_stiffness * np.outer(scale, scale) + BUNDLE.regular * np.eye(size))
-    inverse: Array = np.linalg.inv(information)
-    return inverse
+    information += usual * BUNDLE.scale_stiffness * np.outer(scale, scale)
+    # Unknowns have units of their own: in those of their deviations alone, rounding is the same for all. What the
+    # observations do not tell has a large variance then, never a negative one.
+    units = 1 / np.sqrt(np.maximum(np.diag(normal.cameras), BUNDLE.regular * usual))
+    values, vectors = np.linalg.eigh(information * np.outer(units, units))
+    least = size * np.finfo(np.float64).eps * max(float(values.max(initial=0.0)), 1.0)
+    half = units[:, None] * vectors / np.sqrt(np.maximum(values, least))
+    covariance: Array = half @ half.T
+    return covariance
 
 
 def _of_depths(structure: Structure, normal: Normal, inverses: Array, covariance: Array, noise_px: float) -> Array:

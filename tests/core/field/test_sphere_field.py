@@ -74,6 +74,13 @@ def test_one_place_has_no_depth_at_all() -> None:
     assert not field.warnings
 
 
+def test_a_picture_that_none_of_its_points_fit_has_no_slack() -> None:
+    rig = rig_of((0, 20, 40), moves=0.0)
+    far = rig.observations.pixels + np.where(rig.observations.picture == 1, 500, 0)[:, None]
+    slacks = fit_sphere_field(with_pixels(rig, far)).slacks
+    assert slacks[1] is None
+
+
 def test_a_rig_whose_points_tell_no_range_is_refused(ring: Rig) -> None:
     seen = ring.observations
     once = np.unique(seen.point, return_index=True)[1]

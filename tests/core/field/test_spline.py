@@ -272,6 +272,10 @@ def test_spread_points_keep_budget_and_cells(seed: int, count: int, budget: int,
             assert quality[where[tuple(cell)]] <= quality[i]
 
 
+def test_of_no_points_none_are_spread() -> None:
+    assert spread_points(np.zeros((0, 3)), np.zeros(0), 5, 0.1).size == 0
+
+
 def test_a_budget_that_is_too_small_coarsens_the_cells_but_not_too_much() -> None:
     points = some_points(9, 5000)
     chosen = points[spread_points(points, np.ones(5000), 400, 5.0)]

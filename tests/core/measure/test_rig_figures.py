@@ -11,6 +11,7 @@ from edf_stitch.core.cameras.edge import Edge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.rig import FocalGuess, Rig, RigEdge
 from edf_stitch.core.measure.rig_figures import focal_spread, map_errors, residuals, scale_kind, shares, weak_links
+from edf_stitch.core.measure.rig_report import rig_warnings
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.warp import Warp
 from edf_stitch.core.raster.picture_map import BoxedMap, PictureMap
@@ -44,6 +45,16 @@ def test_the_scale_is_as_sure_as_its_weakest_link(kinds: tuple[str, ...], scale:
     assert scale_kind(with_edges(*chain, (0, 2, 99, "measured"), (1, 3, 99, "measured"), (0, 3, 99, "measured"))) == (
         "measured"
     ), "another way round will do"
+
+
+@pytest.mark.parametrize(("kind", "why"), [
+    ("continuity", "since no three of them show the same things"), ("none", "since near and far hardly move"),
+])  # fmt: skip
+def test_it_is_said_why_a_distance_is_not_known(kind: str, why: str) -> None:
+    rig = with_edges((0, 1, 99, "measured"), (1, 2, 99, kind), (2, 3, 99, "measured"))
+    (warning,) = rig_warnings(rig, "abcd")
+    assert why in warning and "(b and c)" in warning
+    assert not rig_warnings(replace(rig, t=np.zeros((4, 3))), "abcd"), "at one place there is nothing to know"
 
 
 def test_pictures_of_one_station_need_no_scale_between_them() -> None:

@@ -274,6 +274,13 @@ def test_a_speck_at_one_of_many_seams_is_no_place() -> None:
     assert rated(2, look(), 200) == "look", "of the one seam of two pictures it is"
 
 
+def test_of_three_pictures_a_wrong_geometry_is_not_usable_wherever_the_seam_is() -> None:
+    three = look_of_three()
+    assert judged(three, alignment_p95_px=400 * 0.01).rating != "not usable", "this is where the pictures are right"
+    found = judged(three, alignment_p95_px=400 * 0.07)
+    assert found.rating == "not usable" and "missed by more than 7%" in found.because
+
+
 def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:
     good = look_of_three()
     tones, shows = good.tones[2].copy(), good.shows[2].copy()

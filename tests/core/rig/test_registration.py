@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.projective import homogeneous
-from edf_stitch.core.cameras.rig import PictureMatches, Registration
+from edf_stitch.core.cameras.rig import FocalGuess, PictureMatches, Registration
 from edf_stitch.core.raster.arrays import Array
+from edf_stitch.core.rig import registration
 from edf_stitch.core.rig.averaging.turns import degrees_between
 from edf_stitch.core.rig.registration import register
-from edf_stitch.core.system.errors import Cancelled, NoOverlap
+from edf_stitch.core.system.errors import Cancelled, DegenerateGeometry, NoOverlap
 from edf_stitch.core.system.progress import Progress
 
 from .rigs import FOCAL, SyntheticRig, camera_of, make_rig
@@ -87,6 +90,15 @@ def test_deviations_are_those_of_the_errors() -> None:
     assert 0.2 < np.median(places) < 4
 
 
+def test_what_the_observations_do_not_tell_has_a_large_deviation() -> None:
+    """Half are from one place: in which direction they are apart is not told, and rounding may not make it negative."""
+    rig = make_rig("half", 0, points=2000, noise_px=0.1, pictures=7)
+    found = register([camera_of(FOCAL * 1.05, log_sigma=0.25)] * 7, rig.points, rig.matches)
+    sure = found.rig.position_deviation
+    assert np.isfinite(sure).all() and np.isfinite(found.rig.deviations).all()
+    assert (sure[1:] > 0).all()
+
+
 def test_the_order_of_the_pictures_does_not_matter(ring: tuple[SyntheticRig, Registration]) -> None:
     rig, found = ring
     order = np.random.default_rng(1).permutation(11)
@@ -142,6 +154,26 @@ def test_a_fixed_focal_length_stays() -> None:
     assert not found.rig.focal_deviation.any()
 
 
+def test_it_is_said_that_the_matches_told_the_focal_length() -> None:
+    rig = make_rig("ring", 1, points=3000)
+    for knowledge, source in ((Knowledge.ASSUMED, "the matches, from a guess"), (Knowledge.EXIF, "a guess")):
+        believed = [replace(camera, source="a guess", knowledge=knowledge) for camera in rig.cameras]
+        found = register(believed, rig.points, rig.matches).rig
+        assert {camera.source for camera in found.cameras} == {source}
+
+
+def test_focal_lengths_that_cost_almost_the_same_make_it_unsure(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = make_rig("ring", 1, points=3000)
+    before = register(rig.cameras, rig.points, rig.matches).rig
+    others = tuple(FocalGuess(factor * FOCAL, 0.0, 1.0) for factor in (1.0, 1.3, 1.3))
+    monkeypatch.setattr(registration, "_guesses", lambda found: others)
+    assumed = [replace(camera, knowledge=Knowledge.ASSUMED) for camera in rig.cameras]
+    found = register(assumed, rig.points, rig.matches).rig
+    apart = np.sqrt(2 / 3) * np.log(1.3)
+    np.testing.assert_allclose(found.focal_deviation, np.hypot(before.focal_deviation, apart), rtol=1e-6)
+    assert found.cameras[0].source.startswith("not determined by the matches, ")
+
+
 def test_given_poses_stay() -> None:
     rig = make_rig("ring", 2, points=4000)
     cameras = [
@@ -154,6 +186,39 @@ def test_given_poses_stay() -> None:
     between, true = (c[7] - c[4] for c in (found.rig.centres, (rig.centres - rig.centres[0]) @ rig.R[0].T))
     np.testing.assert_allclose(between / np.linalg.norm(between), true / np.linalg.norm(true), atol=1e-9)
     assert placed_off(found, rig).max() < 0.05
+
+
+def given(rig: SyntheticRig, order: Sequence[int]) -> list[Camera]:
+    """True cameras with their poses; picture k is given that of picture order[k]."""
+    return [replace(camera_of(FOCAL, log_sigma=0.0), pose=(rig.R[k], rig.t[k])) for k in order]
+
+
+@pytest.mark.parametrize("kind", ["ring", "tripod"])
+def test_given_cameras_of_swapped_pictures_are_refused(kind: str) -> None:
+    rig = make_rig(kind, 2, points=4000)
+    with pytest.raises(DegenerateGeometry, match="do not fit the matches.* hardly any of picture 2 and picture 5:"):
+        register(given(rig, (0, 4, 2, 3, 1, 5, 6, 7, 8, 9, 10)), rig.points, rig.matches)
+
+
+def test_given_cameras_of_one_place_are_taken() -> None:
+    rig = make_rig("tripod", 2, points=4000)
+    turned = [replace(camera, pose=(R, np.zeros(3))) for camera, R in zip(given(rig, range(11)), rig.R, strict=True)]
+    found = register(turned, rig.points, rig.matches)
+    assert not found.rig.t.any()
+    np.testing.assert_allclose(found.rig.R, rig.R @ rig.R[0].T, atol=1e-9)
+
+
+@pytest.mark.parametrize(("pictures", "seed"), [(7, 0), (7, 1), (13, 2)])
+def test_sharp_matches_of_a_tripod_are_of_one_place(pictures: int, seed: int) -> None:
+    """Most are right to a twentieth of a px, and some err by half a px: no depth is to explain these."""
+    rig = make_rig("tripod", seed, points=5000, noise_px=0.05, outliers=0.01, pictures=pictures)
+    rng = np.random.default_rng(seed)
+    points = [p + rng.normal(0, 0.4, p.shape) * (rng.random((len(p), 1)) < 0.1) for p in rig.points]
+    believed = [camera_of(FOCAL * 0.86, log_sigma=0.25) for _ in rig.cameras]
+    found = register(believed, points, rig.matches)
+    assert found.numbers == tuple(range(pictures))
+    assert not found.rig.t.any() and found.rig.stations == (found.numbers,)
+    assert abs(found.rig.cameras[0].focal / FOCAL - 1) < 0.003
 
 
 def test_two_lenses() -> None:
