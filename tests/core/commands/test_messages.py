@@ -11,7 +11,8 @@ def test_the_worst_loop_is_told_where_there_is_one(
     capsys: pytest.CaptureFixture[str], degrees: float | None, said: str
 ) -> None:
     report = {
-        "rig": {"edges": [0, 1], "points": 9, "loop_degrees": degrees, "scale": "measured"}, "pictures": [], "left_out": [],
+        "rig": {"edges": [0, 1], "points": 9, "loop_degrees": degrees, "scale": "measured"},
+        "pictures": [], "left_out": [],
         "field": {"kind": "slack", "centres": 9, "leave_one_out_px": None}, "matches": {"noise_px": 0.5},
         "measured": {"alignment_median_px": 1.0, "alignment_p95_px": 2.0},
     }  # fmt: skip
