@@ -41,9 +41,9 @@ from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
 from .pose.match_files import read_matches
 from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
-from .rig.averaging.pair_edges import edges_of
-from .rig.bundling.given import given_matches
+from .rig.given_matches import given_matches
 from .rig.left_out import check_connected
+from .rig.pair_edges import edges_of
 from .rig.reframing import seen_from
 from .system.cache import Cache
 from .system.errors import BadRequest, NoOverlap, StitchError, TooFewMatches
@@ -200,15 +200,16 @@ def _of_many(
     progress: ReportProgress,
 ) -> Geometry:  # fmt: skip
     """The geometry of more than two pictures; of two of them, if no more connect."""
-    from .rig.from_pictures import matched_pictures, registered  # a pair starts sooner without it
+    from .rig.from_pictures import content_order, matched_pictures, registered  # a pair starts sooner without it
 
     pictures, cache = frame.pictures, Cache(options.cache)
+    order = content_order(pictures)
     if options.matches is None:
-        matched = matched_pictures(pictures, options.preview, cache, progress)
+        matched = matched_pictures(pictures, order, options.preview, cache, progress)
     else:
         worked = [camera.size for camera in cameras]
         matched = given_matches(options.matches, pictures, frame.full_sizes, worked)
-    found = registered(pictures, cameras, matched, options.seed, cache, progress)
+    found = registered(pictures, order, cameras, matched, options.seed, cache, progress)
     check_connected(found, frame.names, options.require_all)
     left_out = tuple((frame.names[number], why) for number, why in found.left_out.items())
     warnings = (*warnings, *(f"{name} is left out: {why}" for name, why in left_out))

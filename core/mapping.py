@@ -31,7 +31,7 @@ from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
 from .panorama.rig_viewpoint import RigViewpoint, rig_viewpoint
-from .panorama.rig_warp import build_rig_warp, outline_of
+from .panorama.rig_warp import RigSurface, build_rig_warp
 from .panorama.slid_warp import slid_warp
 from .panorama.upright_edges import StraightEdges, straight_edges
 from .panorama.viewpoint import Viewpoint, viewpoint_between
@@ -179,19 +179,21 @@ def map_rig(
     """
     views = rig.views
     progress("warp", 0.0)
+    surface = RigSurface.of(field, views)
     if options.surface[0] == "reference":
         still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
-        return Mapped(build_rig_warp(field, views), None, still)
+        return Mapped(build_rig_warp(surface), None, still)
     lines = AllEdges(pictures, views)
-    slide, viewpoint = _rig_slide(field, lines, options, lambda share: progress("warp", 0.3 * share))
+    slide, viewpoint = _rig_slide(surface, lines, options, lambda share: progress("warp", 0.3 * share))
+    surface = surface.seen_from(viewpoint)
     progress("warp", 0.3)
-    frame = _frame(lines, options, lambda projection: build_rig_warp(field, views, projection, viewpoint))
+    frame = _frame(lines, options, lambda projection: build_rig_warp(surface, projection))
     progress("warp", 0.5)
-    return Mapped(build_rig_warp(field, views, frame, viewpoint), None, slide)
+    return Mapped(build_rig_warp(surface, frame), None, slide)
 
 
 def _rig_slide(
-    field: SphereField, lines: AllEdges, options: StitchOptions, progress: Callable[[float], None]
+    surface: RigSurface, lines: AllEdges, options: StitchOptions, progress: Callable[[float], None]
 ) -> tuple[SlideChoice, RigViewpoint | None]:
     """How far the viewpoint slides among the places of N pictures, as asked for or chosen; None where it stays."""
     asked, views = options.slide, lines.views
@@ -202,11 +204,11 @@ def _rig_slide(
     if asked == "auto" and options.surface[0] == "equirectangular":
         return SlideChoice(0.0, (), "a sphere that is asked for is seen from one place"), None
     axes = upright(lines.down)
-    viewpoint = rig_viewpoint(views, [outline_of(field, view) for view in views], axes)
+    viewpoint = rig_viewpoint(views, surface.outlines, axes)
     if asked != "auto":
         return SlideChoice(float(asked), (), "as asked for"), viewpoint.sliding(float(asked))
     cylinder = round_projection("cylindrical", views[0].K, axes, CHOICE.base_px_per_radian)
-    base = build_rig_warp(field, views, cylinder)
+    base = build_rig_warp(surface, cylinder)
     choice = choose_rig_slide(base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None, progress)
     return choice, viewpoint.sliding(choice.s1) if choice.s1 else None
 

@@ -17,9 +17,8 @@ from ..system.progress import ReportProgress
 from .adding import Added, add
 from .decided import Decided
 from .multiband import bands_for
-from .options import BANDS
+from .options import BANDS, PLACING, WINDOW
 from .placing import Placing
-from .tone.graph_options import PLACING, WINDOW
 from .window import Window
 
 if TYPE_CHECKING:

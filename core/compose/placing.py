@@ -21,7 +21,7 @@ from ..cameras.view import View
 from ..panorama.layers import Layer
 from ..raster.arrays import Array, Part, Plane
 from ..raster.lazy import AnyImage
-from .tone.graph_options import PLACING
+from .options import PLACING
 from .window import Window
 
 if TYPE_CHECKING:

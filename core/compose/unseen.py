@@ -14,7 +14,7 @@ from ..field.folding import folds, turned_over, turning
 from ..field.visibility import by_agreement, occluded
 from ..panorama.layers import Layer
 from ..raster.lazy import AnyImage
-from .tone.graph_options import WINDOW
+from .options import WINDOW
 from .window import Window
 
 if TYPE_CHECKING:

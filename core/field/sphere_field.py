@@ -16,11 +16,10 @@ from ..cameras.rig import Rig
 from ..raster.arrays import Array
 from ..raster.robust import sigma_of
 from ..system.errors import DegenerateGeometry
-from .fade import fading
 from .sphere_options import SPHERE
 from .sphere_points import SpherePoints, angular_unit, points_of, px_scale, seen_at
 from .sphere_slack import SphereSlack, fit_sphere_slack
-from .sphere_spline import SphereSpline, problem_on_sphere, solved_on_sphere, squared_chords
+from .sphere_spline import SphereSpline, problem_on_sphere, share_near, solved_on_sphere, squared_chords
 from .spline import SmoothingProblem, spread_points
 from .strict import best_smoothing
 
@@ -88,8 +87,7 @@ class SphereDepth:
         flat = rays.reshape(-1, 3)
         out = np.zeros(len(flat))
         if self.outer is not None:
-            distance = cKDTree(self.inner.centres * self.inner.unit).query(flat)[0]
-            share = fading(np.maximum(distance - self.reach, 0.0), self.width)
+            share = share_near(self.inner.centres * self.inner.unit, flat, self.reach, self.width)
             for spline, part in ((self.inner, share), (self.outer, 1 - share)):
                 counts = part > 0
                 out[counts] += part[counts] * spline.at(flat[counts])[:, 0]

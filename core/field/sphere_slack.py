@@ -10,15 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..cameras.lens import undistort
 from ..cameras.rig import Rig
 from ..raster.arrays import Array
-from .fade import fading
 from .sphere_options import SPHERE, SPHERE_SLACK
 from .sphere_points import px_scale
-from .sphere_spline import SphereSpline, problem_on_sphere, solved_on_sphere
+from .sphere_spline import SphereSpline, problem_on_sphere, share_near, solved_on_sphere
 from .spline import spread_points
 from .strict import robust_mean
 from .transfer import transfer
@@ -41,8 +39,7 @@ class SphereSlack:
     def at(self, rays: Array) -> Array:
         """px (…, 2) at unit rays (…, 3)."""
         flat = rays.reshape(-1, 3)
-        distance = cKDTree(self.own).query(flat)[0]
-        share = fading(np.maximum(distance - self.reach, 0.0), self.width)
+        share = share_near(self.own, flat, self.reach, self.width)
         out = np.zeros((len(flat), 2))
         near = share > 0
         values = self.spline.at(flat[near])

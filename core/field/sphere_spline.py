@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..raster.arrays import Array
 from ..system.threads import each
+from .fade import fading
 from .options import SPLINE
 from .spline import SmoothingProblem
 
@@ -53,6 +55,12 @@ def squared_chords(points: Array, centres: Array, unit: float) -> Array:
     squared = points @ (-2 * centres.T)
     squared += 2 / unit**2
     return squared
+
+
+def share_near(points: Array, rays: Array, reach: float, width: float) -> Array:
+    """1 (N,) for unit rays (N, 3) up to `reach` from the nearest of some points (M, 3), fading to 0 over `width`; both
+    are chords in radians."""
+    return fading(np.maximum(cKDTree(points).query(rays)[0] - reach, 0.0), width)
 
 
 def problem_on_sphere(rays: Array, noise: Array, unit: float) -> SmoothingProblem:

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from ..pipeline import StitchResult
 
 
-
 def camera_table(result: StitchResult) -> dict[str, Any]:
     """The content of a camera file (see `read_camera_file`), JSON-ready but for arrays.
 

@@ -109,7 +109,6 @@ class LevellingOptions:
     """Edges of any direction favour some direction by about the root of the sum of their squared lengths. Only beyond
     so many times that do edges have a say."""
 
-
     confirming_tilts_deg: tuple[float, float] = (20.0, 1.5)
     """Degrees off upright within which edges are asked whether down is right, and within which they say so: trunks of
     palms lean any way, walls do not."""

@@ -70,7 +70,6 @@ class RigViewpoint:
         length = np.maximum(np.linalg.norm(moved, axis=-1), RIG_SLIDE.least_range)
         return moved / length[..., None], inverse_depth / length
 
-
     def shows_twice(self, directions: Array, inverse_depth: Array) -> NDArray[np.bool_]:
         """Which points q / d (…) the panorama shows more than once: those that several headings look at, each from its
         own place."""

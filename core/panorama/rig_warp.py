@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,30 +31,34 @@ from .warp import Warp, in_plane, raw_pixels, trimmed
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class RigSurface:
     """A field on the sphere as its pictures see it, from one place or from where a viewpoint slides to.
 
-    carried: what is seen from there; None if all is seen from the first picture's place.
+    outlines: of each picture unit rays (N, 3) from the first picture's place to what it shows along its border, in
+    order; viewpoint: None if all is seen from that place.
     """
 
     field: SphereField
     views: Sequence[View]
-    carried: CarriedDepth | None
+    outlines: tuple[Array, ...]
+    viewpoint: RigViewpoint | None = None
 
     @staticmethod
-    def by(field: SphereField, views: Sequence[View], viewpoint: RigViewpoint | None) -> Seen:
-        """The field from a viewpoint; None: from the first picture's place."""
-        slides = viewpoint is not None and viewpoint.s1 > 0
-        return Seen(field, views, CarriedDepth.of(field, views, viewpoint) if viewpoint and slides else None)
+    def of(field: SphereField, views: Sequence[View]) -> RigSurface:
+        """The field from the first picture's place."""
+        return RigSurface(field, views, tuple(outline_of(field, view) for view in views))
 
-    @property
-    def viewpoint(self) -> RigViewpoint | None:
-        """Where it slides to."""
-        return None if self.carried is None else self.carried.viewpoint
+    def seen_from(self, viewpoint: RigViewpoint | None) -> RigSurface:
+        """The same from where a viewpoint slides to; None or one that does not slide: the first picture's place."""
+        return replace(self, viewpoint=viewpoint if viewpoint is not None and viewpoint.s1 > 0 else None)
+
+    @cached_property
+    def _carried(self) -> CarriedDepth | None:
+        return None if self.viewpoint is None else CarriedDepth.of(self.field, self.views, self.viewpoint)
 
     def depth(self, rays: Array) -> tuple[Array, Array | None]:
         """Inverse range d (…) along unit rays (…, 3), and d C (…, 3) where the viewpoint slides."""
-        return (self.field.at(rays), None) if self.carried is None else self.carried.at(rays)
+        return (self.field.at(rays), None) if self._carried is None else self._carried.at(rays)
 
     def brought_along(self, view: View, infinite: list[Array], moved: Array | None) -> list[Array]:
         """H_inf p + K R d C (three (…) arrays) for d C (…, 3); H_inf p if nothing moved."""
@@ -62,12 +67,13 @@ class Seen:
         matrix = view.H_inf @ self.views[0].K
         return [part + moved @ row for part, row in zip(infinite, matrix, strict=True)]
 
-    def outline(self, view: View) -> Array:
-        """Unit rays (N, 3) that show a picture's border, in order."""
-        rays = outline_of(self.field, view)
+    def borders(self) -> list[Array]:
+        """Unit rays (N, 3) from the viewpoint that show each picture's border, in order."""
         if self.viewpoint is None:
-            return rays
-        return self.viewpoint.seen_from(rays, np.maximum(self.field.at(rays), 0.0))[0]
+            return list(self.outlines)
+        return [
+            self.viewpoint.seen_from(rays, np.maximum(self.field.at(rays), 0.0))[0] for rays in self.outlines
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,19 +91,19 @@ class RigValues:
     slacks: tuple[Array | None, ...]
 
     @staticmethod
-    def over(seen: Seen, canvas: Canvas, grid: Grid) -> RigValues:
+    def over(surface: RigSurface, canvas: Canvas, grid: Grid) -> RigValues:
         """A field's values at a grid's nodes."""
-        field, views = seen.field, seen.views
+        field, views = surface.field, surface.views
         camera = views[0].camera
         rays, length = canvas.rays_at(views[0].K, grid.xs, grid.ys, camera)
-        depth, moved = seen.depth(rays)
+        depth, moved = surface.depth(rays)
         depth = depth * length
         if moved is not None:
             rays = rays + moved
             rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
         places, slacks = [], []
         for number, view in enumerate(views):
-            infinite = seen.brought_along(view, canvas.project_rows(view.H_inf, grid.xs, grid.ys, camera), moved)
+            infinite = surface.brought_along(view, canvas.project_rows(view.H_inf, grid.xs, grid.ys, camera), moved)
             slack = field.slack(number, rays) if number or canvas.projection is not None else None
             slacks.append(slack)
             beside = [] if slack is None else [(slack[..., 0], slack[..., 1])]
@@ -105,21 +111,15 @@ class RigValues:
         return RigValues(depth, moved, tuple(places), tuple(slacks))
 
 
-def build_rig_warp(
-    field: SphereField, views: Sequence[View], projection: Projection | None = None,
-    viewpoint: RigViewpoint | None = None,
-) -> Warp:  # fmt: skip
+def build_rig_warp(surface: RigSurface, projection: Projection | None = None) -> Warp:
     """Lay out a canvas that holds all pictures, and map them onto it.
 
     Parameters
     ----------
-    field : SphereField
-    views : sequence of View
+    surface : RigSurface
         Of all pictures, the viewpoint's first.
     projection : Projection, optional
         Of a round panorama; by default the panorama lies in the plane of the viewpoint's picture, pixel for pixel.
-    viewpoint : RigViewpoint, optional
-        Where a round panorama is seen from, if that slides.
 
     Returns
     -------
@@ -130,9 +130,10 @@ def build_rig_warp(
     NoOverlap, OutputTooLarge, BadRequest
         See `build_warp`.
     """
+    field, views = surface.field, surface.views
     camera, sizes = views[0].camera, [view.size for view in views]
-    plane, seen = Canvas(0, 0, (0, 0), projection=projection), Seen.by(field, views, viewpoint)
-    outlines = [seen.outline(view) @ views[0].K.T for view in views]
+    plane = Canvas(0, 0, (0, 0), projection=projection)
+    outlines = [border @ views[0].K.T for border in surface.borders()]
     reference: Box = (0, 0, *camera.size)
     if projection is None:
         reach, cropped = expected_reach([in_plane(one) for one in outlines[1:]], camera.size, sizes[1:])
@@ -141,19 +142,18 @@ def build_rig_warp(
         reference, reach, cropped = round_reach(projection, outlines, shows, camera)
 
     def pictures_at(grid: Grid) -> Sequence[Array]:
-        return RigValues.over(seen, plane, grid).places
+        return RigValues.over(surface, plane, grid).places
 
     canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
-    return trimmed(_mapped(seen, replace(canvas, cropped=canvas.cropped or cropped)))
+    return trimmed(build_rig_map(surface, replace(canvas, cropped=canvas.cropped or cropped)))
 
 
-def build_rig_map(field: SphereField, views: Sequence[View], canvas: Canvas) -> Warp:
+def build_rig_map(surface: RigSurface, canvas: Canvas) -> Warp:
     """Map all pictures onto a given canvas, strip by strip.
 
     Parameters
     ----------
-    field : SphereField
-    views : sequence of View
+    surface : RigSurface
         Of all pictures, the viewpoint's first.
     canvas : Canvas
 
@@ -161,16 +161,11 @@ def build_rig_map(field: SphereField, views: Sequence[View], canvas: Canvas) -> 
     -------
     Warp
     """
-    return _mapped(Seen.by(field, views, None), canvas)
-
-
-def _mapped(seen: Seen, canvas: Canvas) -> Warp:
-    """The maps of all pictures on a canvas."""
-    field, views = seen.field, seen.views
+    field, views = surface.field, surface.views
     left, top = -canvas.offset[0], -canvas.offset[1]
     shape = canvas.height, canvas.width
     grid = Grid.over(left, top, canvas.width, canvas.height, RIG_WARP.nodes)
-    values = RigValues.over(seen, canvas, grid)
+    values = RigValues.over(surface, canvas, grid)
     maps: list[CanvasMap] = [
         _empty_map(places, view.size, canvas, grid) for places, view in zip(values.places, views, strict=True)
     ]
@@ -185,14 +180,14 @@ def _mapped(seen: Seen, canvas: Canvas) -> Warp:
         moved = None
         if values.moved is not None:
             moved = np.stack([grid.to_pixels(values.moved[..., k], *rows) for k in range(3)], axis=-1)
-        strip = _Strip(seen, canvas, grid, start, depth[part], moved)
+        strip = _Strip(surface, canvas, grid, start, depth[part], moved)
         for view, slack, one in zip(views, values.slacks, maps, strict=True):
             if isinstance(one, BoxedMap):
                 strip.put(one, view, slack)
 
     each(put, small_strips(shape))
     return Warp(
-        canvas, tuple(maps), depth, viewpoint=seen.viewpoint, deviation=_deviation(field, views, canvas)
+        canvas, tuple(maps), depth, viewpoint=surface.viewpoint, deviation=_deviation(field, views, canvas)
     )
 
 
@@ -209,7 +204,7 @@ class _Strip:
     """Rows of a canvas from `start` on, of which inverse depth (h, W) is known, and d C (h, W, 3) where the viewpoint
     slides; grid: the nodes of a field."""
 
-    seen: Seen
+    surface: RigSurface
     canvas: Canvas
     grid: Grid
     start: int
@@ -227,13 +222,13 @@ class _Strip:
         if slack is not None:
             strip = (left - canvas.offset[0], low - canvas.offset[1], width, high - low)
             beside.append([self.grid.to_pixels(slack[..., k], *strip) for k in (0, 1)])
-        camera = self.seen.views[0].camera
+        camera = self.surface.views[0].camera
         infinite = canvas.project_rows(view.H_inf, canvas.xs[columns], canvas.ys[low:high], camera)
         part = slice(low - self.start, high - self.start), columns
         # float64 from here on: NumPy 1 and 2 differ in what float32 times a scalar is
         depth = self.depth[part].astype(np.float64)
         moved = None if self.moved is None else self.moved[part].astype(np.float64)
-        infinite = self.seen.brought_along(view, infinite, moved)
+        infinite = self.surface.brought_along(view, infinite, moved)
         rows = slice(low - top, high - top)
         one.inner.x[rows], one.inner.y[rows] = raw_pixels(view, infinite, depth, beside)
 

@@ -140,6 +140,9 @@ class EstimationOptions:
     # Share of what a free F explains that given cameras must explain, and px that their noise is never below.
     given_camera_share: float = 0.5
     given_camera_noise_px: float = 0.1
+    # Share of a picture's longer side by which near things may be off where cameras are given at one place: a head that
+    # is off the lens's centre, or a hand, moves them. Cameras of other pictures are further off: those overlap in part.
+    given_place_share: float = 0.05
     # Share of consistent points that must lie in front of both cameras.
     min_front_share: float = 0.5
     # Share of matches on one homography from which its own poses are tried too: F is unstable on a plane.

@@ -18,12 +18,21 @@ from .reframing import reordered
 from .registration import register
 
 
-def matched_pictures(pictures: Sequence[Picture], quick: bool, cache: Cache, progress: ReportProgress) -> Matched:
+def content_order(pictures: Sequence[Picture]) -> list[int]:
+    """Numbers of the pictures in an order that is the same however they are given."""
+    return sorted(range(len(pictures)), key=lambda number: content_key(pictures[number]))
+
+
+def matched_pictures(
+    pictures: Sequence[Picture], order: Sequence[int], quick: bool, cache: Cache, progress: ReportProgress
+) -> Matched:
     """What pictures have in common.
 
     Parameters
     ----------
     pictures : sequence of Picture
+    order : sequence of int
+        See `content_order`.
     quick : bool
         Whether a preview's few features will do.
     cache : Cache
@@ -35,7 +44,6 @@ def matched_pictures(pictures: Sequence[Picture], quick: bool, cache: Cache, pro
     Matched
         The same in whatever order the pictures are given, but for their numbers.
     """
-    order = sorted(range(len(pictures)), key=lambda number: content_key(pictures[number]))
     progress("features", 0.0)
     seen = found_features(
         [pictures[number] for number in order], quick, cache, lambda share: progress("features", share)
@@ -46,14 +54,16 @@ def matched_pictures(pictures: Sequence[Picture], quick: bool, cache: Cache, pro
 
 
 def registered(
-    pictures: Sequence[Picture], cameras: Sequence[Camera], matched: Matched, seed: int, cache: Cache,
-    progress: ReportProgress,
+    pictures: Sequence[Picture], order: Sequence[int], cameras: Sequence[Camera], matched: Matched, seed: int,
+    cache: Cache, progress: ReportProgress,
 ) -> Registration:  # fmt: skip
     """The rig of pictures.
 
     Parameters
     ----------
     pictures : sequence of Picture
+    order : sequence of int
+        See `content_order`.
     cameras : sequence of Camera
         What is known of them.
     matched : Matched
@@ -70,7 +80,6 @@ def registered(
         The same in whatever order the pictures are given, but for their numbers: those that connect come in the order
         that they were given in, and the first one's frame is the rig's.
     """
-    order = sorted(range(len(pictures)), key=lambda number: content_key(pictures[number]))
     inner = renumbered(matched, np.argsort(order).tolist())
     cameras = tuple(cameras[number] for number in order)
     names = tuple(pictures[number].name for number in order)

@@ -14,10 +14,6 @@ from ..raster.arrays import Array
 from ..system.errors import DegenerateGeometry
 from .averaging.averaged import Verified
 
-# Share of a picture's longer side by which near things may be off where cameras are given at one place: a head that is
-# off the lens's centre, or a hand, moves them. Cameras of other pictures are further off, as those overlap in part.
-PARALLAX_SHARE = 0.05
-
 
 def check_given_poses(
     cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, names: Sequence[str]
@@ -74,7 +70,7 @@ def _explained(cameras: Sequence[Camera], points: Sequence[Array], pair: Picture
         seen = homogeneous(x) @ infinite_homography(first.K, second.K, R).T
         ahead = seen[:, 2] > 0
         off = np.linalg.norm(project(seen[ahead]) - y[ahead], axis=1)
-        px = max(px, PARALLAX_SHARE * max(second.size))
+        px = max(px, ESTIMATION.given_place_share * max(second.size))
     else:
         off = np.abs(sampson_residuals(fundamental_from_pose(first.K, second.K, R, t), x, y))
     return int((off < px).sum())

@@ -77,7 +77,7 @@ def register(
         If given cameras do not fit the matches.
     """
     progress = progress or Progress()
-    ideal = [undistort(p, camera) if camera.distortion.any() else p for p, camera in zip(points, cameras, strict=True)]
+    ideal = [undistort(p, camera) for p, camera in zip(points, cameras, strict=True)]
     plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
     names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
     verified = verify(ideal, _watched(matches, progress), scale, seed)

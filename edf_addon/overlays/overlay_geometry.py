@@ -272,7 +272,6 @@ def cameras_of(geometry: dict[str, Any]) -> dict[str, Camera]:
     return found
 
 
-
 def upright(points: Array, stored: Size, orientation: int) -> Array:
     """px (N, 2) of a picture as it is stored, `stored` (W, H), to px of the upright one; orientation 1..8 as in EXIF
     (see core.decoding.turn)."""

@@ -20,6 +20,8 @@ TURNS = {
     1: (0, False), 2: (0, True), 3: (180, False), 4: (180, True), 5: (-90, True), 6: (90, False), 7: (90, True),
     8: (-90, False),
 }  # fmt: skip
+
+
 def no_world(image: bpy.types.Image | None) -> str:
     """Why an image cannot surround a scene; "" where it can."""
     if image is None:

@@ -20,8 +20,7 @@ from ...raster.arrays import Part, Plane, beside, eroded, small_strips, strips
 from ...raster.lazy import AnyImage
 from ...raster.picture_map import PictureMap
 from ...system.threads import each
-from ..options import OVERLAP
-from ..tone.graph_options import PLACING
+from ..options import OVERLAP, PLACING
 from .seam_options import SEAM
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""What was chosen in composing more than two pictures: each value with its unit, and why it is what it is."""
+"""What was chosen in matching the light of many pictures: each value with its unit, and why it is what it is."""
 
 from __future__ import annotations
 
@@ -30,32 +30,4 @@ class GraphExposureOptions:
     """Blocks of all overlaps below which no vignetting is fitted: one pair of pictures could not tell it from light."""
 
 
-@dataclass(frozen=True)
-class PlacingOptions:
-    """By how much pictures are expected to be misplaced, and what that is worth (`placing`)."""
-
-    samples: int = 10_000
-    """Pixels of a picture that the order is decided by: more take time and change nothing."""
-
-    step_px: int = 8
-    """px from one place to the next at which that is worked out for labels: it changes slowly."""
-
-    price: float = 0.3
-    """Price of showing what is misplaced by one px more, from corner to corner of the overlap, for each pixel of its
-    diagonal. Borders between opposite tones cost 1 a pixel."""
-
-    max_px: float = 4.0
-    """px of difference beyond which more costs no more: neither fits."""
-
-
-@dataclass(frozen=True)
-class WindowOptions:
-    """The part of the canvas that a picture is added in (`window`)."""
-
-    seam_margin_px: int = 32
-    """px around a picture that are looked at in any case: what the seam is held by."""
-
-
 GRAPH_EXPOSURE = GraphExposureOptions()
-PLACING = PlacingOptions()
-WINDOW = WindowOptions()

@@ -81,7 +81,7 @@ def candidates(
     for k in range(len(matched)):
         tick()
         rows = slice(matched.starts[k], matched.starts[k + 1])
-        part = Rays(seen.a[rows], seen.b[rows], seen.focal[:, rows])
+        part = seen.of(rows)
         poses, agree = _ransac(part, scale, seed)
         if agree.sum() < CANDIDATES.min_inliers:
             continue
@@ -161,27 +161,36 @@ def noise_of(residual: Array, scale: float) -> float:
 
 def _ransac(seen: Rays, scale: float, seed: int) -> tuple[Poses, NDArray[np.bool_]]:
     """Poses by several seeds where matches are few, that with most inliers first, and those inliers."""
-    sides = [ray[:, :2] * focal[:, None] for ray, focal in zip((seen.a, seen.b), seen.focal, strict=True)]
-    size = [int(4 * np.abs(side).max()) + 1 for side in sides]
-    cameras = [
-        {"model": "SIMPLE_PINHOLE", "width": s, "height": s, "params": [float(focal[0]), 0.0, 0.0]}
-        for s, focal in zip(size, seen.focal, strict=True)
-    ]
-    options = {
-        "max_epipolar_error": CANDIDATES.inlier_px * scale,
-        "max_iterations": CANDIDATES.iterations,
-        "min_iterations": CANDIDATES.fewest_iterations,
-    }
-    found = []
-    for further in range(CANDIDATES.seeds if len(seen.a) < CANDIDATES.few_matches else 1):
-        pose, info = poselib.estimate_relative_pose(*sides, *cameras, {**options, "seed": seed + further}, {})
-        length = float(np.linalg.norm(pose.t))
-        if length > 0 and np.isfinite(pose.R).all():
-            found.append((np.asarray(pose.R), np.asarray(pose.t) / length, np.asarray(info["inliers"], bool)))
+    seeds = range(seed, seed + (CANDIDATES.seeds if len(seen.a) < CANDIDATES.few_matches else 1))
+    tried = [ransac_pose(seen, CANDIDATES.iterations, scale, each) for each in seeds]
+    found = [each for each in tried if each is not None]
     if not found:
         return Poses(np.zeros((0, 3, 3)), np.zeros((0, 3))), np.zeros(len(seen.a), bool)
     found.sort(key=lambda item: -int(item[2].sum()))
     return Poses(np.array([f[0] for f in found]), np.array([f[1] for f in found])), found[0][2]
+
+
+def ransac_pose(
+    seen: Rays, iterations: int, scale: float, seed: int
+) -> tuple[Array, Array, NDArray[np.bool_]] | None:
+    """R (3, 3), t (3,) of length 1 and the inliers (O,) of a pair's pose; None if no sample gives one."""
+    sides = [ray[:, :2] * focal[:, None] for ray, focal in zip((seen.a, seen.b), seen.focal, strict=True)]
+    # points lie about the principal point: the size is not looked at
+    cameras = [
+        {"model": "SIMPLE_PINHOLE", "width": 1, "height": 1, "params": [float(focal[0]), 0.0, 0.0]}
+        for focal in seen.focal
+    ]
+    options = {
+        "max_epipolar_error": CANDIDATES.inlier_px * scale,
+        "seed": seed,
+        "max_iterations": iterations,
+        "min_iterations": CANDIDATES.fewest_iterations,
+    }
+    pose, info = poselib.estimate_relative_pose(*sides, *cameras, options, {})
+    length = float(np.linalg.norm(pose.t))
+    if not length > 0 or not np.isfinite(pose.R).all():
+        return None
+    return np.asarray(pose.R), np.asarray(pose.t) / length, np.asarray(info["inliers"], bool)
 
 
 def _best_rotation(seen: Rays, scale: float, seed: int) -> Array:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import poselib
 
 from ...cameras.camera import Camera
 from ...raster.arrays import Array
 from ...system.progress import Tick, unwatched
 from .averaged import Verified
+from .candidates import ransac_pose
 from .matched_rays import MatchedRays, SharedLens, matched_rays
-from .options import CANDIDATES, LADDER
+from .options import LADDER
 from .pair_models import EpipolarModel, Poses
 
 
@@ -70,24 +70,12 @@ def log_sigma(cameras: Sequence[Camera]) -> float:
 def _cost(matched: MatchedRays, lens: SharedLens, verified: Verified) -> float:
     """Robust cost of the poses that RANSAC finds with this focal length, log likelihood."""
     seen = matched.undistorted(lens)
-    x, y = (ray[:, :2] * focal[:, None] for ray, focal in zip((seen.a, seen.b), seen.focal, strict=True))
-    options = {
-        "max_epipolar_error": CANDIDATES.inlier_px * verified.scale,
-        "seed": verified.seed,
-        "max_iterations": LADDER.iterations,
-        "min_iterations": CANDIDATES.fewest_iterations,
-    }
     R, t = np.tile(np.eye(3), (len(matched), 1, 1)), np.tile([1.0, 0, 0], (len(matched), 1))
     for k in range(len(matched)):
-        rows = slice(matched.starts[k], matched.starts[k + 1])
-        cameras = [
-            {"model": "SIMPLE_PINHOLE", "width": 1, "height": 1, "params": [float(focal[rows.start]), 0.0, 0.0]}
-            for focal in seen.focal
-        ]
-        pose, _ = poselib.estimate_relative_pose(x[rows], y[rows], *cameras, options, {})
-        length = float(np.linalg.norm(pose.t))
-        if length > 0:
-            R[k], t[k] = pose.R, np.asarray(pose.t) / length
+        part = seen.of(slice(matched.starts[k], matched.starts[k + 1]))
+        pose = ransac_pose(part, LADDER.iterations, verified.scale, verified.seed)
+        if pose is not None:
+            R[k], t[k], _ = pose
     width = LADDER.judged_px * verified.scale
     model = EpipolarModel(matched, width)
     return float(np.log1p(model.squares(Poses(R, t), lens) / width**2).sum())

@@ -44,6 +44,10 @@ class Rays:
     b: Array
     focal: Array
 
+    def of(self, rows: slice) -> Rays:
+        """Those of some matches."""
+        return Rays(self.a[rows], self.b[rows], self.focal[:, rows])
+
     def unit(self) -> tuple[Array, Array]:
         """Both as unit vectors (O, 3)."""
         a, b = (ray / np.linalg.norm(ray, axis=1, keepdims=True) for ray in (self.a, self.b))

@@ -7,20 +7,17 @@ columns. Reference: Triggs et al., Bundle Adjustment: A Modern Synthesis, 1999.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...raster.arrays import Array
+from ...system.progress import Tick, unwatched
 from ..averaging.turns import rotations
 from .bundle_options import BUNDLE
 from .reprojection import CAMERA, Reprojection, derivatives, reproject, tangents
 from .solution import Problem, Solution
 from .tracks import Index, pairs_within
-
-# Called often by long work; ends it by raising.
-Tick = Callable[[], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +140,7 @@ def _columns(problem: Problem, settings: Settings, reference: int) -> Index:
 
 def bundle(
     problem: Problem, solution: Solution, settings: Settings, reference: int, prior: DepthPrior | None = None,
-    tick: Tick = lambda: None,
+    tick: Tick = unwatched,
 ) -> Bundled:  # fmt: skip
     """Minimise the robust cost of all observations that are used.
 

@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 
 from ...raster.arrays import Array
 from ...raster.robust import sigma_of_lengths
-from .bundle import Bundled, DepthPrior, Settings, Tick, bundle, robust_cost
+from ...system.progress import Tick
+from .bundle import Bundled, DepthPrior, Settings, bundle, robust_cost
 from .bundle_options import BUNDLE, JUDGE, POLISHING
 from .reprojection import lengths_of_errors
 from .solution import Problem, Solution

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...cameras.projective import skew
 from ...raster.arrays import Array
 from .bundle_options import POSITIONS
 from .continuity import Blocks, Neighbours, equal_depths, equal_logs, neighbours_of
@@ -161,7 +162,7 @@ class _Positioning:
         """How [w_o]ₓ (c_l + z w_l − c_o) depends on the places; seen (O, 3): unit vectors along which a change is none
         of the angle."""
         point, picture = self.tracks.point, self.tracks.picture
-        cross = _skew(self.w)
+        cross = skew(self.w)
         if seen is not None:
             cross = cross - np.matmul(cross, seen[:, :, None]) * seen[:, None, :]
         along = np.matmul(cross, self.w[depths.left[point]][:, :, None]) * depths.g[point][:, None, :]
@@ -282,11 +283,3 @@ class _System:
         shift = np.tile(np.eye(3), (self.count, 1))
         held = shift @ shift.T / self.count
         return self.matrix + size * (held + POSITIONS.regular * np.eye(len(self.matrix))), size
-
-
-def _skew(v: Array) -> Array:
-    """[v]ₓ (M, 3, 3) of vectors (M, 3)."""
-    matrix = np.zeros((len(v), 3, 3))
-    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        matrix[:, b, a], matrix[:, a, b] = v[:, c], -v[:, c]
-    return matrix

@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from ...cameras.camera import Camera
 from ...raster.arrays import Array
+from ...system.progress import Tick
 from ..averaging.averaged import Averaged, PairGeometry, Verified
 from ..averaging.averaging import averaged
 from ..averaging.matched_rays import SharedLens
-from .bundle import Tick
 from .bundle_options import JUDGE
 from .judging import judged
 from .polishing import Polished, start

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...raster.arrays import Array
+from ...system.progress import Tick
 from ..averaging.averaged import PairGeometry
 from ..averaging.graph import components
-from .bundle import Tick
 from .bundle_options import JUDGE
 from .polishing import Polished, polish, polish_rotations
 from .positions import SamePlace, place_pictures

@@ -12,7 +12,7 @@ from edf_stitch.core.output import inspection
 from edf_stitch.core.output.outputs import json_bytes
 from edf_stitch.core.panorama.projection import round_projection
 from edf_stitch.core.panorama.rig_viewpoint import rig_viewpoint
-from edf_stitch.core.panorama.rig_warp import build_rig_warp, outline_of
+from edf_stitch.core.panorama.rig_warp import RigSurface, build_rig_warp
 from edf_stitch.core.panorama.viewpoint import Viewpoint
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
@@ -136,9 +136,9 @@ def test_the_depth_grid_reaches_from_corner_to_corner(half: StitchResult):
 def test_what_is_infinitely_far_is_seen_from_where_a_viewpoint_slides_to_among_many() -> None:
     rig = rig_of((0, 20, -20), 1, points=1200)
     field = fit_sphere_field(rig, with_slack=False)
-    viewpoint = rig_viewpoint(rig.views, [outline_of(field, view) for view in rig.views], np.eye(3)).sliding(0.7)
+    viewpoint = rig_viewpoint(rig.views, RigSurface.of(field, rig.views).outlines, np.eye(3)).sliding(0.7)
     projection = round_projection("cylindrical", rig.views[0].K, np.eye(3), 60.0)
-    warp = build_rig_warp(field, rig.views, projection, viewpoint)
+    warp = build_rig_warp(RigSurface.of(field, rig.views).seen_from(viewpoint), projection)
     canvas, view = warp.canvas, rig.views[1]
     infinite = canvas.project_rows(view.H_inf, canvas.xs, canvas.ys)
     inspection._slide_along(infinite, warp, viewpoint, view.H_inf @ rig.views[0].K, rig.views[0])

@@ -12,7 +12,7 @@ from edf_stitch.core.field.sphere_field import SphereField, fit_sphere_field
 from edf_stitch.core.panorama.choosing_slide import choose_rig_slide
 from edf_stitch.core.panorama.projection import round_projection
 from edf_stitch.core.panorama.rig_viewpoint import CarriedDepth, RigViewpoint, rig_viewpoint
-from edf_stitch.core.panorama.rig_warp import build_rig_warp, outline_of
+from edf_stitch.core.panorama.rig_warp import RigSurface, build_rig_warp
 from edf_stitch.core.panorama.upright_edges import StraightEdges
 from edf_stitch.core.raster.lazy import whole
 from hypothesis import given, settings
@@ -45,7 +45,7 @@ def field(rig: Rig) -> SphereField:
 
 
 def viewpoint_of(rig: Rig, field: SphereField) -> RigViewpoint:
-    return rig_viewpoint(rig.views, [outline_of(field, view) for view in rig.views], np.eye(3))
+    return rig_viewpoint(rig.views, RigSurface.of(field, rig.views).outlines, np.eye(3))
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_a_rays_depth_ends_on_the_surface(rig: Rig, field: SphereField, viewpoin
 def test_a_slid_warp_shows_one_point_in_all_pictures(rig: Rig, field: SphereField, viewpoint: RigViewpoint) -> None:
     """So that pixels lie on their epipolar lines; and each point lies where the warp says."""
     projection = round_projection("cylindrical", rig.views[0].K, np.eye(3), 140.0)
-    warp = build_rig_warp(field, rig.views, projection, viewpoint)
+    warp = build_rig_warp(RigSurface.of(field, rig.views).seen_from(viewpoint), projection)
     assert warp.viewpoint is viewpoint
     canvas, maps = warp.canvas, [one.arrays() for one in warp.maps]
     rays = projection.rays(np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1))
@@ -143,7 +143,7 @@ def test_nearness_is_counted_from_where_a_pixel_is_seen(
 ) -> None:
     """Baselines per distance along a picture's axis: of the point C + r / d, as that picture sees it."""
     projection = round_projection("cylindrical", rig.views[0].K, np.eye(3), 80.0)
-    warp = build_rig_warp(field, rig.views, projection, viewpoint)
+    warp = build_rig_warp(RigSurface.of(field, rig.views).seen_from(viewpoint), projection)
     canvas, d = warp.canvas, whole(warp.depth).astype(float)
     rays = projection.rays(np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1))
     for number in (0, 3):
@@ -160,7 +160,7 @@ def test_what_one_picture_shows_alone_is_shown_as_it_was_taken(
     """Only turned: where s1 = 1, wrong depth bends nothing of it."""
     projection = round_projection("cylindrical", rig.views[0].K, np.eye(3), 140.0)
     wrong = replace(field.depth, bounds=(0.3, 0.31))
-    warp = build_rig_warp(replace(field, depth=wrong), rig.views, projection, viewpoint)
+    warp = build_rig_warp(RigSurface.of(replace(field, depth=wrong), rig.views).seen_from(viewpoint), projection)
     canvas = warp.canvas
     rays = projection.rays(np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1))
     last, own = rig.views[3], warp.maps[3].arrays()
@@ -169,14 +169,14 @@ def test_what_one_picture_shows_alone_is_shown_as_it_was_taken(
     q = rays @ (last.K @ last.R).T
     off = np.hypot(own.x - q[..., 0] / q[..., 2], own.y - q[..., 1] / q[..., 2])[alone]
     assert off.max() < 3
-    still = build_rig_warp(replace(field, depth=wrong), rig.views, projection).maps[3].arrays()
+    still = build_rig_warp(RigSurface.of(replace(field, depth=wrong), rig.views), projection).maps[3].arrays()
     assert still.inside().any()
 
 
 def test_no_slide_is_the_place_of_the_first(rig: Rig, field: SphereField, viewpoint: RigViewpoint) -> None:
     projection = round_projection("cylindrical", rig.views[0].K, np.eye(3), 100.0)
-    still = build_rig_warp(field, rig.views, projection)
-    same = build_rig_warp(field, rig.views, projection, viewpoint.sliding(0.0))
+    still = build_rig_warp(RigSurface.of(field, rig.views), projection)
+    same = build_rig_warp(RigSurface.of(field, rig.views).seen_from(viewpoint.sliding(0.0)), projection)
     assert same.viewpoint is None
     for one, other in zip(still.maps, same.maps, strict=True):
         assert np.array_equal(one.arrays().x, other.arrays().x, equal_nan=True)
@@ -199,7 +199,7 @@ def test_a_thing_before_which_the_viewpoint_passes_is_shown_twice() -> None:
 def test_a_wrong_depth_beyond_the_overlaps_makes_it_go(rig: Rig, field: SphereField, viewpoint: RigViewpoint) -> None:
     """Straight uprights at the far end, which a ragged depth bends from the first place and not from their own."""
     projection = round_projection("cylindrical", rig.views[0].K, np.eye(3), 120.0)
-    warp = build_rig_warp(field, rig.views, projection)
+    warp = build_rig_warp(RigSurface.of(field, rig.views), projection)
     ragged = whole(warp.depth).copy()
     heading = np.degrees((warp.canvas.xs - projection.centre[0]) / projection.focal)
     rows = np.arange(warp.canvas.height)[:, None]

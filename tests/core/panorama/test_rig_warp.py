@@ -15,7 +15,7 @@ from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.panorama.levelling import turned
 from edf_stitch.core.panorama.projection import Projection, round_projection
 from edf_stitch.core.panorama.rig_options import RIG_WARP
-from edf_stitch.core.panorama.rig_warp import build_rig_map, build_rig_warp, outline_of
+from edf_stitch.core.panorama.rig_warp import RigSurface, build_rig_map, build_rig_warp, outline_of
 from edf_stitch.core.panorama.warp import build_map
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.raster.grid import Grid
@@ -63,7 +63,7 @@ def test_every_pixel_lies_on_its_epipolar_line_in_every_picture(
     rig = rig_of((0, 15, -20, 32), seed, points=1500, noise_px=1.0)
     if kind in ("pannini", "perspective"):
         yaw /= 12
-    warp = build_rig_warp(strict(rig), rig.views, projection_of(rig, kind, turned(yaw, pitch, 3), 90.0))
+    warp = build_rig_warp(RigSurface.of(strict(rig), rig.views), projection_of(rig, kind, turned(yaw, pitch, 3), 90.0))
     maps = [one.arrays() for one in warp.maps]
     shared = 0
     for i in range(4):
@@ -85,7 +85,7 @@ def test_every_pixel_lies_on_its_epipolar_line_in_every_picture(
 def test_what_is_mapped_is_the_equation(ring: Rig, field: SphereField) -> None:
     """x_j ~ K_j (R_j r + d t_j), with the depth that the warp tells, and slack on top."""
     projection = projection_of(ring, "equirectangular", turned(20, 5, 0))
-    warp = build_rig_warp(strict(ring), ring.views, projection)
+    warp = build_rig_warp(RigSurface.of(strict(ring), ring.views), projection)
     canvas = warp.canvas
     rays = projection.rays(np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1))
     for view, one in zip(ring.views, warp.maps, strict=True):
@@ -97,18 +97,19 @@ def test_what_is_mapped_is_the_equation(ring: Rig, field: SphereField) -> None:
         assert ahead[shown].all()
         assert there.x[shown] == pytest.approx((q[..., 0] / q[..., 2])[shown], abs=2e-3)
         assert there.y[shown] == pytest.approx((q[..., 1] / q[..., 2])[shown], abs=2e-3)
-    bent = build_rig_map(field, ring.views, canvas)
+    bent = build_rig_map(RigSurface.of(field, ring.views), canvas)
     places = bent.maps[3].arrays()
     slack = field.slack(3, rays)
     assert slack is not None
-    straight = build_rig_map(replace(field, slacks=(None,) * len(ring)), ring.views, canvas).maps[3].arrays()
+    without = RigSurface.of(replace(field, slacks=(None,) * len(ring)), ring.views)
+    straight = build_rig_map(without, canvas).maps[3].arrays()
     inner = places.inside() & straight.inside()
     assert (places.x - straight.x)[inner] == pytest.approx(slack[..., 0][inner], abs=0.1)
 
 
 def test_a_ring_covers_the_whole_sphere_around_and_goes_on_across_its_ends(ring: Rig, field: SphereField) -> None:
     projection = projection_of(ring, "equirectangular", np.eye(3))
-    warp = build_rig_warp(field, ring.views, projection)
+    warp = build_rig_warp(RigSurface.of(field, ring.views), projection)
     canvas, sphere = warp.canvas, projection.sphere
     assert sphere is not None
     assert canvas.width == sphere[2]
@@ -135,7 +136,7 @@ def test_pictures_around_a_pole_cover_it(pitch: float) -> None:
     """Seen from straight below or above, they take the whole width and reach to the last row."""
     rig = rig_of((0, 20, -20), 2)
     projection = projection_of(rig, "equirectangular", turned(0, pitch, 0))
-    warp = build_rig_warp(strict(rig), rig.views, projection)
+    warp = build_rig_warp(RigSurface.of(strict(rig), rig.views), projection)
     sphere = projection.sphere
     assert sphere is not None
     assert warp.canvas.width == sphere[2]
@@ -165,7 +166,7 @@ def test_two_pictures_have_the_maps_of_a_pair(lens: tuple[float, ...], monkeypat
     canvas = Canvas(460, 300, (40, 30))
     # both on the same nodes
     monkeypatch.setattr("edf_stitch.core.panorama.rig_warp.RIG_WARP", replace(RIG_WARP, nodes=20_000))
-    found = build_rig_map(field, rig.views, canvas)
+    found = build_rig_map(RigSurface.of(field, rig.views), canvas)
     pair = build_map(OnPlane(field, rig.views[0].K), rig.views, canvas)  # type: ignore[arg-type]
     for one, other in zip(found.maps, pair.maps, strict=True):
         there, expected = one.arrays(), other.arrays()
@@ -178,7 +179,7 @@ def test_two_pictures_have_the_maps_of_a_pair(lens: tuple[float, ...], monkeypat
 
 def test_the_first_pictures_own_plane_keeps_its_pixels(ring: Rig, field: SphereField) -> None:
     rig = rig_of((0, 20, -20), noise_px=0.5)
-    warp = build_rig_warp(fit_sphere_field(rig), rig.views)
+    warp = build_rig_warp(RigSurface.of(fit_sphere_field(rig), rig.views))
     left, top = warp.canvas.offset
     own = warp.maps[0].arrays()
     assert own.inside().sum() == SIZE[0] * SIZE[1]
@@ -188,8 +189,8 @@ def test_the_first_pictures_own_plane_keeps_its_pixels(ring: Rig, field: SphereF
 
 def test_a_map_is_known_where_its_picture_is_shown_and_takes_no_more(ring: Rig, field: SphereField) -> None:
     projection = projection_of(ring, "equirectangular", np.eye(3))
-    warp = build_rig_warp(field, ring.views, projection)
-    whole_maps = build_rig_map(field, ring.views, warp.canvas)
+    warp = build_rig_warp(RigSurface.of(field, ring.views), projection)
+    whole_maps = build_rig_map(RigSurface.of(field, ring.views), warp.canvas)
     area = warp.canvas.width * warp.canvas.height
     across = 0
     for number, one in enumerate(warp.maps):
@@ -221,7 +222,7 @@ def test_a_map_is_known_where_its_picture_is_shown_and_takes_no_more(ring: Rig, 
 def test_a_part_of_a_boxed_map_is_that_of_the_whole(
     ring: Rig, field: SphereField, box: tuple[int, int, int, int]
 ) -> None:
-    warp = build_rig_warp(field, ring.views, projection_of(ring, "equirectangular", np.eye(3)))
+    warp = build_rig_warp(RigSurface.of(field, ring.views), projection_of(ring, "equirectangular", np.eye(3)))
     part = warp.within(box)
     for one, other in zip(part.maps, warp.maps, strict=True):
         expected = other.arrays().within(box)
@@ -234,7 +235,7 @@ def test_a_part_of_a_boxed_map_is_that_of_the_whole(
 
 
 def test_a_layer_of_a_boxed_map_is_that_of_the_whole_map(ring: Rig, field: SphereField) -> None:
-    warp = build_rig_warp(field, ring.views, projection_of(ring, "equirectangular", np.eye(3)))
+    warp = build_rig_warp(RigSurface.of(field, ring.views), projection_of(ring, "equirectangular", np.eye(3)))
     picture = picture_from_array(np.random.default_rng(0).integers(0, 255, (SIZE[1], SIZE[0], 3), np.uint8))
     boxed, full = layer_of(picture, warp.maps[2]), layer_of(picture, warp.maps[2].arrays())
     assert np.array_equal(boxed.alpha, full.alpha)

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 from edf_stitch.core.cameras.projective import sampson_residuals
-from edf_stitch.core.rig.averaging.pair_edges import edges_of
 from edf_stitch.core.rig.matching import Matched
+from edf_stitch.core.rig.pair_edges import edges_of
 from edf_stitch.core.rig.reframing import reordered
 
 from .known_rigs import known_rig

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
 from edf_stitch.core.pose.match_files import read_matches
-from edf_stitch.core.rig.bundling.given import given_matches
+from edf_stitch.core.rig.given_matches import given_matches
 from edf_stitch.core.rig.matching import Matched
 from edf_stitch.core.system.errors import BadRequest
 

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...cameras.edge import Edge
-from ...cameras.lens import undistort
-from ...cameras.matches import Matches
-from ...cameras.projective import fundamental_from_pose, infinite_homography
-from ...cameras.rig import PictureMatches, Rig, RigEdge
-from ...cameras.two_view import TwoView
-from ...raster.arrays import Array
-from ..matching import Matched
+from ..cameras.edge import Edge
+from ..cameras.lens import undistort
+from ..cameras.matches import Matches
+from ..cameras.projective import fundamental_from_pose, infinite_homography
+from ..cameras.rig import PictureMatches, Rig, RigEdge
+from ..cameras.two_view import TwoView
+from ..raster.arrays import Array
+from .matching import Matched
 
 
 def edges_of(rig: Rig, matched: Matched, numbers: Sequence[int]) -> tuple[Edge, ...]:

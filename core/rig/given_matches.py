@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...cameras.rig import PictureMatches
-from ...pictures.picture import Picture
-from ...pose.match_files import read_matches_of_pairs
-from ..matching import Matched
+from ..cameras.rig import PictureMatches
+from ..pictures.picture import Picture
+from ..pose.match_files import read_matches_of_pairs
+from .matching import Matched
 
 Size = tuple[int, int]
 
