@@ -65,6 +65,8 @@ class PictureMap:
 
     def between(self, at: Array) -> Array:
         """The pixels (N, 2) that the map has at places (N, 2) px of the canvas, bilinear; NaN outside it."""
+        if not self.x.size:  # a picture that lies beyond the canvas
+            return np.full(at.shape, np.nan)
         limit = np.array(self.shape[::-1]) - 1
         outside = ~((at >= 0) & (at <= limit)).all(axis=1)
         at = np.where(outside[:, None], 0.0, at)
