@@ -66,23 +66,36 @@ def polish_best(
     """The cheapest of: every picture at a place of its own and, where there are stations, those of each at one place,
     and all at one place: pairs with few matches do not show that they rotate. What more places cost is counted (BIC).
     Where there is little parallax, rotations bundled as if at one place are better to start from than averaged ones,
-    and are tried too.
+    and are tried too. Places of stations start both from nothing and from what was found without them: either start
+    can end beside the best.
 
     framed: brings places (N, 3) to where the start's poses stand.
     """
-    candidates = []
-    starts: list[tuple[Problem, Solution]] = [(problem, start)]
-    if stations and not problem.held.any():  # given poses say themselves what is at one place
-        turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
-        if _little_parallax(turned):
-            starts.append((problem, replace(start, R=turned.solution.R, lens=turned.solution.lens)))
-        candidates.append(turned)
-        if not any(len(station) == problem.pictures for station in stations):
-            starts.append((problem.with_stations(stations), start))
-    for assigned, begun in starts:
+
+    def from_nothing(assigned: Problem, begun: Solution) -> Polished:
         placed = place_pictures(assigned, begun, same)
-        candidates.append(polish(assigned, replace(begun, centres=framed(placed.centres)), tick))
+        return polish(assigned, replace(begun, centres=framed(placed.centres)), tick)
+
+    if not stations or problem.held.any():  # given poses say themselves what is at one place
+        return from_nothing(problem, start)
+    turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
+    candidates = [turned, from_nothing(problem, start)]
+    if _little_parallax(turned):
+        candidates.append(from_nothing(problem, replace(start, R=turned.solution.R, lens=turned.solution.lens)))
+    if not any(len(station) == problem.pictures for station in stations):
+        tied = problem.with_stations(stations)
+        apart = min(candidates[1:], key=lambda found: found.cost).solution
+        together = replace(start, R=apart.R, lens=apart.lens, centres=_at_stations(tied, apart.centres))
+        candidates += [from_nothing(tied, start), polish(tied, together, tick)]
     return min(candidates, key=information_criterion)
+
+
+def _at_stations(problem: Problem, centres: Array) -> Array:
+    """Places (N, 3) with those of one station in their middle."""
+    _, number, count = np.unique(problem.place, return_inverse=True, return_counts=True)
+    middle = np.stack([np.bincount(number, axis) for axis in centres.T], axis=1) / count[:, None]
+    placed: Array = middle[number]
+    return placed
 
 
 def _little_parallax(turned: Polished) -> bool:
