@@ -70,10 +70,6 @@ class ContinuityOptions:
     weight: float = 4.0
     # Neighbours that are taken of a picture and two parts of the rig, the nearest ones.
     most: int = 40
-    # Rounds in which parts' sizes are found from both, and the share of a length by which loops of parts may stay open
-    # where depth is off by e: directions are that much surer.
-    rounds: int = 6
-    loops: float = 0.05
 
 
 @dataclass(frozen=True)

@@ -75,9 +75,8 @@ def equal_logs(near: Neighbours, depth: Array, of_depth: Blocks) -> tuple[Blocks
     return blocks, near.share[ahead] * rough, off[:, None]
 
 
-def log_ratios(near: Neighbours, picture: Index, part: Index, depth: Array) -> tuple[Array, Array]:
-    """Steps (G, K) of logs of parts' sizes and how large each has to be (G,) for depths to go on: of each picture and
-    two parts that it sees.
+def log_sizes(near: Neighbours, picture: Index, part: Index, depth: Array) -> Array:
+    """By how much parts have to grow (K,), in logs about 0, for depths to go on between them.
 
     picture, part (O,): of every observation, parts numbered from 0; depth (O,).
     """
@@ -85,4 +84,5 @@ def log_ratios(near: Neighbours, picture: Index, part: Index, depth: Array) -> t
     groups, number = np.unique([picture[near.first], part[near.first], part[near.second]], axis=1, return_inverse=True)
     told = np.array([np.median(off[number.ravel() == k]) for k in range(groups.shape[1])])
     one = np.eye(int(part.max()) + 1)
-    return one[groups[2]] - one[groups[1]], told
+    sizes: Array = np.linalg.lstsq(one[groups[2]] - one[groups[1]], told, rcond=None)[0]
+    return sizes

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from ...cameras.projective import skew
 from ...raster.arrays import Array
-from .bundle_options import CONTINUITY, POSITIONS
-from .continuity import Blocks, Neighbours, equal_logs, log_ratios, neighbours_of
+from .bundle_options import POSITIONS
+from .continuity import Blocks, Neighbours, equal_logs, log_sizes, neighbours_of
 from .parts import part_of_points
 from .solution import Problem, Solution, bearings, lens_of
 from .tracks import Index, pairs_within
@@ -195,30 +195,20 @@ class _Positioning:
         return usual
 
     def continued(self, depths: _Depths, near: Neighbours, centres: Array) -> Array:
-        """Places (N, 3) with each part of the rig as large as loops of parts need and, where there are none, as makes
-        depths go on from one to the next: the linear rounds leave that anywhere."""
+        """Places (N, 3) with each part of the rig as large as makes depths go on from one to the next: the linear
+        rounds leave that anywhere. What loops of parts tell of it is left to the steps that follow."""
         picture, (parts, part) = self.tracks.picture, np.unique(self.part, return_inverse=True)
         if len(parts) == 1:
             return centres
         _, _, depth = self.away(depths, centres)
-        steps, told = log_ratios(near, picture, part[self.tracks.point], depth)
+        sizes = np.exp(log_sizes(near, picture, part[self.tracks.point], depth))
         i, j = (picture[ends] for ends in self.inside)
         i, j, k = np.unique([i, j, part[self.tracks.point[self.inside[0]]]], axis=1)
-        logs = np.linalg.lstsq(steps, told, rcond=None)[0]
-        for _ in range(CONTINUITY.rounds):
-            apart = np.exp(logs)[k][:, None] * (centres[i] - centres[j])
-            lengths = np.sqrt(np.bincount(k, (apart**2).sum(axis=1)) / np.bincount(k))
-            length = np.maximum(lengths, max(POSITIONS.least_distance * lengths.max(), 1e-12))[k][:, None]
-            ties = (self.at[i] - self.at[j]) / length
-            places: Array = np.linalg.lstsq(ties, apart / length, rcond=None)[0]
-            open_ = (apart / length - ties @ places).ravel()  # what is left of loops
-            by_part = (apart / length)[:, :, None] * np.eye(len(parts))[k][:, None, :]
-            by_part -= np.einsum("mn,nak->mak", ties @ np.linalg.pinv(ties), by_part)
-            left = np.vstack([by_part.reshape(-1, len(parts)) / CONTINUITY.loops, steps, np.ones((1, len(parts)))])
-            right = np.concatenate([-open_ / CONTINUITY.loops, told - steps @ logs, [-logs.sum()]])
-            logs = logs + np.clip(np.linalg.lstsq(left, right, rcond=None)[0], -1, 1)
-        placed: Array = self.at @ places
-        return placed
+        apart = sizes[k][:, None] * (centres[i] - centres[j])
+        lengths = np.sqrt(np.bincount(k, (apart**2).sum(axis=1)) / np.bincount(k))
+        length = np.maximum(lengths, max(POSITIONS.least_distance * lengths.max(), 1e-12))[k][:, None]
+        places: Array = self.at @ np.linalg.lstsq((self.at[i] - self.at[j]) / length, apart / length, rcond=None)[0]
+        return places
 
     def reweight(self, depths: _Depths, off: Array, away: Array, round_: int) -> None:
         """Cauchy weights by sines off (O, 3), the kernel narrower with each round; what lies behind fits badly."""

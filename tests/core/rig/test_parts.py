@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.rig.averaging.averaged import PairGeometry
-from edf_stitch.core.rig.bundling.continuity import Neighbours, log_ratios, neighbours_of
+from edf_stitch.core.rig.bundling.continuity import Neighbours, log_sizes, neighbours_of
 from edf_stitch.core.rig.bundling.parts import part_of_points, parts_of_pairs, supported
 from edf_stitch.core.rig.bundling.positions import place_pictures
 from edf_stitch.core.rig.bundling.tracks import Tracks, build_tracks
@@ -97,8 +97,8 @@ def test_a_wrong_point_of_three_pictures_sets_no_length(number: int) -> None:
 
 def test_parts_without_neighbours_keep_their_sizes() -> None:
     none = np.zeros(0, np.intp)
-    steps, told = log_ratios(Neighbours(none, none, np.zeros(0)), none, np.arange(3), np.zeros(0))
-    assert steps.shape == (0, 3) and told.shape == (0,)
+    sizes = log_sizes(Neighbours(none, none, np.zeros(0)), none, np.arange(3), np.zeros(0))
+    np.testing.assert_array_equal(sizes, np.zeros(3))
 
 
 def test_parts_grow_until_depths_go_on() -> None:
@@ -106,8 +106,8 @@ def test_parts_grow_until_depths_go_on() -> None:
     picture, part = np.repeat([0, 0, 1, 1], 3), np.repeat([0, 1, 1, 2], 3)
     depth = np.array([4, 5, 6, 2, 2.5, 3, 1, 2, 3, 6, 12, 18.0])
     near = Neighbours(np.array([0, 1, 2, 6, 7, 8]), np.array([3, 4, 5, 9, 10, 11]), np.ones(6))
-    steps, told = log_ratios(near, picture, part, depth)
-    np.testing.assert_allclose(steps @ np.log([1, 2, 1 / 3]), told, rtol=1e-12)
+    sizes = np.exp(log_sizes(near, picture, part, depth))
+    np.testing.assert_allclose(sizes / sizes[0], [1, 2, 1 / 3], rtol=1e-12)
 
 
 def test_loops_tell_lengths_better_than_depth() -> None:
