@@ -278,7 +278,8 @@ def compose(
         made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
         own = whole.maps[0].inside()
         shown = made.panorama.alpha > 0
-        return made, crop_box(options.kept, whole.canvas.whole, shown, box_of(own) if own.any() else None)
+        reference = box_of(own) if own.any() else None
+        return made, crop_box(options.kept, whole.canvas.whole, shown, reference, len(pictures))
 
     painted = frame.painted
     if painted is not None:
