@@ -63,15 +63,13 @@ class PositionOptions:
 
 @dataclass(frozen=True)
 class ContinuityOptions:
-    """Equal depth of neighbours in a picture where no point is seen by three (`continuity`)."""
+    """Equal depth of neighbours in a picture where too few points are seen by three (`continuity`, `parts`)."""
 
     # σ of the log of the ratio of two neighbours' depths, and how many equations all of a picture's count as.
     log_sigma: float = 0.5
     weight: float = 4.0
-    # Neighbours that are looked at, neighbours of other tracks that are taken, and points of a picture at least.
-    neighbours: int = 11
-    most: int = 400
-    least_points: int = 12
+    # Neighbours that are taken of a picture and two parts of the rig, the nearest ones.
+    most: int = 40
     # Relative difference of depths below which L1 becomes L2, before depths are positive enough for logarithms.
     flat: float = 0.2
 
@@ -163,7 +161,8 @@ class JudgeOptions:
     # Relative cost within which hypotheses are reported as possible, and log f within which two are the same.
     possible: float = 0.05
     same_log_focal: float = 0.002
-    # Points that three pictures see from which the lengths between them are in a measured proportion.
+    # Points that three pictures see from which the lengths between them are in a measured proportion: one wrong point
+    # fits any proportion exactly.
     three_view_points: int = 4
     # Parallax is little where this percentile of errors of rotations alone is below so many σ.
     little_parallax_percentile: float = 80.0
