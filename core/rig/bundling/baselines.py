@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..averaging.averaged import PairGeometry
-from ..averaging.graph import components
-from .bundle_options import JUDGE
+from .parts import parts_of_pairs
 from .polishing import Polished
 
 
@@ -30,20 +29,13 @@ def baselines(pairs: Sequence[PairGeometry], members: Sequence[int], found: Poli
 
 
 def _rigid_groups(found: Polished) -> list[set[int]]:
-    """Pictures between which all lengths are in one proportion: triples, joined where they share two pictures."""
+    """Pictures between which all lengths are in one proportion."""
     seen = _visibility(found)
-    count = len(seen)
-    if count == 2:
+    if len(seen) == 2:
         return [{0, 1}]  # the only length is the unit
-    number = np.arange(count * count).reshape(count, count)
-    links = []
-    for i in range(count):
-        for j in range(i + 1, count):
-            shared = (seen[j + 1 :] & seen[i] & seen[j]).sum(axis=1)
-            for k in j + 1 + np.flatnonzero(shared >= JUDGE.three_view_points):
-                links += [(int(number[i, j]), int(number[i, k])), (int(number[i, j]), int(number[j, k]))]
-    groups = [group for group in components(count * count, links) if len(group) > 1]
-    return [{k for node in group for k in divmod(node, count)} for group in groups]
+    part = parts_of_pairs(seen, np.ones(seen.shape[1]))
+    sizes = np.bincount(part[np.triu_indices(len(seen), 1)])
+    return [{int(k) for k in np.argwhere(part == one).ravel()} for one in np.flatnonzero(sizes > 1)]
 
 
 def _visibility(found: Polished) -> NDArray[np.bool_]:

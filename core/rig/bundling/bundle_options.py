@@ -63,15 +63,13 @@ class PositionOptions:
 
 @dataclass(frozen=True)
 class ContinuityOptions:
-    """Equal depth of neighbours in a picture where no point is seen by three (`continuity`)."""
+    """Equal depth of neighbours in a picture where too few points are seen by three (`continuity`, `parts`)."""
 
     # σ of the log of the ratio of two neighbours' depths, and how many equations all of a picture's count as.
     log_sigma: float = 0.5
     weight: float = 4.0
-    # Neighbours that are looked at, neighbours of other tracks that are taken, and points of a picture at least.
-    neighbours: int = 11
-    most: int = 400
-    least_points: int = 12
+    # Neighbours that are taken of a picture and two parts of the rig, the nearest ones.
+    most: int = 40
     # Relative difference of depths below which L1 becomes L2, before depths are positive enough for logarithms.
     flat: float = 0.2
 
@@ -104,6 +102,10 @@ class BundleOptions:
     tries: int = 8
     # Most that log f changes in a step.
     most_log_focal: float = 0.2
+    # ρ, in units of one by the largest distance of a place, up to which a triangulated point is believed.
+    most_inverse_range: float = 1e4
+    # Rounds of the robust mean of rays that see a point at infinity: two of three outvote a wrong one by then.
+    mean_rounds: int = 5
     # What keeps the equations regular, and stiffness that keeps the scale, in units of their mean diagonal.
     regular: float = 1e-15
     scale_stiffness: float = 1e3
@@ -159,11 +161,16 @@ class JudgeOptions:
     # Relative cost within which hypotheses are reported as possible, and log f within which two are the same.
     possible: float = 0.05
     same_log_focal: float = 0.002
-    # Points that three pictures see from which the lengths between them are in a measured proportion.
+    # Points that three pictures see from which the lengths between them are in a measured proportion: one wrong point
+    # fits any proportion exactly.
     three_view_points: int = 4
     # Parallax is little where this percentile of errors of rotations alone is below so many σ.
     little_parallax_percentile: float = 80.0
     little_parallax_sigmas: float = 6.0
+    # Places are found anew from the bundle's rotations, and bundled from there, where they differ from its places by
+    # more than this share of their extent: it has not come out of a wrong start then. At most so many times.
+    astray: float = 0.1
+    most_anew: int = 3
     # No parallax can be seen where these percentiles of them are below so many px each: matches of pixels err by that
     # much, a few of a hundred by more. A skyline from places far apart has 0.55 and 0.9 px, and keeps its places.
     no_parallax_percentiles: tuple[float, ...] = (80.0, 95.0)

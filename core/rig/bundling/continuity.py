@@ -1,11 +1,13 @@
-"""Depths that continue from a point to its neighbour in a picture: what ties places where no point is seen by three."""
+"""Depths that continue from a point to its neighbour in a picture: what ties parts of a rig that no points tie."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
 from ...raster.arrays import Array
@@ -18,7 +20,7 @@ Blocks = list[tuple[Index, Array]]
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """Observations first, second (M,) that are neighbours in a picture and belong to points that other pictures see;
+    """Observations first, second (M,) that are neighbours in a picture and belong to points of two parts of the rig;
     share (M,): how much each counts."""
 
     first: Index
@@ -26,25 +28,35 @@ class Neighbours:
     share: Array
 
 
-def neighbours_of(tracks: Tracks, measured: NDArray[np.bool_], pictures: int) -> Neighbours:
-    """Among observations of points whose depth is measured (P,)."""
+def neighbours_of(tracks: Tracks, part: Index, measured: NDArray[np.bool_]) -> Neighbours:
+    """Among observations of points whose depth is measured (P,); part (P,): see `parts`.
+
+    The nearest of each two parts, however far apart they are: nothing else tells their proportion.
+    """
     chosen = np.flatnonzero(measured[tracks.point])
-    kind = tracks.kind[tracks.point]
     none = np.zeros(0, np.intp)
-    first, second, share = [none], [none], [np.zeros(0)]
-    for j in range(pictures):
+    found: list[tuple[Index, Index]] = []
+    for j in np.unique(tracks.picture[chosen]):
         mine = chosen[tracks.picture[chosen] == j]
-        if len(mine) < CONTINUITY.least_points or (kind[mine] == kind[mine[0]]).all():
-            continue
-        pixels = tracks.pixels[mine]
-        gaps, near = cKDTree(pixels).query(pixels, k=min(CONTINUITY.neighbours + 1, len(mine)))
-        u, v = np.repeat(mine, near.shape[1] - 1), mine[near[:, 1:].ravel()]
-        other = np.flatnonzero(kind[u] != kind[v])
-        other = other[np.argsort(gaps[:, 1:].ravel()[other], kind="stable")[: CONTINUITY.most]]
-        first.append(u[other])
-        second.append(v[other])
-        share.append(np.full(len(other), CONTINUITY.weight / max(len(other), 1)))
-    return Neighbours(np.concatenate(first), np.concatenate(second), np.concatenate(share) / CONTINUITY.log_sigma**2)
+        own = part[tracks.point[mine]]
+        sides = [mine[own == one] for one in np.unique(own)]
+        found += [_nearest(tracks.pixels, *two) for two in combinations(sides, 2)]
+    counts = [len(first) for first, _ in found]
+    share = np.repeat([CONTINUITY.weight / CONTINUITY.log_sigma**2 / max(count, 1) for count in counts], counts)
+    first, second = (np.concatenate([none, *(two[side] for two in found)]) for side in (0, 1))
+    return Neighbours(first, second, share)
+
+
+def _nearest(pixels: Array, first: Index, second: Index) -> tuple[Index, Index]:
+    """Those of two sets of observations that are nearest to the other set, each paired with another one: across a gap
+    a single one at its rim would be the nearest of all."""
+    near = []
+    for mine, others in ((first, second), (second, first)):
+        gaps, _ = cKDTree(pixels[others]).query(pixels[mine])
+        near.append(mine[np.argsort(gaps, kind="stable")[: CONTINUITY.most]])
+    u, v = near
+    rows, columns = linear_sum_assignment(np.linalg.norm(pixels[u][:, None] - pixels[v], axis=2))
+    return u[rows], v[columns]
 
 
 def equal_depths(near: Neighbours, depth: Array, of_depth: Blocks) -> tuple[Blocks, Array]:

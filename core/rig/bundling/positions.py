@@ -20,6 +20,7 @@ from ...cameras.projective import skew
 from ...raster.arrays import Array
 from .bundle_options import POSITIONS
 from .continuity import Blocks, Neighbours, equal_depths, equal_logs, neighbours_of
+from .parts import part_of_points
 from .solution import Problem, Solution, bearings, lens_of
 from .tracks import Index, pairs_within
 
@@ -68,6 +69,7 @@ class _Positioning:
         self.sigma = problem.noise_px
         self.weight = np.ones(len(tracks.point))
         self.inside = pairs_within(tracks.point)
+        self.part = part_of_points(tracks, self.count)
         self.centres: Array | None = None
         _, number = np.unique(problem.place, return_inverse=True)
         self.spread = np.kron((number[:, None] == np.arange(number.max() + 1)).astype(float), np.eye(3))
@@ -76,7 +78,7 @@ class _Positioning:
         for round_ in range(POSITIONS.rounds):
             if round_ == 0 or round_ in POSITIONS.choosing_rounds:
                 depths = self.chosen_depths()
-                near = neighbours_of(self.tracks, depths.measured, self.count)
+                near = neighbours_of(self.tracks, self.part, depths.measured)
                 of_depth = self.depth_blocks(depths)
             before = self.centres
             if before is None:

@@ -17,6 +17,7 @@ from ..averaging.averaging import averaged
 from ..averaging.matched_rays import SharedLens
 from .bundle_options import JUDGE
 from .judging import judged
+from .parts import supported
 from .polishing import Polished, start
 from .solution import LENS, Problem, lenses_of
 from .stations import polish_best, proposed, same_places, without_parallax
@@ -60,7 +61,7 @@ def _bundled(
 ) -> Solved:
     pairs = fitting_pairs(rotated.pairs)
     members = rotated.members
-    tracks = build_tracks(pairs, points, members)
+    tracks = supported(build_tracks(pairs, points, members), len(members))
     own = [cameras[k] for k in members]
     held = np.array([camera.pose is not None for camera in own])
     lenses = lenses_of(own)

@@ -74,7 +74,7 @@ def build_tracks(pairs: Sequence[PairGeometry], points: Sequence[Array], members
     feature = nodes - firsts[number]
     pixels = np.concatenate(list(points))[nodes]
     starts = np.searchsorted(point, np.arange(point.max(initial=-1) + 1))
-    return Tracks(picture, point, feature, pixels, starts, _kinds(picture, starts, len(members)))
+    return Tracks(picture, point, feature, pixels, starts, kinds_of(picture, starts, len(members)))
 
 
 def _joined(pairs: Sequence[PairGeometry], firsts: Index) -> Index:
@@ -100,7 +100,7 @@ def _joined(pairs: Sequence[PairGeometry], firsts: Index) -> Index:
     return owner
 
 
-def _kinds(picture: Index, starts: Index, count: int) -> Index:
+def kinds_of(picture: Index, starts: Index, count: int) -> Index:
     """A number (P,) for each set of pictures."""
     if not len(starts):
         return np.zeros(0, np.intp)

@@ -1,0 +1,94 @@
+"""Lengths are told by points that three pictures see where there are enough, elsewhere by depth that goes on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edf_stitch.core.rig.averaging.averaged import PairGeometry
+from edf_stitch.core.rig.bundling.continuity import neighbours_of
+from edf_stitch.core.rig.bundling.parts import part_of_points, parts_of_pairs, supported
+from edf_stitch.core.rig.bundling.positions import place_pictures
+from edf_stitch.core.rig.bundling.tracks import Tracks, build_tracks
+
+from .rigs import SyntheticRig, make_rig
+from .test_positions import problem_of
+
+
+def tracks_of(*sets: tuple[int, ...]) -> Tracks:
+    """One track for each set of pictures."""
+    index: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for number, pictures in enumerate(sets):
+        for i, j in zip(pictures[:-1], pictures[1:], strict=True):
+            index.setdefault((i, j), []).append((number, number))
+    t = np.array([1.0, 0, 0])
+    pairs = [
+        PairGeometry(i, j, np.array(rows), 9, 9, np.eye(3), t, np.eye(3), 0.3, 5.0, -1.0, False, 0.0)
+        for (i, j), rows in index.items()
+    ]
+    points = [np.column_stack([np.arange(len(sets)), np.full(len(sets), k)]).astype(float) for k in range(5)]
+    return build_tracks(pairs, points, range(5))
+
+
+def seen_in(tracks: Tracks) -> list[tuple[int, ...]]:
+    bounds = [*tracks.starts.tolist(), len(tracks.picture)]
+    return sorted(tuple(tracks.picture[a:b].tolist()) for a, b in zip(bounds[:-1], bounds[1:], strict=True))
+
+
+def test_pairs_are_of_one_part_if_triangles_join_them() -> None:
+    seen = np.array([[1, 0, 0], [1, 1, 0], [1, 1, 1], [0, 1, 1]], bool)
+    part = parts_of_pairs(seen, np.array([4.0, 4, 100]))
+    assert part[0, 1] == part[1, 2] == part[0, 2] == part[2, 3] == part[1, 3]
+    assert len({part[0, 1], part[0, 3]}) == 2
+    part = parts_of_pairs(seen, np.array([4.0, 3, 100]))
+    assert part[0, 1] == part[1, 2] == part[0, 2] and len({part[0, 1], part[2, 3], part[1, 3]}) == 3
+
+
+def test_too_few_points_of_three_pictures_keep_two() -> None:
+    few = tracks_of(*[(0, 1)] * 9, *[(1, 2)] * 5, *[(0, 1, 2)] * 3)
+    assert seen_in(supported(few, 5)) == sorted([(0, 1)] * 12 + [(1, 2)] * 5)
+    assert len(set(part_of_points(supported(few, 5), 5).tolist())) == 2
+    enough = tracks_of(*[(0, 1)] * 9, *[(1, 2)] * 5, *[(0, 1, 2)] * 4)
+    assert supported(enough, 5) is enough
+    assert len(set(part_of_points(enough, 5).tolist())) == 1
+
+
+def test_a_long_track_keeps_what_its_part_tells() -> None:
+    found = supported(tracks_of(*[(0, 1, 2)] * 6, *[(2, 3)] * 9, (0, 1, 2, 3)), 5)
+    assert seen_in(found) == sorted([(0, 1, 2)] * 7 + [(2, 3)] * 9)
+
+
+def test_neighbours_are_of_two_parts_and_each_counts_once() -> None:
+    """Across a gap in which nothing is, too."""
+    tracks = tracks_of(*[(0, 1)] * 30, *[(1, 2)] * 30)
+    part = part_of_points(tracks, 5)
+    near = neighbours_of(tracks, part, np.ones(60, bool))
+    assert (tracks.picture[near.first] == 1).all() and (tracks.picture[near.second] == 1).all()
+    assert (part[tracks.point[near.first]] != part[tracks.point[near.second]]).all()
+    assert len(near.first) == 30 == len(set(near.first.tolist())) == len(set(near.second.tolist()))
+
+
+def spread_of_lengths(rig: SyntheticRig) -> float:
+    """Log of the ratio between a chain's most enlarged and most reduced length."""
+    problem, begun = problem_of(rig)
+    problem = replace(problem, tracks=supported(problem.tracks, problem.pictures))
+    placed = place_pictures(problem, begun)
+    lengths, true = (np.linalg.norm(np.diff(c, axis=0), axis=1) for c in (placed.centres, rig.centres))
+    return float(np.ptp(np.log(lengths / true)))
+
+
+@pytest.mark.parametrize("pictures", [5, 9])
+def test_no_length_along_a_chain_collapses(pictures: int) -> None:
+    """The linear rounds alone let all lengths but one shrink, a little more each round."""
+    assert max(spread_of_lengths(make_rig("chain", seed, pictures=pictures)) for seed in range(6)) < np.log(3)
+
+
+def test_a_wrong_point_of_three_pictures_sets_no_length() -> None:
+    rig = make_rig("chain", 1)
+    first, second = rig.matches[:2]
+    true = [rig.true_matches(pair) for pair in (first, second)]
+    wrong = np.array([[true[0][5, 1], true[1][7, 1]]])
+    rig.identity[2][wrong[0, 1]] = rig.identity[1][wrong[0, 0]]
+    joined = replace(second, index=np.concatenate([second.index[second.index[:, 1] != wrong[0, 1]], wrong]))
+    assert spread_of_lengths(replace(rig, matches=[first, joined, *rig.matches[2:]])) < np.log(3)
