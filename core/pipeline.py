@@ -270,7 +270,9 @@ def compose(
     """
     pictures, whole = frame.pictures, alignment.warp
     progress("warp", 0.5)
-    layers = tuple(layer_of(picture, one) for picture, one in zip(pictures, whole.maps, strict=True))
+    # two pictures keep what earlier releases made of them
+    by_root = len(pictures) > 2
+    layers = tuple(layer_of(picture, one, by_root) for picture, one in zip(pictures, whole.maps, strict=True))
 
     floats = [picture.bits == 32 for picture in pictures]
 
