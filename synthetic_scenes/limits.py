@@ -58,3 +58,8 @@ class Check:
     limit: str
     unit: str
     passed: bool
+
+
+def number(value: object) -> float | None:
+    """A figure as a number; None where it is none."""
+    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None

@@ -88,10 +88,10 @@ class SphereProof:
 
 
 def resampled(light: NDArray[np.float32], pixels: Array, where: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """A picture (H, W, 3) at pixels (h, w, 2), averaged over the area that each of these covers; only `where` they lie
+    """A picture (H, W, C) at pixels (h, w, 2), averaged over the area that each of these covers; only `where` they lie
     close together."""
     steps = [np.gradient(pixels, axis=axis) / 4 for axis in (0, 1)]
-    total: NDArray[np.float32] = np.zeros((*where.shape, 3), np.float32)
+    total: NDArray[np.float32] = np.zeros((*where.shape, light.shape[2]), np.float32)
     near = dilated(where, 1)
     for a in (-1, 1):
         for b in (-1, 1):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..stage import Colour, Stage
-from ..worlds import BRICK, MORTAR, SAND, STONE
+from ..stage import Colour, Place, Stage
+from ..worlds import BRICK, MORTAR, MOSS, SAND, SKY, STONE
+from .recipes import ELSEWHERE
 
 OAK: tuple[Colour, Colour] = ((0.16, 0.08, 0.03), (0.48, 0.3, 0.14))
 BLUE: tuple[Colour, Colour] = ((0.2, 0.25, 0.35), (0.12, 0.15, 0.25))
@@ -67,4 +68,86 @@ def _table(stage: Stage, x: float, y: float) -> None:
     stage.ball((x + 0.35, y - 0.1, 0.91), 0.15, stage.stone(BRICK, 9))
 
 
-SET_WORLDS: dict[str, Callable[[Stage], None]] = {build.__name__: build for build in (room,)}
+def street(stage: Stage) -> None:
+    """Fronts with balconies to be walked along, things parked and trees before them."""
+    stage.card((2.5, 6, 0), 60, 40, stage.stone(((0.08, 0.08, 0.09), (0.28, 0.28, 0.29)), 4.0), tilt=90)
+    stage.card((2.5, 40, 12), 140, 40, stage.stone(SKY, 0.25))
+    paints = (stage.bricks(BRICK, MORTAR, 0.45), stage.stone(SAND, 1.6), stage.stone(STONE, 1.4))
+    for k in range(8):
+        x, front = -9.0 + 3.4 * k, 6.5 + 0.35 * (k % 3)
+        stage.box((x, front + 1.5, 3.5), (3.38, 3.0, 7.0 + (k * 2) % 3), paints[k % 3])
+        for z in (1.4, 4.2):
+            for side in (-0.85, 0.85):
+                stage.card((x + side, front - 0.03, z), 0.9, 1.4, stage.poster(5))
+        if k % 2:
+            stage.box((x, front - 0.45, 3.0), (2.4, 0.9, 0.12), stage.stone(STONE, 5))
+            for side in range(7):
+                at = x - 1.1 + 0.36 * side, front - 0.85
+                stage.post((*at, 3.0), (*at, 3.9), 0.025, stage.stone(STONE, 9), 12)
+    for k in range(4):
+        x = -5.0 + 4.6 * k
+        stage.box((x, 4.6, 0.55), (1.9, 0.9, 1.1), stage.poster(3), yaw=stage.random.uniform(-8, 8))
+        tree = x + 2.2, 4.0
+        stage.post((*tree, 0), (*tree, 2.6), 0.09, stage.wood((0.05, 0.03, 0.02), (0.3, 0.2, 0.12), 20))
+        stage.ball((*tree, 3.3), 0.85, stage.stone(MOSS, 7))
+
+
+def posts(stage: Stage) -> None:
+    """A room with near, thin things all along its middle: posts, railings, leaves."""
+    room(stage)
+    iron = stage.stone(((0.03, 0.035, 0.04), (0.07, 0.08, 0.09)), 5)
+    pale = stage.stone(((0.45, 0.44, 0.4), (0.62, 0.6, 0.56)), 5)
+    for k in range(7):
+        a = math.radians(-66 + 22 * k)
+        x, y = 1.7 * math.sin(a), 1.7 * math.cos(a)
+        stage.post((x, y, 0), (x, y, 2.2), 0.02 + 0.012 * (k % 3), (iron, pale)[k % 2], 16)
+    for height in (0.6, 1.1):
+        stage.post((-1.4, 1.9, height), (1.2, 1.9, height), 0.022, iron, 12)
+    for k in range(11):
+        x = -1.4 + 0.26 * k
+        stage.post((x, 1.9, 0.6), (x, 1.9, 1.1), 0.013, iron, 12)
+    leaves: list[Place] = []
+    for _ in range(60):
+        x, y, z = (stage.random.uniform(*span) for span in ((-1.9, 1.9), (1.5, 2.2), (1.6, 2.4)))
+        a, size = stage.random.uniform(0, math.pi), stage.random.uniform(0.04, 0.08)
+        along, across = (size * math.cos(a), size * math.sin(a)), (-0.4 * size * math.sin(a), 0.4 * size * math.cos(a))
+        leaves += [(x + i * along[0] + j * across[0], y + 0.2 * i * size, z + i * along[1] + j * across[1])
+                   for i, j in ((-1, 0), (0, -1), (1, 0), (0, 1))]  # fmt: skip
+    stage.mesh(leaves, [range(4 * k, 4 * k + 4) for k in range(len(leaves) // 4)], stage.stone(MOSS[1:], 9))
+
+
+def two_rooms(stage: Stage) -> None:
+    """A room, and far from it another one that no camera of the first sees: a hedge, a sandy ground, a pale sky."""
+    room(stage)
+    x, y = ELSEWHERE
+    stage.card((x, y + 5, 2), 24, 10, stage.stone(MOSS, 3.5))
+    stage.card((x, y + 3, 0), 24, 12, stage.stone(SAND, 3.0), tilt=90)
+    for _ in range(9):
+        at = x + stage.random.uniform(-3, 3), y + stage.random.uniform(2.5, 4.5)
+        size = stage.random.uniform(0.25, 0.7)
+        stage.ball((*at, size), size, stage.stone(SKY, 6 / size))
+
+
+def outdoor(stage: Stage) -> None:
+    """Ground with few things on it, far hills, and a sky 400 m away with few features."""
+    stage.card((0, 0, 0), 160, 160, stage.stone((*SAND, MOSS[1]), 1.2), tilt=90)
+    stage.ball((0, 0, 0), 400.0, stage.stone(SKY, 0.02, 0.5))
+    hills = stage.stone((*MOSS, STONE[1]), 0.25)
+    for k in range(16):
+        a = math.radians(22.5 * k + stage.random.uniform(-8, 8))
+        away, size = stage.random.uniform(60, 78), stage.random.uniform(9, 19)
+        stage.ball((away * math.sin(a), away * math.cos(a), -0.3 * size), size, hills)
+    for k in range(22):
+        a, away = math.radians(17 * k + stage.random.uniform(-6, 6)), stage.random.uniform(4, 22)
+        at, size = (away * math.sin(a), away * math.cos(a)), stage.random.uniform(0.3, 0.8)
+        if k % 3:
+            paint = stage.poster(4) if k % 2 else stage.stone(STONE, 5)
+            stage.box((*at, size), (size, size, 2 * size), paint, yaw=31.0 * k)
+        else:
+            stage.post((*at, 0), (*at, 2.4), 0.1, stage.wood(*OAK))
+            stage.ball((*at, 3.0), 1.1, stage.stone(MOSS, 6))
+
+
+SET_WORLDS: dict[str, Callable[[Stage], None]] = {
+    build.__name__: build for build in (room, street, posts, two_rooms, outdoor)
+}

@@ -24,19 +24,19 @@ def test_the_first_camera_stands_at_the_viewpoint_and_each_overlaps_with_another
 
 
 def test_the_same_set_is_shot_every_time_and_another_by_another_seed() -> None:
-    first, again = (parse_set("ring").views for _ in range(2))
-    assert first == again and first != parse_set("ring:spread=0.2").views
+    first, again = (parse_set("small_room").views for _ in range(2))
+    assert first == again and first != parse_set("small_room:spread=0.2").views
 
 
 def test_a_set_is_made_harder() -> None:
-    recipe = parse_set("ring:n=9,spread=0.3,noise=3")
+    recipe = parse_set("small_room:n=9,spread=0.3,noise=3")
     assert (recipe.count, recipe.spread, recipe.noise) == (9, 0.3, 3.0) and len(recipe.views) == 9
-    places = np.array([view.place for view in parse_set("ring:n=60,spread=0.5").views[1:]])
+    places = np.array([view.place for view in parse_set("small_room:n=60,spread=0.5").views[1:]])
     assert places.std(axis=0) == pytest.approx([0.5, 0.5, 1 / 3], rel=0.3)
 
 
-@pytest.mark.parametrize("text", ["rong", "ring:n=2", "ring:n=61", "ring:n=3.5", "ring:spread=-1", "ring:turn=2",
-                                  "ring:spread=x", "ring:noise=nan"])  # fmt: skip
+@pytest.mark.parametrize("text", ["smal_room", *(f"small_room:{setting}" for setting in (
+    "n=2", "n=61", "n=3.5", "spread=-1", "turn=2", "spread=x", "noise=nan"))])  # fmt: skip
 def test_what_is_no_set_is_refused(text: str) -> None:
     with pytest.raises(BadRequest, match=text.partition(":")[0]):
         parse_set(text)
