@@ -270,7 +270,9 @@ def compose(
     """
     pictures, whole = frame.pictures, alignment.warp
     progress("warp", 0.5)
-    layers = tuple(layer_of(picture, one) for picture, one in zip(pictures, whole.maps, strict=True))
+    # two pictures keep what earlier releases made of them
+    by_root = len(pictures) > 2
+    layers = tuple(layer_of(picture, one, by_root) for picture, one in zip(pictures, whole.maps, strict=True))
 
     floats = [picture.bits == 32 for picture in pictures]
 
@@ -278,7 +280,8 @@ def compose(
         made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
         own = whole.maps[0].inside()
         shown = made.panorama.alpha > 0
-        return made, crop_box(options.kept, whole.canvas.whole, shown, box_of(own) if own.any() else None)
+        reference = box_of(own) if own.any() else None
+        return made, crop_box(options.kept, whole.canvas.whole, shown, reference, len(pictures))
 
     painted = frame.painted
     if painted is not None:

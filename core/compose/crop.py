@@ -30,7 +30,9 @@ def parse_crop(text: str) -> Crop:
     return left, top, width, height
 
 
-def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Box | None) -> Box:
+def crop_box(
+    kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Box | None, pictures: int = 2
+) -> Box:
     """The part of the panorama that is kept.
 
     Parameters
@@ -43,6 +45,8 @@ def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Bo
         Where the canvas shows something.
     reference_box : Box or None
         Where the reference lies, canvas px; None if it lies beside the canvas.
+    pictures : int
+        How many there are.
 
     Returns
     -------
@@ -65,7 +69,8 @@ def crop_box(kind: Crop, whole: Box, shows: NDArray[np.bool_], reference_box: Bo
         if not shows.any():
             raise BadRequest("the panorama shows nothing that a crop could keep")
         box = largest_rectangle(shows)
-        keeps = kind == "inscribed" or box[2] * box[3] >= CROP.least_kept * np.count_nonzero(shows)
+        least = CROP.least_kept if pictures == 2 else CROP.least_kept_of_many
+        keeps = kind == "inscribed" or box[2] * box[3] >= least * np.count_nonzero(shows)
         return box if keeps else box_of(shows)
     if isinstance(kind, str) or len(kind) != 4:
         raise BadRequest(f"the crop {kind!r} is not known; choose from: {', '.join(CROPS)}, or give X, Y, W, H in px")

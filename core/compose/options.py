@@ -145,6 +145,10 @@ class CropOptions:
     least_kept: float = 0.7
     """Share of what is shown that the inscribed rectangle keeps at least to be taken: below, too much would be lost."""
 
+    least_kept_of_many: float = 0.6
+    """The same of more than two pictures: with each one the outline has more corners, and a frame in steps is no
+    picture."""
+
 
 @dataclass(frozen=True)
 class PlacingOptions:

@@ -63,7 +63,8 @@ def frame_outline(
         crop = tuple(int(round(part / step)) for part in crop)  # type: ignore[assignment]
     height, width = grid.shape[:2]
     try:
-        left, top, across, down = crop_box(crop, (0, 0, width, height), shown.at(frame.rays(grid)), reference)
+        shows = shown.at(frame.rays(grid))
+        left, top, across, down = crop_box(crop, (0, 0, width, height), shows, reference, len(views))
     except BadRequest:
         return None
     corner = low + np.array([left, top]) * step

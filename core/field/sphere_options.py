@@ -38,7 +38,7 @@ class SphereOptions:
     noise_range: tuple[float, float] = (0.2, 20.0)
     """Bounds of a point's noise relative to the median point's: a few points with long baselines shall not decide."""
 
-    initial_smoothing: float = 1e-3
+    initial_smoothing: float = 1e-5
     """λ of the first spline, by which gross errors are found: stiff enough that they stand out."""
 
     smoothing_decades: tuple[float, float] = (-7.0, -1.0)

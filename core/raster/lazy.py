@@ -105,6 +105,23 @@ class Weighed(LazyImage):
 
 
 @dataclass(frozen=True, eq=False)
+class Rooted(LazyImage):
+    """The square root of light, with its sign: nearly even steps to the eye, and no scale of its own."""
+
+    light: AnyImage
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.light.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        light = self.light[part]
+        root = np.sqrt(np.abs(light))
+        return np.copysign(root, light, out=root)
+
+
+@dataclass(frozen=True, eq=False)
 class Placed(LazyImage):
     """Light whose first pixel lies at `at` (row, column) of a larger or smaller frame of `size` (H, W); black, or
     `beyond`, where it does not reach."""

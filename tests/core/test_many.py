@@ -17,6 +17,7 @@ from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.camera_file import camera_table
 from edf_stitch.core.output.match_table import match_file
 from edf_stitch.core.output.outputs import OutputRequest, check, warp_bytes, write
+from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import Cancelled, NoOverlap
@@ -190,6 +191,12 @@ def test_warp_and_layers_hold_every_picture(set_result: StitchResult, tmp_path: 
     np.testing.assert_array_equal(labels, set_result.labels + 1)
     page = (tmp_path / "r.html").read_text("utf-8")
     assert page.count("<image ") == 4 and page.count("<line ") == len(set_result.edges)
+
+
+def test_pictures_are_fetched_by_the_root_of_light(four: PictureSet) -> None:
+    result = stitch(four.pictures, replace(KNOWN, crop="full"))
+    for picture, one, layer in zip(result.pictures, result.warp.maps, result.layers, strict=True):
+        np.testing.assert_array_equal(layer.pixels, layer_of(picture, one, by_root=True).pixels)
 
 
 @pytest.mark.parametrize("slide", [0.0, 1.0])

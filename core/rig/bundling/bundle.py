@@ -173,7 +173,11 @@ def bundle(
         scale = scale_direction(structure, solution)
         before = cost
         for _ in range(BUNDLE.tries):
-            step = _solved(structure, normal, scale, damping)
+            try:
+                step = _solved(structure, normal, scale, damping)
+            except np.linalg.LinAlgError:  # singular to rounding: more damping makes it regular
+                damping *= BUNDLE.damping_up
+                continue
             moved = _stepped(problem, solution, structure, bases, *step)
             moved_seen = reproject(problem, moved, structure.chosen)
             moved_cost = _cost(problem, moved, structure, moved_seen, settings, prior)

@@ -100,6 +100,10 @@ class BundleOptions:
     tries: int = 8
     # Most that log f changes in a step.
     most_log_focal: float = 0.2
+    # ρ, in units of one by the largest distance of a place, up to which a triangulated point is believed.
+    most_inverse_range: float = 1e4
+    # Rounds of the robust mean of rays that see a point at infinity: two of three outvote a wrong one by then.
+    mean_rounds: int = 5
     # What keeps the equations regular, and stiffness that keeps the scale, in units of their mean diagonal.
     regular: float = 1e-15
     scale_stiffness: float = 1e3
@@ -161,6 +165,10 @@ class JudgeOptions:
     # Parallax is little where this percentile of errors of rotations alone is below so many σ.
     little_parallax_percentile: float = 80.0
     little_parallax_sigmas: float = 6.0
+    # Places are found anew from the bundle's rotations, and bundled from there, where they differ from its places by
+    # more than this share of their extent: it has not come out of a wrong start then. At most so many times.
+    astray: float = 0.1
+    most_anew: int = 3
     # No parallax can be seen where these percentiles of them are below so many px each: matches of pixels err by that
     # much, a few of a hundred by more. A skyline from places far apart has 0.55 and 0.9 px, and keeps its places.
     no_parallax_percentiles: tuple[float, ...] = (80.0, 95.0)

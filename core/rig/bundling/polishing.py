@@ -78,9 +78,9 @@ def _round(
 def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polished:
     """The same for pictures that were all taken from one place: every point is at infinity."""
     solution = replace(solution, centres=np.zeros_like(solution.centres)).seen_from(0)
-    solution = _points_anew(problem, solution)
-    solution = replace(solution, inverse_ranges=np.zeros_like(solution.inverse_ranges))
     for kernel in POLISHING.rotation_kernels_px:
+        solution = _points_anew(problem, solution)
+        solution = replace(solution, inverse_ranges=np.zeros_like(solution.inverse_ranges))
         settings = Settings(kernel, POLISHING.rotation_iterations, POLISHING.rotation_tolerance, depths=False)
         bundled = bundle(problem, solution, settings, 0, None, tick)
         solution = _pruned(problem, bundled, POLISHING.rotation_prune_sigmas)
@@ -88,11 +88,16 @@ def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polish
 
 
 def total_cost(problem: Problem, solution: Solution) -> float:
-    """The robust cost, px², of all observations: of points that could not be solved too, as if they were far off."""
+    """The robust cost, px², of all observations: what is far off costs the same whether its point is solved or not."""
     kernel = BUNDLE.kernel_px * problem.scale
     lengths = lengths_of_errors(problem, solution)
     missed = np.sqrt(JUDGE.missed_kernels) * kernel
-    return float(robust_cost(np.where(np.isnan(lengths), missed, lengths), kernel).sum())
+    return float(robust_cost(np.fmin(lengths, missed), kernel).sum())
+
+
+def cost_of_start(problem: Problem, solution: Solution) -> float:
+    """The robust cost, px², of all observations before any bundle, their points as these places have them."""
+    return total_cost(problem, _points_anew(problem, solution.rescaled()))
 
 
 def depth_prior(solution: Solution) -> DepthPrior | None:

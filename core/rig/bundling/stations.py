@@ -12,7 +12,7 @@ from ...system.progress import Tick
 from ..averaging.averaged import PairGeometry
 from ..averaging.graph import components
 from .bundle_options import JUDGE
-from .polishing import Polished, polish, polish_rotations
+from .polishing import Polished, cost_of_start, polish, polish_rotations
 from .positions import SamePlace, place_pictures
 from .reprojection import lengths_of_errors
 from .solution import Problem, Solution
@@ -66,36 +66,60 @@ def polish_best(
     """The cheapest of: every picture at a place of its own and, where there are stations, those of each at one place,
     and all at one place: pairs with few matches do not show that they rotate. What more places cost is counted (BIC).
     Where there is little parallax, rotations bundled as if at one place are better to start from than averaged ones,
-    and are tried too. Places of stations start both from nothing and from what was found without them: either start
-    can end beside the best.
+    and are tried too.
 
     framed: brings places (N, 3) to where the start's poses stand.
     """
-
-    def from_nothing(assigned: Problem, begun: Solution) -> Polished:
-        placed = place_pictures(assigned, begun, same)
-        return polish(assigned, replace(begun, centres=framed(placed.centres)), tick)
-
     if not stations or problem.held.any():  # given poses say themselves what is at one place
-        return from_nothing(problem, start)
+        return _placed_and_polished(problem, start, same, framed, tick)
     turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
-    candidates = [turned, from_nothing(problem, start)]
+    candidates = [turned, _placed_and_polished(problem, start, same, framed, tick)]
     if _little_parallax(turned):
-        candidates.append(from_nothing(problem, replace(start, R=turned.solution.R, lens=turned.solution.lens)))
+        begun = replace(start, R=turned.solution.R, lens=turned.solution.lens)
+        candidates.append(_placed_and_polished(problem, begun, same, framed, tick))
     if not any(len(station) == problem.pictures for station in stations):
-        tied = problem.with_stations(stations)
-        apart = min(candidates[1:], key=lambda found: found.cost).solution
-        together = replace(start, R=apart.R, lens=apart.lens, centres=_at_stations(tied, apart.centres))
-        candidates += [from_nothing(tied, start), polish(tied, together, tick)]
+        assigned = problem.with_stations(stations)
+        apart = min(candidates[1:], key=lambda found: found.cost)
+        candidates.append(_placed_and_polished(assigned, start, same, framed, tick, _joined(assigned, apart.solution)))
     return min(candidates, key=information_criterion)
 
 
-def _at_stations(problem: Problem, centres: Array) -> Array:
-    """Places (N, 3) with those of one station in their middle."""
-    _, number, count = np.unique(problem.place, return_inverse=True, return_counts=True)
-    middle = np.stack([np.bincount(number, axis) for axis in centres.T], axis=1) / count[:, None]
-    placed: Array = middle[number]
-    return placed
+def _placed_and_polished(
+    problem: Problem, start: Solution, same: Sequence[SamePlace], framed: Callable[[Array], Array], tick: Tick,
+    known: Solution | None = None,
+) -> Polished:  # fmt: skip
+    """Places and bundle in turn, as long as the bundle's rotations give other places than it ends with, and a lower
+    cost from there: averaged rotations can be degrees off, and so are places by them. It begins with what is known
+    already where that costs less than the first places."""
+    begun = replace(start, centres=framed(place_pictures(problem, start, same).centres))
+    if known is not None:
+        begun = min((begun, known), key=lambda one: cost_of_start(problem, one))
+    best = polish(problem, begun, tick)
+    for _ in range(JUDGE.most_anew):
+        solution = best.solution
+        centres = place_pictures(problem, solution, same).centres
+        if problem.held.any() or _apart(centres, solution.centres) < JUDGE.astray:
+            break
+        again = polish(problem, replace(solution, centres=centres), tick)
+        if again.cost >= best.cost:
+            break
+        best = again
+    return best
+
+
+def _joined(problem: Problem, solution: Solution) -> Solution:
+    """Pictures of one place in the middle of theirs."""
+    _, number, counts = np.unique(problem.place, return_inverse=True, return_counts=True)
+    sums = np.stack([np.bincount(number, axis) for axis in solution.centres.T], axis=1)
+    return replace(solution, centres=(sums / counts[:, None])[number])
+
+
+def _apart(centres: Array, others: Array) -> float:
+    """The most that places (N, 3) differ from others when both are shifted and scaled alike; 1: their extent."""
+    mine, theirs = centres - centres.mean(axis=0), others - others.mean(axis=0)
+    mine *= (mine * theirs).sum() / max(float((mine * mine).sum()), 1e-300)
+    off, extent = (np.linalg.norm(values, axis=1).max() for values in (mine - theirs, theirs))
+    return float(off / extent) if extent > 0 else 0.0
 
 
 def _little_parallax(turned: Polished) -> bool:

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...raster.arrays import Array
-from .solution import Problem, Solution, bearings
+from .bundle_options import BUNDLE
+from .solution import Problem, Solution, bearings, lens_of
 from .tracks import Index
 
 
@@ -15,7 +16,8 @@ def triangulate(problem: Problem, solution: Solution) -> Solution:
     """All points anew, from their used observations: rays, ρ and which of them could be.
 
     A point behind, or no better off at a finite range, starts at infinity: noise puts far points behind the cameras,
-    and from there no step leads back through infinity for all at once.
+    and from there no step leads back through infinity for all at once. So does one far nearer than pictures are apart:
+    it is seen from places that are one but for rounding.
     """
     tracks = problem.tracks
     chosen = np.flatnonzero(solution.used)
@@ -29,25 +31,27 @@ def triangulate(problem: Problem, solution: Solution) -> Solution:
         starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
         seen = bearings(problem, solution)[chosen]
         picture = tracks.picture[chosen]
-        found, depth = _best(solution, picture, point, starts, seen)
+        kernel = BUNDLE.kernel_px * problem.scale / lens_of(problem, solution, picture).focal
+        far = _mean_ray(solution, picture, point, starts, seen, kernel)
+        found, depth = _best(solution, picture, point, starts, seen, far)
         one = _of_one_place(problem.place[picture], starts)
         if one.any():
-            found[one], depth[one] = _at_usual_range(
-                solution.centres[picture[starts[one]]], _mean_ray(solution, picture, starts, seen)[one], depth[~one]
-            )
+            centres = solution.centres[picture[starts[one]]]
+            found[one], depth[one] = _at_usual_range(centres, far[one], depth[~one])
         rays[points], inverse_ranges[points] = found, depth
     return replace(solution, rays=rays, inverse_ranges=inverse_ranges, solved=solved)
 
 
-def _best(solution: Solution, picture: Index, point: Index, starts: Index, seen: Array) -> tuple[Array, Array]:
-    """Rays (P, 3) and ρ (P,), by linear least squares or at infinity."""
+def _best(
+    solution: Solution, picture: Index, point: Index, starts: Index, seen: Array, far: Array
+) -> tuple[Array, Array]:
+    """Rays (P, 3) and ρ (P,), by linear least squares or at infinity, there at far (P, 3)."""
     rays, depth = _linear(solution, picture, starts, seen)
-    far = _mean_ray(solution, picture, starts, seen)
     worst, worst_far = (
         np.maximum.reduceat(_off(solution, picture, r[point], d[point], seen), starts)
         for r, d in ((rays, depth), (far, np.zeros(len(far))))
     )
-    at_infinity = (depth < 0) | (worst_far <= worst)
+    at_infinity = (depth < 0) | (depth > BUNDLE.most_inverse_range) | (worst_far <= worst)
     return np.where(at_infinity[:, None], far, rays), np.where(at_infinity, 0.0, depth)
 
 
@@ -68,11 +72,15 @@ def _linear(solution: Solution, picture: Index, starts: Index, seen: Array) -> t
     return least[:, :3], least[:, 3]
 
 
-def _mean_ray(solution: Solution, picture: Index, starts: Index, seen: Array) -> Array:
-    """Where a point at infinity is seen, by all together."""
-    mean = np.add.reduceat(np.einsum("oji,oj->oi", solution.R[picture], seen), starts, axis=0)
-    unit: Array = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
-    return unit
+def _mean_ray(solution: Solution, picture: Index, point: Index, starts: Index, seen: Array, kernel: Array) -> Array:
+    """Where a point at infinity is seen by most: a mean, weighted anew with Cauchy's kernel (O,), in radians."""
+    world = np.einsum("oji,oj->oi", solution.R[picture], seen)
+    weight = np.ones(len(world))
+    for _ in range(BUNDLE.mean_rounds):
+        mean = np.add.reduceat(weight[:, None] * world, starts, axis=0)
+        mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
+        weight = 1 / (1 + (np.linalg.norm(world - mean[point], axis=1) / kernel) ** 2)
+    return mean
 
 
 def _off(solution: Solution, picture: Index, rays: Array, depth: Array, seen: Array) -> Array:

@@ -40,16 +40,19 @@ def test_other_kinds_are_refused_by_name(wrong: str | tuple) -> None:
         box(wrong)
 
 
-@pytest.mark.parametrize(("rows", "kept"), [(8, (5, 10, 40, 20)), (9, (5, 10, 40, 29))])
+@pytest.mark.parametrize(("pictures", "rows", "kept"), [
+    (2, 8, (5, 10, 40, 20)), (2, 9, (5, 10, 40, 29)), (3, 13, (5, 10, 40, 20)), (3, 14, (5, 10, 40, 34)),
+])  # fmt: skip
 def test_by_itself_it_keeps_what_is_full_where_that_is_most_of_what_is_shown(
-    rows: int, kept: tuple[int, int, int, int]
+    pictures: int, rows: int, kept: tuple[int, int, int, int]
 ) -> None:
-    """Beside 800 pixels of a rectangle rows of 39: 70 % are kept with 8 of them, and less with 9."""
+    """Beside 800 pixels of a rectangle rows of 39: of two pictures 70 % are kept with 8 of them, and less with 9; of
+    more 60 % with 13, and less with 14."""
     shows = np.zeros((60, 60), bool)
     shows[10:30, 5:45] = True
     for row in range(rows):
         shows[30 + row, 5:45] = np.arange(40) != 3 * row + 1
-    assert crop_box("auto", (0, 0, 60, 60), shows, REFERENCE) == kept
+    assert crop_box("auto", (0, 0, 60, 60), shows, REFERENCE, pictures) == kept
     assert crop_box("inscribed", (0, 0, 60, 60), shows, REFERENCE) == (5, 10, 40, 20)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera, Knowledge
+from edf_stitch.core.raster.arrays import Array
 from edf_stitch.core.rig.averaging.turns import degrees_between, rotations
 from edf_stitch.core.rig.bundling.bundle import DepthPrior, Settings, bundle
 from edf_stitch.core.rig.bundling.polishing import start
@@ -195,3 +196,21 @@ def test_depths_may_be_negative_on_the_way(sign: int) -> None:
     begun = replace(true, inverse_ranges=np.where(np.arange(60) == 5, sign * -0.03, true.inverse_ranges))
     found = bundle(problem, begun, Settings(), 0).solution
     np.testing.assert_allclose(found.inverse_ranges[5], true.inverse_ranges[5], atol=5e-3)
+
+
+def test_equations_that_are_singular_to_rounding_are_damped(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, true = _scene(0)
+    solve = np.linalg.solve
+    tried = []
+
+    def singular_once(left: Array, right: Array) -> Array:
+        tried.append(len(left))
+        if len(tried) == 1:
+            raise np.linalg.LinAlgError("Singular matrix")
+        return solve(left, right)
+
+    begun = _disturbed(true, 0), Settings(2.0, 30, 1e-10), 0
+    usual = bundle(problem, *begun)
+    monkeypatch.setattr(np.linalg, "solve", singular_once)
+    assert bundle(problem, *begun).cost == pytest.approx(usual.cost, rel=1e-6)
+    assert len(tried) > 2

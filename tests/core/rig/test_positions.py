@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.rig.averaging.averaged import PairGeometry
 from edf_stitch.core.rig.averaging.turns import rotations
-from edf_stitch.core.rig.bundling.polishing import start
+from edf_stitch.core.rig.bundling.polishing import start, total_cost
 from edf_stitch.core.rig.bundling.positions import place_pictures
 from edf_stitch.core.rig.bundling.reprojection import lengths_of_errors
 from edf_stitch.core.rig.bundling.solution import LENS, Problem, Solution, lenses_of
@@ -91,3 +91,42 @@ def test_a_point_needs_two_views() -> None:
     used[problem.tracks.starts[0]] = problem.tracks.starts[1] - problem.tracks.starts[0] != 2
     found = triangulate(problem, replace(begun, centres=rig.centres, used=used))
     assert found.solved[0] == used[problem.tracks.starts[0]] and found.solved[1:].all()
+
+
+def test_a_wrong_view_does_not_draw_a_far_point_away() -> None:
+    """Of three views of a point at infinity two agree."""
+    rig = make_rig("tripod", 0, points=1500, noise_px=0.0, outliers=0.0)
+    problem, begun = problem_of(rig)
+    tracks = problem.tracks
+    k = int(np.flatnonzero(np.diff(tracks.starts) == 3)[0])
+    pixels = tracks.pixels.copy()
+    pixels[tracks.starts[k]] += 150.0
+    disturbed = replace(problem, tracks=replace(tracks, pixels=pixels))
+    true, found = (triangulate(one, begun).rays[k] for one in (problem, disturbed))
+    assert np.degrees(np.arccos(min(1.0, float(true @ found)))) < 0.1
+
+
+def test_places_that_are_one_but_for_rounding_measure_no_depth() -> None:
+    rig = make_rig("tripod", 0, points=1500)
+    problem, begun = problem_of(rig)
+    centres = rig.centres - rig.centres[0]
+    centres[:4] = centres[0] + 1e-9 * np.arange(12).reshape(4, 3)
+    centres[4:] += [[1.0, 0, 0]]
+    found = triangulate(problem, replace(begun, centres=centres))
+    assert found.inverse_ranges.max() < 1e5
+
+
+def test_a_view_far_off_costs_the_same_whether_its_point_is_solved_or_not() -> None:
+    rig = make_rig("tripod", 0, points=1500, noise_px=0.0, outliers=0.0)
+    problem, begun = problem_of(rig)
+    tracks = problem.tracks
+    k = int(tracks.starts[np.flatnonzero(np.diff(tracks.starts) == 3)[0]])
+    pixels = tracks.pixels.copy()
+    pixels[k] += 150.0
+    disturbed = replace(problem, tracks=replace(tracks, pixels=pixels))
+    of_this = tracks.point == tracks.point[k]
+    whole, solved, unsolved = (
+        total_cost(one, triangulate(one, replace(begun, used=begun.used & used)))
+        for one, used in ((problem, True), (disturbed, True), (disturbed, ~of_this))
+    )
+    assert solved - whole > 1 and unsolved - whole == pytest.approx(3 * (solved - whole), rel=0.02)
