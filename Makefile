@@ -67,7 +67,8 @@ slow: setup
 soak: setup
 	$(PYTEST) -n $(WORKERS) -m soak
 
-# SUITE=full: all scenes at 1280×960, 25 minutes from empty on two cores. Pictures are kept and made only once.
+# SUITE=full: all scenes at 1280×960, 25 minutes from empty on two cores; SUITE=sets: all sets of many pictures. Pictures
+# are kept and made only once.
 validate: setup
 	$(BIN)/edf validate --suite $(SUITE) -o validation_$(SUITE) --overwrite
 
@@ -93,4 +94,4 @@ extension: setup
 		--blender "$$BLENDER_RUN" --output-dir dist
 
 clean:
-	rm -rf .venv $(OLDEST) $(NEWEST) build dist wheels demo_output validation_quick validation_full *.egg-info
+	rm -rf .venv $(OLDEST) $(NEWEST) build dist wheels demo_output validation_quick validation_full validation_sets *.egg-info

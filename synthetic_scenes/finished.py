@@ -31,12 +31,18 @@ def finished(result: StitchResult, pair: RenderedPair, truth: Truth) -> dict[str
     """
     picture, _ = on_the_wide_canvas(result, truth)
     alone = truth.in_target & ~truth.in_reference
-    known = truth.in_reference & (picture > DARKEST).all(axis=-1) & (picture < BRIGHTEST).all(axis=-1)
-    shown, true = decode(picture), decode(truth.picture)
-    gain = np.median(true[known] / shown[known], axis=0) if known.any() else np.float32(1)
-    exposed = encode((shown * gain).astype(np.float32), 8)
+    exposed = evened(decode(picture), truth.picture, truth.in_reference)
     found = {"target_only_psnr_db": psnr(exposed, truth.picture, alone) if alone.any() else math.nan}
     return found | ({"things_half": things_half(result, pair, truth)} if pair.things else {})
+
+
+def evened(light: NDArray[np.float32], true: NDArray[np.uint8], where: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """A picture (H, W, 3), scene-linear, with one gain per channel that brings it nearest to the true one over a mask,
+    where neither is too dark or too bright to tell."""
+    picture = encode(light, 8)
+    known = where & (picture > DARKEST).all(axis=-1) & (picture < BRIGHTEST).all(axis=-1)
+    gain = np.median(decode(true)[known] / decode(picture)[known], axis=0) if known.any() else np.float32(1)
+    return encode((light * gain).astype(np.float32), 8)
 
 
 def things_half(result: StitchResult, pair: RenderedPair, truth: Truth) -> float:

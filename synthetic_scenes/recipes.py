@@ -176,8 +176,6 @@ RECIPES = {recipe.name: recipe for recipe in _RECIPES}
 # A wall and floor, depth in layers, strong relief, no parallax at all.
 QUICK = ("two_planes", "layered_cards", "tabletop", "pure_rotation")
 FULL = tuple(RECIPES)
-SUITES = {"quick": QUICK, "full": FULL}
-SIZES = {"quick": (640, 480), "full": (1280, 960)}
 
 
 def parse_scene(text: str) -> tuple[Recipe, Difficulty]:

@@ -29,7 +29,8 @@ SAMPLES = 24
 VIEWS = ("reference", "target", "wide")
 # Whatever decides about pixels: a change in one of these files makes every cached picture a stranger.
 SOURCES = (
-    "render.py", "stage.py", "worlds.py", "rendered.py", "passes.py", "proof.py", "../core/cameras/blender_camera.py",
+    "render.py", "camera_render.py", "stage.py", "worlds.py", "rendered.py", "passes.py", "proof.py",
+    "../core/cameras/blender_camera.py",
 )  # fmt: skip
 
 
@@ -110,14 +111,15 @@ def _keep(rendered: Path, place: Path, recipe: Recipe, difficulty: Difficulty) -
         data, _ = encode_picture(passes["wide"].light, None, 32, ".exr")
         files.add_to_folder(place, "wide.exr", data)
         for name in ("target", "wide"):
-            files.add_to_folder(place, f"{name}_depth.npy", _npy(passes[name].depth))
+            files.add_to_folder(place, f"{name}_depth.npy", npy_bytes(passes[name].depth))
         if passes["wide"].things.any():
             for name in VIEWS:
-                files.add_to_folder(place, f"{name}_things.npy", _npy(passes[name].things))
+                files.add_to_folder(place, f"{name}_things.npy", npy_bytes(passes[name].things))
         files.add_to_folder(place, "cameras.json", json.dumps(entries, indent=1).encode())
 
 
-def _npy(array: NDArray) -> bytes:
+def npy_bytes(array: NDArray) -> bytes:
+    """An array as a file of NumPy's own."""
     stream = io.BytesIO()
     np.save(stream, array)
     return stream.getvalue()

@@ -9,7 +9,9 @@ from typing import Any
 from urllib.parse import quote
 
 from ..core.output.page import STYLE, table
-from .thresholds import BEYOND_MEASURES, BEYOND_RUN, LEAD, SAYING_RUN, Check, Median, Result, Verdict
+from .limits import Check, Result
+from .sets.set_names import SET_MEASURES, SET_PROOF_NAMES
+from .thresholds import BEYOND_MEASURES, BEYOND_RUN, LEAD, SAYING_RUN, Median, Verdict
 
 # Figures of a run: what people call them, their unit, digits after the point.
 MEASURES = {
@@ -35,12 +37,14 @@ MEASURES = {
     "slid_half_px": ("viewpoint slides half-way: both pictures meet, median", "px", 3),
     "slid_half_p95_px": ("viewpoint slides half-way: both pictures meet, 95th", "px", 3),
 }  # fmt: skip
+Names = dict[str, tuple[str, str, int]]
 OTHER_NAMES = {
     "lead_db": "whole picture's lead over the best rival", "model": "model", "status": "status",
     "undetermined_said": "undetermined focal length said", "position_px": "Position pass from pixel centres",
     "depth_relative": "Position against Depth, relative", "ray_cast_relative": "ray casts against Depth, relative",
     "warp_psnr_db": "target by the true map: PSNR", "half_pixel_psnr_db": "the same, half a pixel off: PSNR",
     "half_pixel_loss_db": "what half a pixel costs", "wide_psnr_db": "wide render against reference: PSNR",
+    **SET_PROOF_NAMES,
 }  # fmt: skip
 PICTURES = {
     "reference": "Reference", "target": "Target", "stitch": "Stitch (K known, strict)",
@@ -63,8 +67,13 @@ HEADS = {
 GOOD, BAD = '<b class="mark">✓</b>', '<b class="mark">✗</b>'
 
 
-def page(results: Sequence[Result], suite: str, version: str, verdict: Verdict, middles: Sequence[Median]) -> str:
-    """The whole page. middles: the suite's medians, shown also where they are not judged."""
+def page(
+    results: Sequence[Result], suite: str, version: str, verdict: Verdict, middles: Sequence[Median],
+    of_sets: Sequence[str] = (),
+) -> str:  # fmt: skip
+    """The whole page. middles: the suite's medians, shown also where they are not judged; of_sets: what stands about
+    sets above the sections of pairs, then their own sections."""
+    pairs = [result for result in results if result.get("kind") != "set"]
     failed = {check.scene for check in verdict.failed if check.scene is not None}
     word = "passed" if verdict.passed else "failed"
     counts = (
@@ -79,19 +88,26 @@ def page(results: Sequence[Result], suite: str, version: str, verdict: Verdict, 
         f"<title>Validation {word}: {escape(suite)}</title>", f"<style>{STYLE}</style>", "</head>", "<body>", "<main>",
         f'<header class="{_class(verdict.passed)}"><h1>{"✓" if verdict.passed else "✗"} Validation {word}</h1>',
         f"<p>{escape(counts)}</p>", f'<p class="quiet">{escape(about)}</p></header>',
-        _bars(middles, verdict.complete), _failures(general),
-        "<h2>Scenes</h2>", _overview(results, verdict),
-        "<h2>Whole picture against the true panorama</h2>", _rivals(results),
-        "<h2>Outside the overlap</h2>", _beyond(results),
-        *(_section(result, [c for c in verdict.checks if c.scene == result["scene"]]) for result in results),
+        failures(general), *(_of_pairs(pairs, verdict, middles) if pairs else ()), *of_sets[:1],
+        *(_section(result, [c for c in verdict.checks if c.scene == result["scene"]]) for result in pairs),
+        *of_sets[1:],
         "</main>", "</body>", "</html>", "",
     ])  # fmt: skip
 
 
-def named(measure: str) -> str:
-    """A figure as people call it."""
+def _of_pairs(pairs: Sequence[Result], verdict: Verdict, middles: Sequence[Median]) -> list[str]:
+    return [
+        _bars(middles, verdict.complete), "<h2>Scenes</h2>", _overview(pairs, verdict),
+        "<h2>Whole picture against the true panorama</h2>", _rivals(pairs), "<h2>Outside the overlap</h2>",
+        _beyond(pairs),
+    ]  # fmt: skip
+
+
+def named(measure: str, first: Names = MEASURES) -> str:
+    """A figure as people call it; first: where its name is looked up first."""
     figure, _, rival = measure.partition(" over ")
-    name = MEASURES[figure][0] if figure in MEASURES else OTHER_NAMES.get(figure, figure)
+    names = SET_MEASURES | MEASURES | first
+    name = names[figure][0] if figure in names else OTHER_NAMES.get(figure, figure)
     return f"{name}, lead over {rival}" if rival else name
 
 
@@ -105,7 +121,8 @@ def check_value(value: object, measure: str) -> str:
         return str(value)
     if measure.endswith("_relative"):
         return f"{value:.1e}"
-    digits = MEASURES[measure][2] if measure in MEASURES else 2 if "_db" in measure else 0 if measure == "scenes" else 4
+    known = SET_MEASURES | MEASURES
+    digits = known[measure][2] if measure in known else 2 if "_db" in measure else 0 if measure == "scenes" else 4
     return f"{value:.{digits}f}"
 
 
@@ -116,7 +133,7 @@ def _bars(middles: Sequence[Median], judged: bool) -> str:
         lacking = f", {middle.missing} of them without" if middle.missing else ""
         rows.append(
             f"<tr><td>{escape(limit.run)}</td><td>{escape(named(limit.measure))}</td>"
-            + _cell(middle.value, limit.measure, middle.passed if judged else None, f" {limit.unit}")
+            + cell(middle.value, limit.measure, middle.passed if judged else None, f" {limit.unit}")
             + f"<td class=n>{escape(f'{limit.text} {limit.unit}')}</td><td class=n>{middle.scenes}{lacking}</td></tr>"
         )
     head = "<tr><th>run</th><th>median of</th><th class=n>value</th><th class=n>limit</th><th class=n>scenes</th></tr>"
@@ -134,7 +151,7 @@ def _overview(results: Sequence[Result], verdict: Verdict) -> str:
     for result in results:
         checks = [check for check in verdict.checks if check.scene == result["scene"]]
         passed = all(check.passed for check in checks)
-        name = f'<a href="#{_slug(result)}">{escape(result["scene"])}</a>'
+        name = f'<a href="#{slug(result)}">{escape(result["scene"])}</a>'
         row = f'<tr><th class="{_class(passed)}">{GOOD if passed else BAD} {name}</th>'
         if result["status"] != "done":
             width = 1 + sum(len(names) for _, _, names in OVERVIEW)
@@ -150,7 +167,7 @@ def _overview(results: Sequence[Result], verdict: Verdict) -> str:
                 value = run["figures"].get(measure)
                 if measure == "model":
                     value = "refused" if run["refused"] else run["model"]
-                row += _cell(value, measure, all(mine) if mine else None, first=measure == "model")
+                row += cell(value, measure, all(mine) if mine else None, first=measure == "model")
         rows.append(row + "</tr>")
     note = (
         "Coloured and marked: judged. Overlap and whole: PSNR. Of the whole picture it is judged that no rival is "
@@ -179,7 +196,7 @@ def _rivals(results: Sequence[Result]) -> str:
         for value in values:
             text = check_value(value, LEAD.measure)
             cells += f"<td class=n>{f'<b>{text}</b>' if value is not None and value == best else text}</td>"
-        rows.append(f'<tr><th><a href="#{_slug(result)}">{escape(result["scene"])}</a></th>{cells}</tr>')
+        rows.append(f'<tr><th><a href="#{slug(result)}">{escape(result["scene"])}</a></th>{cells}</tr>')
     return table(head, rows) + '<p class="quiet">PSNR in dB over the pixels that all of them show; best: bold.</p>'
 
 
@@ -193,8 +210,8 @@ def _beyond(results: Sequence[Result]) -> str:
         cells = ""
         for way in (BEYOND_RUN, "known/homography"):
             run = result["runs"].get(way) or {"figures": {}}
-            cells += "".join(_cell(run["figures"].get(name), name, None) for name in BEYOND_MEASURES)
-        rows.append(f'<tr><th><a href="#{_slug(result)}">{escape(result["scene"])}</a></th>{cells}</tr>')
+            cells += "".join(cell(run["figures"].get(name), name, None) for name in BEYOND_MEASURES)
+        rows.append(f'<tr><th><a href="#{slug(result)}">{escape(result["scene"])}</a></th>{cells}</tr>')
     return table(f"<tr><th rowspan=2>scene</th>{groups}</tr><tr>{columns}</tr>", rows)
 
 
@@ -206,29 +223,35 @@ def _section(result: Result, checks: Sequence[Check]) -> str:
         "" if result["focal_determined"] else "focal length not determined by two pictures",
     ]  # fmt: skip
     parts = [
-        f'<section id="{_slug(result)}"><h2 class="{_class(passed)}">{GOOD if passed else BAD} '
+        f'<section id="{slug(result)}"><h2 class="{_class(passed)}">{GOOD if passed else BAD} '
         f"{escape(result['scene'])}</h2>",
         f"<p>{escape(result['title'])}</p>", f'<p class="quiet">{escape("; ".join(f for f in facts if f))}</p>',
     ]  # fmt: skip
     if result["message"]:
         parts.append(f"<pre>{escape(result['message'])}</pre>")
-    parts.append(_failures([check for check in checks if not check.passed]))
+    parts.append(failures([check for check in checks if not check.passed]))
     if result["pictures"]:
         parts.append(f'<div class="pictures">{"".join(_pictures(result))}</div>')
-    said = _warnings(result["runs"])
+    said = warnings_list(result["runs"])
     if said:
         parts.append(f"<details><summary>Refusals and warnings</summary>{said}</details>")
     if result["runs"]:
         parts.append(f"<details><summary>All figures</summary>{_figures(result['runs'])}</details>")
     if result["proof"]:
-        rows = [f"<tr><th>{escape(named(name))}</th>{_cell(value, name, None)}<td>{escape(_unit(name))}</td></tr>"
-                for name, value in result["proof"].items()]  # fmt: skip
-        title = "Proof of the ground truth: worst distances, px and relative, and PSNR"
-        parts.append(f"<details><summary>{title}</summary>{table('', rows)}</details>")
+        parts.append(proof_table(result))
     return "\n".join([*parts, '<p class="quiet"><a href="#">to the top</a></p></section>'])
 
 
-def _failures(failed: Sequence[Check]) -> str:
+def proof_table(result: Result) -> str:
+    """How far the ground truth is from what it is made of."""
+    rows = [f"<tr><th>{escape(named(name))}</th>{cell(value, name, None)}<td>{escape(unit(name))}</td></tr>"
+            for name, value in result["proof"].items()]  # fmt: skip
+    title = "Proof of the ground truth: worst distances, px and relative, and PSNR"
+    return f"<details><summary>{title}</summary>{table('', rows)}</details>"
+
+
+def failures(failed: Sequence[Check]) -> str:
+    """A list of checks that failed, empty for none."""
     items = []
     for check in failed:
         value = f"{check_value(check.value, check.measure)} {check.unit}".strip()
@@ -241,12 +264,17 @@ def _pictures(result: Result) -> Iterable[str]:
     kinds = [kind for kind in PICTURES if kind in result["pictures"]]
     kinds += [kind for kind in result["pictures"] if kind not in PICTURES]
     for kind in kinds:
-        path, caption = escape(quote(result["pictures"][kind], safe="/=")), escape(PICTURES.get(kind, kind))
-        alt = escape(f"{result['scene']}: {PICTURES.get(kind, kind)}")
-        yield (
-            f'<figure><a href="{path}"><img loading="lazy" src="{path}" alt="{alt}"></a>'
-            f"<figcaption>{caption}</figcaption></figure>"
-        )
+        yield figure(result, kind, PICTURES.get(kind, kind))
+
+
+def figure(result: Result, kind: str, caption: str) -> str:
+    """One picture of a scene with what it shows."""
+    path = escape(quote(result["pictures"][kind], safe="/="))
+    alt = escape(f"{result['scene']}: {caption}")
+    return (
+        f'<figure><a href="{path}"><img loading="lazy" src="{path}" alt="{alt}"></a>'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
 
 
 def _figures(runs: dict[str, dict[str, Any]]) -> str:
@@ -254,16 +282,16 @@ def _figures(runs: dict[str, dict[str, Any]]) -> str:
     names += [name for run in runs.values() for name in run["figures"] if name not in MEASURES]
     head = f"<tr><th></th><th></th>{''.join(f'<th class=n>{escape(way)}</th>' for way in runs)}</tr>"
     models = ("refused" if run["refused"] else run["model"] for run in runs.values())
-    rows = [f"<tr><th>model</th><td></td>{''.join(_cell(model, 'run', None) for model in models)}</tr>"]
+    rows = [f"<tr><th>model</th><td></td>{''.join(cell(model, 'run', None) for model in models)}</tr>"]
     for name in dict.fromkeys(names):
-        cells = "".join(_cell(run["figures"].get(name), name, None) for run in runs.values())
-        rows.append(f"<tr><th>{escape(named(name))}</th><td>{escape(_unit(name))}</td>{cells}</tr>")
-    said = "".join(_cell(run["undetermined_said"], "undetermined_said", None) for run in runs.values())
+        cells = "".join(cell(run["figures"].get(name), name, None) for run in runs.values())
+        rows.append(f"<tr><th>{escape(named(name))}</th><td>{escape(unit(name))}</td>{cells}</tr>")
+    said = "".join(cell(run["undetermined_said"], "undetermined_said", None) for run in runs.values())
     rows.append(f"<tr><th>{escape(named('undetermined_said'))}</th><td></td>{said}</tr>")
     return table(head, rows)
 
 
-def _warnings(runs: dict[str, dict[str, Any]]) -> str:
+def warnings_list(runs: dict[str, dict[str, Any]]) -> str:
     """Each text once, with the runs that gave it: most runs say the same."""
     texts: dict[str, list[str]] = {}
     for way, run in runs.items():
@@ -273,21 +301,24 @@ def _warnings(runs: dict[str, dict[str, Any]]) -> str:
     return f"<ul>{''.join(items)}</ul>" if items else ""
 
 
-def _cell(value: object, measure: str, passed: bool | None, unit: str = "", first: bool = False) -> str:
+def cell(value: object, measure: str, passed: bool | None, behind: str = "", first: bool = False) -> str:
     """A table's cell; passed: None where nothing is asked."""
     kinds = [kind for kind, wanted in (("n", measure != "model"), ("first", first)) if wanted]
     kinds += [] if passed is None else [_class(passed)]
     mark = "" if passed is None else f" {GOOD if passed else BAD}"
-    return f'<td class="{" ".join(kinds)}">{escape(check_value(value, measure) + unit)}{mark}</td>'
+    return f'<td class="{" ".join(kinds)}">{escape(check_value(value, measure) + behind)}{mark}</td>'
 
 
-def _unit(measure: str) -> str:
-    if measure in MEASURES:
-        return MEASURES[measure][1]
+def unit(measure: str) -> str:
+    """A figure's unit, empty for none."""
+    for known in (MEASURES, SET_MEASURES):
+        if measure in known:
+            return known[measure][1]
     return "dB" if measure.endswith("_db") else "px" if measure.endswith("_px") else ""
 
 
-def _slug(result: Result) -> str:
+def slug(result: Result) -> str:
+    """The name of a scene's section in the page."""
     return "scene-" + re.sub(r"[^A-Za-z0-9_.=-]", "_", result["scene"])
 
 

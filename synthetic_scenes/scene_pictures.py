@@ -37,7 +37,7 @@ def scene_pictures(pair: RenderedPair, truth: Truth, result: StitchResult, panor
         "difference": np.minimum(4 * apart.astype(int), 255).astype(np.uint8),
         "lines": _lines(_display(pair.target), truth, result), "error_map": _error_map(truth, result),
     }  # fmt: skip
-    return {name: _jpeg(picture) for name, picture in pictures.items()}
+    return {name: jpeg(picture) for name, picture in pictures.items()}
 
 
 def _display(picture: NDArray) -> Rgb:
@@ -85,13 +85,19 @@ def _error_map(truth: Truth, result: StitchResult) -> Rgb:
         maps.append(np.where(inside, values[np.where(inside, y, 0), np.where(inside, x, 0)], np.nan))
     apart = np.hypot(maps[0] - truth.target[..., 0], maps[1] - truth.target[..., 1])
     known = truth.in_target & np.isfinite(apart)
+    return error_colours(apart, known)
+
+
+def error_colours(apart: Array, known: NDArray[np.bool_]) -> Rgb:
+    """Distances (H, W) px, dark to bright up to WORST_PX, gray where they are not known."""
     level = np.rint(255 * np.clip(np.where(known, apart, 0) / WORST_PX, 0, 1)).astype(np.uint8)
     out = np.ascontiguousarray(cv2.applyColorMap(level, cv2.COLORMAP_INFERNO)[..., ::-1])
     out[~known] = 96
     return out
 
 
-def _jpeg(picture: Rgb) -> bytes:
+def jpeg(picture: Rgb) -> bytes:
+    """A JPEG file of a picture, no larger than is needed to judge it."""
     scale = min(1.0, LONGEST / max(picture.shape[:2]))
     if scale < 1:
         picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)

@@ -22,7 +22,11 @@ from .measures import Truth, composition, figures, meeting, on_the_wide_canvas, 
 from .recipes import parse_scene
 from .rendered import RenderedPair, rendered_pair
 from .scene_pictures import scene_pictures
+from .sets.measured_set import measured_set
+from .sets.recipes import parse_set
+from .sets.rendered_set import rendered_set
 from .stitches import SLIDES, WAYS, Shared, delivered, slid, stitched
+from .suites import heading, is_set
 
 SCHEMA = 1
 # The stitch that the report shows, and that whose composition is judged: of the default field.
@@ -71,18 +75,36 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
     name = file_name(scene)
     pictures = scene_pictures(pair, truth, results[SHOWN], placed[SHOWN][0]) if SHOWN in results else {}
     entry = {
-        "schema": SCHEMA, "scene": scene, "title": recipe.title, "size": list(recipe.size(*size)),
-        "expected_model": recipe.model, "parallax": recipe.parallax, "focal_determined": recipe.focal_determined,
-        "status": "done", "message": "", "blender": pair.blender, "made_from": made_from, "proof": pair.proof,
-        "runs": {way: runs[way] for way in WAYS},
+        "schema": SCHEMA, **heading(scene, size), "status": "done", "message": "", "blender": pair.blender,
+        "made_from": made_from, "proof": pair.proof, "runs": {way: runs[way] for way in WAYS},
         "pictures": {kind: f"scenes/{name}/{kind}.jpg" for kind in pictures},
     }  # fmt: skip
+    _write(folder, name, entry, pictures, seconds)
+    return seconds
+
+
+def measure_set(scene: str, size: tuple[int, int], folder: Path, made_from: str) -> dict[str, float]:
+    """The same of a set of many pictures. Raises StitchError."""
+    rendered = rendered_set(parse_set(scene), size, folder / "sets")  # in `pictures` lie pairs, for `edf compare`
+    measured = measured_set(rendered)
+    name = file_name(scene)
+    entry = {
+        "schema": SCHEMA, **heading(scene, size), "status": "done", "message": "", "blender": rendered.blender,
+        "made_from": made_from, "proof": rendered.proof, "runs": measured.runs,
+        "pictures": {kind: f"scenes/{name}/{kind}.jpg" for kind in measured.pictures},
+    }  # fmt: skip
+    _write(folder, name, entry, measured.pictures, measured.seconds)
+    return measured.seconds
+
+
+def _write(
+    folder: Path, name: str, entry: dict[str, Any], pictures: dict[str, bytes], seconds: dict[str, float]
+) -> None:
     with OutputFiles(overwrite=True) as files:
         for kind, data in pictures.items():
             files.add_to_folder(folder / "scenes" / name, f"{kind}.jpg", data)
         files.add_to_folder(folder / "scenes", f"{name}.timing.json", json_bytes(seconds))
         files.add_to_folder(folder / "scenes", f"{name}.json", json_bytes(plain(entry)))
-    return seconds
 
 
 def _slid_figures(pair: RenderedPair, truth: Truth, shared: Shared) -> dict[str, float]:
@@ -110,7 +132,8 @@ def main(arguments: list[str]) -> int:
     """Exit code: 0, or the error's; its message goes to stderr."""
     scene, width, height, folder, made_from = arguments
     try:
-        measure_scene(scene, (int(width), int(height)), Path(folder), made_from)
+        measure = measure_set if is_set(scene) else measure_scene
+        measure(scene, (int(width), int(height)), Path(folder), made_from)
     except StitchError as error:
         print(error, file=sys.stderr)
         return error.exit_code

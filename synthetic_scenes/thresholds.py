@@ -8,46 +8,8 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
-Result = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Limit:
-    """A bound on a figure of a run ("proof": of the ground truth). Infinity: any number will do, but there must be one.
-
-    absolute: the sign does not count; determined: only of scenes in which two pictures determine the focal length;
-    always: also of scenes without parallax.
-    """
-
-    run: str
-    measure: str
-    unit: str
-    at_most: float | None = None
-    at_least: float | None = None
-    absolute: bool = False
-    determined: bool = False
-    always: bool = False
-
-    @property
-    def text(self) -> str:
-        """As people read it."""
-        if self.at_most is not None:
-            return "a number" if math.isinf(self.at_most) else f"≤ {self.at_most:g}"
-        return f"≥ {self.at_least:g}"
-
-    def holds(self, value: float | None) -> bool:
-        """Whether a value keeps it; where there is none, it does not."""
-        if value is None:
-            return False
-        if self.at_most is not None:
-            return value <= self.at_most
-        return self.at_least is not None and value >= self.at_least
-
-    @property
-    def worst(self) -> float:
-        """What a value that is missing counts as in a median."""
-        return math.inf if self.at_most is not None else -math.inf
-
+from .limits import Check, Limit, Result, number
+from .sets.set_thresholds import set_checks
 
 # ---- The table. Where one is missed: find out why (render, ground truth or estimate?) before you touch it. ----
 
@@ -136,19 +98,6 @@ SUITE = (
 
 
 @dataclass(frozen=True)
-class Check:
-    """One thing that was asked for. scene: None for the whole suite's."""
-
-    scene: str | None
-    run: str
-    measure: str
-    value: float | str | bool | None
-    limit: str
-    unit: str
-    passed: bool
-
-
-@dataclass(frozen=True)
 class Median:
     """A figure of the whole suite: over how many scenes, of which how many lack it; None where half of them do."""
 
@@ -202,7 +151,8 @@ def medians(results: Sequence[Result]) -> tuple[Median, ...]:
     """The suite's figures, in the order of SUITE. A scene that lacks one counts as worse than all others."""
     out = []
     for limit in SUITE:
-        values = [value_of(result, limit) for result in results if _concerns(limit, result)]
+        pairs = (result for result in results if result.get("kind") != "set")
+        values = [value_of(result, limit) for result in pairs if _concerns(limit, result)]
         middle = median(limit.worst if value is None else value for value in values) if values else None
         finite = middle if middle is not None and math.isfinite(middle) else None
         out.append(Median(limit, finite, len(values), values.count(None)))
@@ -238,6 +188,8 @@ def _scene_checks(result: Result) -> list[Check]:
     scene = result["scene"]
     if result["status"] != "done":
         return [Check(scene, "", "status", result["status"], "= done", "", False)]
+    if result.get("kind") == "set":
+        return set_checks(result)
     limits = [
         limit for limit in (*PROOF, *SCENE, *COMPOSED, *_beyond(scene), *(CUT if scene in CUT_SCENES else ()))
         if limit.run == "proof" or _concerns(limit, result)
@@ -272,15 +224,11 @@ def _concerns(limit: Limit, result: Result) -> bool:
 
 
 def _figure(result: Result, run: str, measure: str) -> float | None:
-    return _number(((result["runs"].get(run) or {}).get("figures") or {}).get(measure))
+    return number(((result["runs"].get(run) or {}).get("figures") or {}).get(measure))
 
 
 def _proof_figure(proof: dict[str, Any], measure: str) -> float | None:
     if measure != "half_pixel_loss_db":
-        return _number(proof.get(measure))
-    right, off = _number(proof.get("warp_psnr_db")), _number(proof.get("half_pixel_psnr_db"))
+        return number(proof.get(measure))
+    right, off = number(proof.get("warp_psnr_db")), number(proof.get("half_pixel_psnr_db"))
     return None if right is None or off is None else round(right - off, 9)
-
-
-def _number(value: object) -> float | None:
-    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None

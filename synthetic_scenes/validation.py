@@ -26,15 +26,18 @@ from ..core.output.outputs import json_bytes
 from ..core.system.errors import BadRequest, UnwritableOutput
 from ..core.system.output_files import OutputFiles
 from .blender_process import LAST_LINES, find_blender
-from .recipes import SIZES, SUITES, parse_scene
 from .scene_process import SCHEMA, file_name
+from .suites import SIZES, SUITES, heading
 from .thresholds import Verdict, judge
 from .validation_report import report_files
 
 PACKAGE = __package__
 # What a scene's figures depend on; judging and showing them anew needs no new measuring.
 PARTS = ("core", "synthetic_scenes")
-ONLY_SHOWING = {"thresholds.py", "validation_report.py", "report_page.py", "validation.py", "demo.py"}
+ONLY_SHOWING = {
+    "thresholds.py", "set_thresholds.py", "limits.py", "validation_report.py", "report_page.py", "set_page.py",
+    "set_names.py", "validation.py", "demo.py",
+}  # fmt: skip
 # A scene of the full suite takes up to 2 GB, and its renders take all cores anyway.
 MOST_AT_ONCE = 4
 Tell = Callable[[str], None]
@@ -44,7 +47,8 @@ Tell = Callable[[str], None]
 class ValidationRequest:
     """What is to be validated, and where it goes.
 
-    suite: one of SUITES; scenes: instead of the suite's own, each a name or `name:baseline=2,…`; shard: (I, N), the
+    suite: one of SUITES; scenes: instead of the suite's own, each the name of a scene or set, or
+    `name:baseline=2,…`; shard: (I, N), the
     I-th (from 1) of N runs that share the work; resume: keep finished scenes; overwrite: replace a report that is
     there. Raises BadRequest.
     """
@@ -60,7 +64,7 @@ class ValidationRequest:
         if self.suite not in SUITES:
             raise BadRequest(f"no suite {self.suite!r}; there are: {', '.join(SUITES)}")
         for scene in self.scenes:
-            parse_scene(scene)
+            heading(scene, self.size)
         if not 1 <= self.shard[0] <= self.shard[1]:
             raise BadRequest(f"shard {self.shard[0]}/{self.shard[1]}: it is I/N with I from 1 to N")
         names = [file_name(scene) for scene in self.all_scenes]
@@ -161,7 +165,7 @@ def _found(request: ValidationRequest, mark: str) -> dict[str, dict[str, Any]]:
     found = {}
     for scene in request.all_scenes:
         entry = read_json(_entry(request.folder, scene))
-        size = list(parse_scene(scene)[0].size(*request.size))
+        size = heading(scene, request.size)["size"]
         if entry.get("scene") == scene and (not mark or (entry.get("made_from"), entry.get("size")) == (mark, size)):
             found[scene] = entry
     return found
@@ -225,12 +229,9 @@ class _Running:
 
 
 def _write_failure(request: ValidationRequest, scene: str, mark: str, message: str) -> None:
-    recipe, _ = parse_scene(scene)
     entry = {
-        "schema": SCHEMA, "scene": scene, "title": recipe.title, "size": list(recipe.size(*request.size)),
-        "expected_model": recipe.model, "parallax": recipe.parallax, "focal_determined": recipe.focal_determined,
-        "status": "failed", "message": message, "blender": "", "made_from": mark, "proof": {}, "runs": {},
-        "pictures": {},
+        "schema": SCHEMA, **heading(scene, request.size), "status": "failed", "message": message, "blender": "",
+        "made_from": mark, "proof": {}, "runs": {}, "pictures": {},
     }  # fmt: skip
     with OutputFiles(overwrite=True) as files:
         files.add_to_folder(request.folder / "scenes", f"{file_name(scene)}.json", json.dumps(entry, indent=1).encode())

@@ -12,8 +12,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from .limits import Result
 from .report_page import MEASURES, check_value, named, page
-from .thresholds import Median, Result, Verdict, judge, medians
+from .sets.set_page import set_overview, set_section
+from .thresholds import Median, Verdict, judge, medians
 
 SCHEMA = 1
 # Failed checks that the terminal shows.
@@ -33,21 +35,25 @@ def report_files(results: Sequence[Result], suite: str, complete: bool, version:
                 fails), limit, unit, passed}]
       medians   [{run, measure, unit, value, limit, scenes (so many count), missing (so many of them lack the figure and
                 count as worst), judged, passed}]; over scenes with parallax
-      scenes    [as given: schema, scene, title, size, expected_model, parallax, focal_determined, status ("done" or
-                "failed"), message, blender, made_from, proof {figure: value}, runs {known/strict: {model (null: no
-                decision), undetermined_said, refused (why, or ""), warnings, figures {name: value or null}}, …},
-                pictures {kind: path beside the report}]
-    The figures' meanings stand in `measures.figures` and `measures.whole_picture`, the proof's in `proof.prove`.
+      scenes    [as given: schema, scene, kind ("pair" or "set"), title, size, parallax, status ("done" or "failed"),
+                message, blender, made_from, proof {figure: value}, pictures {kind: path beside the report};
+                of pairs: expected_model, focal_determined, runs {known/strict: {model (null: no decision),
+                undetermined_said, refused (why, or ""), warnings, figures {name: value or null}}, …};
+                of sets: count, expected_left_out [name], runs {ours: {refused, warnings, used (how many pictures),
+                left_out [name], figures {name: value or null}, by_picture [{picture, figure: value or null}]}, …}]
+    The figures' meanings stand in `measures.figures` and `measures.whole_picture`, the proof's in `proof.prove`; of
+    sets in `sets.set_measures` and `sets.set_proof`.
 
     report.csv: a row for every run of every scene (one with an empty run where a scene has none): what was expected,
-    the model, every figure (empty: undefined), and whether all checks of the run and of its scene passed.
+    the model, every figure (empty: undefined, or of the other kind), and whether all checks of the run and of its scene
+    passed.
     """
     verdict = judge(results, complete)
     middles = medians(results)
     return {
         "report.json": _json(results, suite, version, verdict, middles),
         "report.csv": _csv(results, verdict),
-        "report.html": page(results, suite, version, verdict, middles).encode(),
+        "report.html": page(results, suite, version, verdict, middles, _of_sets(results, verdict)).encode(),
     }
 
 
@@ -58,7 +64,8 @@ def summary_lines(verdict: Verdict, results: Sequence[Result]) -> list[str]:
         f"{'PASSED' if verdict.passed else 'FAILED'}: {counts['scenes'] - counts['scenes_failed']} of "
         f"{counts['scenes']} scenes, {counts['checks'] - counts['checks_failed']} of {counts['checks']} checks"
     ]
-    if verdict.complete and results:
+    pairs = [result for result in results if result.get("kind") != "set"]
+    if verdict.complete and pairs:
         lines.append("medians over scenes with parallax:")
         for middle in medians(results):
             limit = middle.limit
@@ -66,7 +73,7 @@ def summary_lines(verdict: Verdict, results: Sequence[Result]) -> list[str]:
                 f"  {'ok  ' if middle.passed else 'FAIL'} {limit.run:14} {named(limit.measure)}: "
                 f"{check_value(middle.value, limit.measure)} {limit.unit} (limit {limit.text})"
             )
-    elif results:
+    elif pairs:
         lines.append("not a whole suite: its medians are not judged")
     failed = verdict.failed
     if failed:
@@ -78,6 +85,15 @@ def summary_lines(verdict: Verdict, results: Sequence[Result]) -> list[str]:
     if len(failed) > MOST_LINES:
         lines.append(f"  and {len(failed) - MOST_LINES} more: see report.html")
     return lines
+
+
+def _of_sets(results: Sequence[Result], verdict: Verdict) -> list[str]:
+    """The page's part about sets: an overview, and a section for each; nothing without any."""
+    sets = [result for result in results if result.get("kind") == "set"]
+    if not sets:
+        return []
+    sections = (set_section(one, [c for c in verdict.checks if c.scene == one["scene"]]) for one in sets)
+    return [f"<h2>Sets of many pictures</h2>{set_overview(sets, verdict.checks)}", *sections]
 
 
 def _counts(results: Sequence[Result], verdict: Verdict) -> dict[str, int]:
@@ -124,7 +140,7 @@ def _csv(results: Sequence[Result], verdict: Verdict) -> bytes:
     for result in results:
         scene = result["scene"]
         for way, run in (result["runs"] or {"": nothing}).items():
-            row = [scene, *(result[name] for name in first[1:6]), way, *(run[name] for name in first[7:])]
+            row = [scene, *(result.get(name) for name in first[1:6]), way, *(run.get(name) for name in first[7:])]
             row += [run["figures"].get(name) for name in names]
             row += [(scene, way) not in bad_runs, scene not in bad_scenes]
             table.writerow([_cell(value) for value in row])

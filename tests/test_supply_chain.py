@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-ROOMS = (".", "core", "core/*", "edf_addon", "edf_addon/*", "synthetic_scenes")
+ROOMS = (".", "core", "core/*", "edf_addon", "edf_addon/*", "synthetic_scenes", "synthetic_scenes/*")
 SOURCES = [path for room in ROOMS for path in sorted(ROOT.glob(f"{room}/*.py"))]
 NETWORK = re.compile(r"(socket|ssl|http|urllib\.(request|error)|ftplib|smtplib|xmlrpc|requests|urllib3|asyncio)\b")
 LOCKED = re.compile(r"([a-z0-9_]+)==([0-9.]+) --hash=sha256:[0-9a-f]{64}  # (\S+)\.whl")

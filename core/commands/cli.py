@@ -233,11 +233,14 @@ def _add_validate(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_validate)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUTDIR", help="folder for everything")
     parser.add_argument(
-        "--suite", default="quick", metavar="SUITE", help="quick (default: 4 scenes, 640×480) or full (all, 1280×960)"
-    )
+        "--suite", default="quick", metavar="SUITE",
+        help="quick (default: 4 scenes and a set, 640×480), full (all scenes of two pictures, 1280×960) or sets (of "
+        "many, 640×480)",
+    )  # fmt: skip
     parser.add_argument(
         "--scene", nargs="+", default=[], metavar="NAME",
-        help="these scenes only; NAME:baseline=2,turn=1.5,overlap=0.4,noise=3 makes one harder",
+        help="these only; NAME:baseline=2,turn=1.5,overlap=0.4,noise=3 makes a scene harder, "
+        "NAME:n=12,spread=0.3,noise=3 a set",
     )  # fmt: skip
     parser.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="the I-th of N runs sharing OUTDIR")
     parser.add_argument("--resume", action="store_true", help="measure only what is missing or was measured otherwise")

@@ -7,14 +7,14 @@ import sys
 from pathlib import Path
 
 import bpy
-from edf_stitch.synthetic_scenes.render import _settings as settings
+from edf_stitch.synthetic_scenes.camera_render import prepare
 from edf_stitch.synthetic_scenes.stage import Stage
 from edf_stitch.synthetic_scenes.worlds import WORLDS
 from mathutils import Matrix
 
 job = json.loads(Path(sys.argv[1]).read_text("utf-8"))
 stage = Stage(job["seed"])
-settings(job["samples"])
+prepare(job["samples"])
 scene, render = bpy.context.scene, bpy.context.scene.render
 render.image_settings.file_format = "OPEN_EXR"
 data = bpy.data.cameras.new("camera")

@@ -11,13 +11,13 @@ from edf_stitch.synthetic_scenes.recipes import (
     FULL,
     QUICK,
     RECIPES,
-    SIZES,
-    SUITES,
     Difficulty,
     View,
     overlap_at_infinity,
     parse_scene,
 )
+from edf_stitch.synthetic_scenes.sets.recipes import SETS
+from edf_stitch.synthetic_scenes.suites import SIZES, SUITES
 
 ASKED_FOR = {
     "two_planes", "layered_cards", "corner_room", "street", "foliage", "relief", "tabletop", "portrait_pair",
@@ -34,7 +34,9 @@ def geometry(name: str, difficulty: Difficulty | None = None) -> TrueGeometry:
 
 def test_all_that_was_asked_for_is_there() -> None:
     assert set(FULL) >= ASKED_FOR and len(QUICK) == 4 and set(QUICK) <= set(FULL)
-    assert SIZES == {"quick": (640, 480), "full": (1280, 960)} and set(SUITES) == set(SIZES)
+    assert SIZES == {"quick": (640, 480), "full": (1280, 960), "sets": (640, 480)} and set(SUITES) == set(SIZES)
+    assert set(SUITES["quick"]) > set(QUICK) and SUITES["full"] == FULL and set(SUITES["sets"]) == set(SETS)
+    assert not set(SETS) & set(RECIPES), "a name is that of one scene"
 
 
 def test_a_view_by_hand() -> None:

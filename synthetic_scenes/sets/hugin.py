@@ -1,0 +1,90 @@
+"""Hugin's command line as a rival on sets, where it is installed: one place for all, seams around what does not fit."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.raster.arrays import Array
+from ...core.raster.colour import decode
+from ...core.system.errors import StitchError
+from ..recipes import View
+from .rendered_set import RenderedSet
+from .set_measures import SetTruth, common_rotation, sampled
+from .set_stitches import told_lens
+from .sphere_camera import SphereCamera
+
+PROGRAMS = ("pto_gen", "cpfind", "autooptimiser", "pano_modify", "hugin_executor")
+# Seconds after which a program of theirs is given up.
+PATIENCE = 900
+
+
+class HuginFailed(StitchError):
+    """Hugin made no panorama."""
+
+
+def installed() -> bool:
+    """Whether all its programs are there."""
+    return all(shutil.which(program) for program in PROGRAMS)
+
+
+def hugin_on_sphere(rendered: RenderedSet, truth: SetTruth) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Its panorama (H, W, 3), scene-linear, as the true sphere lies after the common turn that fits its rotations best,
+    and where (H, W) it shows something. Raises HuginFailed."""
+    size = rendered.sphere.size
+    with tempfile.TemporaryDirectory(prefix="edf-hugin-") as temporary:
+        folder = Path(temporary)
+        first = rendered.cameras[0]
+        width = first.size[0]
+        view = 2 * math.degrees(math.atan(width / 2 / told_lens(first)))
+        pictures = [str(path.absolute()) for path in rendered.pictures]
+        _run(folder, "pto_gen", "-o", "a.pto", "-f", f"{view:.3f}", *pictures)
+        _run(folder, "cpfind", "--multirow", "-o", "b.pto", "a.pto")
+        _run(folder, "autooptimiser", "-a", "-m", "-o", "c.pto", "b.pto")
+        _run(folder, "pano_modify", "--projection=2", "--fov=360x180", f"--canvas={size[0]}x{size[1]}",
+             "--crop=0,{},0,{}".format(*size), "-o", "d.pto", "c.pto")  # fmt: skip
+        _run(folder, "hugin_executor", "--stitching", "--prefix=out", "d.pto")
+        made = cv2.imread(str(folder / "out.tif"), cv2.IMREAD_UNCHANGED)
+        rotations = rotations_of((folder / "d.pto").read_text("utf-8"))
+    if made is None or made.shape != (size[1], size[0], 4):
+        raise HuginFailed("Hugin left no whole sphere")
+    gauge = common_rotation(rotations, [camera.R for camera in rendered.cameras])
+    at = np.stack(SphereCamera(rendered.sphere.place, size).pixels(truth.directions @ gauge.T), axis=-1)
+    return sampled(decode(np.ascontiguousarray(made[..., 2::-1])), (made[..., 3] > 250).astype(np.float32), at)
+
+
+def rotations_of(project: str) -> Array:
+    """The rotations (N, 3, 3) of the pictures of a project file, from the panorama's axes (x right, y ahead, z up)."""
+    lines = [line for line in project.splitlines() if line.startswith("i ")]
+    return np.array([
+        View(yaw=_value(line, "y"), pitch=-_value(line, "p"), roll=_value(line, "r")).camera((640, 480)).R
+        for line in lines
+    ])  # fmt: skip
+
+
+def _value(line: str, name: str) -> float:
+    found = re.search(rf" {name}([-+.\deE]+)", line)
+    if found is None:
+        raise HuginFailed(f"Hugin's project names no {name}")
+    return float(found[1])
+
+
+def _run(folder: Path, *command: str) -> None:
+    try:
+        done = subprocess.run(
+            command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+            timeout=PATIENCE,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        raise HuginFailed(f"{command[0]} took more than {PATIENCE} s") from None
+    if done.returncode:
+        said = (done.stdout + done.stderr).strip().splitlines()
+        raise HuginFailed(f"{command[0]} ended with {done.returncode}: {said[-1] if said else 'it said nothing'}")

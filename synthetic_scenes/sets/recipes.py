@@ -1,0 +1,100 @@
+"""The sets by name: which world, which cameras in it, what must come out. No bpy: `worlds` builds them.
+
+As in `..recipes`, world axes are Blender's and a camera without any turn looks along +y; metres and degrees. The first
+camera stands at the viewpoint, from which the true sphere is rendered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...core.system.errors import BadRequest
+from ..recipes import EYE, View
+from ..scene_camera import SceneCamera
+
+Shoot = Callable[[int, float, np.random.Generator], tuple[View, ...]]
+MOST_PICTURES = 60
+# x and y of the place that stray pictures show, m.
+ELSEWHERE = (60.0, 0.0)
+
+
+@dataclass(frozen=True)
+class SetRecipe:
+    """A world and the cameras in it.
+
+    world: a function of `sets.worlds`; shoot: makes `count` views by how far from the viewpoint they lie, `spread`
+    (standard deviation, m), and chance; noise: σ of the sensor's, levels of 8 bit; left_out: numbers of the pictures
+    that show another place, and no others; parallax: whether one place cannot explain all pictures.
+    """
+
+    name: str
+    title: str
+    world: str
+    shoot: Shoot
+    count: int
+    spread: float
+    seed: int = 0
+    noise: float = 1.0
+    left_out: tuple[int, ...] = ()
+    parallax: bool = True
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """All cameras, the viewpoint's first."""
+        return self.shoot(self.count, self.spread, np.random.default_rng(self.seed))
+
+    def cameras(self, size: tuple[int, int]) -> dict[str, SceneCamera]:
+        """The same by name, for pictures of (W, H) px."""
+        return {f"{number:02d}": view.camera(size) for number, view in enumerate(self.views)}
+
+
+def in_the_hand(view: View, spread: float, random: np.random.Generator) -> View:
+    """A view as a hand holds it: off its place by `spread` (two thirds of it in height), and turned by 2 to 3°."""
+    x, y, z = (np.array(view.place) + random.normal(0, [spread, spread, spread * 2 / 3])).tolist()
+    yaw, pitch, roll = random.normal(0, [3.0, 2.0, 2.0]).tolist()
+    return replace(view, place=(x, y, z), yaw=view.yaw + yaw, pitch=view.pitch + pitch, roll=view.roll + roll)
+
+
+def fan(step: float, lens: float, pitch: float = 4.0) -> Shoot:
+    """Views side by side, `step` degrees apart: the first in the middle, the others right and left of it in turn."""
+
+    def shoot(count: int, spread: float, random: np.random.Generator) -> tuple[View, ...]:
+        first = View((0.0, 0.0, EYE), 0.0, pitch, 0.0, lens)
+        turns = (step * ((k + 1) // 2) * (1 if k % 2 else -1) for k in range(1, count))
+        return first, *(in_the_hand(replace(first, yaw=yaw), spread, random) for yaw in turns)
+
+    return shoot
+
+
+_SETS = (
+    SetRecipe("small_room", "A furnished room, five pictures over half of it", "room", fan(32.0, 24.0), 5, 0.12,
+              seed=3),
+)  # fmt: skip
+SETS = {recipe.name: recipe for recipe in _SETS}
+
+
+def parse_set(text: str) -> SetRecipe:
+    """A set by name, made harder if wanted: `ring`, `ring:n=9,spread=0.3,noise=3`. Raises BadRequest."""
+    name, _, settings = text.partition(":")
+    if name not in SETS:
+        raise BadRequest(f"no set {name!r}; there are: {', '.join(SETS)}")
+    recipe = SETS[name]
+    for setting in filter(None, settings.split(",")):
+        key, _, value = setting.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if key == "n" and number in range(3, MOST_PICTURES + 1):
+            recipe = replace(recipe, count=int(number))
+        elif key == "spread" and 0 <= number < 100:
+            recipe = replace(recipe, spread=number)
+        elif key == "noise" and 0 <= number < 100:
+            recipe = replace(recipe, noise=number)
+        else:
+            known = f"n (3 to {MOST_PICTURES}), spread (m), noise"
+            raise BadRequest(f"set {text!r}: {setting!r} is not like spread=0.3; there are: {known}")
+    return recipe

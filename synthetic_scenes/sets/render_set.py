@@ -1,0 +1,88 @@
+"""Renders a set inside Blender, or with bpy as a module: every camera's picture, and the sphere at the viewpoint.
+
+The job names a world, a seed, the samples a pixel, cameras by name, the viewpoint's place and the sphere's width.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ..camera_render import camera_of, prepare, render_through
+from ..stage import Stage
+from .sphere_camera import SphereCamera
+from .worlds import SET_WORLDS
+
+# Rays cast from the viewpoint; each hit is looked for from every camera too.
+RAYS = 1500
+
+
+def render_set(job: dict[str, Any], folder: Path) -> None:
+    """Into the folder go a multilayer EXR for each camera, sphere.exr, and cameras.json, last: the cameras as Blender
+    had them, rays cast through them, and what rays from the viewpoint hit and which cameras see that."""
+    SET_WORLDS[job["world"]](Stage(job["seed"]))
+    prepare(job["samples"])
+    cameras = {name: camera_of(entry) for name, entry in job["views"].items()}
+    entries: dict[str, Any] = {"views": {}}
+    for number, (name, camera) in enumerate(cameras.items()):
+        entries["views"][name] = render_through(camera, folder / f"{name}.exr", number)
+    width = job["sphere"]["width"]
+    sphere = SphereCamera(np.array(job["sphere"]["place"]), (width, width // 2))
+    entries["sphere"] = _render_sphere(sphere, folder / "sphere.exr", len(cameras))
+    entries["sphere"]["rays"] = _cast(sphere, [camera.place for camera in cameras.values()])
+    entries["blender"] = bpy.app.version_string
+    (folder / "cameras.json").write_text(json.dumps(entries), "utf-8")
+
+
+def _render_sphere(sphere: SphereCamera, path: Path, number: int) -> dict[str, Any]:
+    """Renders all directions; returns the camera as Blender has it."""
+    scene = bpy.context.scene
+    data = bpy.data.cameras.new("sphere")
+    made = bpy.data.objects.new("sphere", data)
+    scene.collection.objects.link(made)
+    data.type = "PANO"
+    # a camera's own from Blender 5.0 on
+    panoramic = data if hasattr(data, "panorama_type") else data.cycles
+    panoramic.panorama_type = "EQUIRECTANGULAR"
+    data.clip_start, data.clip_end = 0.01, 1000.0
+    made.location, made.rotation_euler = sphere.place.tolist(), (math.pi / 2, 0.0, 0.0)
+    scene.camera = made
+    scene.render.resolution_x, scene.render.resolution_y = sphere.size
+    scene.render.resolution_percentage = 100
+    scene.cycles.seed = number
+    scene.render.filepath = str(path)
+    bpy.context.view_layer.update()
+    bpy.ops.render.render(write_still=True)
+    return {"place": list(made.matrix_world.translation), "size": list(sphere.size)}
+
+
+def _cast(sphere: SphereCamera, places: list[Any]) -> list[list[float]]:
+    """[x, y, range, share of the way to it that is free from each place, …] for pixels spread evenly over the sphere;
+    rays that hit nothing are left out."""
+    scene, graph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
+    random = np.random.default_rng(0)
+    up = random.uniform(-1, 1, RAYS)
+    level, turn = np.sqrt(1 - up**2), random.uniform(-np.pi, np.pi, RAYS)
+    pixels = sphere.pixels(np.column_stack([level * np.sin(turn), level * np.cos(turn), up]))
+    x, y = (np.mod(np.rint(part), float(side)) for part, side in zip(pixels, sphere.size, strict=True))
+    out = []
+    for row, direction in zip(np.column_stack([x, y]).tolist(), sphere.directions(x, y), strict=True):
+        hit, point, *_ = scene.ray_cast(graph, Vector(sphere.place), Vector(direction))
+        if hit:
+            away = float(np.linalg.norm(np.array(point) - sphere.place))
+            out.append([*row, away, *(_free(graph, place, np.array(point)) for place in places)])
+    return out
+
+
+def _free(graph: Any, place: Any, point: Any) -> float:
+    """Share of the way from a place to a point that a ray gets; 1 where nothing is before it."""
+    way = point - place
+    length = float(np.linalg.norm(way))
+    hit, first, *_ = bpy.context.scene.ray_cast(graph, Vector(place), Vector(way / length))
+    return min(1.0, float(np.linalg.norm(np.array(first) - place)) / length) if hit else 1.0

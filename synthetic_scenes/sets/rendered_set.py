@@ -1,0 +1,117 @@
+"""A rendered set with all that is true of it: made once, proved, kept, and found again by what it was made of."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.pictures.encoding import encode_picture
+from ...core.pictures.picture import load_picture, picture_from_array
+from ...core.system.output_files import OutputFiles
+from ..blender_process import run_job
+from ..passes import read_passes
+from ..rendered import blenders_camera, expose, npy_bytes
+from ..scene_camera import SceneCamera
+from .recipes import SetRecipe
+from .set_proof import SphereProof
+from .sphere_camera import SphereCamera
+
+SAMPLES = 16
+# Width of the true sphere in widths of a picture: about two thirds of the pictures' own scale at 24 mm.
+SPHERE_WIDTH = 2.5
+# Whatever decides about pixels: a change in one of these files makes every kept set a stranger.
+SOURCES = (
+    "render_set.py", "worlds.py", "sphere_camera.py", "rendered_set.py", "set_proof.py", "../camera_render.py",
+    "../stage.py", "../passes.py", "../proof.py", "../rendered.py", "../../core/cameras/blender_camera.py",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RenderedSet:
+    """Pictures of a world, and the truth about them.
+
+    pictures: files, in order; cameras and depths (H, W) float32, inf where there is nothing, of the same; sphere: what
+    is seen from the first one's place, light (H, W, 3) float32 scene-linear without noise, distance (H, W) float32, inf
+    where there is nothing; proof: see `set_proof`.
+    """
+
+    pictures: tuple[Path, ...]
+    cameras: tuple[SceneCamera, ...]
+    depths: tuple[NDArray[np.float32], ...]
+    sphere: SphereCamera
+    light: NDArray[np.float32]
+    distance: NDArray[np.float32]
+    proof: dict[str, float]
+    blender: str
+
+
+def rendered_set(recipe: SetRecipe, size: tuple[int, int], folder: Path) -> RenderedSet:
+    """The set in a folder of pictures, rendered where it is not there yet.
+
+    size: (W, H) px of its pictures. Raises RenderFailed, UnwritableOutput.
+    """
+    cameras = recipe.cameras(size)
+    first = next(iter(cameras.values()))
+    job = {
+        "world": recipe.world, "seed": recipe.seed, "samples": SAMPLES,
+        "views": {name: {"K": c.K.tolist(), "R": c.R.tolist(), "t": c.t.tolist(), "size": list(c.size)}
+                  for name, c in cameras.items()},
+        "sphere": {"place": first.place.tolist(), "width": 2 * round(SPHERE_WIDTH * max(size) / 2)},
+    }  # fmt: skip
+    place = folder / f"{recipe.name}-{_key(job, recipe)}"
+    if not (place / "cameras.json").is_file():
+        with tempfile.TemporaryDirectory(prefix="edf-render-") as temporary:
+            run_job(job, Path(temporary))
+            _keep(Path(temporary), place, recipe)
+    return _load(place)
+
+
+def _key(job: dict[str, Any], recipe: SetRecipe) -> str:
+    content = hashlib.sha256(json.dumps([job, recipe.seed, recipe.noise], sort_keys=True).encode())
+    for name in SOURCES:
+        content.update((Path(__file__).parent / name).read_bytes())
+    return content.hexdigest()[:16]
+
+
+def _keep(rendered: Path, place: Path, recipe: SetRecipe) -> None:
+    """Proves what was rendered, makes the pictures of it, and puts all in place; cameras.json last, as the seal."""
+    entries = json.loads((rendered / "cameras.json").read_text("utf-8"))
+    sphere, passes = _sphere_of(entries["sphere"]), read_passes(rendered / "sphere.exr")
+    proof = SphereProof(sphere, passes, np.array(entries["sphere"].pop("rays")))
+    random = np.random.default_rng(recipe.seed)
+    with OutputFiles(overwrite=True) as files:
+        for name, entry in entries["views"].items():  # one at a time: many pictures' passes are large
+            seen = read_passes(rendered / f"{name}.exr")
+            proof.add(seen, blenders_camera(entry), np.array(entry.pop("rays")))
+            taken = expose(seen.light, (1.0, 1.0, 1.0), recipe.noise, False, random)
+            data, _ = encode_picture(picture_from_array(taken).pixels, None, 8, ".png")
+            files.add_to_folder(place, f"{name}.png", data)
+            files.add_to_folder(place, f"{name}_depth.npy", npy_bytes(seen.depth))
+        files.add_to_folder(place, "sphere.exr", encode_picture(passes.light, None, 32, ".exr")[0])
+        files.add_to_folder(place, "sphere_distance.npy", npy_bytes(proof.distance))
+        entries["proof"] = proof.figures()
+        files.add_to_folder(place, "cameras.json", json.dumps(entries, indent=1).encode())
+
+
+def _sphere_of(entry: dict[str, Any]) -> SphereCamera:
+    width, height = entry["size"]
+    return SphereCamera(np.array(entry["place"]), (width, height))
+
+
+def _load(place: Path) -> RenderedSet:
+    entries = json.loads((place / "cameras.json").read_text("utf-8"))
+    names = list(entries["views"])
+    return RenderedSet(
+        tuple(place / f"{name}.png" for name in names),
+        tuple(blenders_camera(entries["views"][name]) for name in names),
+        tuple(np.load(place / f"{name}_depth.npy") for name in names),
+        _sphere_of(entries["sphere"]), load_picture(place / "sphere.exr").pixels,
+        np.load(place / "sphere_distance.npy"), entries["proof"], entries["blender"],
+    )  # fmt: skip

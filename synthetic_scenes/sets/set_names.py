@@ -1,0 +1,30 @@
+"""What people call the figures of sets: name, unit, digits after the point."""
+
+SET_MEASURES = {
+    "rotation_deg": ("rotation, median", "°", 3), "rotation_max_deg": ("rotation, worst", "°", 3),
+    "position_mm": ("position, median", "mm", 1), "position_max_mm": ("position, worst", "mm", 1),
+    "focal_percent": ("focal length, worst", "%", 2), "k1_error": ("k1, worst", "", 4),
+    "places": ("places that pictures are at", "", 0),
+    "overlap_px": ("map, what several see, median", "px", 2),
+    "overlap_p90_px": ("map, what several see, 90th", "px", 2),
+    "alone_px": ("map, what one sees, median", "px", 2), "alone_p90_px": ("map, what one sees, 90th", "px", 2),
+    "hidden_px": ("map, what is hidden, median", "px", 2), "hidden_p90_px": ("map, what is hidden, 90th", "px", 2),
+    "mapped": ("share of what is seen that maps show", "", 4),
+    "hidden_precision": ("said to be hidden: precision", "", 3), "hidden_recall": ("said to be hidden: recall", "", 3),
+    "range_log": ("range, median |ln|", "", 4), "range_log_p90": ("range, 90th |ln|", "", 3),
+    "range_log_sure": ("range, median |ln| of the surer half", "", 4),
+    "psnr_db": ("panorama against the true sphere, PSNR", "dB", 2),
+    "ssim": ("panorama against the true sphere, SSIM", "", 4),
+    "covered": ("share of what is seen that it shows", "", 3),
+}  # fmt: skip
+SET_PROOF_NAMES = {
+    "direction_deg": "sphere's Position from its directions", "distance_relative": "ray casts against it, relative",
+    "visibility_wrong": "visible by depth, not by rays: share", "visibility_asked": "rays that were asked",
+    "sphere_psnr_db": "pictures by the true maps against the sphere: PSNR", "left_out": "pictures left out",
+}  # fmt: skip
+SET_PICTURES = {
+    "sphere": "True sphere (dim: no picture sees it)", "panorama_ours": "Ours",
+    "difference": "Difference of both × 4", "map_error": "Error of the maps: black 0, yellow ≥ 4 px",
+    "panorama_rotation_only": "Ours as if taken from one place", "panorama_hugin": "Hugin",
+    "from_above": "From above: true green, found pink",
+}  # fmt: skip

@@ -1,0 +1,104 @@
+"""What is asked of sets, and what the page shows of it."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import pytest
+from edf_stitch.synthetic_scenes.limits import Check
+from edf_stitch.synthetic_scenes.sets.recipes import SETS
+from edf_stitch.synthetic_scenes.sets.set_thresholds import BARS, OURS, PROOF, ROTATION_ONLY, set_checks
+from edf_stitch.synthetic_scenes.suites import heading
+from edf_stitch.synthetic_scenes.thresholds import judge, medians
+from edf_stitch.synthetic_scenes.validation_report import report_files, summary_lines
+
+
+def measured(scene: str = "small_room") -> dict[str, Any]:
+    """A set as it was when its bars were set."""
+    ours = {bar.measure: bar.measured for bar in BARS[scene]}
+    runs = {
+        OURS: {"refused": "", "warnings": ["<odd>"], "used": 5, "left_out": [], "figures": ours,
+               "by_picture": [{"picture": 0.0, "overlap_px": 0.25}]},
+        ROTATION_ONLY: {"refused": "", "warnings": [], "used": 5, "left_out": [], "by_picture": [],
+                        "figures": {**ours, "psnr_db": ours["psnr_db"] - 3}},
+    }  # fmt: skip
+    return {
+        "schema": 1, **heading(scene, (640, 480)), "status": "done", "message": "", "blender": "", "made_from": "",
+        "proof": {limit.measure: limit.at_least or 0.0 for limit in PROOF}, "runs": runs,
+        "pictures": {"sphere": f"scenes/{scene}/sphere.jpg", "from_above": f"scenes/{scene}/from_above.jpg"},
+    }  # fmt: skip
+
+
+def failed(result: dict[str, Any]) -> list[str]:
+    return [check.measure for check in set_checks(result) if not check.passed]
+
+
+@pytest.mark.parametrize("scene", sorted(BARS))
+def test_every_bar_holds_for_what_was_measured_and_none_is_loose(scene: str) -> None:
+    assert failed(measured(scene)) == []
+    for bar in BARS[scene]:
+        if bar.at_most is not None and bar.measured > 0:
+            assert bar.at_most <= 2 * bar.measured, bar
+        if bar.at_least is not None:
+            assert bar.at_least >= bar.measured - 1.01, bar
+
+
+def test_every_set_has_bars() -> None:
+    assert set(BARS) == set(SETS)
+
+
+@pytest.mark.parametrize("bar", BARS["small_room"], ids=lambda bar: bar.measure)
+def test_a_figure_beyond_its_bar_fails_and_a_missing_one_too(bar: Any) -> None:
+    result = measured()
+    worse = 1.01 * bar.at_most if bar.at_most is not None else 0.99 * bar.at_least
+    for value in ([worse, -worse] if bar.absolute else [worse]) + [None, float("nan")]:
+        result["runs"][OURS]["figures"][bar.measure] = value
+        assert bar.measure in failed(result)
+
+
+@pytest.mark.parametrize("limit", PROOF, ids=lambda limit: limit.measure)
+def test_a_truth_that_does_not_prove_itself_fails(limit: Any) -> None:
+    result = measured()
+    result["proof"][limit.measure] = 1e9 if limit.at_most is not None else 0.0
+    assert failed(result) == [limit.measure]
+
+
+def test_pictures_left_out_must_be_exactly_those_of_another_place() -> None:
+    result = measured()
+    result["runs"][OURS]["left_out"] = ["03"]
+    assert failed(result) == ["left_out"]
+    result["expected_left_out"] = ["03"]
+    assert failed(result) == []
+    result["runs"][OURS]["refused"] = "nothing connects"
+    assert "left_out" in failed(result)
+
+
+def test_one_place_for_all_must_be_worse_where_there_is_parallax() -> None:
+    result = measured()
+    result["runs"][ROTATION_ONLY]["figures"]["psnr_db"] = 99.0
+    assert failed(result) == ["psnr_db over rotation only"]
+    result["parallax"] = False
+    assert failed(result) == []
+
+
+def test_sets_are_judged_beside_pairs_and_enter_no_median() -> None:
+    result = measured()
+    verdict = judge([result], complete=False)
+    assert verdict.passed and all(isinstance(check, Check) for check in verdict.checks)
+    assert all(middle.scenes == 0 for middle in medians([result]))
+    crashed = copy.deepcopy(result) | {"status": "failed", "message": "gone", "runs": {}, "proof": {}}
+    assert [check.measure for check in judge([crashed], complete=False).failed] == ["status"]
+
+
+def test_the_report_shows_sets_and_what_was_measured_when_bars_were_set() -> None:
+    result = measured()
+    files = report_files([result], "sets", False, "1.0")
+    page = files["report.html"].decode()
+    for text in ("Sets of many pictures", "True sphere", "From above", "measured then", 'id="scene-small_room"',
+                 "&lt;odd&gt;", "Each picture"):  # fmt: skip
+        assert text in page, text
+    assert "The suite’s bars" not in page and "Outside the overlap" not in page, "there is no pair"
+    assert b"small_room" in files["report.csv"] and b"rotation_max_deg" in files["report.csv"]
+    lines = summary_lines(judge([result], complete=False), [result])
+    assert lines[0].startswith("PASSED: 1 of 1 scenes") and len(lines) == 1

@@ -1,0 +1,183 @@
+"""Errors of a stitch of a set are measured in the units they are named by, and the truth has none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.projective import rotation_from_vector
+from edf_stitch.core.panorama.projection import Projection
+from edf_stitch.core.raster.picture_map import PictureMap
+from edf_stitch.synthetic_scenes.recipes import View
+from edf_stitch.synthetic_scenes.sets.rendered_set import RenderedSet
+from edf_stitch.synthetic_scenes.sets.set_measures import (
+    Found,
+    SetTruth,
+    colour_figures,
+    common_rotation,
+    map_figures,
+    on_the_sphere,
+    onto,
+    pose_figures,
+    range_figures,
+)
+from edf_stitch.synthetic_scenes.sets.sphere_camera import SphereCamera
+from edf_stitch.synthetic_scenes.sets.sphere_truth import seen_by
+from edf_stitch.synthetic_scenes.sets.top_view import top_view
+
+from .analytic_room import camera_passes, hit, passes_along, sphere_passes
+
+VIEWS = (View(lens=24.0), View((0.4, 0.1, 1.4), 24.0, 5.0, 3.0, 24.0), View((-0.3, 0.2, 1.6), -26.0, -4.0, 2.0, 24.0))
+FOCAL = 90.0
+TURN = rotation_from_vector(np.array([0.05, -0.3, 0.1]))
+
+
+@pytest.fixture(scope="module")
+def truth() -> SetTruth:
+    cameras = tuple(view.camera((120, 90)) for view in VIEWS)
+    sphere = SphereCamera(cameras[0].place, (480, 240))
+    seen = sphere_passes(sphere)
+    depths = tuple(camera_passes(camera).depth for camera in cameras)
+    names = tuple(Path(f"{number:02d}.png") for number in range(3))
+    return SetTruth.of(RenderedSet(names, cameras, depths, sphere, seen.light, seen.depth, {}, ""))
+
+
+def perfect(truth: SetTruth, unit: float = 0.5, numbers: tuple[int, ...] = (0, 1, 2)) -> Any:
+    """What stitching would give if nothing were wrong: the world turned, in a unit of its own, on the whole sphere."""
+    cameras = [truth.rendered.cameras[number] for number in numbers]
+    place = truth.rendered.sphere.place
+    projection = Projection("equirectangular", FOCAL, (0.0, 0.0), np.eye(3), cameras[0].K)
+    left, top, width, height = projection.sphere or (0, 0, 0, 0)
+    x, y = np.meshgrid(np.arange(width) + left, np.arange(height) + top)
+    directions = projection.rays(np.stack([x, y], axis=-1).astype(float)) @ TURN
+    away = hit(place, directions)
+    maps = []
+    for camera in cameras:
+        pixels, _ = seen_by(camera, truth.rendered.sphere, directions, away)
+        maps.append(PictureMap(*np.moveaxis(pixels.astype(np.float32), -1, 0), camera.size))
+    R = np.array([camera.R @ TURN.T for camera in cameras])
+    t = np.array([camera.R @ place + camera.t for camera in cameras]) / unit
+    known = tuple(Camera(camera.K, camera.size, "", 0.0) for camera in cameras)
+    centres = -np.einsum("nji,nj->ni", R, t)
+    parts = dict(R=R, t=t, centres=centres, cameras=known, stations=())
+    rig = type("Rig", (), {**parts, "__len__": lambda _: len(numbers)})()
+    deviation = np.where(np.arange(width) < width // 2, 0.01, 0.02)[None].repeat(height, axis=0)
+    canvas = SimpleNamespace(projection=projection, offset=(-left, -top))
+    return SimpleNamespace(
+        rig=rig, canvas=canvas, occluded=[np.zeros((height, width), bool) for _ in numbers],
+        warp=SimpleNamespace(maps=maps, canvas=canvas, inverse_depth=unit / away, deviation=deviation),
+        pixels=passes_along(place, directions, np.ones(away.shape)).light, alpha=np.ones(away.shape, np.float32),
+        pictures=[SimpleNamespace(name=f"{number:02d}.png") for number in numbers],
+    )  # fmt: skip
+
+
+def moved(result: Any, number: int, by: float) -> None:
+    one = result.warp.maps[number]
+    result.warp.maps[number] = replace(one, x=one.x + np.float32(by))
+
+
+def test_the_truth_has_no_error(truth: SetTruth) -> None:
+    found = Found.of(perfect(truth), truth)
+    assert np.allclose(found.gauge, TURN)
+    poses = pose_figures(found)
+    assert poses["places"] == 3 and all(abs(poses[name]) < 1e-4 for name in poses if name != "places"), poses
+    maps, pictures = map_figures(found)
+    assert max(maps["overlap_px"], maps["alone_px"]) < 0.02 and maps["overlap_p90_px"] < 0.1 and maps["mapped"] > 0.99
+    assert [line["picture"] for line in pictures] == [0, 1, 2]
+    assert range_figures(found)["range_log"] < 1e-3 and range_figures(found)["range_log_p90"] < 0.01
+    light, shown = on_the_sphere(found)
+    where = shown & (truth.views_at(found.numbers) > 0)
+    assert where.sum() > 0.97 * (truth.views_at(found.numbers) > 0).sum()
+    figures, _ = colour_figures(light * np.float32(0.8), where, truth)
+    assert figures["psnr_db"] > 30 and figures["ssim"] > 0.95, "one gain is allowed for"
+    assert colour_figures(np.roll(light, 3, axis=1), where, truth)[0]["psnr_db"] < figures["psnr_db"] - 5
+
+
+def test_poses_are_judged_after_the_common_turn_and_similarity(truth: SetTruth) -> None:
+    result = perfect(truth)
+    result.rig.R[1] = rotation_from_vector(np.radians([0, 0.3, 0])) @ result.rig.R[1]
+    poses = pose_figures(Found.of(result, truth))
+    assert poses["rotation_max_deg"] == pytest.approx(0.2, abs=1e-3), "two thirds: the others take their share"
+    assert poses["rotation_deg"] == pytest.approx(0.1, abs=1e-3)
+    result = perfect(truth)
+    result.rig.centres[2] += [0, 0.02, 0]  # 1 cm
+    worst = pose_figures(Found.of(result, truth))["position_max_mm"]
+    assert 1 < worst < 10
+    result = perfect(truth)
+    result.rig.cameras = tuple(replace(camera, K=camera.scaled(1.02)) for camera in result.rig.cameras)
+    assert pose_figures(Found.of(result, truth))["focal_percent"] == pytest.approx(2.0)
+    result.rig.t = np.zeros((3, 3))
+    assert pose_figures(Found.of(result, truth))["places"] == 1
+
+
+def test_maps_are_judged_where_several_one_or_no_camera_sees(truth: SetTruth) -> None:
+    result = perfect(truth)
+    for number in range(3):
+        moved(result, number, 0.75)
+    maps, pictures = map_figures(Found.of(result, truth))
+    for kind in ("overlap", "alone", "hidden"):
+        assert maps[f"{kind}_px"] == pytest.approx(0.75, abs=0.02), kind
+    moved(result, 2, 1.0)
+    _, pictures = map_figures(Found.of(result, truth))
+    assert [line["overlap_px"] for line in pictures] == pytest.approx([0.75, 0.75, 1.75], abs=0.02)
+    views = truth.views_at((0, 1, 2))
+    alone = views == 1
+    assert alone.any() and (views >= 2).any()
+    only = perfect(truth, numbers=(0,))
+    assert np.isnan(map_figures(Found.of(only, truth))[0]["overlap_px"]), "one picture has no overlap"
+
+
+def test_what_is_said_to_be_hidden_is_held_against_each_cameras_depth(truth: SetTruth) -> None:
+    result = perfect(truth)
+    found = Found.of(result, truth)
+    assert np.isnan(map_figures(found)[0]["hidden_precision"]) and map_figures(found)[0]["hidden_recall"] == 0
+    at = np.rint(found.on_maps().reshape(-1, 2)).astype(int)
+    for order in range(3):
+        seen = truth.seen[order]
+        x, y = at[seen.index[~seen.visible]].T
+        result.occluded[order][y % 283, x % 565] = True
+    maps, _ = map_figures(found)
+    assert maps["hidden_recall"] > 0.99 and maps["hidden_precision"] > 0.7
+    for order in range(3):
+        result.occluded[order][:] = True
+    maps, _ = map_figures(found)
+    assert maps["hidden_recall"] == 1 and maps["hidden_precision"] < 0.2
+
+
+def test_ranges_are_judged_in_metres_by_the_scale_of_the_places(truth: SetTruth) -> None:
+    result = perfect(truth, unit=2.0)
+    result.warp.inverse_depth = result.warp.inverse_depth * 1.1
+    figures = range_figures(Found.of(result, truth))
+    assert figures["range_log"] == pytest.approx(np.log(1.1), abs=1e-3)
+    result.warp.inverse_depth = np.where(result.warp.deviation < 0.015, result.warp.inverse_depth, -1.0)
+    figures = range_figures(Found.of(result, truth))
+    assert figures["range_log_p90"] == np.inf, "behind the viewpoint nothing is in the right place"
+    result.rig.centres = np.zeros((3, 3))
+    assert np.isnan(range_figures(Found.of(result, truth))["range_log"])
+
+
+def test_the_similarity_and_the_common_rotation_are_found_again() -> None:
+    random = np.random.default_rng(3)
+    points = random.normal(size=(6, 3))
+    true = 2.5 * points @ TURN.T + [1, 2, 3]
+    placed, scale = onto(points, true)
+    assert np.allclose(placed, true) and scale == pytest.approx(2.5)
+    mirrored, _ = onto(points * [1, 1, -1], true)
+    assert not np.allclose(mirrored, true, atol=0.1), "a mirror image is another place"
+    one, none = onto(np.zeros((6, 3)), true)
+    assert none == 0 and np.allclose(one, true.mean(axis=0))
+    rotations = np.array([rotation_from_vector(vector) for vector in random.normal(size=(5, 3))])
+    assert np.allclose(common_rotation(rotations @ TURN.T, rotations), TURN)
+
+
+def test_the_view_from_above_shows_true_and_found_places(truth: SetTruth) -> None:
+    drawn = top_view(Found.of(perfect(truth), truth))
+    result = perfect(truth)
+    result.rig.centres[2] += [0.2, 0, 0]
+    other = top_view(Found.of(result, truth))
+    assert drawn.shape == (720, 720, 3) and (drawn != 255).any() and (drawn != other).any()

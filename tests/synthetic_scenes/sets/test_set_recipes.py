@@ -1,0 +1,42 @@
+"""Sets by name, and made harder."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from edf_stitch.core.system.errors import BadRequest
+from edf_stitch.synthetic_scenes.recipes import EYE
+from edf_stitch.synthetic_scenes.sets.recipes import SETS, parse_set
+
+SIZE = (640, 480)
+
+
+@pytest.mark.parametrize("name", sorted(SETS))
+def test_the_first_camera_stands_at_the_viewpoint_and_each_overlaps_with_another(name: str) -> None:
+    recipe = SETS[name]
+    cameras = list(recipe.cameras(SIZE).values())
+    assert np.allclose(cameras[0].place, [0, 0, EYE]) and len(cameras) == recipe.count
+    assert recipe.cameras(SIZE).keys() == {f"{k:02d}" for k in range(recipe.count)}
+    for number, camera in enumerate(cameras):
+        others = [np.degrees(np.arccos(np.clip(camera.R[2] @ other.R[2], -1, 1)))
+                  for k, other in enumerate(cameras) if k != number]  # fmt: skip
+        assert min(others) < 45, number
+
+
+def test_the_same_set_is_shot_every_time_and_another_by_another_seed() -> None:
+    first, again = (parse_set("small_room").views for _ in range(2))
+    assert first == again and first != parse_set("small_room:spread=0.2").views
+
+
+def test_a_set_is_made_harder() -> None:
+    recipe = parse_set("small_room:n=9,spread=0.3,noise=3")
+    assert (recipe.count, recipe.spread, recipe.noise) == (9, 0.3, 3.0) and len(recipe.views) == 9
+    places = np.array([view.place for view in parse_set("small_room:n=60,spread=0.5").views[1:]])
+    assert places.std(axis=0) == pytest.approx([0.5, 0.5, 1 / 3], rel=0.3)
+
+
+@pytest.mark.parametrize("text", ["smal_room", *(f"small_room:{setting}" for setting in (
+    "n=2", "n=61", "n=3.5", "spread=-1", "turn=2", "spread=x", "noise=nan"))])  # fmt: skip
+def test_what_is_no_set_is_refused(text: str) -> None:
+    with pytest.raises(BadRequest, match=text.partition(":")[0]):
+        parse_set(text)
