@@ -102,8 +102,8 @@ class BundleOptions:
     most_log_focal: float = 0.2
     # ρ, in units of one by the largest distance of a place, up to which a triangulated point is believed.
     most_inverse_range: float = 1e4
-    # Rounds of the robust mean of rays that see a point at infinity: two of three outvote a wrong one by then.
-    mean_rounds: int = 5
+    # Rounds of the robust mean of rays from one place that see a point: two of three outvote a wrong one by then.
+    mean_rounds: int = 4
     # What keeps the equations regular, and stiffness that keeps the scale, in units of their mean diagonal.
     regular: float = 1e-15
     scale_stiffness: float = 1e3

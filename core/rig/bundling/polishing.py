@@ -44,7 +44,7 @@ def polish(problem: Problem, solution: Solution, tick: Tick) -> Polished:
         solution, kernel, _ = _round(problem, solution, reference, settings, tick)
     solution = _settled(problem, solution, reference, BUNDLE.kernel_px, tick)
     sharp = _settled(problem, solution, reference, kernel, tick)
-    if total_cost(problem, sharp) < (1 + POLISHING.sharp_loss) * total_cost(problem, solution):
+    if _uncapped_cost(problem, sharp) < (1 + POLISHING.sharp_loss) * _uncapped_cost(problem, solution):
         solution = sharp
     solution = solution.rescaled()
     return Polished(problem, solution, total_cost(problem, solution), _behind(solution), False, depth_prior(solution))
@@ -93,6 +93,13 @@ def total_cost(problem: Problem, solution: Solution) -> float:
     lengths = lengths_of_errors(problem, solution)
     missed = np.sqrt(JUDGE.missed_kernels) * kernel
     return float(robust_cost(np.fmin(lengths, missed), kernel).sum())
+
+
+def _uncapped_cost(problem: Problem, solution: Solution) -> float:
+    """The same with what is far off costing the more the farther off it is: what a narrow kernel loses of a picture."""
+    kernel = BUNDLE.kernel_px * problem.scale
+    missed = np.sqrt(JUDGE.missed_kernels) * kernel
+    return float(robust_cost(np.nan_to_num(lengths_of_errors(problem, solution), nan=missed), kernel).sum())
 
 
 def cost_of_start(problem: Problem, solution: Solution) -> float:

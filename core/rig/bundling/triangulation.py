@@ -31,22 +31,20 @@ def triangulate(problem: Problem, solution: Solution) -> Solution:
         starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
         seen = bearings(problem, solution)[chosen]
         picture = tracks.picture[chosen]
-        kernel = BUNDLE.kernel_px * problem.scale / lens_of(problem, solution, picture).focal
-        far = _mean_ray(solution, picture, point, starts, seen, kernel)
-        found, depth = _best(solution, picture, point, starts, seen, far)
+        found, depth = _best(solution, picture, point, starts, seen)
         one = _of_one_place(problem.place[picture], starts)
         if one.any():
-            centres = solution.centres[picture[starts[one]]]
-            found[one], depth[one] = _at_usual_range(centres, far[one], depth[~one])
+            kernel = BUNDLE.kernel_px * problem.scale / lens_of(problem, solution, picture).focal
+            usual = _robust_ray(solution, picture, point, starts, seen, kernel)[one]
+            found[one], depth[one] = _at_usual_range(solution.centres[picture[starts[one]]], usual, depth[~one])
         rays[points], inverse_ranges[points] = found, depth
     return replace(solution, rays=rays, inverse_ranges=inverse_ranges, solved=solved)
 
 
-def _best(
-    solution: Solution, picture: Index, point: Index, starts: Index, seen: Array, far: Array
-) -> tuple[Array, Array]:
-    """Rays (P, 3) and ρ (P,), by linear least squares or at infinity, there at far (P, 3)."""
+def _best(solution: Solution, picture: Index, point: Index, starts: Index, seen: Array) -> tuple[Array, Array]:
+    """Rays (P, 3) and ρ (P,), by linear least squares or at infinity."""
     rays, depth = _linear(solution, picture, starts, seen)
+    far = _mean_ray(np.einsum("oji,oj->oi", solution.R[picture], seen), starts)
     worst, worst_far = (
         np.maximum.reduceat(_off(solution, picture, r[point], d[point], seen), starts)
         for r, d in ((rays, depth), (far, np.zeros(len(far))))
@@ -72,14 +70,21 @@ def _linear(solution: Solution, picture: Index, starts: Index, seen: Array) -> t
     return least[:, :3], least[:, 3]
 
 
-def _mean_ray(solution: Solution, picture: Index, point: Index, starts: Index, seen: Array, kernel: Array) -> Array:
-    """Where a point at infinity is seen by most: a mean, weighted anew with Cauchy's kernel (O,), in radians."""
+def _mean_ray(world: Array, starts: Index) -> Array:
+    """Where a point at infinity is seen, by all rays world (O, 3) together."""
+    mean = np.add.reduceat(world, starts, axis=0)
+    unit: Array = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
+    return unit
+
+
+def _robust_ray(solution: Solution, picture: Index, point: Index, starts: Index, seen: Array, kernel: Array) -> Array:
+    """The same by most of them, with Cauchy weights; kernel (O,), radians. From one place, outliers are all that rays
+    differ by."""
     world = np.einsum("oji,oj->oi", solution.R[picture], seen)
-    weight = np.ones(len(world))
+    mean = _mean_ray(world, starts)
     for _ in range(BUNDLE.mean_rounds):
-        mean = np.add.reduceat(weight[:, None] * world, starts, axis=0)
-        mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
-        weight = 1 / (1 + (np.linalg.norm(world - mean[point], axis=1) / kernel) ** 2)
+        off = np.linalg.norm(world - mean[point], axis=1)
+        mean = _mean_ray(world / (1 + (off / kernel) ** 2)[:, None], starts)
     return mean
 
 
