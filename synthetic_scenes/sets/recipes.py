@@ -85,15 +85,18 @@ def sweep(step: float, lens: float) -> Shoot:
     return shoot
 
 
-def on_a_tripod(step: float, lens: float) -> Shoot:
-    """A fan from one place, of which the last two views stand `spread` to the right, as where a tripod does not quite
-    turn about the lens's nodal point."""
+def on_a_tripod(step: float, lens: float, in_hand: int = 0) -> Shoot:
+    """A fan from one place. The last `in_hand` views are taken from the hand; if there are none, the last two stand
+    `spread` to the right, as where a tripod does not quite turn about the lens's nodal point."""
 
     def shoot(count: int, spread: float, random: np.random.Generator) -> tuple[View, ...]:
         views = list(fan(step, lens)(count, 0.0, random))
-        for number in (count - 2, count - 1):
-            x, y, z = views[number].place
-            views[number] = replace(views[number], place=(x + spread, y, z))
+        for number in range(count - in_hand, count):
+            views[number] = in_the_hand(views[number], spread, random)
+        if not in_hand:
+            for number in (count - 2, count - 1):
+                x, y, z = views[number].place
+                views[number] = replace(views[number], place=(x + spread, y, z))
         return tuple(views)
 
     return shoot
@@ -116,6 +119,8 @@ _SETS = (
     SetRecipe("street_sweep", "A street walked along sideways", "street", sweep(0.9, 26.0), 6, 0.06, seed=5),
     SetRecipe("tripod", "A room from a tripod, two pictures 2 mm off it", "room", on_a_tripod(26.0, 26.0), 8, 0.002,
               seed=7, parallax=False),
+    SetRecipe("mixed", "Six pictures from a tripod, four more from the hand", "room", on_a_tripod(24.0, 26.0, 4), 10,
+              0.15, seed=8),
     SetRecipe("stray", "Nine pictures, two of them of another place", "two_rooms",
               with_strays(fan(26.0, 26.0), 2, 26.0), 9, 0.12, seed=9, strays=2),
 )  # fmt: skip

@@ -72,6 +72,18 @@ BARS: dict[str, tuple[Bar, ...]] = {
         Bar("range_log", "", 0.0042, at_most=0.0055),
         Bar("psnr_db", "dB", 27.5, at_least=26.5),
     ),
+    "mixed": (
+        Bar("rotation_deg", "°", 0.036, at_most=0.047),
+        Bar("rotation_max_deg", "°", 0.355, at_most=0.46),
+        Bar("position_max_mm", "mm", 15.8, at_most=20.5),
+        Bar("places", "", 5.0, at_most=5.0),
+        Bar("focal_percent", "%", -0.01, at_most=0.1, absolute=True),
+        Bar("overlap_px", "px", 0.26, at_most=0.34),
+        Bar("overlap_p90_px", "px", 0.42, at_most=0.55),
+        Bar("alone_px", "px", 1.91, at_most=2.5),
+        Bar("range_log", "", 0.048, at_most=0.062),
+        Bar("psnr_db", "dB", 30.4, at_least=29.4),
+    ),
     "stray": (
         Bar("rotation_max_deg", "°", 0.065, at_most=0.085),
         Bar("position_max_mm", "mm", 5.8, at_most=7.5),
