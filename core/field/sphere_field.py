@@ -20,7 +20,7 @@ from .sphere_options import SPHERE
 from .sphere_points import SpherePoints, angular_unit, points_of, px_scale, seen_at
 from .sphere_slack import SphereSlack, fit_sphere_slack
 from .sphere_spline import SphereSpline, problem_on_sphere, share_near, solved_on_sphere, squared_chords
-from .spline import SmoothingProblem, spread_points
+from .spline import Inverse, SmoothingProblem, spread_points
 from .strict import best_smoothing
 
 
@@ -175,22 +175,27 @@ def _fitted(rig: Rig, unit: float) -> SphereDepth:
 
 
 def _pruned(points: SpherePoints, unit: float, scale: float) -> tuple[SpherePoints, SmoothingProblem, float]:
-    """Points without gross errors, each judged by a stiff spline without it, unless neighbours agree with it; and the λ
-    that predicts the rest best."""
+    """Points without gross errors, which a stiff and a flexible spline both miss and no neighbours agree with; and the
+    λ that predicts the rest best."""
     problem = problem_on_sphere(points.rays, points.noise, unit)
-    inverse = problem.inverse(SPHERE.initial_smoothing)
     protected = _supported(points, scale)
+    fits = [_fitting(points, problem.inverse(one), protected, scale) for one in SPHERE.judging_smoothings]
+    keep: NDArray[np.bool_] = np.logical_or.reduce(fits)
+    points, problem = points.subset(keep), problem.subset(keep)
+    return points, problem, best_smoothing(problem, points.inverse_ranges, points.sensitivity, SPHERE.smoothing_ladder)
+
+
+def _fitting(points: SpherePoints, inverse: Inverse, protected: NDArray[np.bool_], scale: float) -> NDArray[np.bool_]:
+    """Which points (N,) a spline predicts without them, once those that it does not are left out."""
     remaining = np.full(len(points), True)
-    here, floor = points, SPHERE.gross_error_floor_px * scale
+    floor = SPHERE.gross_error_floor_px * scale
     while True:
-        error = np.abs(here.sensitivity * inverse.held_out(here.inverse_ranges))
+        error = np.abs(points.sensitivity * inverse.held_out(points.inverse_ranges))
         keep = (error <= max(SPHERE.gross_error_medians * np.median(error), floor)) | protected
         if keep.all() or keep.sum() < SPHERE.min_centres:
-            break
-        here, inverse, protected = here.subset(keep), inverse.subset(keep), protected[keep]
+            return remaining
+        points, inverse, protected = points.subset(keep), inverse.subset(keep), protected[keep]
         remaining[remaining] = keep
-    problem = problem.subset(remaining)
-    return here, problem, best_smoothing(problem, here.inverse_ranges, here.sensitivity, SPHERE.smoothing_ladder)
 
 
 def _supported(points: SpherePoints, scale: float) -> NDArray[np.bool_]:

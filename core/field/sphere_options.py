@@ -38,8 +38,9 @@ class SphereOptions:
     noise_range: tuple[float, float] = (0.2, 20.0)
     """Bounds of a point's noise relative to the median point's: a few points with long baselines shall not decide."""
 
-    initial_smoothing: float = 1e-5
-    """λ of the first spline, by which gross errors are found: stiff enough that they stand out."""
+    judging_smoothings: tuple[float, ...] = (1e-3, 1e-5)
+    """λ of the splines that gross errors are found by: only what stands out from all is one. From a stiff one things in
+    front of others stand out too, and beside what a flexible one follows well so do all edges of depth."""
 
     smoothing_decades: tuple[float, float] = (-7.0, -1.0)
     """Powers of ten between which leave-one-out looks for the best λ, by halves: from hardly any smoothing to almost a

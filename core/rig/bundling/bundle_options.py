@@ -26,7 +26,7 @@ class PositionOptions:
     """Places of the pictures by linear equations (`positions`, `continuity`)."""
 
     # Rounds at most, and the round from which steps of Gauss-Newton replace solving anew: the first rounds need no
-    # start, but without the projector parts of free scale shrink in them.
+    # start, but parts of free scale shrink in them, without the projector.
     rounds: int = 32
     newton_round: int = 8
     # Rounds at which every track chooses its two views of most parallax again, now that outliers are known.
@@ -70,8 +70,6 @@ class ContinuityOptions:
     weight: float = 4.0
     # Neighbours that are taken of a picture and two parts of the rig, the nearest ones.
     most: int = 40
-    # Relative difference of depths below which L1 becomes L2, before depths are positive enough for logarithms.
-    flat: float = 0.2
 
 
 @dataclass(frozen=True)

@@ -59,22 +59,12 @@ def _nearest(pixels: Array, first: Index, second: Index) -> tuple[Index, Index]:
     return u[rows], v[columns]
 
 
-def equal_depths(near: Neighbours, depth: Array, of_depth: Blocks) -> tuple[Blocks, Array]:
-    """Rows z_first − z_second = 0 in units of their mean, and weights (M,) that make their squares an L1 norm.
+def equal_logs(near: Neighbours, depth: Array, of_depth: Blocks) -> tuple[Blocks, Array, Array]:
+    """Rows ln z_first − ln z_second = 0 where both are positive: blocks, weights (M,) that make squares an L1 norm
+    beyond σ, residuals (M, 1).
 
     depth (O,): of every observation; of_depth: how depths depend on the places.
     """
-    first, second = depth[near.first], depth[near.second]
-    size = np.maximum((np.abs(first) + np.abs(second)) / 2, 1e-9)
-    blocks = [(p[near.first], J[near.first]) for p, J in of_depth] + [
-        (p[near.second], -J[near.second]) for p, J in of_depth
-    ]
-    rough = CONTINUITY.flat / np.maximum(np.abs(first - second) / size, CONTINUITY.flat)
-    return blocks, near.share * rough / size**2
-
-
-def equal_logs(near: Neighbours, depth: Array, of_depth: Blocks) -> tuple[Blocks, Array, Array]:
-    """Rows ln z_first − ln z_second = 0 where both are positive: blocks, weights (M,), residuals (M, 1)."""
     ahead = (depth[near.first] > 0) & (depth[near.second] > 0)
     u, v = near.first[ahead], near.second[ahead]
     off = np.log(depth[u] / depth[v])
@@ -83,3 +73,16 @@ def equal_logs(near: Neighbours, depth: Array, of_depth: Blocks) -> tuple[Blocks
     ]
     rough = 1 / np.maximum(np.abs(off) / CONTINUITY.log_sigma, 1)
     return blocks, near.share[ahead] * rough, off[:, None]
+
+
+def log_sizes(near: Neighbours, picture: Index, part: Index, depth: Array) -> Array:
+    """By how much parts have to grow (K,), in logs about 0, for depths to go on between them.
+
+    picture, part (O,): of every observation, parts numbered from 0; depth (O,).
+    """
+    off = np.log(np.abs(depth[near.first] / depth[near.second]))
+    groups, number = np.unique([picture[near.first], part[near.first], part[near.second]], axis=1, return_inverse=True)
+    told = np.array([np.median(off[number.ravel() == k]) for k in range(groups.shape[1])])
+    one = np.eye(int(part.max()) + 1)
+    sizes: Array = np.linalg.lstsq(one[groups[2]] - one[groups[1]], told, rcond=None)[0]
+    return sizes

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...cameras.projective import skew
 from ...raster.arrays import Array
 from .bundle_options import POSITIONS
-from .continuity import Blocks, Neighbours, equal_depths, equal_logs, neighbours_of
+from .continuity import Blocks, Neighbours, equal_logs, log_sizes, neighbours_of
 from .parts import part_of_points
 from .solution import Problem, Solution, bearings, lens_of
 from .tracks import Index, pairs_within
@@ -72,7 +72,8 @@ class _Positioning:
         self.part = part_of_points(tracks, self.count)
         self.centres: Array | None = None
         _, number = np.unique(problem.place, return_inverse=True)
-        self.spread = np.kron((number[:, None] == np.arange(number.max() + 1)).astype(float), np.eye(3))
+        self.at = (number[:, None] == np.arange(number.max() + 1)).astype(float)
+        self.spread = np.kron(self.at, np.eye(3))
 
     def run(self) -> Positions:
         for round_ in range(POSITIONS.rounds):
@@ -81,8 +82,10 @@ class _Positioning:
                 near = neighbours_of(self.tracks, self.part, depths.measured)
                 of_depth = self.depth_blocks(depths)
             before = self.centres
+            if before is not None and round_ == POSITIONS.newton_round:
+                self.centres = before = self.normalised(self.continued(depths, near, before), depths)
             if before is None:
-                self.centres = self.normalised(self.first(depths, near, of_depth), depths)
+                self.centres = self.normalised(self.first(depths, of_depth), depths)
                 continue
             self.centres = self.normalised(self.next(depths, near, of_depth, round_), depths)
             change = np.linalg.norm(self.centres - before)
@@ -121,7 +124,7 @@ class _Positioning:
         found = [(picture[view[point]], rows[:, None, :]) for view, rows in blocks]
         return [*found, (picture, -self.w[:, None, :])]
 
-    def first(self, depths: _Depths, near: Neighbours, of_depth: Blocks) -> Array:
+    def first(self, depths: _Depths, of_depth: Blocks) -> Array:
         """Places (N, 3) from nothing, up to a shift: distances are taken to be what they are for a usual parallax."""
         rows = np.flatnonzero(depths.measured[self.tracks.point])
         sine = depths.sine[self.tracks.point]
@@ -129,7 +132,6 @@ class _Positioning:
         system = _System(self.count)
         self.add_rays(system, depths, rows, sine / usual, None, None)
         self.add_same(system, 1.0)
-        system.add(*equal_depths(near, np.ones(len(sine)), of_depth))
         return self.smallest(system, self.towards(depths, of_depth, rows, sine))
 
     def next(self, depths: _Depths, near: Neighbours, of_depth: Blocks, round_: int) -> Array:
@@ -145,7 +147,6 @@ class _Positioning:
         self.add_same(system, float(np.median(1 / distance[rows])) if len(rows) else 1.0)
         towards = self.towards(depths, of_depth, rows, 1 / np.abs(depth))
         if not newton:
-            system.add(*equal_depths(near, depth, of_depth))
             return self.smallest(system, towards)
         system.add(*equal_logs(near, depth, of_depth))
         return self.stepped(system, towards, depths)
@@ -179,11 +180,35 @@ class _Positioning:
         z = self.depths_along(depths, centres)
         X = centres[picture[depths.left]] + z[:, None] * self.w[depths.left]
         away = X[point] - centres[picture]
-        usual = float(np.median(np.abs(z[depths.measured]))) if depths.measured.any() else 1.0
-        least = max(POSITIONS.least_distance * usual, 1e-12)
+        least = np.maximum(POSITIONS.least_distance * self.usual_depths(depths, z), 1e-12)[point]
         depth = (away * self.w).sum(axis=1)
         depth = np.where(np.abs(depth) < least, np.where(depth < 0, -least, least), depth)
         return away, np.maximum(np.linalg.norm(away, axis=1), least), depth
+
+    def usual_depths(self, depths: _Depths, z: Array) -> Array:
+        """For each point (P,) the median |z| of those of its part whose depth is measured, 1 where there are none."""
+        usual = np.ones(len(z))
+        for part in np.unique(self.part):
+            mine = self.part == part
+            if (mine & depths.measured).any():
+                usual[mine] = np.median(np.abs(z[mine & depths.measured]))
+        return usual
+
+    def continued(self, depths: _Depths, near: Neighbours, centres: Array) -> Array:
+        """Places (N, 3) with each part of the rig as large as makes depths go on from one to the next: the linear
+        rounds leave that anywhere. What loops of parts tell of it is left to the steps that follow."""
+        picture, (parts, part) = self.tracks.picture, np.unique(self.part, return_inverse=True)
+        if len(parts) == 1:
+            return centres
+        _, _, depth = self.away(depths, centres)
+        sizes = np.exp(log_sizes(near, picture, part[self.tracks.point], depth))
+        i, j = (picture[ends] for ends in self.inside)
+        i, j, k = np.unique([i, j, part[self.tracks.point[self.inside[0]]]], axis=1)
+        apart = sizes[k][:, None] * (centres[i] - centres[j])
+        lengths = np.sqrt(np.bincount(k, (apart**2).sum(axis=1)) / np.bincount(k))
+        length = np.maximum(lengths, max(POSITIONS.least_distance * lengths.max(), 1e-12))[k][:, None]
+        places: Array = self.at @ np.linalg.lstsq((self.at[i] - self.at[j]) / length, apart / length, rcond=None)[0]
+        return places
 
     def reweight(self, depths: _Depths, off: Array, away: Array, round_: int) -> None:
         """Cauchy weights by sines off (O, 3), the kernel narrower with each round; what lies behind fits badly."""

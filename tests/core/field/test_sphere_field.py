@@ -156,6 +156,20 @@ def test_a_thing_in_front_of_a_wall_keeps_its_points() -> None:
     assert np.median(found) == pytest.approx(0.5, abs=0.05)
 
 
+@pytest.mark.parametrize(("waves", "most"), [(12, 0.012), (18, 0.002)])
+def test_things_of_a_deep_scene_are_no_gross_errors(waves: int, most: float) -> None:
+    """A wall with many things in front of it, four times as near: a stiff spline alone drops those of wide waves, a
+    flexible one those of narrow ones."""
+
+    def depth(rays: np.ndarray) -> np.ndarray:
+        wave = np.sin(waves * np.arctan2(rays[:, 0], rays[:, 2]))
+        return 0.1 + 0.35 * np.clip(1.5 * wave - 0.5, 0, 1)
+
+    rig = rig_of((-30, 0, 30), 0, depth, noise_px=0.3, points=20_000)
+    found = fit_sphere_field(rig, with_slack=False).at(rig.rays)
+    assert np.abs(found - depth(rig.rays)).mean() < most
+
+
 def test_beyond_the_points_d_goes_over_to_that_of_the_nearest() -> None:
     """Points in the lower half alone, nearer the lower they lie: above, nothing goes negative, near or far."""
 

@@ -14,10 +14,10 @@ from edf_stitch.core.rig.bundling.solving import Solved, solve
 
 from .rigs import SyntheticRig, make_rig
 
-# As many of so many random rigs have to do so. Where half the pictures are from a tripod, several assignments of places
+# As many of 20 random rigs may fail to. Where half the pictures are from a tripod, several assignments of places
 # explain what is seen about equally well.
-MUST = {"ring": 18, "street": 18, "sphere": 18, "mixed": 18, "wrong": 18, "tripod": 20, "half": 14}
-SEEDS = 20
+MAY_FAIL = {"ring": 2, "street": 2, "sphere": 2, "mixed": 2, "wrong": 2, "tripod": 0, "half": 6}
+RIGS = 20
 ABOVE = 1.05
 
 
@@ -59,7 +59,9 @@ def test_cost_is_that_from_the_truth(kind: str, seed: int, points: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", MUST)
-def test_cost_is_that_from_the_truth_on_many_rigs(kind: str) -> None:
-    ratios = [ratio(kind, seed) for seed in range(SEEDS)]
-    assert sum(value < ABOVE for value in ratios) >= MUST[kind], ratios
+@pytest.mark.parametrize("rigs", [6, pytest.param(RIGS, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("kind", MAY_FAIL)
+def test_cost_is_that_from_the_truth_on_many_rigs(kind: str, rigs: int) -> None:
+    """Of all of them by `make soak`; fewer may fail of fewer."""
+    ratios = [ratio(kind, seed) for seed in range(rigs)]
+    assert sum(value >= ABOVE for value in ratios) <= MAY_FAIL[kind] * rigs // RIGS, ratios

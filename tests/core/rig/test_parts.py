@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.rig.averaging.averaged import PairGeometry
-from edf_stitch.core.rig.bundling.continuity import neighbours_of
+from edf_stitch.core.rig.bundling.continuity import Neighbours, log_sizes, neighbours_of
 from edf_stitch.core.rig.bundling.parts import part_of_points, parts_of_pairs, supported
 from edf_stitch.core.rig.bundling.positions import place_pictures
 from edf_stitch.core.rig.bundling.tracks import Tracks, build_tracks
 
 from .rigs import SyntheticRig, make_rig
-from .test_positions import problem_of
+from .test_positions import off, problem_of
 
 
 def tracks_of(*sets: tuple[int, ...]) -> Tracks:
@@ -84,11 +84,41 @@ def test_no_length_along_a_chain_collapses(pictures: int) -> None:
     assert max(spread_of_lengths(make_rig("chain", seed, pictures=pictures)) for seed in range(6)) < np.log(3)
 
 
-def test_a_wrong_point_of_three_pictures_sets_no_length() -> None:
-    rig = make_rig("chain", 1)
+@pytest.mark.parametrize("number", [7, 47])
+def test_a_wrong_point_of_three_pictures_sets_no_length(number: int) -> None:
+    """With its third observation it would; with the wrong two alone it is off their line, or fits it by chance."""
+    rig = make_rig("chain", 0)
     first, second = rig.matches[:2]
-    true = [rig.true_matches(pair) for pair in (first, second)]
-    wrong = np.array([[true[0][5, 1], true[1][7, 1]]])
+    wrong = np.array([[rig.true_matches(first)[25, 1], rig.true_matches(second)[number, 1]]])
     rig.identity[2][wrong[0, 1]] = rig.identity[1][wrong[0, 0]]
     joined = replace(second, index=np.concatenate([second.index[second.index[:, 1] != wrong[0, 1]], wrong]))
-    assert spread_of_lengths(replace(rig, matches=[first, joined, *rig.matches[2:]])) < np.log(3)
+    assert spread_of_lengths(replace(rig, matches=[first, joined, *rig.matches[2:]])) < np.log(1.5)
+
+
+def test_parts_without_neighbours_keep_their_sizes() -> None:
+    none = np.zeros(0, np.intp)
+    sizes = log_sizes(Neighbours(none, none, np.zeros(0)), none, np.arange(3), np.zeros(0))
+    np.testing.assert_array_equal(sizes, np.zeros(3))
+
+
+def test_parts_grow_until_depths_go_on() -> None:
+    """Three parts in two pictures: the second is half as large as it has to be, the third three times."""
+    picture, part = np.repeat([0, 0, 1, 1], 3), np.repeat([0, 1, 1, 2], 3)
+    depth = np.array([4, 5, 6, 2, 2.5, 3, 1, 2, 3, 6, 12, 18.0])
+    near = Neighbours(np.array([0, 1, 2, 6, 7, 8]), np.array([3, 4, 5, 9, 10, 11]), np.ones(6))
+    sizes = np.exp(log_sizes(near, picture, part, depth))
+    np.testing.assert_allclose(sizes / sizes[0], [1, 2, 1 / 3], rtol=1e-12)
+
+
+def test_loops_tell_lengths_better_than_depth() -> None:
+    """A ring of links that no three-view points tie closes only with the right lengths."""
+    rig = make_rig("ring", 3)
+    links = []
+    for pair in rig.matches:
+        if pair.j - pair.i in (1, 10):
+            number = pair.i if pair.j - pair.i == 1 else 10
+            kept = rig.identity[pair.i][pair.index[:, 0]] % 3 == number % 3
+            links.append(replace(pair, index=pair.index[kept]))
+    problem, begun = problem_of(replace(rig, matches=links))
+    assert len(np.unique(part_of_points(problem.tracks, 11))) == 11
+    assert off(place_pictures(problem, begun).centres, rig).max() < 0.15 * rig.extent
