@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -17,8 +18,7 @@ from ...core.raster.arrays import Array
 from ...core.raster.colour import decode
 from ...core.system.errors import StitchError
 from ..recipes import View
-from .rendered_set import RenderedSet
-from .set_measures import SetTruth, common_rotation, sampled
+from .set_measures import SetTruth, colour_figures, common_rotation, sampled
 from .set_stitches import told_lens
 from .sphere_camera import SphereCamera
 
@@ -36,9 +36,14 @@ def installed() -> bool:
     return all(shutil.which(program) for program in PROGRAMS)
 
 
-def hugin_on_sphere(rendered: RenderedSet, truth: SetTruth) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Its panorama (H, W, 3), scene-linear, as the true sphere lies after the common turn that fits its rotations best,
-    and where (H, W) it shows something. Raises HuginFailed."""
+def hugin_on_sphere(truth: SetTruth, numbers: Sequence[int]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Its panorama (H, W, 3) of a set, scene-linear, as the true sphere lies, and where (H, W) it shows something.
+
+    What it takes for rotation is partly parallax, so that no one turn brings all onto the truth: of that which fits the
+    rotations of some of its pictures best, by their numbers, and those that fit one of them, the one that shows it in
+    the best light is taken. Raises HuginFailed.
+    """
+    rendered = truth.rendered
     size = rendered.sphere.size
     with tempfile.TemporaryDirectory(prefix="edf-hugin-") as temporary:
         folder = Path(temporary)
@@ -56,9 +61,16 @@ def hugin_on_sphere(rendered: RenderedSet, truth: SetTruth) -> tuple[NDArray[np.
         rotations = rotations_of((folder / "d.pto").read_text("utf-8"))
     if made is None or made.shape != (size[1], size[0], 4):
         raise HuginFailed("Hugin left no whole sphere")
-    gauge = common_rotation(rotations, [camera.R for camera in rendered.cameras])
-    at = np.stack(SphereCamera(rendered.sphere.place, size).pixels(truth.directions @ gauge.T), axis=-1)
-    return sampled(decode(np.ascontiguousarray(made[..., 2::-1])), (made[..., 3] > 250).astype(np.float32), at)
+    light, alpha = decode(np.ascontiguousarray(made[..., 2::-1])), (made[..., 3] > 250).astype(np.float32)
+    true = np.array([camera.R for camera in rendered.cameras])
+    seen, sphere = truth.views_at(numbers) > 0, SphereCamera(rendered.sphere.place, size)
+
+    def turned(chosen: list[int]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        gauge = common_rotation(rotations[chosen], true[chosen])
+        return sampled(light, alpha, np.stack(sphere.pixels(truth.directions @ gauge.T), axis=-1))
+
+    shown = [turned(chosen) for chosen in (list(numbers), *([number] for number in numbers))]
+    return max(shown, key=lambda one: colour_figures(one[0], one[1] & seen, truth)[0]["psnr_db"])
 
 
 def rotations_of(project: str) -> Array:

@@ -23,10 +23,10 @@ from .set_measures import (
     pose_figures,
     range_figures,
 )
-from .set_stitches import OURS, WAYS, Shared, stitched
+from .set_stitches import WAYS, Shared, stitched
+from .set_thresholds import HUGIN, OURS
 from .top_view import top_view
 
-HUGIN = "hugin"
 # Pixels of the sphere that are shown beside what pictures see.
 MARGIN = 40
 
@@ -50,13 +50,15 @@ class _Shown:
 
 
 def measured_set(rendered: RenderedSet) -> MeasuredSet:
-    """Stitches a set every way, and measures all against the truth; colours over the pixels that all of them show and
-    any camera sees: whoever shows less must not gain by it."""
+    """Stitches a set every way, and measures all against the truth: colours over what each shows of what any camera
+    sees (psnr_db, ssim; covered: that share), and over what all of them show (common_psnr_db, common_ssim), for whoever
+    shows less must not gain by it."""
     truth, shared = SetTruth.of(rendered), Shared()
     runs: dict[str, dict[str, Any]] = {}
     panoramas: dict[str, _Shown] = {}
     pictures: dict[str, bytes] = {}
     seconds: dict[str, float] = {}
+    used: list[int] = []
     seen: NDArray[np.bool_] = np.zeros(truth.picture.shape[:2], bool)
     for way in WAYS:
         try:
@@ -75,24 +77,28 @@ def measured_set(rendered: RenderedSet) -> MeasuredSet:
         panoramas[way] = _Shown(*on_the_sphere(found))
         seconds |= {f"{way} {stage}": value for stage, value in result.seconds.items()}
         if way == OURS:
-            seen = truth.views_at(found.numbers) > 0
+            used, seen = found.numbers, truth.views_at(found.numbers) > 0
             pictures["map_error"] = jpeg(_map_error(found, truth)[_part_of(seen)])
             pictures["from_above"] = jpeg(top_view(found))
-    if installed():
+    if installed() and used:
         try:
-            panoramas[HUGIN] = _Shown(*hugin_on_sphere(rendered, truth))
+            panoramas[HUGIN] = _Shown(*hugin_on_sphere(truth, used))
             runs[HUGIN] = _run(used=len(rendered.pictures))
         except StitchError as refusal:
             runs[HUGIN] = _run(refused=str(refusal))
     part = _part_of(seen)
     common = np.logical_and.reduce([seen, *(panorama.where for panorama in panoramas.values())])
     for way, panorama in panoramas.items():
-        figures, exposed = colour_figures(panorama.light, common, truth)
-        covered = float((panorama.where & seen).sum() / max(int(seen.sum()), 1))
-        runs[way]["figures"] |= {**figures, "covered": covered}
+        own = panorama.where & seen
+        figures, exposed = colour_figures(panorama.light, own, truth)
+        beside, _ = colour_figures(panorama.light, common, truth)
+        runs[way]["figures"] |= {
+            **figures, "covered": float(own.sum() / max(int(seen.sum()), 1)),
+            **{f"common_{name}": value for name, value in beside.items()},
+        }  # fmt: skip
         pictures[f"panorama {way}".replace(" ", "_")] = jpeg(np.where(panorama.where[..., None], exposed, 0)[part])
         if way == OURS:
-            apart = np.abs(exposed.astype(int) - truth.picture) * (seen & panorama.where)[..., None]
+            apart = np.abs(exposed.astype(int) - truth.picture) * own[..., None]
             pictures["difference"] = jpeg(np.minimum(4 * apart, 255).astype(np.uint8)[part])
     dim = encode(rendered.light, 8) // 4
     pictures["sphere"] = jpeg(np.where(seen[..., None], truth.picture, dim).astype(np.uint8)[part])

@@ -26,8 +26,8 @@ class SetRecipe:
     """A world and the cameras in it.
 
     world: a function of `sets.worlds`; shoot: makes `count` views by how far from the viewpoint they lie, `spread`
-    (standard deviation, m), and chance; noise: σ of the sensor's, levels of 8 bit; left_out: numbers of the pictures
-    that show another place, and no others; parallax: whether one place cannot explain all pictures.
+    (standard deviation, m), and chance; noise: σ of the sensor's, levels of 8 bit; strays: how many pictures, the
+    last ones, show another place; parallax: whether one place cannot explain all pictures.
     """
 
     name: str
@@ -38,13 +38,18 @@ class SetRecipe:
     spread: float
     seed: int = 0
     noise: float = 1.0
-    left_out: tuple[int, ...] = ()
+    strays: int = 0
     parallax: bool = True
 
     @property
     def views(self) -> tuple[View, ...]:
         """All cameras, the viewpoint's first."""
         return self.shoot(self.count, self.spread, np.random.default_rng(self.seed))
+
+    @property
+    def left_out(self) -> tuple[int, ...]:
+        """Numbers of the pictures that show another place."""
+        return tuple(range(self.count - self.strays, self.count))
 
     def cameras(self, size: tuple[int, int]) -> dict[str, SceneCamera]:
         """The same by name, for pictures of (W, H) px."""
@@ -69,9 +74,55 @@ def fan(step: float, lens: float, pitch: float = 4.0) -> Shoot:
     return shoot
 
 
+def sweep(step: float, lens: float) -> Shoot:
+    """Views that all look ahead, `step` metres apart to the right."""
+
+    def shoot(count: int, spread: float, random: np.random.Generator) -> tuple[View, ...]:
+        first = View((0.0, 0.0, EYE), 0.0, -4.0, 0.0, lens)
+        others = (replace(first, place=(step * k, 0.0, EYE)) for k in range(1, count))
+        return first, *(in_the_hand(view, spread, random) for view in others)
+
+    return shoot
+
+
+def on_a_tripod(step: float, lens: float, in_hand: int = 0) -> Shoot:
+    """A fan from one place. The last `in_hand` views are taken from the hand; if there are none, the last two stand
+    `spread` to the right, as where a tripod does not quite turn about the lens's nodal point."""
+
+    def shoot(count: int, spread: float, random: np.random.Generator) -> tuple[View, ...]:
+        views = list(fan(step, lens)(count, 0.0, random))
+        for number in range(count - in_hand, count):
+            views[number] = in_the_hand(views[number], spread, random)
+        if not in_hand:
+            for number in (count - 2, count - 1):
+                x, y, z = views[number].place
+                views[number] = replace(views[number], place=(x + spread, y, z))
+        return tuple(views)
+
+    return shoot
+
+
+def with_strays(shoot: Shoot, strays: int, lens: float) -> Shoot:
+    """Views of which the last show another place."""
+
+    def with_them(count: int, spread: float, random: np.random.Generator) -> tuple[View, ...]:
+        x, y = ELSEWHERE
+        others = [View((x + 0.3 * k, y, EYE), 12.0 * k, 6.0, 0.0, lens) for k in range(strays)]
+        return *shoot(count - strays, spread, random), *others
+
+    return with_them
+
+
 _SETS = (
     SetRecipe("small_room", "A furnished room, five pictures over half of it", "room", fan(32.0, 24.0), 5, 0.12,
               seed=3),
+    SetRecipe("street_sweep", "A street walked along sideways", "street", sweep(0.9, 26.0), 6, 0.06, seed=5),
+    SetRecipe("tripod", "A room from a tripod, two pictures 2 mm off it", "room", on_a_tripod(26.0, 26.0), 8, 0.002,
+              seed=7, parallax=False),
+    SetRecipe("mixed", "Six pictures from a tripod, four more from the hand", "room", on_a_tripod(24.0, 26.0, 4), 10,
+              0.15, seed=8),
+    SetRecipe("stray", "Nine pictures, two of them of another place", "two_rooms",
+              with_strays(fan(26.0, 26.0), 2, 26.0), 9, 0.12, seed=9, strays=2),
 )  # fmt: skip
 SETS = {recipe.name: recipe for recipe in _SETS}
 

@@ -120,7 +120,7 @@ class Found:
         return self.points + np.array(self.result.warp.canvas.offset, np.float64)
 
 
-def common_rotation(found: Array, true: Sequence[Array]) -> Array:
+def common_rotation(found: Array, true: Sequence[Array] | Array) -> Array:
     """The rotation G (3, 3) for which R_j G of found rotations (N, 3, 3) come nearest to the true ones."""
     return nearest_rotation(np.einsum("nji,njk->ik", found, np.array(true)))
 

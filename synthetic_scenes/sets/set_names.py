@@ -15,6 +15,8 @@ SET_MEASURES = {
     "range_log_sure": ("range, median |ln| of the surer half", "", 4),
     "psnr_db": ("panorama against the true sphere, PSNR", "dB", 2),
     "ssim": ("panorama against the true sphere, SSIM", "", 4),
+    "common_psnr_db": ("the same over what all of these show, PSNR", "dB", 2),
+    "common_ssim": ("the same over what all of these show, SSIM", "", 4),
     "covered": ("share of what is seen that it shows", "", 3),
 }  # fmt: skip
 SET_PROOF_NAMES = {

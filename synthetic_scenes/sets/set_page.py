@@ -9,31 +9,34 @@ from ...core.output.page import table
 from ..limits import Check, Result
 from ..report_page import BAD, GOOD, cell, failures, figure, named, proof_table, slug, unit, warnings_list
 from .set_names import SET_MEASURES, SET_PICTURES
-from .set_thresholds import BARS, OURS, ROTATION_ONLY
+from .set_thresholds import BARS, HUGIN, LEAD, OURS, ROTATION_ONLY
 
 OVERVIEW = (
     "rotation_deg", "rotation_max_deg", "position_max_mm", "focal_percent", "overlap_px", "overlap_p90_px", "alone_px",
-    "range_log", "psnr_db", "ssim",
+    "range_log", "psnr_db", "ssim", "common_psnr_db",
 )  # fmt: skip
+RIVALS = (ROTATION_ONLY, HUGIN)
 
 
 def set_overview(results: Sequence[Result], checks: Sequence[Check]) -> str:
-    """A table of all sets: figures of ours, coloured where they are judged, and the rival's PSNR."""
+    """A table of all sets: figures of ours, coloured where they are judged, and the rivals' PSNR."""
     heads = "".join(f"<th class=n>{escape(SET_MEASURES[name][0])}<br>{SET_MEASURES[name][1]}</th>" for name in OVERVIEW)
+    rivals = "".join(f"<th class=n>{escape(rival)}, the same<br>dB</th>" for rival in RIVALS)
     rows = []
     for result in results:
         mine = [check for check in checks if check.scene == result["scene"]]
         passed = all(check.passed for check in mine)
-        ours, other = (result["runs"].get(way) or {} for way in (OURS, ROTATION_ONLY))
+        ours = result["runs"].get(OURS) or {}
         figures = ours.get("figures") or {}
         judged = {check.measure: check.passed for check in mine if check.run == OURS}
         row = f'<th class="{"good" if passed else "bad"}">{GOOD if passed else BAD} '
         row += f'<a href="#{slug(result)}">{escape(result["scene"])}</a></th>'
         row += f"<td class=n>{ours.get('used', 0)} of {result['count']}</td>"
         row += "".join(cell(figures.get(name), name, judged.get(name)) for name in OVERVIEW)
-        row += cell((other.get("figures") or {}).get("psnr_db"), "psnr_db", None)
+        for rival in RIVALS:
+            row += cell(((result["runs"].get(rival) or {}).get("figures") or {}).get(LEAD), LEAD, None)
         rows.append(f"<tr>{row}</tr>")
-    head = f"<tr><th>set</th><th class=n>pictures</th>{heads}<th class=n>PSNR as if from one place<br>dB</th></tr>"
+    head = f"<tr><th>set</th><th class=n>pictures</th>{heads}{rivals}</tr>"
     return table(head, rows)
 
 

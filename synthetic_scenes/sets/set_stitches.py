@@ -15,8 +15,8 @@ from ...core.pipeline import StitchResult, Stopwatch, compose
 from ...core.system.progress import STAGES_OF_MANY, Progress
 from ..scene_camera import SceneCamera
 from .rendered_set import RenderedSet
+from .set_thresholds import OURS, ROTATION_ONLY
 
-OURS, ROTATION_ONLY = "ours", "rotation only"
 WAYS = (OURS, ROTATION_ONLY)
 # The whole sphere from the first picture's place, with all that the defaults do: the truth is known there.
 ON_SPHERE = StitchOptions(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..stage import Colour, Place, Stage
+from ..stage import Colour, Stage
 from ..worlds import BRICK, MORTAR, MOSS, SAND, SKY, STONE
 from .recipes import ELSEWHERE
 
@@ -92,30 +92,6 @@ def street(stage: Stage) -> None:
         stage.ball((*tree, 3.3), 0.85, stage.stone(MOSS, 7))
 
 
-def posts(stage: Stage) -> None:
-    """A room with near, thin things all along its middle: posts, railings, leaves."""
-    room(stage)
-    iron = stage.stone(((0.03, 0.035, 0.04), (0.07, 0.08, 0.09)), 5)
-    pale = stage.stone(((0.45, 0.44, 0.4), (0.62, 0.6, 0.56)), 5)
-    for k in range(7):
-        a = math.radians(-66 + 22 * k)
-        x, y = 1.7 * math.sin(a), 1.7 * math.cos(a)
-        stage.post((x, y, 0), (x, y, 2.2), 0.02 + 0.012 * (k % 3), (iron, pale)[k % 2], 16)
-    for height in (0.6, 1.1):
-        stage.post((-1.4, 1.9, height), (1.2, 1.9, height), 0.022, iron, 12)
-    for k in range(11):
-        x = -1.4 + 0.26 * k
-        stage.post((x, 1.9, 0.6), (x, 1.9, 1.1), 0.013, iron, 12)
-    leaves: list[Place] = []
-    for _ in range(60):
-        x, y, z = (stage.random.uniform(*span) for span in ((-1.9, 1.9), (1.5, 2.2), (1.6, 2.4)))
-        a, size = stage.random.uniform(0, math.pi), stage.random.uniform(0.04, 0.08)
-        along, across = (size * math.cos(a), size * math.sin(a)), (-0.4 * size * math.sin(a), 0.4 * size * math.cos(a))
-        leaves += [(x + i * along[0] + j * across[0], y + 0.2 * i * size, z + i * along[1] + j * across[1])
-                   for i, j in ((-1, 0), (0, -1), (1, 0), (0, 1))]  # fmt: skip
-    stage.mesh(leaves, [range(4 * k, 4 * k + 4) for k in range(len(leaves) // 4)], stage.stone(MOSS[1:], 9))
-
-
 def two_rooms(stage: Stage) -> None:
     """A room, and far from it another one that no camera of the first sees: a hedge, a sandy ground, a pale sky."""
     room(stage)
@@ -128,26 +104,6 @@ def two_rooms(stage: Stage) -> None:
         stage.ball((*at, size), size, stage.stone(SKY, 6 / size))
 
 
-def outdoor(stage: Stage) -> None:
-    """Ground with few things on it, far hills, and a sky 400 m away with few features."""
-    stage.card((0, 0, 0), 160, 160, stage.stone((*SAND, MOSS[1]), 1.2), tilt=90)
-    stage.ball((0, 0, 0), 400.0, stage.stone(SKY, 0.02, 0.5))
-    hills = stage.stone((*MOSS, STONE[1]), 0.25)
-    for k in range(16):
-        a = math.radians(22.5 * k + stage.random.uniform(-8, 8))
-        away, size = stage.random.uniform(60, 78), stage.random.uniform(9, 19)
-        stage.ball((away * math.sin(a), away * math.cos(a), -0.3 * size), size, hills)
-    for k in range(22):
-        a, away = math.radians(17 * k + stage.random.uniform(-6, 6)), stage.random.uniform(4, 22)
-        at, size = (away * math.sin(a), away * math.cos(a)), stage.random.uniform(0.3, 0.8)
-        if k % 3:
-            paint = stage.poster(4) if k % 2 else stage.stone(STONE, 5)
-            stage.box((*at, size), (size, size, 2 * size), paint, yaw=31.0 * k)
-        else:
-            stage.post((*at, 0), (*at, 2.4), 0.1, stage.wood(*OAK))
-            stage.ball((*at, 3.0), 1.1, stage.stone(MOSS, 6))
-
-
 SET_WORLDS: dict[str, Callable[[Stage], None]] = {
-    build.__name__: build for build in (room, street, posts, two_rooms, outdoor)
+    build.__name__: build for build in (room, street, two_rooms)
 }

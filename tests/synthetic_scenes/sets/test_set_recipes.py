@@ -35,6 +35,21 @@ def test_a_set_is_made_harder() -> None:
     assert places.std(axis=0) == pytest.approx([0.5, 0.5, 1 / 3], rel=0.3)
 
 
+def test_pictures_of_another_place_stand_far_from_all_others_however_many_there_are() -> None:
+    for text, expected in (("stray", (7, 8)), ("stray:n=5", (3, 4))):
+        recipe = parse_set(text)
+        away = [np.linalg.norm(camera.place[:2]) > 20 for camera in recipe.cameras(SIZE).values()]
+        assert recipe.left_out == expected == tuple(np.flatnonzero(away))
+    assert parse_set("small_room").left_out == ()
+
+
+def test_on_a_tripod_all_are_at_one_place_but_those_that_are_meant_to_be_off() -> None:
+    away = [float(np.linalg.norm(np.array(view.place) - [0, 0, EYE])) for view in SETS["tripod"].views]
+    assert max(away[:-2]) == 0 and away[-2:] == pytest.approx([0.002, 0.002])
+    away = [float(np.linalg.norm(np.array(view.place) - [0, 0, EYE])) for view in SETS["mixed"].views]
+    assert max(away[:-4]) == 0 and min(away[-4:]) > 0.03, "four are taken from the hand"
+
+
 @pytest.mark.parametrize("text", ["smal_room", *(f"small_room:{setting}" for setting in (
     "n=2", "n=61", "n=3.5", "spread=-1", "turn=2", "spread=x", "noise=nan"))])  # fmt: skip
 def test_what_is_no_set_is_refused(text: str) -> None:
