@@ -73,32 +73,37 @@ def polish_best(
     if not stations or problem.held.any():  # given poses say themselves what is at one place
         return _placed_and_polished(problem, start, same, framed, tick)
     turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
-    candidates = [turned, _placed_and_polished(problem, start, same, framed, tick)]
+    most = information_criterion(turned)
+    candidates = [turned, _placed_and_polished(problem, start, same, framed, tick, most=most)]
     if _little_parallax(turned):
         begun = replace(start, R=turned.solution.R, lens=turned.solution.lens)
-        candidates.append(_placed_and_polished(problem, begun, same, framed, tick))
+        candidates.append(_placed_and_polished(problem, begun, same, framed, tick, most=most))
     if not any(len(station) == problem.pictures for station in stations):
         assigned = problem.with_stations(stations)
         apart = min(candidates[1:], key=lambda found: found.cost)
-        candidates.append(_placed_and_polished(assigned, start, same, framed, tick, _joined(assigned, apart.solution)))
+        known = _joined(assigned, apart.solution)
+        candidates.append(_placed_and_polished(assigned, start, same, framed, tick, known, most))
     return min(candidates, key=information_criterion)
 
 
 def _placed_and_polished(
     problem: Problem, start: Solution, same: Sequence[SamePlace], framed: Callable[[Array], Array], tick: Tick,
-    known: Solution | None = None,
+    known: Solution | None = None, most: float = np.inf,
 ) -> Polished:  # fmt: skip
     """Places and bundle in turn, as long as the bundle's rotations give other places than it ends with, and a lower
     cost from there: averaged rotations can be degrees off, and so are places by them. It begins with what is known
-    already where that costs less than the first places."""
+    already where that costs less than the first places, and ends where its parameters alone count for more than `most`:
+    no bundle of them would be taken."""
     begun = replace(start, centres=framed(place_pictures(problem, start, same).centres))
     if known is not None:
         begun = min((begun, known), key=lambda one: cost_of_start(problem, one))
     best = polish(problem, begun, tick)
     for _ in range(JUDGE.most_anew):
         solution = best.solution
+        if problem.held.any() or _of_parameters(best) > most:
+            break
         centres = place_pictures(problem, solution, same).centres
-        if problem.held.any() or _apart(centres, solution.centres) < JUDGE.astray:
+        if _apart(centres, solution.centres) < JUDGE.astray:
             break
         again = polish(problem, replace(solution, centres=centres), tick)
         if again.cost >= best.cost:
@@ -134,11 +139,15 @@ def information_criterion(found: Polished) -> float:
 
     A point that is seen from one place only has no depth: that is most of what a station saves.
     """
-    problem = found.problem
-    tracks = problem.tracks
+    noise = max(found.problem.noise_px, JUDGE.least_noise_px * found.problem.scale)
+    return float(found.cost / (2 * noise**2)) + _of_parameters(found)
+
+
+def _of_parameters(found: Polished) -> float:
+    """The part of the criterion that parameters count for."""
+    problem, tracks = found.problem, found.problem.tracks
     places = len(np.unique(problem.place)) - 1
     place = problem.place[tracks.picture]
     several = np.maximum.reduceat(place, tracks.starts) > np.minimum.reduceat(place, tracks.starts)
     depths = 0 if found.one_place else int((several & found.solution.solved).sum())
-    noise = max(problem.noise_px, JUDGE.least_noise_px * problem.scale)
-    return float(found.cost / (2 * noise**2) + (3 * places + depths) * np.log(len(tracks.point)) / 2)
+    return float((3 * places + depths) * np.log(len(tracks.point)) / 2)
