@@ -74,6 +74,11 @@ def fan(step: float, lens: float, pitch: float = 4.0) -> Shoot:
     return shoot
 
 
+def ring(lens: float) -> Shoot:
+    """Views all around, whose ends meet."""
+    return lambda count, spread, random: fan(360 / count, lens)(count, spread, random)
+
+
 def sweep(step: float, lens: float) -> Shoot:
     """Views that all look ahead, `step` metres apart to the right."""
 
@@ -116,6 +121,8 @@ def with_strays(shoot: Shoot, strays: int, lens: float) -> Shoot:
 _SETS = (
     SetRecipe("small_room", "A furnished room, five pictures over half of it", "room", fan(32.0, 24.0), 5, 0.12,
               seed=3),
+    SetRecipe("ring", "A furnished room all around, eleven pictures whose ends meet", "room", ring(24.0), 11, 0.15,
+              seed=4),
     SetRecipe("street_sweep", "A street walked along sideways", "street", sweep(0.9, 26.0), 6, 0.06, seed=5),
     SetRecipe("tripod", "A room from a tripod, two pictures 2 mm off it", "room", on_a_tripod(26.0, 26.0), 8, 0.002,
               seed=7, parallax=False),

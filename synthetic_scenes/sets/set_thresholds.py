@@ -52,6 +52,16 @@ BARS: dict[str, tuple[Bar, ...]] = {
         Bar("range_log", "", 0.0066, at_most=0.009),
         Bar("psnr_db", "dB", 29.4, at_least=28.4),
     ),
+    "ring": (
+        Bar("rotation_max_deg", "°", 0.311, at_most=0.4),  # the aim is 0.3
+        Bar("position_max_mm", "mm", 17.0, at_most=20.0),
+        Bar("focal_percent", "%", 0.136, at_most=0.18, absolute=True),
+        Bar("overlap_px", "px", 1.28, at_most=1.66),  # the aim is 0.5
+        Bar("overlap_p90_px", "px", 2.78, at_most=3.0),
+        Bar("alone_px", "px", 1.74, at_most=2.26),
+        Bar("range_log", "", 0.0168, at_most=0.0218),
+        Bar("psnr_db", "dB", 29.6, at_least=28.6),
+    ),
     "tripod": (
         Bar("rotation_deg", "°", 0.019, at_most=0.03),
         Bar("rotation_max_deg", "°", 0.037, at_most=0.05),

@@ -50,6 +50,13 @@ def test_on_a_tripod_all_are_at_one_place_but_those_that_are_meant_to_be_off() -
     assert max(away[:-4]) == 0 and min(away[-4:]) > 0.03, "four are taken from the hand"
 
 
+@pytest.mark.parametrize("name", ["ring"])
+def test_the_ends_of_a_ring_meet(name: str) -> None:
+    ahead = np.array([camera.R[2] for camera in SETS[name].cameras(SIZE).values()])
+    turns = np.sort(np.degrees(np.arctan2(ahead[:, 0], ahead[:, 1])))
+    assert np.diff(turns, append=turns[0] + 360).max() < 45
+
+
 @pytest.mark.parametrize("text", ["smal_room", *(f"small_room:{setting}" for setting in (
     "n=2", "n=61", "n=3.5", "spread=-1", "turn=2", "spread=x", "noise=nan"))])  # fmt: skip
 def test_what_is_no_set_is_refused(text: str) -> None:
