@@ -123,6 +123,8 @@ _SETS = (
               seed=3),
     SetRecipe("ring", "A furnished room all around, eleven pictures whose ends meet", "room", ring(24.0), 11, 0.15,
               seed=4),
+    SetRecipe("posts", "Near, thin posts, a railing and leaves before the walls of a room", "posts", fan(24.0, 26.0),
+              6, 0.1, seed=6),
     SetRecipe("street_sweep", "A street walked along sideways", "street", sweep(0.9, 26.0), 6, 0.06, seed=5),
     SetRecipe("tripod", "A room from a tripod, two pictures 2 mm off it", "room", on_a_tripod(26.0, 26.0), 8, 0.002,
               seed=7, parallax=False),

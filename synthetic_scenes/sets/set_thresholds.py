@@ -62,6 +62,16 @@ BARS: dict[str, tuple[Bar, ...]] = {
         Bar("range_log", "", 0.0168, at_most=0.0218),
         Bar("psnr_db", "dB", 29.6, at_least=28.6),
     ),
+    "posts": (
+        Bar("rotation_max_deg", "°", 0.182, at_most=0.24),
+        Bar("position_max_mm", "mm", 9.1, at_most=11.8),
+        Bar("focal_percent", "%", 0.253, at_most=0.33, absolute=True),
+        Bar("overlap_px", "px", 1.94, at_most=2.5),
+        Bar("overlap_p90_px", "px", 10.9, at_most=14.2),
+        Bar("alone_px", "px", 3.54, at_most=4.6),
+        Bar("range_log", "", 0.0356, at_most=0.046),
+        Bar("psnr_db", "dB", 22.1, at_least=21.1),
+    ),
     "tripod": (
         Bar("rotation_deg", "°", 0.019, at_most=0.03),
         Bar("rotation_max_deg", "°", 0.037, at_most=0.05),

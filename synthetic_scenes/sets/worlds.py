@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..stage import Colour, Stage
+from ..stage import Colour, Place, Stage
 from ..worlds import BRICK, MORTAR, MOSS, SAND, SKY, STONE
 from .recipes import ELSEWHERE
 
@@ -68,6 +68,30 @@ def _table(stage: Stage, x: float, y: float) -> None:
     stage.ball((x + 0.35, y - 0.1, 0.91), 0.15, stage.stone(BRICK, 9))
 
 
+def posts(stage: Stage) -> None:
+    """A room with near, thin things all along its middle: posts, railings, leaves."""
+    room(stage)
+    iron = stage.stone(((0.03, 0.035, 0.04), (0.07, 0.08, 0.09)), 5)
+    pale = stage.stone(((0.45, 0.44, 0.4), (0.62, 0.6, 0.56)), 5)
+    for k in range(7):
+        a = math.radians(-66 + 22 * k)
+        x, y = 1.7 * math.sin(a), 1.7 * math.cos(a)
+        stage.post((x, y, 0), (x, y, 2.2), 0.02 + 0.012 * (k % 3), (iron, pale)[k % 2], 16)
+    for height in (0.6, 1.1):
+        stage.post((-1.4, 1.9, height), (1.2, 1.9, height), 0.022, iron, 12)
+    for k in range(11):
+        x = -1.4 + 0.26 * k
+        stage.post((x, 1.9, 0.6), (x, 1.9, 1.1), 0.013, iron, 12)
+    leaves: list[Place] = []
+    for _ in range(60):
+        x, y, z = (stage.random.uniform(*span) for span in ((-1.9, 1.9), (1.5, 2.2), (1.6, 2.4)))
+        a, size = stage.random.uniform(0, math.pi), stage.random.uniform(0.04, 0.08)
+        along, across = (size * math.cos(a), size * math.sin(a)), (-0.4 * size * math.sin(a), 0.4 * size * math.cos(a))
+        leaves += [(x + i * along[0] + j * across[0], y + 0.2 * i * size, z + i * along[1] + j * across[1])
+                   for i, j in ((-1, 0), (0, -1), (1, 0), (0, 1))]  # fmt: skip
+    stage.mesh(leaves, [range(4 * k, 4 * k + 4) for k in range(len(leaves) // 4)], stage.stone(MOSS[1:], 9))
+
+
 def street(stage: Stage) -> None:
     """Fronts with balconies to be walked along, things parked and trees before them."""
     stage.card((2.5, 6, 0), 60, 40, stage.stone(((0.08, 0.08, 0.09), (0.28, 0.28, 0.29)), 4.0), tilt=90)
@@ -105,5 +129,5 @@ def two_rooms(stage: Stage) -> None:
 
 
 SET_WORLDS: dict[str, Callable[[Stage], None]] = {
-    build.__name__: build for build in (room, street, two_rooms)
+    build.__name__: build for build in (room, posts, street, two_rooms)
 }
