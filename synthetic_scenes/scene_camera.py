@@ -11,12 +11,16 @@ if TYPE_CHECKING:  # Blender renders with these, and has no OpenCV
 
 @dataclass(frozen=True)
 class SceneCamera:
-    """K (3, 3) px, R, t: a world point X is seen at K (R X + t); size (W, H) px; pixel centres are integers."""
+    """K (3, 3) px, R, t: a world point X is seen at K (R X + t); size (W, H) px; pixel centres are integers.
+
+    k1: radial distortion of its lens (`sets.bent_lens`); none of pairs.
+    """
 
     K: Array
     R: Array
     t: Array
     size: tuple[int, int]
+    k1: float = 0.0
 
     @property
     def place(self) -> Array:
@@ -24,7 +28,7 @@ class SceneCamera:
         return -self.R.T @ self.t
 
     def widened(self, left: int, top: int, width: int, height: int) -> SceneCamera:
-        """The same camera with a larger sensor whose first pixel lies at (left, top) of this one's picture."""
+        """The same with an ideal lens and a larger sensor, whose first pixel lies at (left, top) of this picture."""
         K = self.K.copy()
         K[:2, 2] -= (left, top)
         return SceneCamera(K, self.R, self.t, (width, height))

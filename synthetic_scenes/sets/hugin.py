@@ -18,6 +18,7 @@ from ...core.raster.arrays import Array
 from ...core.raster.colour import decode
 from ...core.system.errors import StitchError
 from ..recipes import View
+from ..scene_camera import SceneCamera
 from .set_measures import SetTruth, colour_figures, common_rotation, sampled
 from .set_stitches import told_lens
 from .sphere_camera import SphereCamera
@@ -47,11 +48,10 @@ def hugin_on_sphere(truth: SetTruth, numbers: Sequence[int]) -> tuple[NDArray[np
     size = rendered.sphere.size
     with tempfile.TemporaryDirectory(prefix="edf-hugin-") as temporary:
         folder = Path(temporary)
-        first = rendered.cameras[0]
-        width = first.size[0]
-        view = 2 * math.degrees(math.atan(width / 2 / told_lens(first)))
         pictures = [str(path.absolute()) for path in rendered.pictures]
-        _run(folder, "pto_gen", "-o", "a.pto", "-f", f"{view:.3f}", *pictures)
+        _run(folder, "pto_gen", "-o", "a.pto", "-f", "50", *pictures)
+        told = with_lenses((folder / "a.pto").read_text("utf-8"), rendered.cameras)
+        (folder / "a.pto").write_text(told, "utf-8")
         _run(folder, "cpfind", "--multirow", "-o", "b.pto", "a.pto")
         _run(folder, "autooptimiser", "-a", "-m", "-o", "c.pto", "b.pto")
         _run(folder, "pano_modify", "--projection=2", "--fov=360x180", f"--canvas={size[0]}x{size[1]}",
@@ -71,6 +71,16 @@ def hugin_on_sphere(truth: SetTruth, numbers: Sequence[int]) -> tuple[NDArray[np
 
     shown = [turned(chosen) for chosen in (list(numbers), *([number] for number in numbers))]
     return max(shown, key=lambda one: colour_figures(one[0], one[1] & seen, truth)[0]["psnr_db"])
+
+
+def with_lenses(project: str, cameras: Sequence[SceneCamera]) -> str:
+    """A project file whose pictures have the fields of view that cameras tell, but those tied to another's."""
+    lines, number = project.split("\n"), 0
+    for k, line in enumerate(lines):
+        if line.startswith("i "):
+            view = 2 * math.degrees(math.atan(cameras[number].size[0] / 2 / told_lens(cameras[number])))
+            lines[k], number = re.sub(r" v[\d.]+", f" v{view:.3f}", line), number + 1
+    return "\n".join(lines)
 
 
 def rotations_of(project: str) -> Array:

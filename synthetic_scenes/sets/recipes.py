@@ -56,6 +56,21 @@ class SetRecipe:
         return {f"{number:02d}": view.camera(size) for number, view in enumerate(self.views)}
 
 
+@dataclass(frozen=True)
+class Body(View):
+    """A view through a body of its own: the sides of its pictures as a share of all others', upright or not, and the
+    radial distortion of its lens."""
+
+    share: float = 1.0
+    portrait: bool = False
+    k1: float = 0.0
+
+    def camera(self, size: tuple[int, int]) -> SceneCamera:
+        """As a camera, where others have pictures of (W, H) px."""
+        width, height = (round(self.share * side) for side in size)
+        return replace(super().camera((height, width) if self.portrait else (width, height)), k1=self.k1)
+
+
 def in_the_hand(view: View, spread: float, random: np.random.Generator) -> View:
     """A view as a hand holds it: off its place by `spread` (two thirds of it in height), and turned by 2 to 3°."""
     x, y, z = (np.array(view.place) + random.normal(0, [spread, spread, spread * 2 / 3])).tolist()
@@ -68,8 +83,23 @@ def fan(step: float, lens: float, pitch: float = 4.0) -> Shoot:
 
     def shoot(count: int, spread: float, random: np.random.Generator) -> tuple[View, ...]:
         first = View((0.0, 0.0, EYE), 0.0, pitch, 0.0, lens)
-        turns = (step * ((k + 1) // 2) * (1 if k % 2 else -1) for k in range(1, count))
-        return first, *(in_the_hand(replace(first, yaw=yaw), spread, random) for yaw in turns)
+        return first, *(in_the_hand(replace(first, yaw=step * aside(k)), spread, random) for k in range(1, count))
+
+    return shoot
+
+
+def aside(number: int) -> int:
+    """How many steps to the right a picture is turned, by its number: 0, 1, -1, 2, -2, …"""
+    return (number + 1) // 2 * (1 if number % 2 else -1)
+
+
+def wide_and_tele(step: float, wide: Body, tele: Body) -> Shoot:
+    """Views side by side, `step` degrees apart, through two bodies in turn: the first in the middle is wide."""
+
+    def shoot(count: int, spread: float, random: np.random.Generator) -> tuple[View, ...]:
+        bodies = (tele if aside(k) % 2 else wide for k in range(1, count))
+        turned = (replace(body, yaw=step * aside(k)) for k, body in enumerate(bodies, start=1))
+        return wide, *(in_the_hand(view, spread, random) for view in turned)
 
     return shoot
 
@@ -125,6 +155,9 @@ _SETS = (
               seed=4),
     SetRecipe("posts", "Near, thin posts, a railing and leaves before the walls of a room", "posts", fan(24.0, 26.0),
               6, 0.1, seed=6),
+    SetRecipe("two_lenses", "A bent wide lens and a tele held upright, seven pictures in turn", "room",
+              wide_and_tele(24.0, Body(pitch=4.0, lens=20.0, k1=-0.08),
+                            Body(pitch=4.0, lens=40.0, share=0.8, portrait=True)), 7, 0.1, seed=12),
     SetRecipe("street_sweep", "A street walked along sideways", "street", sweep(0.9, 26.0), 6, 0.06, seed=5),
     SetRecipe("tripod", "A room from a tripod, two pictures 2 mm off it", "room", on_a_tripod(26.0, 26.0), 8, 0.002,
               seed=7, parallax=False),

@@ -19,6 +19,7 @@ from ..blender_process import run_job
 from ..passes import read_passes
 from ..rendered import blenders_camera, expose, npy_bytes
 from ..scene_camera import SceneCamera
+from .bent_lens import bent_camera, ideal_camera, through_lens
 from .recipes import SetRecipe
 from .set_proof import SphereProof
 from .sphere_camera import SphereCamera
@@ -28,8 +29,9 @@ SAMPLES = 16
 SPHERE_WIDTH = 2.5
 # Whatever decides about pixels: a change in one of these files makes every kept set a stranger.
 SOURCES = (
-    "render_set.py", "worlds.py", "sphere_camera.py", "rendered_set.py", "set_proof.py", "../camera_render.py",
-    "../stage.py", "../passes.py", "../proof.py", "../rendered.py", "../../core/cameras/blender_camera.py",
+    "render_set.py", "worlds.py", "sphere_camera.py", "bent_lens.py", "rendered_set.py", "set_proof.py",
+    "../camera_render.py", "../stage.py", "../passes.py", "../proof.py", "../rendered.py",
+    "../../core/cameras/blender_camera.py",
 )  # fmt: skip
 
 
@@ -59,28 +61,30 @@ def rendered_set(recipe: SetRecipe, size: tuple[int, int], folder: Path) -> Rend
     """
     cameras = recipe.cameras(size)
     first = next(iter(cameras.values()))
+    rendered = {name: ideal_camera(camera)[0] for name, camera in cameras.items()}
     job = {
         "world": recipe.world, "seed": recipe.seed, "samples": SAMPLES,
         "views": {name: {"K": c.K.tolist(), "R": c.R.tolist(), "t": c.t.tolist(), "size": list(c.size)}
-                  for name, c in cameras.items()},
+                  for name, c in rendered.items()},
         "sphere": {"place": first.place.tolist(), "width": 2 * round(SPHERE_WIDTH * max(size) / 2)},
     }  # fmt: skip
-    place = folder / f"{recipe.name}-{_key(job, recipe)}"
+    place = folder / f"{recipe.name}-{_key(job, recipe, cameras)}"
     if not (place / "cameras.json").is_file():
         with tempfile.TemporaryDirectory(prefix="edf-render-") as temporary:
             run_job(job, Path(temporary))
-            _keep(Path(temporary), place, recipe)
+            _keep(Path(temporary), place, recipe, cameras)
     return _load(place)
 
 
-def _key(job: dict[str, Any], recipe: SetRecipe) -> str:
-    content = hashlib.sha256(json.dumps([job, recipe.seed, recipe.noise], sort_keys=True).encode())
+def _key(job: dict[str, Any], recipe: SetRecipe, cameras: dict[str, SceneCamera]) -> str:
+    bends = [camera.k1 for camera in cameras.values()]
+    content = hashlib.sha256(json.dumps([job, recipe.seed, recipe.noise, bends], sort_keys=True).encode())
     for name in SOURCES:
         content.update((Path(__file__).parent / name).read_bytes())
     return content.hexdigest()[:16]
 
 
-def _keep(rendered: Path, place: Path, recipe: SetRecipe) -> None:
+def _keep(rendered: Path, place: Path, recipe: SetRecipe, cameras: dict[str, SceneCamera]) -> None:
     """Proves what was rendered, makes the pictures of it, and puts all in place; cameras.json last, as the seal."""
     entries = json.loads((rendered / "cameras.json").read_text("utf-8"))
     sphere, passes = _sphere_of(entries["sphere"]), read_passes(rendered / "sphere.exr")
@@ -90,14 +94,27 @@ def _keep(rendered: Path, place: Path, recipe: SetRecipe) -> None:
         for name, entry in entries["views"].items():  # one at a time: many pictures' passes are large
             seen = read_passes(rendered / f"{name}.exr")
             proof.add(seen, blenders_camera(entry), np.array(entry.pop("rays")))
-            taken = expose(seen.light, (1.0, 1.0, 1.0), recipe.noise, False, random)
+            corner = ideal_camera(cameras[name])[1]
+            entry["picture"] = {"corner": corner, "size": cameras[name].size, "k1": cameras[name].k1}
+            camera = _camera_of(entry)
+            light, depth = through_lens(seen, camera, corner)
+            if camera.k1:
+                proof.add_bent(light, depth, camera)
+            taken = expose(light, (1.0, 1.0, 1.0), recipe.noise, False, random)
             data, _ = encode_picture(picture_from_array(taken).pixels, None, 8, ".png")
             files.add_to_folder(place, f"{name}.png", data)
-            files.add_to_folder(place, f"{name}_depth.npy", npy_bytes(seen.depth))
+            files.add_to_folder(place, f"{name}_depth.npy", npy_bytes(depth))
         files.add_to_folder(place, "sphere.exr", encode_picture(passes.light, None, 32, ".exr")[0])
         files.add_to_folder(place, "sphere_distance.npy", npy_bytes(proof.distance))
         entries["proof"] = proof.figures()
         files.add_to_folder(place, "cameras.json", json.dumps(entries, indent=1).encode())
+
+
+def _camera_of(entry: dict[str, Any]) -> SceneCamera:
+    """The camera of a picture: Blender's, through the picture's own lens."""
+    picture = entry["picture"]
+    (left, top), (width, height) = picture["corner"], picture["size"]
+    return bent_camera(blenders_camera(entry), (left, top), (width, height), picture["k1"])
 
 
 def _sphere_of(entry: dict[str, Any]) -> SphereCamera:
@@ -110,7 +127,7 @@ def _load(place: Path) -> RenderedSet:
     names = list(entries["views"])
     return RenderedSet(
         tuple(place / f"{name}.png" for name in names),
-        tuple(blenders_camera(entries["views"][name]) for name in names),
+        tuple(_camera_of(entries["views"][name]) for name in names),
         tuple(np.load(place / f"{name}_depth.npy") for name in names),
         _sphere_of(entries["sphere"]), load_picture(place / "sphere.exr").pixels,
         np.load(place / "sphere_distance.npy"), entries["proof"], entries["blender"],

@@ -152,12 +152,13 @@ def pose_figures(found: Found) -> dict[str, float]:
     placed, _ = found.places
     off = 1000 * np.linalg.norm(placed - [camera.place for camera in found.cameras], axis=1)
     focals = [ours.focal / true.K[0, 0] - 1 for ours, true in zip(found.rig.cameras, found.cameras, strict=True)]
+    bends = [float(ours.distortion[0]) - true.k1 for ours, true in zip(found.rig.cameras, found.cameras, strict=True)]
     tied = sum(len(station) - 1 for station in found.rig.stations)
     return {
         "rotation_deg": float(np.median(angles)), "rotation_max_deg": max(angles),
         "position_mm": float(np.median(off)), "position_max_mm": float(off.max()),
         "focal_percent": 100 * max(focals, key=abs),
-        "k1_error": max((float(ours.distortion[0]) for ours in found.rig.cameras), key=abs),
+        "k1_error": max(bends, key=abs),
         "places": float(len(found.rig) - tied) if found.rig.t.any() else 1.0,
     }  # fmt: skip
 

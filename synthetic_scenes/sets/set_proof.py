@@ -45,15 +45,18 @@ class SphereProof:
         """Proves the next camera; rays: [x, y, depth] that were cast through its pixels."""
         number = len(self._cameras)
         self._cameras.append(prove_camera(passes, camera, rays))
-        pixels, depth = seen_by(camera, self.sphere, self.directions, self.distance)
-        shown = visible(pixels, depth, passes.depth)
-        smooth = self._smooth & flat_there(pixels, passes.depth)
+        pixels, shown, smooth = self._seen(camera, passes.depth)
         x, y = self.rays[:, 0].astype(int), self.rays[:, 1].astype(int)
         asked = smooth[y, x]
         free = self.rays[:, 3 + number] >= ALL_THE_WAY
         self._asked += int(asked.sum())
         self._wrong += int((shown[y, x] != free)[asked].sum())
-        self._compare(passes.light, pixels, eroded(shown & smooth, 1))  # what is averaged lies in the picture
+        self._compare(passes.light, pixels, shown & smooth)
+
+    def add_bent(self, light: NDArray[np.float32], depth: NDArray[np.float32], camera: SceneCamera) -> None:
+        """Proves the picture that a lens with distortion makes of the last camera's."""
+        pixels, shown, smooth = self._seen(camera, depth)
+        self._compare(light, pixels, shown & smooth)
 
     def figures(self) -> dict[str, float]:
         """How far the truth is from the renders it is made of.
@@ -79,7 +82,15 @@ class SphereProof:
             "half_pixel_loss_db": min((a - b for a, b in zip(self._right, self._off, strict=True)), default=0.0),
         }  # fmt: skip
 
+    def _seen(
+        self, camera: SceneCamera, depths: NDArray[np.float32]
+    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Where (H, W, 2) a camera sees what the sphere shows, what of it it sees, and what is smooth in both."""
+        pixels, there = seen_by(camera, self.sphere, self.directions, self.distance)
+        return pixels, visible(pixels, there, depths), self._smooth & flat_there(pixels, depths)
+
     def _compare(self, light: NDArray[np.float32], pixels: Array, where: NDArray[np.bool_]) -> None:
+        where = eroded(where, 1)  # what is averaged lies in the picture
         if not where.any():
             return
         true = encode(self.passes.light, 8)

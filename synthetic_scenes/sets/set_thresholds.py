@@ -72,6 +72,17 @@ BARS: dict[str, tuple[Bar, ...]] = {
         Bar("range_log", "", 0.0356, at_most=0.046),
         Bar("psnr_db", "dB", 22.1, at_least=21.1),
     ),
+    "two_lenses": (
+        Bar("rotation_max_deg", "°", 0.128, at_most=0.17),
+        Bar("position_max_mm", "mm", 11.2, at_most=14.6),
+        Bar("focal_percent", "%", 0.201, at_most=0.26, absolute=True),
+        Bar("k1_error", "", 0.0018, at_most=0.0024, absolute=True),
+        Bar("overlap_px", "px", 0.74, at_most=0.96),
+        Bar("overlap_p90_px", "px", 2.74, at_most=3.0),
+        Bar("alone_px", "px", 1.34, at_most=1.74),
+        Bar("range_log", "", 0.058, at_most=0.075),
+        Bar("psnr_db", "dB", 28.7, at_least=27.7),
+    ),
     "tripod": (
         Bar("rotation_deg", "°", 0.019, at_most=0.03),
         Bar("rotation_max_deg", "°", 0.037, at_most=0.05),

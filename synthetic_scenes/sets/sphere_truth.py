@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ...core.cameras.projective import project
 from ...core.raster.arrays import Array
 from ..scene_camera import SceneCamera
+from .bent_lens import bent
 from .sphere_camera import SphereCamera
 
 
@@ -21,7 +22,7 @@ def seen_by(camera: SceneCamera, sphere: SphereCamera, directions: Array, distan
         depth = scaled[..., 2] / inverse
     seen = scaled @ camera.K.T
     seen[seen[..., 2] <= 0] = np.nan
-    return project(seen), depth
+    return bent(project(seen), camera), depth
 
 
 def in_frame(pixels: Array, camera: SceneCamera) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.projective import rotation_angle
 from edf_stitch.synthetic_scenes.recipes import View
-from edf_stitch.synthetic_scenes.sets.hugin import HuginFailed, rotations_of
+from edf_stitch.synthetic_scenes.sets.hugin import HuginFailed, rotations_of, with_lenses
 from edf_stitch.synthetic_scenes.sets.set_stitches import equivalent_mm, told_lens
 
 # Of a set whose true views these are, as it wrote them (shortened).
@@ -24,6 +24,16 @@ def test_angles_of_a_project_are_views() -> None:
         assert rotation_angle(R, view.camera((640, 480)).R) < 1e-6
     with pytest.raises(HuginFailed, match="no r"):
         rotations_of("i w640 h480 y3 p4")
+
+
+def test_each_lens_is_told_its_own_field_of_view() -> None:
+    wide, tele = (View(lens=lens).camera((640, 480)) for lens in (24.0, 48.0))
+    project = PROJECT + PROJECT.split("\n")[1] + "\n"
+    project = project.replace("\ni w640 h480 f0 v73.41", "\ni w640 h480 f0 v50", 1)
+    lines = with_lenses(project, (wide, wide, tele)).split("\n")
+    first, second, third = (line.split(" v")[1].split()[0] for line in lines if line.startswith("i "))
+    assert second == "=0", "as the first"
+    assert [float(first), float(third)] == pytest.approx([73.7, 41.1], abs=1.5)
 
 
 def test_a_camera_tells_its_focal_length_in_whole_millimetres() -> None:

@@ -111,6 +111,9 @@ def test_poses_are_judged_after_the_common_turn_and_similarity(truth: SetTruth) 
     result = perfect(truth)
     result.rig.cameras = tuple(replace(camera, K=camera.scaled(1.02)) for camera in result.rig.cameras)
     assert pose_figures(Found.of(result, truth))["focal_percent"] == pytest.approx(2.0)
+    bent = [replace(camera, k1=-0.08) for camera in truth.rendered.cameras]
+    known = Found.of(result, replace(truth, rendered=replace(truth.rendered, cameras=tuple(bent))))
+    assert pose_figures(known)["k1_error"] == pytest.approx(0.08), "it was not found"
     result.rig.t = np.zeros((3, 3))
     assert pose_figures(Found.of(result, truth))["places"] == 1
 

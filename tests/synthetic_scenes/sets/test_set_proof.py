@@ -11,6 +11,7 @@ import pytest
 from edf_stitch.core.cameras.projective import rotation_from_vector
 from edf_stitch.synthetic_scenes.recipes import View
 from edf_stitch.synthetic_scenes.scene_camera import SceneCamera
+from edf_stitch.synthetic_scenes.sets.bent_lens import ideal_camera, through_lens
 from edf_stitch.synthetic_scenes.sets.set_proof import SphereProof
 from edf_stitch.synthetic_scenes.sets.set_thresholds import PROOF
 from edf_stitch.synthetic_scenes.sets.sphere_camera import SphereCamera
@@ -43,6 +44,25 @@ def missed(parts: dict[str, Any]) -> set[str]:
 
 def test_the_truth_is_proved() -> None:
     assert missed(made()) == set()
+
+
+def bent_missed(told: float) -> set[str]:
+    """Which limits are missed where a lens with k1 = -0.08 is said to have another."""
+    parts = made()
+    camera = replace(parts["cameras"][1], k1=-0.08)
+    ideal, corner = ideal_camera(camera)
+    seen = camera_passes(ideal)
+    proof = SphereProof(parts["sphere"], parts["passes"], parts["rays"][:, [0, 1, 2, 4]])
+    proof.add(seen, ideal, camera_rays(ideal))
+    proof.add_bent(*through_lens(seen, camera, corner), replace(camera, k1=told))
+    figures = proof.figures()
+    return {limit.measure for limit in PROOF if not limit.holds(figures[limit.measure])}
+
+
+def test_a_bent_picture_is_proved_and_one_without_its_distortion_fails() -> None:
+    assert bent_missed(-0.08) == set()
+    for told in (0.0, 0.08):
+        assert "sphere_psnr_db" in bent_missed(told), told
 
 
 def turned(camera: SceneCamera, degrees: float) -> SceneCamera:

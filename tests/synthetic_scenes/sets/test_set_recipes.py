@@ -57,6 +57,14 @@ def test_the_ends_of_a_ring_meet(name: str) -> None:
     assert np.diff(turns, append=turns[0] + 360).max() < 45
 
 
+def test_two_lenses_differ_in_size_orientation_and_distortion() -> None:
+    cameras = list(SETS["two_lenses"].cameras(SIZE).values())
+    wide, tele = [0, 3, 4], [1, 2, 5, 6]
+    assert {(cameras[k].size, cameras[k].k1) for k in wide} == {((640, 480), -0.08)}
+    assert {(cameras[k].size, cameras[k].k1) for k in tele} == {((384, 512), 0.0)}
+    assert cameras[1].K[0, 0] / 512 == pytest.approx(2 * cameras[0].K[0, 0] / 640)
+
+
 @pytest.mark.parametrize("text", ["smal_room", *(f"small_room:{setting}" for setting in (
     "n=2", "n=61", "n=3.5", "spread=-1", "turn=2", "spread=x", "noise=nan"))])  # fmt: skip
 def test_what_is_no_set_is_refused(text: str) -> None:
