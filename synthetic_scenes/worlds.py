@@ -210,17 +210,21 @@ def cut_branch(stage: Stage) -> None:
     stage.thing(1, *parts)
 
 
-def cut_person(stage: Stage) -> None:
-    two_planes(stage)
+def person(stage: Stage, x: float, y: float) -> list[Any]:
+    """The parts of somebody who stands at a place, 1.74 m high."""
     cloth, trousers = stage.poster(6), stage.stone(STONE, 9)
     skin = stage.stone(((0.35, 0.2, 0.14), (0.6, 0.4, 0.3)), 5)
-    x, y = -0.62, 3.9
     parts = [stage.ball((x, y, 1.62), 0.12, skin), stage.box((x, y, 1.2), (0.44, 0.24, 0.6), cloth, yaw=10)]
     for side in (-1, 1):
         parts.append(stage.post((x + 0.12 * side, y, 0), (x + 0.1 * side, y, 0.92), 0.085, trousers))
         parts.append(stage.post((x + 0.34 * side, y, 0.8), (x + 0.26 * side, y, 1.46), 0.055, cloth))
     parts.append(stage.post((x, y, 1.45), (x, y, 1.55), 0.06, skin))
-    stage.thing(1, *parts)
+    return parts
+
+
+def cut_person(stage: Stage) -> None:
+    two_planes(stage)
+    stage.thing(1, *person(stage, -0.62, 3.9))
 
 
 WORLDS: dict[str, Callable[[Stage], None]] = {

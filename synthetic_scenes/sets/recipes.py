@@ -161,6 +161,8 @@ _SETS = (
     SetRecipe("street_sweep", "A street walked along sideways", "street", sweep(0.9, 26.0), 6, 0.06, seed=5),
     SetRecipe("tripod", "A room from a tripod, two pictures 2 mm off it", "room", on_a_tripod(26.0, 26.0), 8, 0.002,
               seed=7, parallax=False),
+    SetRecipe("mover", "A room that somebody walks through in four of eight pictures", "walked_through",
+              fan(22.0, 26.0), 8, 0.1, seed=13),
     SetRecipe("mixed", "Six pictures from a tripod, four more from the hand", "room", on_a_tripod(24.0, 26.0, 4), 10,
               0.15, seed=8),
     SetRecipe("stray", "Nine pictures, two of them of another place", "two_rooms",

@@ -26,16 +26,20 @@ RAYS = 1500
 def render_set(job: dict[str, Any], folder: Path) -> None:
     """Into the folder go a multilayer EXR for each camera, sphere.exr, and cameras.json, last: the cameras as Blender
     had them, rays cast through them, and what rays from the viewpoint hit and which cameras see that."""
-    SET_WORLDS[job["world"]](Stage(job["seed"]))
+    pose = SET_WORLDS[job["world"]](Stage(job["seed"])) or (lambda number: None)
     prepare(job["samples"])
     cameras = {name: camera_of(entry) for name, entry in job["views"].items()}
-    entries: dict[str, Any] = {"views": {}}
-    for number, (name, camera) in enumerate(cameras.items()):
-        entries["views"][name] = render_through(camera, folder / f"{name}.exr", number)
     width = job["sphere"]["width"]
     sphere = SphereCamera(np.array(job["sphere"]["place"]), (width, width // 2))
-    entries["sphere"] = _render_sphere(sphere, folder / "sphere.exr", len(cameras))
-    entries["sphere"]["rays"] = _cast(sphere, [camera.place for camera in cameras.values()])
+    pose(None)
+    entries: dict[str, Any] = {"sphere": _render_sphere(sphere, folder / "sphere.exr", len(cameras)), "views": {}}
+    hits = _cast(sphere)
+    for number, (name, camera) in enumerate(cameras.items()):
+        pose(number)
+        entries["views"][name] = render_through(camera, folder / f"{name}.exr", number)
+        for hit, free in zip(hits, _free(camera.place, sphere, hits), strict=True):
+            hit.append(free)
+    entries["sphere"]["rays"] = hits
     entries["blender"] = bpy.app.version_string
     (folder / "cameras.json").write_text(json.dumps(entries), "utf-8")
 
@@ -62,9 +66,8 @@ def _render_sphere(sphere: SphereCamera, path: Path, number: int) -> dict[str, A
     return {"place": list(made.matrix_world.translation), "size": list(sphere.size)}
 
 
-def _cast(sphere: SphereCamera, places: list[Any]) -> list[list[float]]:
-    """[x, y, range, share of the way to it that is free from each place, …] for pixels spread evenly over the sphere;
-    rays that hit nothing are left out."""
+def _cast(sphere: SphereCamera) -> list[list[float]]:
+    """[x, y, range] of pixels spread evenly over the sphere; rays that hit nothing are left out."""
     scene, graph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
     random = np.random.default_rng(0)
     up = random.uniform(-1, 1, RAYS)
@@ -75,14 +78,18 @@ def _cast(sphere: SphereCamera, places: list[Any]) -> list[list[float]]:
     for row, direction in zip(np.column_stack([x, y]).tolist(), sphere.directions(x, y), strict=True):
         hit, point, *_ = scene.ray_cast(graph, Vector(sphere.place), Vector(direction))
         if hit:
-            away = float(np.linalg.norm(np.array(point) - sphere.place))
-            out.append([*row, away, *(_free(graph, place, np.array(point)) for place in places)])
+            out.append([*row, float(np.linalg.norm(np.array(point) - sphere.place))])
     return out
 
 
-def _free(graph: Any, place: Any, point: Any) -> float:
-    """Share of the way from a place to a point that a ray gets; 1 where nothing is before it."""
-    way = point - place
-    length = float(np.linalg.norm(way))
-    hit, first, *_ = bpy.context.scene.ray_cast(graph, Vector(place), Vector(way / length))
-    return min(1.0, float(np.linalg.norm(np.array(first) - place)) / length) if hit else 1.0
+def _free(place: Any, sphere: SphereCamera, hits: list[list[float]]) -> list[float]:
+    """Share of the way from a place to what each ray from the sphere's hit that a ray gets; 1 where nothing is before
+    it."""
+    scene, graph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
+    x, y, away = np.array(hits).T[:3]
+    out = []
+    for way in sphere.place + away[:, None] * sphere.directions(x, y) - place:
+        length = float(np.linalg.norm(way))
+        hit, first, *_ = scene.ray_cast(graph, Vector(place), Vector(way / length))
+        out.append(min(1.0, float(np.linalg.norm(np.array(first) - place)) / length) if hit else 1.0)
+    return out

@@ -30,7 +30,7 @@ SPHERE_WIDTH = 2.5
 # Whatever decides about pixels: a change in one of these files makes every kept set a stranger.
 SOURCES = (
     "render_set.py", "worlds.py", "sphere_camera.py", "bent_lens.py", "rendered_set.py", "set_proof.py",
-    "../camera_render.py", "../stage.py", "../passes.py", "../proof.py", "../rendered.py",
+    "../camera_render.py", "../stage.py", "../worlds.py", "../passes.py", "../proof.py", "../rendered.py",
     "../../core/cameras/blender_camera.py",
 )  # fmt: skip
 

@@ -83,6 +83,16 @@ BARS: dict[str, tuple[Bar, ...]] = {
         Bar("range_log", "", 0.058, at_most=0.075),
         Bar("psnr_db", "dB", 28.7, at_least=27.7),
     ),
+    "mover": (
+        Bar("rotation_max_deg", "°", 0.212, at_most=0.276),
+        Bar("position_max_mm", "mm", 20.5, at_most=26.7),
+        Bar("focal_percent", "%", -0.231, at_most=0.3, absolute=True),
+        Bar("overlap_px", "px", 1.12, at_most=1.46),
+        Bar("overlap_p90_px", "px", 2.04, at_most=2.65),
+        Bar("alone_px", "px", 1.63, at_most=2.1),
+        Bar("range_log", "", 0.0113, at_most=0.0147),
+        Bar("psnr_db", "dB", 23.9, at_least=22.9),
+    ),
     "tripod": (
         Bar("rotation_deg", "°", 0.019, at_most=0.03),
         Bar("rotation_max_deg", "°", 0.037, at_most=0.05),

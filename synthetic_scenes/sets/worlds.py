@@ -6,13 +6,17 @@ import math
 from collections.abc import Callable
 
 from ..stage import Colour, Place, Stage
-from ..worlds import BRICK, MORTAR, MOSS, SAND, SKY, STONE
+from ..worlds import BRICK, MORTAR, MOSS, SAND, SKY, STONE, person
 from .recipes import ELSEWHERE
 
 OAK: tuple[Colour, Colour] = ((0.16, 0.08, 0.03), (0.48, 0.3, 0.14))
 BLUE: tuple[Colour, Colour] = ((0.2, 0.25, 0.35), (0.12, 0.15, 0.25))
 # x and y of a room's walls, and how high it is, m.
 ROOM = (-3.2, 3.6, -3.0, 4.0, 2.8)
+# Where (x, y), m, somebody is while pictures are taken, by their numbers.
+WALK = {2: (-0.45, 2.05), 1: (0.25, 2.0), 3: (1.05, 1.75), 5: (1.6, 0.9)}
+# Sets up what moves as it is while a picture is taken, by its number; None: without what moves, as the sphere shows it.
+Pose = Callable[[int | None], None]
 
 
 def room(stage: Stage) -> None:
@@ -116,6 +120,21 @@ def street(stage: Stage) -> None:
         stage.ball((*tree, 3.3), 0.85, stage.stone(MOSS, 7))
 
 
+def walked_through(stage: Stage) -> Pose:
+    """A room that somebody walks through while the second, third, fourth and sixth picture are taken."""
+    room(stage)
+    parts = person(stage, 0.0, 0.0)
+    stood = [tuple(part.location) for part in parts]
+
+    def pose(number: int | None) -> None:
+        # between pictures the floor hides them
+        x, y, z = (*WALK[number], 0.0) if number in WALK else (0.0, 0.0, -20.0)
+        for part, (at_x, at_y, at_z) in zip(parts, stood, strict=True):
+            part.location = at_x + x, at_y + y, at_z + z
+
+    return pose
+
+
 def two_rooms(stage: Stage) -> None:
     """A room, and far from it another one that no camera of the first sees: a hedge, a sandy ground, a pale sky."""
     room(stage)
@@ -128,6 +147,6 @@ def two_rooms(stage: Stage) -> None:
         stage.ball((*at, size), size, stage.stone(SKY, 6 / size))
 
 
-SET_WORLDS: dict[str, Callable[[Stage], None]] = {
-    build.__name__: build for build in (room, posts, street, two_rooms)
+SET_WORLDS: dict[str, Callable[[Stage], Pose | None]] = {
+    build.__name__: build for build in (room, posts, street, walked_through, two_rooms)
 }

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.raster.colour import encode
+from edf_stitch.synthetic_scenes.ground_truth import visible
 from edf_stitch.synthetic_scenes.sets import rendered_set as module
 from edf_stitch.synthetic_scenes.sets.recipes import SETS
 from edf_stitch.synthetic_scenes.sets.rendered_set import RenderedSet, rendered_set
 from edf_stitch.synthetic_scenes.sets.set_thresholds import PROOF
+from edf_stitch.synthetic_scenes.sets.sphere_truth import in_frame, seen_by
 
 RECIPE, SIZE = replace(SETS["small_room"], count=3, noise=0.0), (240, 180)
 
@@ -48,6 +50,22 @@ def test_the_sphere_shows_what_the_first_camera_sees_ahead(room: RenderedSet) ->
     picture = load_picture(room.pictures[0]).view.astype(float)
     middle = encode(room.light[y[0] - 3 : y[0] + 4, x[0] - 3 : x[0] + 4], 8).mean(axis=(0, 1))
     assert np.abs(middle - picture[55:66, 75:86].mean(axis=(0, 1))).max() < 12
+
+
+def test_who_walks_through_is_in_a_picture_and_not_on_the_sphere(rendered_folder: Path) -> None:
+    recipe = replace(SETS["mover"], count=3, noise=0.0)
+    rendered = rendered_set(recipe, SIZE, rendered_folder)
+    limits = [limit for limit in PROOF if limit.unit != "dB"]
+    assert all(limit.holds(rendered.proof[limit.measure]) for limit in limits), rendered.proof
+    # of what the first sees, what the second has somebody before
+    hidden = []
+    for number in (1, 2):
+        pixels, there = seen_by(rendered.cameras[number], rendered.sphere, rendered.sphere.all_directions(),
+                                rendered.distance)  # fmt: skip
+        nearer = in_frame(pixels, rendered.cameras[number]) & ~visible(pixels, there, rendered.depths[number])
+        columns = np.flatnonzero(nearer.sum(axis=0) > 40)
+        hidden.append(np.median(columns) / rendered.sphere.size[0] * 360 - 180)
+    assert hidden == pytest.approx([7, -12], abs=5), "at two places"
 
 
 def test_a_set_is_rendered_once_and_again_when_anything_about_it_changes(
