@@ -109,6 +109,18 @@ def ring(lens: float) -> Shoot:
     return lambda count, spread, random: fan(360 / count, lens)(count, spread, random)
 
 
+def chain(step: float, link: float, lens: float) -> Shoot:
+    """Views one after the other to the right, `step` degrees apart but for two in between, which are `link` apart."""
+
+    def shoot(count: int, spread: float, random: np.random.Generator) -> tuple[View, ...]:
+        first = View((0.0, 0.0, EYE), 0.0, 4.0, 0.0, lens)
+        far = (count // 3, count - count // 3)
+        turns = np.cumsum([link if k in far else step for k in range(1, count)]).tolist()
+        return first, *(in_the_hand(replace(first, yaw=yaw), spread, random) for yaw in turns)
+
+    return shoot
+
+
 def sweep(step: float, lens: float) -> Shoot:
     """Views that all look ahead, `step` metres apart to the right."""
 
@@ -155,6 +167,8 @@ _SETS = (
               seed=4),
     SetRecipe("posts", "Near, thin posts, a railing and leaves before the walls of a room", "posts", fan(24.0, 26.0),
               6, 0.1, seed=6),
+    SetRecipe("chain", "Nine pictures in a row, two of whose links no third picture sees", "room",
+              chain(27.0, 48.0, 28.0), 9, 0.12, seed=18),
     SetRecipe("two_lenses", "A bent wide lens and a tele held upright, seven pictures in turn", "room",
               wide_and_tele(24.0, Body(pitch=4.0, lens=20.0, k1=-0.08),
                             Body(pitch=4.0, lens=40.0, share=0.8, portrait=True)), 7, 0.1, seed=12),

@@ -147,7 +147,7 @@ def onto(points: Array, true: Array) -> tuple[Array, float]:
 def pose_figures(found: Found) -> dict[str, float]:
     """rotation_deg, rotation_max_deg (after the common turn that fits best: median, max); position_mm, position_max_mm
     (after the similarity that fits best); focal_percent, k1_error (worst); places: at how many the pictures are said to
-    be."""
+    be; guessed_lengths: how many pairs are said to have a baseline whose length no third picture tells."""
     angles = [rotation_angle(R @ found.gauge, camera.R) for R, camera in zip(found.rig.R, found.cameras, strict=True)]
     placed, _ = found.places
     off = 1000 * np.linalg.norm(placed - [camera.place for camera in found.cameras], axis=1)
@@ -160,6 +160,7 @@ def pose_figures(found: Found) -> dict[str, float]:
         "focal_percent": 100 * max(focals, key=abs),
         "k1_error": max(bends, key=abs),
         "places": float(len(found.rig) - tied) if found.rig.t.any() else 1.0,
+        "guessed_lengths": float(sum(edge.baseline == "continuity" for edge in found.rig.edges)),
     }  # fmt: skip
 
 

@@ -5,6 +5,7 @@ SET_MEASURES = {
     "position_mm": ("position, median", "mm", 1), "position_max_mm": ("position, worst", "mm", 1),
     "focal_percent": ("focal length, worst", "%", 2), "k1_error": ("k1, worst", "", 4),
     "places": ("places that pictures are at", "", 0),
+    "guessed_lengths": ("pairs whose distance is said to be guessed", "", 0),
     "overlap_px": ("map, what several see, median", "px", 2),
     "overlap_p90_px": ("map, what several see, 90th", "px", 2),
     "alone_px": ("map, what one sees, median", "px", 2), "alone_p90_px": ("map, what one sees, 90th", "px", 2),

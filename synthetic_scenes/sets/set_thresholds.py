@@ -72,6 +72,17 @@ BARS: dict[str, tuple[Bar, ...]] = {
         Bar("range_log", "", 0.0356, at_most=0.046),
         Bar("psnr_db", "dB", 22.1, at_least=21.1),
     ),
+    "chain": (
+        Bar("guessed_lengths", "", 2.0, at_most=2.0, at_least=2.0),
+        Bar("rotation_max_deg", "°", 1.115, at_most=1.45),
+        Bar("position_max_mm", "mm", 57.5, at_most=74.8),
+        Bar("focal_percent", "%", 0.247, at_most=0.32, absolute=True),
+        Bar("overlap_px", "px", 9.55, at_most=12.4),
+        Bar("overlap_p90_px", "px", 14.3, at_most=18.6),
+        Bar("alone_px", "px", 11.07, at_most=14.4),
+        Bar("range_log", "", 0.180, at_most=0.235),
+        Bar("psnr_db", "dB", 20.5, at_least=19.5),
+    ),
     "two_lenses": (
         Bar("rotation_max_deg", "°", 0.128, at_most=0.17),
         Bar("position_max_mm", "mm", 11.2, at_most=14.6),

@@ -64,7 +64,7 @@ def perfect(truth: SetTruth, unit: float = 0.5, numbers: tuple[int, ...] = (0, 1
     t = np.array([camera.R @ place + camera.t for camera in cameras]) / unit
     known = tuple(Camera(camera.K, camera.size, "", 0.0) for camera in cameras)
     centres = -np.einsum("nji,nj->ni", R, t)
-    parts = dict(R=R, t=t, centres=centres, cameras=known, stations=())
+    parts = dict(R=R, t=t, centres=centres, cameras=known, stations=(), edges=())
     rig = type("Rig", (), {**parts, "__len__": lambda _: len(numbers)})()
     deviation = np.where(np.arange(width) < width // 2, 0.01, 0.02)[None].repeat(height, axis=0)
     canvas = SimpleNamespace(projection=projection, offset=(-left, -top))
@@ -116,6 +116,8 @@ def test_poses_are_judged_after_the_common_turn_and_similarity(truth: SetTruth) 
     assert pose_figures(known)["k1_error"] == pytest.approx(0.08), "it was not found"
     result.rig.t = np.zeros((3, 3))
     assert pose_figures(Found.of(result, truth))["places"] == 1
+    result.rig.edges = tuple(SimpleNamespace(baseline=known) for known in ("measured", "continuity", "none"))
+    assert pose_figures(Found.of(result, truth))["guessed_lengths"] == 1
 
 
 def test_maps_are_judged_where_several_one_or_no_camera_sees(truth: SetTruth) -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.synthetic_scenes.recipes import EYE
 from edf_stitch.synthetic_scenes.sets.recipes import SETS, parse_set
+from edf_stitch.synthetic_scenes.sets.sphere_camera import SphereCamera
+from edf_stitch.synthetic_scenes.sets.sphere_truth import in_frame, seen_by
 
 SIZE = (640, 480)
 
@@ -55,6 +59,19 @@ def test_the_ends_of_a_ring_meet(name: str) -> None:
     ahead = np.array([camera.R[2] for camera in SETS[name].cameras(SIZE).values()])
     turns = np.sort(np.degrees(np.arctan2(ahead[:, 0], ahead[:, 1])))
     assert np.diff(turns, append=turns[0] + 360).max() < 45
+
+
+def test_no_third_picture_sees_what_two_links_of_the_chain_have_in_common() -> None:
+    sphere = SphereCamera(np.array([0, 0, EYE]), (720, 360))
+    for away in (1.4, 4.0):  # all that the room holds lies between
+        distance = np.full((360, 720), away)
+        seen = [in_frame(seen_by(camera, sphere, sphere.all_directions(), distance)[0], camera)
+                for camera in SETS["chain"].cameras(SIZE).values()]  # fmt: skip
+        pairs = [first & second for first, second in pairwise(seen)]
+        thirds = [(pair & (np.sum(seen, axis=0) > 2)).sum() / pair.sum() for pair in pairs]
+        assert [k for k, share in enumerate(thirds) if not share] == [2, 5] and min(thirds[:2] + thirds[3:5]) > 0.05
+        assert min(pair.mean() for pair in pairs) > 0.01, "but each two of them see something"
+        assert not (seen[0] & seen[-1]).any(), "its ends do not meet"
 
 
 def test_two_lenses_differ_in_size_orientation_and_distortion() -> None:
