@@ -306,7 +306,9 @@ def _many_mapped(
     """The second half of `align` for the pictures of a rig."""
     progress("field", 0.0)
     slack = options.field == "slack"
-    field = Cache(options.cache).remember("sphere", (rig, slack), lambda: fit_sphere_field(rig, slack))
+    field = Cache(options.cache).remember(
+        "sphere", (rig, slack), lambda: fit_sphere_field(rig, slack, lambda: progress("field", 0.0))
+    )
     progress("warp", 0.0)
     mapped = map_rig(rig, field, frame.pictures, options, progress)
     warnings = (*geometry.warnings, *field.warnings)

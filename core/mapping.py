@@ -38,7 +38,7 @@ from .panorama.viewpoint import Viewpoint, viewpoint_between
 from .panorama.warp import Warp, build_warp
 from .raster.arrays import Array
 from .system.cache import Cache
-from .system.progress import ReportProgress
+from .system.progress import ReportProgress, Tick, unwatched
 
 if TYPE_CHECKING:
     from .pictures.picture import Picture
@@ -56,19 +56,22 @@ class Mapped:
 
 @dataclass(frozen=True, eq=False)
 class AllEdges:
-    """Straight edges (N) of each picture whose orientation is known, in the reference's frame, found when asked for."""
+    """Straight edges (N) of each picture whose orientation is known, in the reference's frame, found when asked for;
+    tick is called before each picture."""
 
     pictures: Sequence[Picture]
     views: Sequence[View]
+    tick: Tick = unwatched
 
     @cached_property
     def each(self) -> list[StraightEdges]:
         """The edges of each such picture."""
-        return [
-            straight_edges(picture, view.camera, view.K).in_reference(view.R)
-            for picture, view in zip(self.pictures, self.views, strict=True)
-            if np.isfinite(view.R).all()
-        ]
+        found = []
+        for picture, view in zip(self.pictures, self.views, strict=True):
+            if np.isfinite(view.R).all():
+                self.tick()
+                found.append(straight_edges(picture, view.camera, view.K).in_reference(view.R))
+        return found
 
     @cached_property
     def together(self) -> tuple[Array, Array]:
@@ -182,14 +185,14 @@ def map_rig(
     surface = RigSurface.of(field, views)
     if options.surface[0] == "reference":
         still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
-        return Mapped(build_rig_warp(surface), None, still)
-    lines = AllEdges(pictures, views)
+        return Mapped(build_rig_warp(surface, tick=lambda: progress("warp", 0.5)), None, still)
+    lines = AllEdges(pictures, views, lambda: progress("warp", 0.0))
     slide, viewpoint = _rig_slide(surface, lines, options, lambda share: progress("warp", 0.3 * share))
     surface = surface.seen_from(viewpoint)
     progress("warp", 0.3)
-    frame = _frame(lines, options, lambda projection: build_rig_warp(surface, projection))
-    progress("warp", 0.5)
-    return Mapped(build_rig_warp(surface, frame), None, slide)
+    frame = _frame(lines, options, lambda one: build_rig_warp(surface, one, lambda: progress("warp", 0.3)))
+    progress("warp", 0.4)
+    return Mapped(build_rig_warp(surface, frame, lambda: progress("warp", 0.4)), None, slide)
 
 
 def _rig_slide(

@@ -16,6 +16,7 @@ from ..cameras.rig import Rig
 from ..raster.arrays import Array
 from ..raster.robust import sigma_of
 from ..system.errors import DegenerateGeometry
+from ..system.progress import Tick, unwatched
 from .sphere_options import SPHERE
 from .sphere_points import SpherePoints, angular_unit, points_of, px_scale, seen_at
 from .sphere_slack import SphereSlack, fit_sphere_slack
@@ -114,7 +115,7 @@ class Nearby:
         return out.reshape(rays.shape[:-1])
 
 
-def fit_sphere_field(rig: Rig, with_slack: bool = True) -> SphereField:
+def fit_sphere_field(rig: Rig, with_slack: bool = True, tick: Tick = unwatched) -> SphereField:
     """Fit inverse range to the points of a rig, and to each picture what its own points leave.
 
     Parameters
@@ -122,6 +123,8 @@ def fit_sphere_field(rig: Rig, with_slack: bool = True) -> SphereField:
     rig : Rig
     with_slack : bool
         Whether pictures may be off their epipolar lines, where their points are.
+    tick : callable
+        Called between steps; ends the work by raising.
 
     Returns
     -------
@@ -134,9 +137,11 @@ def fit_sphere_field(rig: Rig, with_slack: bool = True) -> SphereField:
         Too few points tell a range.
     """
     unit = angular_unit(rig)
-    depth = _fitted(rig, unit) if rig.t.any() else _without_parallax(unit)
-    numbers = range(len(rig))
-    slacks = (fit_sphere_slack(rig, number, depth.at, unit) if with_slack else None for number in numbers)
+    depth = _fitted(rig, unit, tick) if rig.t.any() else _without_parallax(unit)
+    slacks = []
+    for number in range(len(rig)):
+        tick()
+        slacks.append(fit_sphere_slack(rig, number, depth.at, unit) if with_slack else None)
     return SphereField(depth, tuple(slacks))
 
 
@@ -147,7 +152,7 @@ def _without_parallax(unit: float) -> SphereDepth:
     return SphereDepth(nothing, None, 0.0, unit, (0.0, 0.0), sure, np.inf, 0.0, 1.0)
 
 
-def _fitted(rig: Rig, unit: float) -> SphereDepth:
+def _fitted(rig: Rig, unit: float, tick: Tick) -> SphereDepth:
     """d by the points of a rig; unit: radians."""
     points, scale = points_of(rig), px_scale(rig)
     if len(points) < SPHERE.min_centres:
@@ -156,10 +161,12 @@ def _fitted(rig: Rig, unit: float) -> SphereDepth:
             "were taken too close together, or share too little"
         )
     chosen = spread_points(points.rays, points.error_px, SPHERE.max_centres, SPHERE.spacing * unit)
-    points, problem, smoothing = _pruned(points.subset(chosen), unit, scale)
+    points, problem, smoothing = _pruned(points.subset(chosen), unit, scale, tick)
+    tick()
     values = points.inverse_ranges
     inner, residual = solved_on_sphere(problem, values[:, None], smoothing)
     left_out = problem.inverse(smoothing).held_out(values)
+    tick()
     anchors, levels, spreads = _anchors(rig, points, unit)
     rays = np.vstack([points.rays, anchors])
     noise = np.concatenate([points.noise, np.full(len(anchors), _anchor_noise(smoothing))])
@@ -174,12 +181,18 @@ def _fitted(rig: Rig, unit: float) -> SphereDepth:
     )  # fmt: skip
 
 
-def _pruned(points: SpherePoints, unit: float, scale: float) -> tuple[SpherePoints, SmoothingProblem, float]:
+def _pruned(
+    points: SpherePoints, unit: float, scale: float, tick: Tick
+) -> tuple[SpherePoints, SmoothingProblem, float]:
     """Points without gross errors, which a stiff and a flexible spline both miss and no neighbours agree with; and the
     λ that predicts the rest best."""
     problem = problem_on_sphere(points.rays, points.noise, unit)
     protected = _supported(points, scale)
-    fits = [_fitting(points, problem.inverse(one), protected, scale) for one in SPHERE.judging_smoothings]
+    fits = []
+    for smoothing in SPHERE.judging_smoothings:
+        tick()
+        fits.append(_fitting(points, problem.inverse(smoothing), protected, scale))
+    tick()
     keep: NDArray[np.bool_] = np.logical_or.reduce(fits)
     points, problem = points.subset(keep), problem.subset(keep)
     return points, problem, best_smoothing(problem, points.inverse_ranges, points.sensitivity, SPHERE.smoothing_ladder)

@@ -143,13 +143,14 @@ def choose_rig_slide(
     SlideChoice
         Of candidates that cost about as much, the one that slides least.
     """
-    samples = []
+    samples, costs = [], []
     for number, (view, one) in enumerate(zip(views, edges, strict=True)):
-        progress(number / len(views))
+        progress(number / len(views) / 2)
         samples.append(_samples(OwnDepth.of(base, view, number), one, down))
-    return _least(tuple(
-        _cost(s1, _geometry(samples, viewpoint.sliding(s1), down), 0.0, 0.0) for s1 in CHOICE.candidates
-    ))  # fmt: skip
+    for number, s1 in enumerate(CHOICE.candidates):
+        progress(0.5 + number / len(CHOICE.candidates) / 2)
+        costs.append(_cost(s1, _geometry(samples, viewpoint.sliding(s1), down), 0.0, 0.0))
+    return _least(tuple(costs))
 
 
 def _least(costs: tuple[SlideCost, ...]) -> SlideChoice:

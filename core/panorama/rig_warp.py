@@ -20,7 +20,8 @@ from ..field.sphere_field import SphereField
 from ..raster.arrays import Array, Box, bounds, small_strips
 from ..raster.grid import Grid
 from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap, falls_inside
-from ..system.threads import each
+from ..system.progress import Tick, unwatched
+from ..system.threads import in_order
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
 from .depth import AtNodes
 from .projection import Projection
@@ -111,7 +112,7 @@ class RigValues:
         return RigValues(depth, moved, tuple(places), tuple(slacks))
 
 
-def build_rig_warp(surface: RigSurface, projection: Projection | None = None) -> Warp:
+def build_rig_warp(surface: RigSurface, projection: Projection | None = None, tick: Tick = unwatched) -> Warp:
     """Lay out a canvas that holds all pictures, and map them onto it.
 
     Parameters
@@ -120,6 +121,8 @@ def build_rig_warp(surface: RigSurface, projection: Projection | None = None) ->
         Of all pictures, the viewpoint's first.
     projection : Projection, optional
         Of a round panorama; by default the panorama lies in the plane of the viewpoint's picture, pixel for pixel.
+    tick : callable
+        Called between strips; ends the work by raising.
 
     Returns
     -------
@@ -145,10 +148,10 @@ def build_rig_warp(surface: RigSurface, projection: Projection | None = None) ->
         return RigValues.over(surface, plane, grid).places
 
     canvas = bounding_canvas(pictures_at, reference, sizes, reach, projection)
-    return trimmed(build_rig_map(surface, replace(canvas, cropped=canvas.cropped or cropped)))
+    return trimmed(build_rig_map(surface, replace(canvas, cropped=canvas.cropped or cropped), tick))
 
 
-def build_rig_map(surface: RigSurface, canvas: Canvas) -> Warp:
+def build_rig_map(surface: RigSurface, canvas: Canvas, tick: Tick = unwatched) -> Warp:
     """Map all pictures onto a given canvas, strip by strip.
 
     Parameters
@@ -156,6 +159,8 @@ def build_rig_map(surface: RigSurface, canvas: Canvas) -> Warp:
     surface : RigSurface
         Of all pictures, the viewpoint's first.
     canvas : Canvas
+    tick : callable
+        See `build_rig_warp`.
 
     Returns
     -------
@@ -185,7 +190,8 @@ def build_rig_map(surface: RigSurface, canvas: Canvas) -> Warp:
             if isinstance(one, BoxedMap):
                 strip.put(one, view, slack)
 
-    each(put, small_strips(shape))
+    for _ in in_order(put, small_strips(shape)):
+        tick()
     return Warp(
         canvas, tuple(maps), depth, viewpoint=surface.viewpoint, deviation=_deviation(field, views, canvas)
     )

@@ -14,11 +14,10 @@ import numpy as np
 from ...core.system.errors import BadRequest
 from ..recipes import EYE, View
 from ..scene_camera import SceneCamera
+from .places import ELSEWHERE
 
 Shoot = Callable[[int, float, np.random.Generator], tuple[View, ...]]
 MOST_PICTURES = 60
-# x and y of the place that stray pictures show, m.
-ELSEWHERE = (60.0, 0.0)
 
 
 @dataclass(frozen=True)

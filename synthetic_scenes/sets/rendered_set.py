@@ -29,7 +29,7 @@ SAMPLES = 16
 SPHERE_WIDTH = 2.5
 # Whatever decides about pixels: a change in one of these files makes every kept set a stranger.
 SOURCES = (
-    "render_set.py", "worlds.py", "sphere_camera.py", "bent_lens.py", "rendered_set.py", "set_proof.py",
+    "render_set.py", "worlds.py", "places.py", "sphere_camera.py", "bent_lens.py", "rendered_set.py", "set_proof.py",
     "../camera_render.py", "../stage.py", "../worlds.py", "../passes.py", "../proof.py", "../rendered.py",
     "../../core/cameras/blender_camera.py",
 )  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from ..stage import Colour, Place, Stage
 from ..worlds import BRICK, MORTAR, MOSS, SAND, SKY, STONE, person
-from .recipes import ELSEWHERE
+from .places import ELSEWHERE
 
 OAK: tuple[Colour, Colour] = ((0.16, 0.08, 0.03), (0.48, 0.3, 0.14))
 BLUE: tuple[Colour, Colour] = ((0.2, 0.25, 0.35), (0.12, 0.15, 0.25))

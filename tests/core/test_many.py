@@ -242,3 +242,21 @@ def test_it_stops_soon_after_it_is_asked_to(four: PictureSet) -> None:
 
         with pytest.raises(Cancelled):
             stitch(four.pictures[:3], KNOWN, tell, lambda wanted=wanted: stage == wanted)  # type: ignore[misc]  # noqa: B023
+
+
+def test_whether_to_go_on_is_asked_at_every_picture_of_field_and_maps(four: PictureSet) -> None:
+    """Between steps a cancel waits: no step may be as long as all pictures together."""
+    asked: list[str] = []
+    stage = ""
+
+    def tell(name: str, share: float) -> None:
+        nonlocal stage
+        stage = name
+
+    def cancelled() -> bool:
+        asked.append(stage)
+        return False
+
+    stitch(four.pictures, KNOWN, tell, cancelled)
+    # field: two splines, their anchors, and every picture's slack; maps: edges and depth of every picture, each slide
+    assert asked.count("field") > 5 + 4 and asked.count("warp") > 4 + 4 + 5
