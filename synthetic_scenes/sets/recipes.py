@@ -171,6 +171,8 @@ _SETS = (
     SetRecipe("two_lenses", "A bent wide lens and a tele held upright, seven pictures in turn", "room",
               wide_and_tele(24.0, Body(pitch=4.0, lens=20.0, k1=-0.08),
                             Body(pitch=4.0, lens=40.0, share=0.8, portrait=True)), 7, 0.1, seed=12),
+    SetRecipe("outdoor", "Few things on open ground, far hills, a sky without features", "outdoor", ring(24.0), 11,
+              0.2, seed=10),
     SetRecipe("street_sweep", "A street walked along sideways", "street", sweep(0.9, 26.0), 6, 0.06, seed=5),
     SetRecipe("tripod", "A room from a tripod, two pictures 2 mm off it", "room", on_a_tripod(26.0, 26.0), 8, 0.002,
               seed=7, parallax=False),

@@ -104,6 +104,16 @@ BARS: dict[str, tuple[Bar, ...]] = {
         Bar("range_log", "", 0.0113, at_most=0.0147),
         Bar("psnr_db", "dB", 23.9, at_least=22.9),
     ),
+    "outdoor": (
+        Bar("rotation_max_deg", "°", 0.051, at_most=0.066),
+        Bar("position_max_mm", "mm", 4.9, at_most=6.4),
+        Bar("focal_percent", "%", 0.0, at_most=0.05, absolute=True),
+        Bar("overlap_px", "px", 0.35, at_most=0.45),
+        Bar("overlap_p90_px", "px", 3.39, at_most=4.4),
+        Bar("alone_px", "px", 0.69, at_most=0.9),
+        Bar("range_log", "", 0.027, at_most=0.035),
+        Bar("psnr_db", "dB", 36.5, at_least=35.5),
+    ),
     "tripod": (
         Bar("rotation_deg", "°", 0.019, at_most=0.03),
         Bar("rotation_max_deg", "°", 0.037, at_most=0.05),

@@ -147,6 +147,28 @@ def two_rooms(stage: Stage) -> None:
         stage.ball((*at, size), size, stage.stone(SKY, 6 / size))
 
 
+def outdoor(stage: Stage) -> None:
+    """Ground with few things on it, far hills, and a sky 400 m away with few features."""
+    # in small faces: of one as large as all of it Cycles hits what is near a little beside its rays
+    ground = stage.relief(160, 160, lambda x, y: 0.0, stage.stone((*SAND, MOSS[1]), 1.2))
+    ground.rotation_euler = (math.radians(-90), 0.0, 0.0)
+    stage.ball((0, 0, 0), 400.0, stage.stone(SKY, 0.02, 0.5))
+    hills = stage.stone((*MOSS, STONE[1]), 0.25)
+    for k in range(16):
+        a = math.radians(22.5 * k + stage.random.uniform(-8, 8))
+        away, size = stage.random.uniform(60, 78), stage.random.uniform(9, 19)
+        stage.ball((away * math.sin(a), away * math.cos(a), -0.3 * size), size, hills)
+    for k in range(22):
+        a, away = math.radians(17 * k + stage.random.uniform(-6, 6)), stage.random.uniform(4, 22)
+        at, size = (away * math.sin(a), away * math.cos(a)), stage.random.uniform(0.3, 0.8)
+        if k % 3:
+            paint = stage.poster(4) if k % 2 else stage.stone(STONE, 5)
+            stage.box((*at, size), (size, size, 2 * size), paint, yaw=31.0 * k)
+        else:
+            stage.post((*at, 0), (*at, 2.4), 0.1, stage.wood(*OAK))
+            stage.ball((*at, 3.0), 1.1, stage.stone(MOSS, 6))
+
+
 SET_WORLDS: dict[str, Callable[[Stage], Pose | None]] = {
-    build.__name__: build for build in (room, posts, street, walked_through, two_rooms)
+    build.__name__: build for build in (room, posts, street, walked_through, two_rooms, outdoor)
 }

@@ -54,7 +54,7 @@ def test_on_a_tripod_all_are_at_one_place_but_those_that_are_meant_to_be_off() -
     assert max(away[:-4]) == 0 and min(away[-4:]) > 0.03, "four are taken from the hand"
 
 
-@pytest.mark.parametrize("name", ["ring"])
+@pytest.mark.parametrize("name", ["ring", "outdoor"])
 def test_the_ends_of_a_ring_meet(name: str) -> None:
     ahead = np.array([camera.R[2] for camera in SETS[name].cameras(SIZE).values()])
     turns = np.sort(np.degrees(np.arctan2(ahead[:, 0], ahead[:, 1])))
