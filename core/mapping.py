@@ -180,19 +180,26 @@ def map_rig(
     NoOverlap, OutputTooLarge, BadRequest
         There is no canvas for it (see `build_rig_warp`).
     """
-    views = rig.views
-    progress("warp", 0.0)
+    views, done = rig.views, 0.0
+
+    def tell(share: float = 0.0) -> None:
+        """Never less than was told: edges are found when they are first asked for."""
+        nonlocal done
+        done = max(done, share)
+        progress("warp", done)
+
+    tell()
     surface = RigSurface.of(field, views)
     if options.surface[0] == "reference":
         still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
-        return Mapped(build_rig_warp(surface, tick=lambda: progress("warp", 0.5)), None, still)
-    lines = AllEdges(pictures, views, lambda: progress("warp", 0.0))
-    slide, viewpoint = _rig_slide(surface, lines, options, lambda share: progress("warp", 0.3 * share))
+        return Mapped(build_rig_warp(surface, tick=tell), None, still)
+    lines = AllEdges(pictures, views, tell)
+    slide, viewpoint = _rig_slide(surface, lines, options, lambda share: tell(0.3 * share))
     surface = surface.seen_from(viewpoint)
-    progress("warp", 0.3)
-    frame = _frame(lines, options, lambda one: build_rig_warp(surface, one, lambda: progress("warp", 0.3)))
-    progress("warp", 0.4)
-    return Mapped(build_rig_warp(surface, frame, lambda: progress("warp", 0.4)), None, slide)
+    tell(0.3)
+    frame = _frame(lines, options, lambda one: build_rig_warp(surface, one, tell))
+    tell(0.5)
+    return Mapped(build_rig_warp(surface, frame, tell), None, slide)
 
 
 def _rig_slide(
