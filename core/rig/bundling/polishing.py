@@ -44,7 +44,8 @@ def polish(problem: Problem, solution: Solution, tick: Tick) -> Polished:
         solution, kernel, _ = _round(problem, solution, reference, settings, tick)
     solution = _settled(problem, solution, reference, BUNDLE.kernel_px, tick)
     sharp = _settled(problem, solution, reference, kernel, tick)
-    if _uncapped_cost(problem, sharp) < (1 + POLISHING.sharp_loss) * _uncapped_cost(problem, solution):
+    # with what is far off costing the more the farther off it is: that is what a narrow kernel loses of a picture
+    if total_cost(problem, sharp, np.inf) < (1 + POLISHING.sharp_loss) * total_cost(problem, solution, np.inf):
         solution = sharp
     solution = solution.rescaled()
     return Polished(problem, solution, total_cost(problem, solution), _behind(solution), False, depth_prior(solution))
@@ -87,19 +88,15 @@ def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polish
     return Polished(problem, solution, total_cost(problem, solution), 0.0, True, None)
 
 
-def total_cost(problem: Problem, solution: Solution) -> float:
-    """The robust cost, px², of all observations: what is far off costs the same whether its point is solved or not."""
-    kernel = BUNDLE.kernel_px * problem.scale
-    lengths = lengths_of_errors(problem, solution)
-    missed = np.sqrt(JUDGE.missed_kernels) * kernel
-    return float(robust_cost(np.fmin(lengths, missed), kernel).sum())
+def total_cost(problem: Problem, solution: Solution, most_kernels: float = JUDGE.missed_kernels) -> float:
+    """The robust cost, px², of all observations: what is far off costs the same whether its point is solved or not.
 
-
-def _uncapped_cost(problem: Problem, solution: Solution) -> float:
-    """The same with what is far off costing the more the farther off it is: what a narrow kernel loses of a picture."""
+    most_kernels: kernel widths squared beyond which a view costs no more.
+    """
     kernel = BUNDLE.kernel_px * problem.scale
-    missed = np.sqrt(JUDGE.missed_kernels) * kernel
-    return float(robust_cost(np.nan_to_num(lengths_of_errors(problem, solution), nan=missed), kernel).sum())
+    missed, most = (np.sqrt(widths) * kernel for widths in (JUDGE.missed_kernels, most_kernels))
+    lengths = np.nan_to_num(lengths_of_errors(problem, solution), nan=missed)
+    return float(robust_cost(np.minimum(lengths, most), kernel).sum())
 
 
 def cost_of_start(problem: Problem, solution: Solution) -> float:

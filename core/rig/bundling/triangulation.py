@@ -31,20 +31,23 @@ def triangulate(problem: Problem, solution: Solution) -> Solution:
         starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
         seen = bearings(problem, solution)[chosen]
         picture = tracks.picture[chosen]
-        found, depth = _best(solution, picture, point, starts, seen)
+        world = np.einsum("oji,oj->oi", solution.R[picture], seen)
+        found, depth = _best(solution, picture, point, starts, seen, world)
         one = _of_one_place(problem.place[picture], starts)
         if one.any():
             kernel = BUNDLE.kernel_px * problem.scale / lens_of(problem, solution, picture).focal
-            usual = _robust_ray(solution, picture, point, starts, seen, kernel)[one]
+            usual = _robust_ray(world, point, starts, kernel)[one]
             found[one], depth[one] = _at_usual_range(solution.centres[picture[starts[one]]], usual, depth[~one])
         rays[points], inverse_ranges[points] = found, depth
     return replace(solution, rays=rays, inverse_ranges=inverse_ranges, solved=solved)
 
 
-def _best(solution: Solution, picture: Index, point: Index, starts: Index, seen: Array) -> tuple[Array, Array]:
-    """Rays (P, 3) and ρ (P,), by linear least squares or at infinity."""
-    rays, depth = _linear(solution, picture, starts, seen)
-    far = _mean_ray(np.einsum("oji,oj->oi", solution.R[picture], seen), starts)
+def _best(
+    solution: Solution, picture: Index, point: Index, starts: Index, seen: Array, world: Array
+) -> tuple[Array, Array]:
+    """Rays (P, 3) and ρ (P,), by linear least squares or at infinity; world (O, 3): what is seen, in the world."""
+    rays, depth = _linear(solution, picture, starts, world)
+    far = _mean_ray(world, starts)
     worst, worst_far = (
         np.maximum.reduceat(_off(solution, picture, r[point], d[point], seen), starts)
         for r, d in ((rays, depth), (far, np.zeros(len(far))))
@@ -53,9 +56,8 @@ def _best(solution: Solution, picture: Index, point: Index, starts: Index, seen:
     return np.where(at_infinity[:, None], far, rays), np.where(at_infinity, 0.0, depth)
 
 
-def _linear(solution: Solution, picture: Index, starts: Index, seen: Array) -> tuple[Array, Array]:
+def _linear(solution: Solution, picture: Index, starts: Index, world: Array) -> tuple[Array, Array]:
     """The (r, ρ) of least Σ |b × R (r − ρ c)|², turned so that most cameras have it before them."""
-    world = np.einsum("oji,oj->oi", solution.R[picture], seen)
     across = np.eye(3) - world[:, :, None] * world[:, None, :]  # [w]ₓᵀ [w]ₓ
     pulled = -np.einsum("oij,oj->oi", across, solution.centres[picture])
     equations = np.empty((len(picture), 4, 4))
@@ -77,10 +79,9 @@ def _mean_ray(world: Array, starts: Index) -> Array:
     return unit
 
 
-def _robust_ray(solution: Solution, picture: Index, point: Index, starts: Index, seen: Array, kernel: Array) -> Array:
+def _robust_ray(world: Array, point: Index, starts: Index, kernel: Array) -> Array:
     """The same by most of them, with Cauchy weights; kernel (O,), radians. From one place, outliers are all that rays
     differ by."""
-    world = np.einsum("oji,oj->oi", solution.R[picture], seen)
     mean = _mean_ray(world, starts)
     for _ in range(BUNDLE.mean_rounds):
         off = np.linalg.norm(world - mean[point], axis=1)
