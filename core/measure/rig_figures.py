@@ -92,7 +92,8 @@ def shares(labels: NDArray[np.int16] | None, maps: Sequence[CanvasMap], shown: i
 def _known_part(one: CanvasMap) -> tuple[PictureMap, Array]:
     """A map where it is known, and the canvas px (2,) of its first pixel."""
     if isinstance(one, BoxedMap):
-        return one.inner, np.array(one.corner, np.float64)
+        known = one.known()
+        return known.inner, np.array(known.corner, np.float64)
     return one.arrays(), np.zeros(2)
 
 
