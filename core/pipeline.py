@@ -44,7 +44,7 @@ from .raster.arrays import Box, box_of, common, cut
 from .raster.resizing import resized_points
 from .system.errors import BadRequest
 from .system.progress import Progress, stages_of
-from .system.threads import asking
+from .system.threads import ask, asking
 
 
 @dataclass(frozen=True)
@@ -280,6 +280,7 @@ def compose(
 
     def composed_with(painted: NDArray[np.int8] | None) -> tuple[Composition, Box]:
         made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
+        ask()
         own = whole.maps[0].inside()
         shown = made.panorama.alpha > 0
         reference = box_of(own) if own.any() else None
@@ -295,6 +296,7 @@ def compose(
         painted = _on_canvas(painted, whole.canvas, place)
     made, box = composed_with(painted)
     panorama, labels = made.panorama, made.labels
+    ask()
     looks = appearance(panorama, made.exposed, labels, any(floats)) if options.measure else {}
     panorama, canvas = panorama.within(box), whole.canvas.within(box)
     # of a whole sphere, layers and maps exist only where the pictures lie

@@ -26,16 +26,21 @@ _here = threading.local()
 _asking: ContextVar[Tick] = ContextVar("asking", default=unwatched)
 
 
+def ask() -> None:
+    """Ask whether to stop, between steps that take long; see `asking`."""
+    _asking.get()()
+
+
 @contextmanager
 def asking(cancelled: Callable[[], bool] | None) -> Iterator[None]:
-    """Within this, whoever waits for parts of work asks whether to stop, and raises Cancelled without waiting for those
-    that are begun: these end by themselves, and what they make is not wanted."""
+    """Within this, `ask` and whoever waits for parts of work raise Cancelled where asked to stop; parts that are begun
+    are not waited for: these end by themselves, and what they make is not wanted."""
 
-    def ask() -> None:
+    def stop_if_asked() -> None:
         if cancelled is not None and cancelled():
             raise Cancelled()
 
-    before = _asking.set(ask)
+    before = _asking.set(stop_if_asked)
     try:
         yield
     finally:
@@ -63,7 +68,7 @@ def in_order(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[
         is raised when it is its turn; then, or if no more results are asked for, no further part is begun. Cancelled is
         raised as soon as it is asked for (see `asking`).
     """
-    at_once, ask = count(), _asking.get()
+    at_once = count()
     if at_once == 1:
         for part in parts:
             ask()
@@ -74,10 +79,10 @@ def in_order(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[
     try:
         for part in parts:
             if len(begun) == at_once:
-                yield _waited_for(begun.popleft(), ask)
+                yield _waited_for(begun.popleft())
             begun.append(pool.submit(work, part))
         while begun:
-            yield _waited_for(begun.popleft(), ask)
+            yield _waited_for(begun.popleft())
     except (Cancelled, KeyboardInterrupt):
         is_wanted = False
         raise
@@ -85,7 +90,7 @@ def in_order(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[
         pool.shutdown(wait=is_wanted, cancel_futures=True)
 
 
-def _waited_for(begun: Future[Result], ask: Tick) -> Result:
+def _waited_for(begun: Future[Result]) -> Result:
     """What a part gives, asking meanwhile whether to go on."""
     ask()
     while not wait([begun], SYSTEM.ask_seconds).done:
