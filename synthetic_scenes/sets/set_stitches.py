@@ -10,7 +10,7 @@ from ...core.alignment import Geometry, estimate_geometry, fit_and_warp
 from ...core.frames.frame import Frame
 from ...core.frames.reading import read_frame
 from ...core.options import StitchOptions
-from ...core.pictures.picture import load_picture
+from ...core.pictures.picture import Picture, load_picture
 from ...core.pipeline import StitchResult, Stopwatch, compose
 from ...core.system.progress import STAGES_OF_MANY, Progress
 from ..scene_camera import SceneCamera
@@ -38,18 +38,20 @@ def told_lens(camera: SceneCamera) -> float:
     return equivalent_mm(camera) * float(np.hypot(*camera.size)) / FULL_FRAME_MM
 
 
-def stitched(rendered: RenderedSet, way: str, shared: Shared) -> StitchResult:
-    """The set stitched in one of WAYS; shared: features and geometry, kept from way to way. Raises StitchError.
+def told_pictures(rendered: RenderedSet) -> list[Picture]:
+    """Its pictures, which say what most cameras write: their 35 mm equivalent focal length in whole millimetres."""
+    pictures = []
+    for path, camera in zip(rendered.pictures, rendered.cameras, strict=True):
+        picture = load_picture(path)
+        pictures.append(replace(picture, exif=replace(picture.exif, focal35_mm=equivalent_mm(camera))))
+    return pictures
 
-    A picture says what most cameras write: its 35 mm equivalent focal length in whole millimetres.
-    """
+
+def stitched(rendered: RenderedSet, way: str, shared: Shared) -> StitchResult:
+    """The set stitched in one of WAYS; shared: features and geometry, kept from way to way. Raises StitchError."""
     progress = Stopwatch(Progress(stages=STAGES_OF_MANY))
     if not shared:
-        pictures = []
-        for path, camera in zip(rendered.pictures, rendered.cameras, strict=True):
-            picture = load_picture(path)
-            pictures.append(replace(picture, exif=replace(picture.exif, focal35_mm=equivalent_mm(camera))))
-        frame = read_frame(pictures, ON_SPHERE)
+        frame = read_frame(told_pictures(rendered), ON_SPHERE)
         geometry = estimate_geometry([frame], ON_SPHERE, progress)
         shared["read"] = frame.only(geometry.numbers), geometry
     frame, geometry = shared["read"]
