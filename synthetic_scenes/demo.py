@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -125,7 +124,7 @@ def true_panorama(found: Found) -> NDArray[np.float32]:
     # bicubic sampling asks for two pixels to every side, and the sphere goes on behind either end
     around = np.pad(found.truth.rendered.light, ((0, 0), (2, 2), (0, 0)), mode="wrap")
     around = np.pad(around, ((2, 2), (0, 0), (0, 0)), mode="edge")
-    light: NDArray[np.float32] = fetch(around, *(np.float32(at + 2) for at in (x, y)), cv2.INTER_CUBIC)
+    light: NDArray[np.float32] = fetch(around, (x + 2).astype(np.float32), (y + 2).astype(np.float32))
     return np.maximum(light, 0)
 
 

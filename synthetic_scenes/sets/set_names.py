@@ -29,5 +29,6 @@ SET_PICTURES = {
     "sphere": "True sphere (dim: no picture sees it)", "panorama_ours": "Ours",
     "difference": "Difference of both × 4", "map_error": "Error of the maps: black 0, yellow ≥ 4 px",
     "panorama_rotation_only": "Ours as if taken from one place", "panorama_hugin": "Hugin",
+    "panorama_opencv": "OpenCV's Stitcher",
     "from_above": "From above: true green, found pink",
 }  # fmt: skip

@@ -18,7 +18,7 @@ PROOF = (
     Limit("proof", "sphere_psnr_db", "dB", at_least=35.0),
     Limit("proof", "half_pixel_loss_db", "dB", at_least=1.0),
 )
-OURS, ROTATION_ONLY, HUGIN = "ours", "rotation only", "hugin"
+OURS, ROTATION_ONLY, HUGIN, OPENCV = "ours", "rotation only", "hugin", "opencv"
 
 
 @dataclass(frozen=True)
