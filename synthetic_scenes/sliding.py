@@ -14,6 +14,7 @@ from .ground_truth import inverse_depth_at, visible
 from .measures import Truth
 from .rendered import RenderedPair
 from .scene_camera import SceneCamera
+from .sets.bent_lens import bent, straightened
 
 # 1/m: what is farther away counts as being that far, and has no parallax.
 LEAST_INVERSE = 1e-6
@@ -56,20 +57,20 @@ def beside_rays(result: StitchResult, number: int, camera: SceneCamera, depth: N
     shown = (found.inside() & ~result.occluded[number])[::STEP, ::STEP]
     x, y = found.x[::STEP, ::STEP][shown], found.y[::STEP, ::STEP][shown]
     inverse = np.maximum(inverse_depth_at(depth, x, y), LEAST_INVERSE)
-    rays = homogeneous(np.stack([x, y], axis=-1).astype(np.float64)) @ np.linalg.inv(camera.K).T @ camera.R
+    raw = np.stack([x, y], axis=-1).astype(np.float64)
+    rays = homogeneous(straightened(raw, camera)) @ np.linalg.inv(camera.K).T @ camera.R
     things = camera.place + rays / inverse[:, None]
     ray, place = canvas.rays[shown], canvas.places[shown]
     on_ray = place + ((things - place) * ray).sum(axis=1)[:, None] * ray
     px, where = np.full(shown.shape, np.nan), np.full((*shown.shape, 3), np.nan)
-    apart = seen_at(camera, on_ray) - np.stack([x, y], axis=-1)
-    px[shown], where[shown] = np.linalg.norm(apart, axis=1), things
+    px[shown], where[shown] = np.linalg.norm(seen_at(camera, on_ray) - raw, axis=1), things
     return Beside(px, where)
 
 
 def seen_at(camera: SceneCamera, points: Array) -> Array:
-    """Pixels (…, 2) at which a camera with an ideal lens sees points (…, 3); NaN behind it."""
+    """Pixels (…, 2) at which a camera sees points (…, 3); NaN behind it."""
     seen = (points @ camera.R.T + camera.t) @ camera.K.T
-    return project(np.where(seen[..., 2:] > 0, seen, np.nan))
+    return bent(project(np.where(seen[..., 2:] > 0, seen, np.nan)), camera)
 
 
 def sees(camera: SceneCamera, depth: NDArray, points: Array) -> NDArray[np.bool_]:

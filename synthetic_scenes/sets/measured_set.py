@@ -24,7 +24,8 @@ from .set_measures import (
     pose_figures,
     range_figures,
 )
-from .set_stitches import WAYS, Shared, stitched
+from .set_sliding import beside_figures
+from .set_stitches import SLID, WAYS, Shared, stitched
 from .set_thresholds import HUGIN, OPENCV, OURS
 from .top_view import top_view
 
@@ -79,6 +80,11 @@ def measured_set(rendered: RenderedSet) -> MeasuredSet:
         seconds |= {f"{way} {stage}": value for stage, value in result.seconds.items()}
         if way == OURS:
             used, seen = found.numbers, truth.views_at(found.numbers) > 0
+            sliding = Found.of(stitched(rendered, SLID, shared), truth)
+            viewpoint = sliding.result.warp.viewpoint
+            runs[way]["figures"]["s1"] = 0.0 if viewpoint is None else viewpoint.s1
+            for name, one in (("still", found), ("slid", sliding)):
+                runs[way]["figures"] |= {f"{name}_{key}": value for key, value in beside_figures(one).items()}
             pictures["map_error"] = jpeg(_map_error(found, truth)[_part_of(seen)])
             pictures["from_above"] = jpeg(top_view(found))
     rivals = {OPENCV: stitcher_panorama} | ({HUGIN: hugin_panorama} if installed() else {})

@@ -17,11 +17,13 @@ from ..scene_camera import SceneCamera
 from .rendered_set import RenderedSet
 from .set_thresholds import OURS, ROTATION_ONLY
 
-WAYS = (OURS, ROTATION_ONLY)
+WAYS, SLID = (OURS, ROTATION_ONLY), "slid"
 # The whole sphere from the first picture's place, with all that the defaults do: the truth is known there.
 ON_SPHERE = StitchOptions(
     projection="equirectangular", level="none", slide=0.0, crop="full", holes="transparent", viewpoint=1, measure=False
 )
+# On a cylinder, from a viewpoint that slides as far as is chosen.
+SLIDING = replace(ON_SPHERE, projection="cylindrical", slide="auto")
 # Diagonal of the 36 × 24 mm frame, to which "35 mm equivalent" refers.
 FULL_FRAME_MM = float(np.hypot(36.0, 24.0))
 
@@ -48,15 +50,19 @@ def told_pictures(rendered: RenderedSet) -> list[Picture]:
 
 
 def stitched(rendered: RenderedSet, way: str, shared: Shared) -> StitchResult:
-    """The set stitched in one of WAYS; shared: features and geometry, kept from way to way. Raises StitchError."""
+    """The set stitched in one of WAYS, or SLID; shared: features and geometry, kept from way to way.
+
+    Raises StitchError.
+    """
     progress = Stopwatch(Progress(stages=STAGES_OF_MANY))
     if not shared:
         frame = read_frame(told_pictures(rendered), ON_SPHERE)
         geometry = estimate_geometry([frame], ON_SPHERE, progress)
         shared["read"] = frame.only(geometry.numbers), geometry
     frame, geometry = shared["read"]
+    options = SLIDING if way == SLID else ON_SPHERE
     if way == ROTATION_ONLY and geometry.rig is not None:
         rig = geometry.rig
         one_place = replace(rig, t=np.zeros_like(rig.t), inverse_ranges=np.zeros_like(rig.inverse_ranges))
         geometry = replace(geometry, rig=one_place)
-    return compose(frame, fit_and_warp(geometry, [frame], ON_SPHERE, progress), ON_SPHERE, progress)
+    return compose(frame, fit_and_warp(geometry, [frame], options, progress), options, progress)
