@@ -44,7 +44,9 @@ MEASURES = {
 }  # fmt: skip
 Names = dict[str, tuple[str, str, int]]
 OTHER_NAMES = {
-    "lead_db": "whole picture's lead over the best rival", "model": "model", "status": "status",
+    "lead_db": "whole picture's lead over the best rival",
+    "nearer_share": "share of scenes in which ours is nearer than one homography",
+    "model": "model", "status": "status",
     "undetermined_said": "undetermined focal length said", "position_px": "Position pass from pixel centres",
     "depth_relative": "Position against Depth, relative", "ray_cast_relative": "ray casts against Depth, relative",
     "warp_psnr_db": "target by the true map: PSNR", "half_pixel_psnr_db": "the same, half a pixel off: PSNR",
