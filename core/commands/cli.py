@@ -128,7 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_validate(
         commands.add_parser("validate", help="render scenes with known cameras and measure", description=_VALIDATE)
     )
-    _add_demo(commands.add_parser("demo", help="make a pair, stitch it, say what was measured", description=_DEMO))
+    _add_demo(commands.add_parser("demo", help="make pictures, stitch them, say what was measured", description=_DEMO))
     return parser
 
 
@@ -159,7 +159,7 @@ _VALIDATE = """Render scenes with known cameras in Blender, stitch them, and hol
 gets report.html, report.json and report.csv. Pictures are kept in OUTDIR/pictures and made only once. Exit codes: 0 all
 thresholds held, 1 some did not, 2 the call is wrong, 3 nothing can render, 4 a file can't be read or written, 130
 interrupted (--resume goes on)."""
-_DEMO = "Render two pictures of a small scene through known cameras, stitch them, and compare with the truth."
+_DEMO = "Render a pair and five pictures of a room through known cameras, stitch both, and compare with the truth."
 
 
 def _add_stitch(parser: argparse.ArgumentParser) -> None:

@@ -9,13 +9,13 @@ from ...core.output.page import table
 from ..limits import Check, Result
 from ..report_page import BAD, GOOD, cell, failures, figure, named, proof_table, slug, unit, warnings_list
 from .set_names import SET_MEASURES, SET_PICTURES
-from .set_thresholds import BARS, HUGIN, LEAD, OURS, ROTATION_ONLY
+from .set_thresholds import BARS, HUGIN, LEAD, OPENCV, OURS, ROTATION_ONLY
 
 OVERVIEW = (
     "rotation_deg", "rotation_max_deg", "position_max_mm", "focal_percent", "overlap_px", "overlap_p90_px", "alone_px",
     "range_log", "psnr_db", "ssim", "common_psnr_db",
 )  # fmt: skip
-RIVALS = (ROTATION_ONLY, HUGIN)
+RIVALS = (ROTATION_ONLY, HUGIN, OPENCV)
 
 
 def set_overview(results: Sequence[Result], checks: Sequence[Check]) -> str:

@@ -18,7 +18,7 @@ PROOF = (
     Limit("proof", "sphere_psnr_db", "dB", at_least=35.0),
     Limit("proof", "half_pixel_loss_db", "dB", at_least=1.0),
 )
-OURS, ROTATION_ONLY, HUGIN = "ours", "rotation only", "hugin"
+OURS, ROTATION_ONLY, HUGIN, OPENCV = "ours", "rotation only", "hugin", "opencv"
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,7 @@ BARS: dict[str, tuple[Bar, ...]] = {
         Bar("rotation_max_deg", "°", 0.053, at_most=0.07),
         Bar("position_max_mm", "mm", 6.5, at_most=8.5),
         Bar("focal_percent", "%", 0.156, at_most=0.21, absolute=True),
+        Bar("k1_error", "", 0.00095, at_most=0.00124, absolute=True),  # with as much noise again
         Bar("overlap_px", "px", 0.53, at_most=0.7),  # the aim is 0.5
         Bar("overlap_p90_px", "px", 1.60, at_most=2.1),
         Bar("alone_px", "px", 1.29, at_most=1.7),

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.projective import rotation_from_vector
+from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.projection import Projection
+from edf_stitch.core.panorama.rig_viewpoint import RigViewpoint
 from edf_stitch.core.raster.picture_map import PictureMap
 from edf_stitch.synthetic_scenes.recipes import View
 from edf_stitch.synthetic_scenes.sets.rendered_set import RenderedSet
@@ -26,6 +28,7 @@ from edf_stitch.synthetic_scenes.sets.set_measures import (
     pose_figures,
     range_figures,
 )
+from edf_stitch.synthetic_scenes.sets.set_sliding import beside_figures
 from edf_stitch.synthetic_scenes.sets.sphere_camera import SphereCamera
 from edf_stitch.synthetic_scenes.sets.sphere_truth import seen_by
 from edf_stitch.synthetic_scenes.sets.top_view import top_view
@@ -47,10 +50,14 @@ def truth() -> SetTruth:
     return SetTruth.of(RenderedSet(names, cameras, depths, sphere, seen.light, seen.depth, {}, ""))
 
 
-def perfect(truth: SetTruth, unit: float = 0.5, numbers: tuple[int, ...] = (0, 1, 2)) -> Any:
-    """What stitching would give if nothing were wrong: the world turned, in a unit of its own, on the whole sphere."""
+def perfect(
+    truth: SetTruth, unit: float = 0.5, numbers: tuple[int, ...] = (0, 1, 2), aside: tuple[float, ...] = (0, 0, 0)
+) -> Any:
+    """What stitching would give if nothing were wrong: the world turned, in its own unit, on the whole sphere, seen
+    from a place so many metres aside of the first picture's."""
     cameras = [truth.rendered.cameras[number] for number in numbers]
-    place = truth.rendered.sphere.place
+    first = truth.rendered.sphere.place
+    place = first + np.array(aside)
     projection = Projection("equirectangular", FOCAL, (0.0, 0.0), np.eye(3), cameras[0].K)
     left, top, width, height = projection.sphere or (0, 0, 0, 0)
     x, y = np.meshgrid(np.arange(width) + left, np.arange(height) + top)
@@ -58,19 +65,22 @@ def perfect(truth: SetTruth, unit: float = 0.5, numbers: tuple[int, ...] = (0, 1
     away = hit(place, directions)
     maps = []
     for camera in cameras:
-        pixels, _ = seen_by(camera, truth.rendered.sphere, directions, away)
+        pixels, _ = seen_by(camera, SphereCamera(place, truth.rendered.sphere.size), directions, away)
         maps.append(PictureMap(*np.moveaxis(pixels.astype(np.float32), -1, 0), camera.size))
     R = np.array([camera.R @ TURN.T for camera in cameras])
-    t = np.array([camera.R @ place + camera.t for camera in cameras]) / unit
+    t = np.array([camera.R @ first + camera.t for camera in cameras]) / unit
     known = tuple(Camera(camera.K, camera.size, "", 0.0) for camera in cameras)
     centres = -np.einsum("nji,nj->ni", R, t)
     parts = dict(R=R, t=t, centres=centres, cameras=known, stations=(), edges=())
     rig = type("Rig", (), {**parts, "__len__": lambda _: len(numbers)})()
     deviation = np.where(np.arange(width) < width // 2, 0.01, 0.02)[None].repeat(height, axis=0)
-    canvas = SimpleNamespace(projection=projection, offset=(-left, -top))
+    canvas = Canvas(width, height, (-left, -top), projection=projection)
+    viewpoint = RigViewpoint(0.5, np.eye(3), np.tile(2 * TURN @ np.array(aside) / unit, (8, 1)))
     return SimpleNamespace(
         rig=rig, canvas=canvas, occluded=[np.zeros((height, width), bool) for _ in numbers],
-        warp=SimpleNamespace(maps=maps, canvas=canvas, inverse_depth=unit / away, deviation=deviation),
+        warp=SimpleNamespace(
+            maps=maps, canvas=canvas, inverse_depth=unit / away, deviation=deviation, viewpoint=viewpoint
+        ),
         pixels=passes_along(place, directions, np.ones(away.shape)).light, alpha=np.ones(away.shape, np.float32),
         pictures=[SimpleNamespace(name=f"{number:02d}.png") for number in numbers],
     )  # fmt: skip
@@ -186,3 +196,28 @@ def test_the_view_from_above_shows_true_and_found_places(truth: SetTruth) -> Non
     result.rig.centres[2] += [0.2, 0, 0]
     other = top_view(Found.of(result, truth))
     assert drawn.shape == (720, 720, 3) and (drawn != 255).any() and (drawn != other).any()
+
+
+@pytest.mark.parametrize("aside", [(0.0, 0.0, 0.0), (0.2, -0.1, 0.05)])
+def test_what_pictures_show_lies_on_the_rays_of_wherever_the_viewpoint_is(
+    aside: tuple[float, float, float], truth: SetTruth
+) -> None:
+    right = beside_figures(Found.of(perfect(truth, aside=aside), truth))
+    assert right["beside_px"] < 0.02
+    # nothing is said to be hidden by the ball
+    assert right["beside_p95_px"] < 20
+    one = perfect(truth, aside=aside)
+    moved(one, 1, 40.0)
+    assert beside_figures(Found.of(one, truth))["beside_p95_px"] > 35
+    off = perfect(truth, aside=aside)
+    for number in range(3):
+        moved(off, number, 2.0)
+    assert beside_figures(Found.of(off, truth))["beside_px"] == pytest.approx(2.0, abs=0.1)
+    elsewhere = perfect(truth, aside=aside)
+    place = elsewhere.warp.viewpoint.places + TURN @ np.array([0.4, 0.0, 0.0])
+    elsewhere.warp.viewpoint = replace(elsewhere.warp.viewpoint, places=place)
+    assert beside_figures(Found.of(elsewhere, truth))["beside_px"] > 1
+
+
+def test_what_one_camera_alone_sees_is_not_asked_for(truth: SetTruth) -> None:
+    assert np.isnan(beside_figures(Found.of(perfect(truth, numbers=(1,)), truth))["beside_px"])
