@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.rig.bundling import valley
-from edf_stitch.core.rig.bundling.polishing import Polished, polish, total_cost
+from edf_stitch.core.rig.bundling.polishing import Polished, polish
 from edf_stitch.core.rig.bundling.reprojection import reproject
-from edf_stitch.core.rig.bundling.solution import Problem, Solution
+from edf_stitch.core.rig.bundling.solution import LENS, Problem, Solution
 from edf_stitch.core.rig.bundling.valley import lowest
 
 from .bundle_scenes import believed_cameras, bundled_scene, disturbed
@@ -32,14 +32,23 @@ def _found(problem: Problem, true: Solution) -> Polished:
     return polish(problem, replace(disturbed(true, 2, 0.003), lens=lens), lambda: None)
 
 
-def test_a_deeper_hollow_of_the_valley_is_found() -> None:
+@pytest.mark.parametrize(("bottom", "found_at"), [(-0.07, -0.06), (0.04, 0.03), (0.4, 0.09), (0.01, 0.0)])
+def test_it_goes_down_the_valley(monkeypatch: pytest.MonkeyPatch, bottom: float, found_at: float) -> None:
+    """In steps of .03, three at most each way, from where the bundle ended."""
     problem, true = _far()
-    found = _found(problem, true)
-    low = lowest(found, lambda: None)
-    before, after = (total_cost(problem, one.solution, 0.5) for one in (found, low))
-    assert after < 0.95 * before
-    off = [abs(one.solution.lens[0, 0] - true.lens[0, 0]) for one in (found, low)]
-    assert off[1] < 0.5 * off[0]
+    begun = replace(_found(problem, true), solution=replace(true, lens=np.zeros((1, LENS))))
+    monkeypatch.setattr(valley, "_unsure", lambda _: True)
+    monkeypatch.setattr(
+        valley, "polished_on", lambda problem, solution, tick: replace(begun, problem=problem, solution=solution)
+    )
+    monkeypatch.setattr(valley, "_cost", lambda found: 1 + (found.solution.lens[0, 0] - bottom) ** 2 * 1e3)
+    assert lowest(begun, lambda: None).solution.lens[0, 0] == pytest.approx(found_at)
+
+
+def test_few_pictures_of_what_is_far_are_unsure_and_near_ones_are_not() -> None:
+    far = _found(*_far())
+    near, true = bundled_scene(6, pictures=8, points=400, noise_px=0.05)
+    assert valley._unsure(far) and not valley._unsure(polish(near, true, lambda: None))
 
 
 def test_nothing_is_tried_where_the_focal_length_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
