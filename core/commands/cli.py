@@ -145,7 +145,7 @@ slides along its epipolar lines to meet it; more may come in any order, and thos
 out and named. Messages go to stderr; the last line says whether the panorama is good, where to look at it, or why it is
 not usable. Exit codes: 0 done, 1 not usable (with --strict-verdict), 2 the call is wrong, 3 the pictures can't be
 stitched, 4 a file can't be read or written, 130 interrupted."""
-_BATCH = """Stitch every line of LIST.csv: pictures, a folder of them, or a clip of two cameras that stand still
+_BATCH = """Stitch every line of LIST.csv: pictures, a folder of them, or a clip of cameras that stand still
 (a_%04d.png or a_####.png), whose frames share one alignment. A line holds reference,target and, if wanted, a name; a
 header may name picture3 and so on, first, last, step, focal_px and focal35 as well. A bad one is reported and the rest
 goes on; DIR/batch.json says what became of each. Exit codes: 0 all done, 2 the call is wrong, 3 one can't be stitched,
