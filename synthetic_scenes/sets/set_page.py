@@ -7,14 +7,17 @@ from html import escape
 
 from ...core.output.page import table
 from ..limits import Check, Result
-from ..report_page import BAD, GOOD, cell, failures, figure, named, proof_table, slug, unit, warnings_list
+from ..report_page import BAD, GOOD, address, cell, failures, figure, named, proof_table, slug, unit, warnings_list
 from .set_names import SET_MEASURES, SET_PICTURES
 from .set_thresholds import BARS, HUGIN, LEAD, OURS, ROTATION_ONLY
+from .slider import slider
 
 OVERVIEW = (
     "rotation_deg", "rotation_max_deg", "position_max_mm", "focal_percent", "overlap_px", "overlap_p90_px", "alone_px",
-    "range_log", "psnr_db", "ssim", "common_psnr_db",
+    "range_log", "psnr_db", "ssim", "common_psnr_db", "line_px", "upright_deg", "things_cut", "seam_levels",
 )  # fmt: skip
+# The two that a slider shows one over the other.
+BESIDE = ("sphere", "panorama_ours")
 RIVALS = (ROTATION_ONLY, HUGIN)
 
 
@@ -51,6 +54,9 @@ def set_section(result: Result, checks: Sequence[Check]) -> str:
         parts.append(f"<pre>{escape(result['message'])}</pre>")
     parts.append(failures([check for check in checks if not check.passed]))
     kinds = [kind for kind in SET_PICTURES if kind in result["pictures"]]
+    if set(BESIDE) <= set(kinds):
+        true, ours = ((address(result, kind), SET_PICTURES[kind]) for kind in BESIDE)
+        parts.append(slider(true, ours))
     if kinds:
         shown = "".join(figure(result, kind, SET_PICTURES[kind]) for kind in kinds)
         parts.append(f'<div class="pictures">{shown}</div>')
