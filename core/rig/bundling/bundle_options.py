@@ -79,9 +79,9 @@ class BundleOptions:
     # px, the scale of the Cauchy cost: wide at first with the lenses held, then with all free.
     first_kernel_px: float = 4.0
     kernel_px: float = 2.0
-    # The same at last, in σ of the noise (2.4: for normal noise 95 % as good as least squares), and px at least: with a
+    # The same at last, in σ of the noise (3: for normal noise 97 % as good as least squares), and px at least: with a
     # wider one matches that are a little wrong, as many are, turn cameras by a tenth of a degree.
-    last_kernel_sigmas: float = 2.4
+    last_kernel_sigmas: float = 3.0
     least_kernel_px: float = 0.2
     # σ of k1 and px of noise that priors are weighed with: errors of a lens that the model leaves go together, so that
     # thousands of observations do not outweigh a prior as independent ones would.
@@ -121,8 +121,8 @@ class PolishingOptions:
     revived_tolerances: tuple[float, ...] = (1e-4, 1e-4)
     iterations: int = 60
     tolerances: tuple[float, ...] = (1e-6, 1e-7)
-    # Then once more with a kernel as wide as the noise, unless all observations cost so much more with it: where the
-    # model of the lens is not good enough, it would fit a part of the pictures and lose the rest.
+    # Then once more with a kernel as wide as the noise, unless some picture loses more than this share of what fitted:
+    # where the model of the lens is not good enough, it would fit a part of the pictures and lose the rest.
     sharp_loss: float = 0.1
     # Robust σ beyond which an observation is left out, and px below which none is.
     prune_sigmas: float = 4.0

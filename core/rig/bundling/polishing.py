@@ -40,24 +40,50 @@ def polish(problem: Problem, solution: Solution, tick: Tick) -> Polished:
     solution = bundle(problem, solution, wide, reference, prior, tick).solution
     for iterations, tolerance in zip(POLISHING.revived_iterations, POLISHING.revived_tolerances, strict=True):
         solution = _revived(problem, solution).rescaled()
-        settings = Settings(BUNDLE.kernel_px, iterations, tolerance)
-        solution, kernel, _ = _round(problem, solution, reference, settings, tick)
-    solution = _settled(problem, solution, reference, BUNDLE.kernel_px, tick)
-    sharp = _settled(problem, solution, reference, kernel, tick)
-    # with what is far off costing the more the farther off it is: that is what a narrow kernel loses of a picture
-    if total_cost(problem, sharp, np.inf) < (1 + POLISHING.sharp_loss) * total_cost(problem, solution, np.inf):
-        solution = sharp
-    solution = solution.rescaled()
+        solution, _ = _round(problem, solution, reference, Settings(BUNDLE.kernel_px, iterations, tolerance), tick)
+    solution = _settled(problem, solution, reference, BUNDLE.kernel_px, True, tick).rescaled()
     return Polished(problem, solution, total_cost(problem, solution), _behind(solution), False, depth_prior(solution))
 
 
-def _settled(problem: Problem, solution: Solution, reference: int, kernel_px: float, tick: Tick) -> Solution:
+def sharpened(found: Polished, tick: Tick) -> Polished:
+    """The same bundled on with a kernel as wide as the noise, where that keeps the pictures together: to be done last,
+    for a narrow kernel stays in the minimum that it begins in."""
+    problem, wide = found.problem, found.solution
+    lengths = lengths_of_errors(problem, wide)
+    seen = lengths[wide.used & np.isfinite(lengths)]
+    if not len(seen):
+        return found
+    kernel = BUNDLE.last_kernel_sigmas * sigma_of_lengths(seen) / problem.scale
+    kernel = float(np.clip(kernel, BUNDLE.least_kernel_px, BUNDLE.kernel_px))
+    reference = 0 if found.one_place else _middle(wide)
+    sharp = _settled(problem, wide.seen_from(reference), reference, kernel, not found.one_place, tick).rescaled()
+    if _lost(problem, wide, sharp) > POLISHING.sharp_loss:
+        return found
+    cost, behind = total_cost(problem, sharp), _behind(sharp)
+    return replace(found, solution=sharp, cost=cost, behind=behind, prior=depth_prior(sharp))
+
+
+def _lost(problem: Problem, before: Solution, after: Solution) -> float:
+    """Share of the observations that fitted before and do not any more, of the picture that lost most of its own."""
+    fitting = [
+        np.bincount(
+            problem.tracks.picture[lengths_of_errors(problem, solution) < BUNDLE.kernel_px * problem.scale],
+            minlength=problem.pictures,
+        )
+        for solution in (before, after)
+    ]
+    return float(np.max(1 - fitting[1] / np.maximum(fitting[0], 1)))
+
+
+def _settled(
+    problem: Problem, solution: Solution, reference: int, kernel_px: float, depths: bool, tick: Tick
+) -> Solution:
     """Rounds with one kernel until hardly anything is left out any more and the cost does not fall."""
     last = np.inf
     for tolerance in POLISHING.tolerances:
-        settings = Settings(kernel_px, POLISHING.iterations, tolerance)
+        settings = Settings(kernel_px, POLISHING.iterations, tolerance, depths=depths)
         before = int(solution.used.sum())
-        solution, _, cost = _round(problem, solution.rescaled(), reference, settings, tick)
+        solution, cost = _round(problem, solution.rescaled(), reference, settings, tick)
         pruned = before - int(solution.used.sum())
         if pruned < POLISHING.settled_pruned * before and cost > (1 - POLISHING.settled_cost) * last:
             break
@@ -67,13 +93,10 @@ def _settled(problem: Problem, solution: Solution, reference: int, kernel_px: fl
 
 def _round(
     problem: Problem, solution: Solution, reference: int, settings: Settings, tick: Tick
-) -> tuple[Solution, float, float]:
-    """One bundle, without the observations that it does not fit; px at the features' scale of a kernel as wide as the
-    noise; the cost."""
+) -> tuple[Solution, float]:
+    """One bundle, without the observations that it does not fit; the cost."""
     bundled = bundle(problem, solution, settings, reference, depth_prior(solution), tick)
-    sigma = sigma_of_lengths(bundled.lengths) / problem.scale if len(bundled.lengths) else np.inf
-    kernel = float(np.clip(BUNDLE.last_kernel_sigmas * sigma, BUNDLE.least_kernel_px, BUNDLE.kernel_px))
-    return _pruned(problem, bundled, POLISHING.prune_sigmas), kernel, bundled.cost
+    return _pruned(problem, bundled, POLISHING.prune_sigmas), bundled.cost
 
 
 def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polished:
@@ -88,14 +111,11 @@ def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polish
     return Polished(problem, solution, total_cost(problem, solution), 0.0, True, None)
 
 
-def total_cost(problem: Problem, solution: Solution, most_kernels: float = JUDGE.missed_kernels) -> float:
-    """The robust cost, px², of all observations: what is far off costs the same whether its point is solved or not.
-
-    most_kernels: kernel widths squared beyond which a view costs no more.
-    """
+def total_cost(problem: Problem, solution: Solution) -> float:
+    """The robust cost, px², of all observations: what is far off costs the same whether its point is solved or not."""
     kernel = BUNDLE.kernel_px * problem.scale
-    missed, most = (np.sqrt(widths) * kernel for widths in (JUDGE.missed_kernels, most_kernels))
-    lengths = np.nan_to_num(lengths_of_errors(problem, solution), nan=missed)
+    most = np.sqrt(JUDGE.missed_kernels) * kernel
+    lengths = np.nan_to_num(lengths_of_errors(problem, solution), nan=most)
     return float(robust_cost(np.minimum(lengths, most), kernel).sum())
 
 

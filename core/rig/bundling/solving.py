@@ -18,7 +18,7 @@ from ..averaging.matched_rays import SharedLens
 from .bundle_options import JUDGE
 from .judging import judged
 from .parts import supported
-from .polishing import Polished, start
+from .polishing import Polished, sharpened, start
 from .solution import LENS, Problem, lenses_of
 from .stations import polish_best, proposed, same_places, without_parallax
 from .tracks import build_tracks, fitting_pairs
@@ -53,7 +53,15 @@ def solve(
             break
         known, shared = _cameras_of(cameras, rotated, found[-1].found)
         rotated = averaged(known, points, verified, shared, hold=True, tick=tick)
-    return min(found, key=lambda solved: solved.cost, default=None)
+    return _sharpened(cameras, points, verified, min(found, key=lambda solved: solved.cost), tick) if found else None
+
+
+def _sharpened(
+    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, solved: Solved, tick: Tick
+) -> Solved:
+    found = sharpened(solved.found, tick)
+    cost = judged(cameras, points, verified, solved.averaged.members, solved.pairs, found)
+    return replace(solved, found=found, cost=cost)
 
 
 def _bundled(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.rig.averaging.averaging import hypotheses
 from edf_stitch.core.rig.averaging.pairs import verified
-from edf_stitch.core.rig.bundling.polishing import Polished, polish, polish_rotations, start
+from edf_stitch.core.rig.bundling.polishing import Polished, polish, polish_rotations, sharpened, start
 from edf_stitch.core.rig.bundling.solution import LENS
 from edf_stitch.core.rig.bundling.solving import Solved, solve
 
@@ -29,18 +29,18 @@ def solved(rig: SyntheticRig) -> Solved:
 
 
 def from_truth(rig: SyntheticRig, found: Solved) -> Polished:
-    """The bundle of the same observations and ties, started from the true cameras."""
+    """The bundle of the same observations and ties, started from the true cameras, to the same sharp end."""
     members = list(found.averaged.members)
     problem = found.found.problem
     lens = np.zeros((1, LENS))
     lens[0, 0] = np.log(rig.focal / problem.lenses.focal[0])
     begun = start(problem, rig.R[members], lens)
     if found.found.one_place:
-        return polish_rotations(problem, begun, lambda: None)
+        return sharpened(polish_rotations(problem, begun, lambda: None), lambda: None)
     centres = rig.centres[members]
     for number in np.unique(problem.place):
         centres[problem.place == number] = centres[problem.place == number].mean(axis=0)
-    return polish(problem, replace(begun, centres=centres), lambda: None)
+    return sharpened(polish(problem, replace(begun, centres=centres), lambda: None), lambda: None)
 
 
 def ratio(kind: str, seed: int, points: int = 7000) -> float:

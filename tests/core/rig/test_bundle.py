@@ -6,72 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.raster.arrays import Array
 from edf_stitch.core.rig.averaging.turns import degrees_between, rotations
 from edf_stitch.core.rig.bundling.bundle import DepthPrior, Settings, bundle
-from edf_stitch.core.rig.bundling.polishing import start
 from edf_stitch.core.rig.bundling.reprojection import CAMERA, derivatives, lengths_of_errors, reproject, tangents
-from edf_stitch.core.rig.bundling.solution import LENS, Problem, Solution, lenses_of
-from edf_stitch.core.rig.bundling.tracks import Tracks
+from edf_stitch.core.rig.bundling.solution import LENS
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+
+from .bundle_scenes import believed_cameras, bundled_scene, disturbed
 
 SEEDS = st.integers(0, 10_000)
-
-
-def _cameras(count: int, log_sigma: float = 0.05, focal: float = 500.0) -> list[Camera]:
-    K = np.array([[focal, 0, 399.5], [0, 1.02 * focal, 299.5], [0, 0, 1]])
-    return [Camera(K, (800, 600), "test", log_sigma, principal_sigma=0.01, knowledge=Knowledge.EXIF)] * count
-
-
-def _scene(
-    seed: int, pictures: int = 4, points: int = 60, noise_px: float = 0.0, k1: float = -0.05,
-    cameras: list[Camera] | None = None, held: NDArray[np.bool_] | None = None,
-) -> tuple[Problem, Solution]:  # fmt: skip
-    """Cameras that look the same way from places side by side, and the solution that is true."""
-    rng = np.random.default_rng(seed)
-    lenses = lenses_of(cameras or _cameras(pictures))
-    picture, point = np.tile(np.arange(pictures), points), np.repeat(np.arange(points), pictures)
-    tracks = Tracks(
-        picture, point, point, np.zeros((len(point), 2)), np.arange(points) * pictures, np.zeros(points, np.intp)
-    )
-    problem = Problem(
-        tracks, lenses, 1.0, 0.5, np.arange(pictures), np.zeros(pictures, bool) if held is None else held
-    )
-    lens = np.tile([0.02, k1, 3.0, -2.0], (len(lenses), 1))
-    true = start(problem, rotations(rng.normal(0, 0.05, (pictures, 3))), np.where(lenses.free, lens, 0))
-    rays = np.column_stack([rng.uniform(-0.5, 0.5, (points, 2)), np.ones(points)])
-    centres = rng.normal(0, 0.4, (pictures, 3)) * [1, 1, 0.2]
-    solution = replace(
-        true, centres=centres - centres[0], rays=rays / np.linalg.norm(rays, axis=1, keepdims=True),
-        inverse_ranges=rng.uniform(0.0, 0.4, points), solved=np.ones(points, bool),
-    ).seen_from(0).rescaled()  # fmt: skip
-    everything = np.arange(len(point))
-    found = reproject(problem, solution, everything)
-    assert not found.behind.any()
-    pixels = found.errors + rng.normal(0, noise_px, (len(point), 2))
-    return replace(problem, tracks=replace(tracks, pixels=pixels)), solution
-
-
-def _disturbed(solution: Solution, seed: int, by: float = 0.01) -> Solution:
-    rng = np.random.default_rng(seed + 1)
-    turned = rotations(rng.normal(0, by, (len(solution.R), 3)))
-    turned[0] = np.eye(3)
-    rays = solution.rays + rng.normal(0, by, solution.rays.shape)
-    centres = solution.centres + rng.normal(0, by, solution.centres.shape) * (np.arange(len(turned)) > 0)[:, None]
-    return replace(
-        solution, R=turned @ solution.R, centres=centres, rays=rays / np.linalg.norm(rays, axis=1, keepdims=True),
-        inverse_ranges=solution.inverse_ranges + rng.normal(0, by, len(rays)),
-    )  # fmt: skip
 
 
 @settings(max_examples=20)
 @given(SEEDS)
 def test_derivatives_are_those_of_finite_differences(seed: int) -> None:
-    problem, true = _scene(seed, k1=0.08 * (-1) ** seed)
-    at = _disturbed(true, seed)
+    problem, true = bundled_scene(seed, k1=0.08 * (-1) ** seed)
+    at = disturbed(true, seed)
     everything = np.arange(len(problem.tracks.point))
     bases = tangents(at.rays)
     seen = reproject(problem, at, everything)
@@ -98,17 +50,17 @@ def test_derivatives_are_those_of_finite_differences(seed: int) -> None:
 @given(SEEDS, st.integers(3, 6))
 def test_without_noise_the_truth_is_found(seed: int, pictures: int) -> None:
     # k1 and the principal point are drawn to 0 by their priors: here they are
-    problem, true = _scene(seed, pictures, k1=0.0)
+    problem, true = bundled_scene(seed, pictures, k1=0.0)
     true = replace(true, lens=np.zeros((1, LENS)))
     pixels = problem.tracks.pixels + reproject(problem, true, np.arange(len(problem.tracks.point))).errors
     problem = replace(problem, tracks=replace(problem.tracks, pixels=pixels))
-    found = bundle(problem, _disturbed(true, seed), Settings(iterations=100, tolerance=1e-14), 0).solution.rescaled()
+    found = bundle(problem, disturbed(true, seed), Settings(iterations=100, tolerance=1e-14), 0).solution.rescaled()
     assert np.nanmax(lengths_of_errors(problem, found)) < 1e-3
     assert degrees_between(found.R, true.R).max() < 1e-3
 
 
 def test_what_lies_behind_pulls_nothing() -> None:
-    problem, true = _scene(3, noise_px=0.3)
+    problem, true = bundled_scene(3, noise_px=0.3)
     behind = replace(true, rays=true.rays * np.where(np.arange(60) == 7, -1.0, 1.0)[:, None])
     seen = reproject(problem, behind, np.arange(len(problem.tracks.point)))
     assert seen.behind.reshape(60, -1)[7].all() and seen.behind.sum() == problem.pictures
@@ -119,7 +71,7 @@ def test_what_lies_behind_pulls_nothing() -> None:
 
 def test_outliers_move_little() -> None:
     """Without the robust cost, a tenth of the observations 60 px off turn cameras by degrees."""
-    problem, true = _scene(5, points=200, noise_px=0.3)
+    problem, true = bundled_scene(5, points=200, noise_px=0.3)
     rng = np.random.default_rng(0)
     wrong = rng.random(len(problem.tracks.point)) < 0.1
     pixels = problem.tracks.pixels + np.where(wrong[:, None], rng.uniform(-60, 60, problem.tracks.pixels.shape), 0)
@@ -131,32 +83,32 @@ def test_outliers_move_little() -> None:
 
 
 def test_a_fixed_focal_length_stays() -> None:
-    problem, true = _scene(2, noise_px=0.3, cameras=_cameras(4, log_sigma=0.0))
-    found = bundle(problem, _disturbed(true, 2), Settings(), 0).solution
+    problem, true = bundled_scene(2, noise_px=0.3, cameras=believed_cameras(4, log_sigma=0.0))
+    found = bundle(problem, disturbed(true, 2), Settings(), 0).solution
     assert found.lens[0, 0] == 0
     assert found.lens[0, 1] != 0
 
 
 def test_a_whole_camera_that_is_given_stays() -> None:
-    cameras = [replace(camera, principal_sigma=0.0) for camera in _cameras(4, log_sigma=0.0)]
-    problem, true = _scene(2, noise_px=0.3, cameras=cameras)
-    found = bundle(problem, _disturbed(true, 2), Settings(), 0).solution
+    cameras = [replace(camera, principal_sigma=0.0) for camera in believed_cameras(4, log_sigma=0.0)]
+    problem, true = bundled_scene(2, noise_px=0.3, cameras=cameras)
+    found = bundle(problem, disturbed(true, 2), Settings(), 0).solution
     assert not found.lens.any()
 
 
 def test_each_lens_has_its_own_focal_length() -> None:
-    cameras = _cameras(2) + _cameras(2, focal=900.0)
-    problem, true = _scene(4, points=200, noise_px=0.2, cameras=cameras)
+    cameras = believed_cameras(2) + believed_cameras(2, focal=900.0)
+    problem, true = bundled_scene(4, points=200, noise_px=0.2, cameras=cameras)
     assert problem.lenses.of.tolist() == [0, 0, 1, 1]
     off = np.array([[0.03, 0, 0, 0], [-0.03, 0, 0, 0]])
-    found = bundle(problem, replace(_disturbed(true, 4), lens=true.lens + off), Settings(), 0).solution
+    found = bundle(problem, replace(disturbed(true, 4), lens=true.lens + off), Settings(), 0).solution
     np.testing.assert_allclose(found.lens[:, 0], true.lens[:, 0], atol=0.01)
 
 
 def test_given_poses_stay() -> None:
     held = np.array([True, False, True, False])
-    problem, true = _scene(6, noise_px=0.3, held=held)
-    start_at = _disturbed(true, 6)
+    problem, true = bundled_scene(6, noise_px=0.3, held=held)
+    start_at = disturbed(true, 6)
     found = bundle(problem, start_at, Settings(), 0).solution
     np.testing.assert_array_equal(found.R[held], start_at.R[held])
     np.testing.assert_array_equal(found.centres[held], start_at.centres[held])
@@ -164,7 +116,7 @@ def test_given_poses_stay() -> None:
 
 
 def test_pictures_of_one_place_stay_together() -> None:
-    problem, true = _scene(7, noise_px=0.3)
+    problem, true = bundled_scene(7, noise_px=0.3)
     tied = problem.with_stations([(1, 3)])
     centres = true.centres.copy()
     centres[3] = centres[1]
@@ -174,7 +126,7 @@ def test_pictures_of_one_place_stay_together() -> None:
 
 
 def test_rotations_alone_leave_all_at_one_place_and_at_infinity() -> None:
-    problem, true = _scene(8, noise_px=0.3)
+    problem, true = bundled_scene(8, noise_px=0.3)
     far = replace(true, centres=np.zeros_like(true.centres), inverse_ranges=np.zeros(60))
     found = bundle(problem, far, Settings(depths=False), 0).solution
     assert not found.centres.any() and not found.inverse_ranges.any()
@@ -183,7 +135,7 @@ def test_rotations_alone_leave_all_at_one_place_and_at_infinity() -> None:
 
 def test_the_scale_does_not_drift() -> None:
     """A prior of ρ would be the cheaper the larger all places are, at no cost of the observations."""
-    problem, true = _scene(9, noise_px=0.3)
+    problem, true = bundled_scene(9, noise_px=0.3)
     prior = DepthPrior(np.zeros(60), np.full(60, 0.05))
     found = bundle(problem, true, Settings(iterations=30, tolerance=0), 0, prior).solution
     np.testing.assert_allclose(np.linalg.norm(found.centres), np.linalg.norm(true.centres), rtol=0.05)
@@ -192,14 +144,14 @@ def test_the_scale_does_not_drift() -> None:
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_depths_may_be_negative_on_the_way(sign: int) -> None:
     """ρ is not clamped: from behind infinity a point comes back by itself."""
-    problem, true = _scene(10)
+    problem, true = bundled_scene(10)
     begun = replace(true, inverse_ranges=np.where(np.arange(60) == 5, sign * -0.03, true.inverse_ranges))
     found = bundle(problem, begun, Settings(), 0).solution
     np.testing.assert_allclose(found.inverse_ranges[5], true.inverse_ranges[5], atol=5e-3)
 
 
 def test_equations_that_are_singular_to_rounding_are_damped(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem, true = _scene(0)
+    problem, true = bundled_scene(0)
     solve = np.linalg.solve
     tried = []
 
@@ -209,7 +161,7 @@ def test_equations_that_are_singular_to_rounding_are_damped(monkeypatch: pytest.
             raise np.linalg.LinAlgError("Singular matrix")
         return solve(left, right)
 
-    begun = _disturbed(true, 0), Settings(2.0, 30, 1e-10), 0
+    begun = disturbed(true, 0), Settings(2.0, 30, 1e-10), 0
     usual = bundle(problem, *begun)
     monkeypatch.setattr(np.linalg, "solve", singular_once)
     assert bundle(problem, *begun).cost == pytest.approx(usual.cost, rel=1e-6)
