@@ -12,6 +12,7 @@ from edf_stitch.synthetic_scenes.sets.set_lines import (
     WorldLines,
     is_there,
     line_figures,
+    pixels_of,
     points_along,
     shown_at,
     straightness,
@@ -87,6 +88,16 @@ def test_points_of_an_edge_are_evenly_spread_and_hidden_ones_left_out(truth: Set
     lines = np.array([[behind - [0, 0, 0.2], behind + [0, 0, 0.2]], [[-3.0, 4.0, 0.5], [-3.0, 4.0, 2.5]]])
     world = WorldLines.of(replace(truth, rendered=replace(truth.rendered, lines=lines)))
     assert set(world.line) == {1} and world.upright.all()
+
+
+def test_a_camera_sees_points_ahead_of_it_that_nothing_hides(truth: SetTruth) -> None:
+    camera, depth = truth.rendered.cameras[0], truth.rendered.depths[0]
+    wall = np.array([0.5, 4.0, 1.2])
+    behind = camera.place + 1.5 * (BALL - camera.place)
+    points = np.array([wall, behind, 2 * camera.place - wall, [-3.0, 0.0, 1.5]])
+    found = pixels_of(points, camera, depth)
+    u, v, w = camera.K @ (camera.R @ wall + camera.t)
+    assert np.allclose(found[0], [u / w, v / w]) and np.isnan(found[1:]).all(), "hidden, behind it, beside it"
 
 
 def test_what_lies_beside_an_edge_of_depth_is_found_there() -> None:
