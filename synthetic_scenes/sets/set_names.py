@@ -30,6 +30,8 @@ SET_MEASURES = {
     "seam_levels": ("step of tone along borders, off the true one, median", "levels", 2),
     "seam_p90_levels": ("step of tone along borders, off the true one, 90th", "levels", 2),
 }  # fmt: skip
+# The same of one picture.
+OF_A_PICTURE = SET_MEASURES | {"rotation_deg": ("rotation", "°", 3), "position_mm": ("position", "mm", 1)}
 SET_PROOF_NAMES = {
     "direction_deg": "sphere's Position from its directions", "distance_relative": "ray casts against it, relative",
     "visibility_wrong": "visible by depth, not by rays: share", "visibility_asked": "rays that were asked",

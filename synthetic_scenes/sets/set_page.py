@@ -8,7 +8,7 @@ from html import escape
 from ...core.output.page import table
 from ..limits import Check, Result
 from ..report_page import BAD, GOOD, address, cell, failures, figure, named, proof_table, slug, unit, warnings_list
-from .set_names import SET_MEASURES, SET_PICTURES
+from .set_names import OF_A_PICTURE, SET_MEASURES, SET_PICTURES
 from .set_thresholds import BARS, HUGIN, LEAD, OURS, ROTATION_ONLY
 from .slider import slider
 
@@ -84,7 +84,7 @@ def _figures(result: Result) -> str:
     all_of_them = table(f"<tr><th></th><th></th>{head}<th>asked of ours</th><th>measured then</th></tr>", rows)
     lines = (result["runs"].get(OURS) or {}).get("by_picture") or []
     names = [name for name in (lines[0] if lines else {}) if name != "picture"]
-    columns = "".join(f"<th class=n>{escape(named(name, SET_MEASURES))}</th>" for name in names)
+    columns = "".join(f"<th class=n>{escape(named(name, OF_A_PICTURE))}</th>" for name in names)
     each = table(f"<tr><th>picture</th>{columns}</tr>", [
         f"<tr><th>{int(line['picture']):02d}</th>{''.join(cell(line[name], name, None) for name in names)}</tr>"
         for line in lines

@@ -20,7 +20,7 @@ def measured(scene: str = "small_room") -> dict[str, Any]:
     ours, left = {bar.measure: bar.measured for bar in BARS[scene]}, heading(scene, (640, 480))["expected_left_out"]
     runs = {
         OURS: {"refused": "", "warnings": ["<odd>"], "used": 5, "left_out": left, "figures": {**ours, LEAD: 25.0},
-               "by_picture": [{"picture": 0.0, "overlap_px": 0.25}]},
+               "by_picture": [{"picture": 0.0, "overlap_px": 0.25, "rotation_deg": 0.1}]},
         ROTATION_ONLY: {"refused": "", "warnings": [], "used": 5, "left_out": [], "by_picture": [],
                         "figures": {**ours, LEAD: 22.0}},
     }  # fmt: skip
@@ -97,7 +97,7 @@ def test_the_report_shows_sets_and_what_was_measured_when_bars_were_set() -> Non
     files = report_files([result], "sets", False, "1.0")
     page = files["report.html"].decode()
     for text in ("Sets of many pictures", "True sphere", "From above", "measured then", 'id="scene-small_room"',
-                 "&lt;odd&gt;", "Each picture"):  # fmt: skip
+                 "&lt;odd&gt;", "Each picture", "<th class=n>rotation</th>"):  # fmt: skip
         assert text in page, text
     assert "The suite’s bars" not in page and "Outside the overlap" not in page, "there is no pair"
     assert b"small_room" in files["report.csv"] and b"rotation_max_deg" in files["report.csv"]
