@@ -80,6 +80,8 @@ class Alignment:
         The cameras of more than two pictures, which `cameras` are then as well; None of a pair.
     left_out : tuple of (str, str)
         Names of the pictures that connect with no others, and why.
+    numbers : tuple of int
+        Which of the frame's pictures are used, in their order here.
     """
 
     cameras: tuple[Camera, ...]
@@ -93,6 +95,7 @@ class Alignment:
     slide: SlideChoice = SlideChoice(0.0, (), "")
     rig: Rig | None = None
     left_out: tuple[tuple[str, str], ...] = ()
+    numbers: tuple[int, ...] = (0, 1)
 
     @property
     def pair_field(self) -> Field:
@@ -141,7 +144,8 @@ def align(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgr
     StitchError
         And its kinds: too few matches, no overlap, a geometry that explains nothing.
     """
-    return fit_and_warp(estimate_geometry(frames, options, progress), frames, options, progress)
+    geometry = estimate_geometry(frames, options, progress)
+    return fit_and_warp(geometry, [frame.only(geometry.numbers) for frame in frames], options, progress)
 
 
 def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Geometry:
@@ -150,7 +154,7 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     Parameters
     ----------
     frames : sequence of Frame
-        Of the same cameras.
+        Of the same cameras; of more than two, the first frame alone is looked at.
     options : StitchOptions
         What is known of cameras and matches; preview, seed and cache. The field does not matter.
     progress : callable
@@ -296,7 +300,7 @@ def fit_and_warp(
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(
         cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide,
-        left_out=geometry.left_out,
+        left_out=geometry.left_out, numbers=geometry.numbers,
     )  # fmt: skip
 
 
@@ -314,7 +318,7 @@ def _many_mapped(
     warnings = (*geometry.warnings, *field.warnings)
     return Alignment(
         geometry.cameras, geometry.edges, rig.views, field, mapped.warp, warnings, None, mapped.continuation,
-        mapped.slide, rig, geometry.left_out,
+        mapped.slide, rig, geometry.left_out, geometry.numbers,
     )  # fmt: skip
 
 

@@ -81,7 +81,10 @@ class AllEdges:
     @cached_property
     def down(self) -> Array:
         """The unit vector (3,) along gravity."""
-        return gravity_by_edges([view.R for view in self.views if np.isfinite(view.R).all()], *self.together)
+        rotations = [view.R for view in self.views if np.isfinite(view.R).all()]
+        edges = self.together
+        self.tick()
+        return gravity_by_edges(rotations, *edges)
 
     @cached_property
     def down_is_sure(self) -> bool:

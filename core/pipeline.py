@@ -43,7 +43,8 @@ from .pictures.picture import Picture
 from .raster.arrays import Box, box_of, common, cut
 from .raster.resizing import resized_points
 from .system.errors import BadRequest
-from .system.progress import STAGES, STAGES_OF_MANY, Progress
+from .system.progress import Progress, stages_of
+from .system.threads import ask, asking
 
 
 @dataclass(frozen=True)
@@ -228,17 +229,18 @@ def stitch(
     if isinstance(pictures, (str, Path, np.ndarray, Picture)):
         raise BadRequest("stitch() takes its pictures as a list: stitch([left, right], options)")
     options = options or StitchOptions()
-    stopwatch = Stopwatch(Progress(progress, cancelled, STAGES if len(pictures) == 2 else STAGES_OF_MANY))
+    stopwatch = Stopwatch(Progress(progress, cancelled, stages_of(len(pictures))))
 
-    stopwatch("read")
-    frame = read_frame(pictures, options)
-    geometry = estimate_geometry([frame], options, stopwatch)
-    frame = frame.only(geometry.numbers)
+    with asking(cancelled):
+        stopwatch("read")
+        frame = read_frame(pictures, options)
+        geometry = estimate_geometry([frame], options, stopwatch)
+        frame = frame.only(geometry.numbers)
 
-    def made(by: StitchOptions) -> StitchResult:
-        return compose(frame, fit_and_warp(geometry, [frame], by, stopwatch), by, stopwatch)
+        def made(by: StitchOptions) -> StitchResult:
+            return compose(frame, fit_and_warp(geometry, [frame], by, stopwatch), by, stopwatch)
 
-    return first_usable(made, options) if geometry.rig is None else made(options)
+        return first_usable(made, options) if geometry.rig is None else made(options)
 
 
 def compose(
@@ -278,6 +280,7 @@ def compose(
 
     def composed_with(painted: NDArray[np.int8] | None) -> tuple[Composition, Box]:
         made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
+        ask()
         own = whole.maps[0].inside()
         shown = made.panorama.alpha > 0
         reference = box_of(own) if own.any() else None
@@ -293,6 +296,7 @@ def compose(
         painted = _on_canvas(painted, whole.canvas, place)
     made, box = composed_with(painted)
     panorama, labels = made.panorama, made.labels
+    ask()
     looks = appearance(panorama, made.exposed, labels, any(floats)) if options.measure else {}
     panorama, canvas = panorama.within(box), whole.canvas.within(box)
     # of a whole sphere, layers and maps exist only where the pictures lie

@@ -25,15 +25,21 @@ RIM_PX = 3
 def finished(result: StitchResult, pair: RenderedPair, truth: Truth) -> dict[str, float]:
     """Figures of a panorama on the reference's plane, made with all that the defaults do.
 
-    target_only_psnr_db: what the target alone sees, against the true panorama; what is not shown is black. One gain per
-    channel is allowed for: no picture says which exposure is the true one. things_half, of worlds that name things: see
-    `things_half`.
+    delivered_target_only_psnr_db: see `target_only`; things_half, of worlds that name things: see `things_half`.
     """
-    picture, _ = on_the_wide_canvas(result, truth)
-    alone = truth.in_target & ~truth.in_reference
-    exposed = evened(decode(picture), truth.picture, truth.in_reference)
-    found = {"target_only_psnr_db": psnr(exposed, truth.picture, alone) if alone.any() else math.nan}
+    found = {f"delivered_{key}": value for key, value in target_only(result, truth).items()}
     return found | ({"things_half": things_half(result, pair, truth)} if pair.things else {})
+
+
+def target_only(result: StitchResult, truth: Truth) -> dict[str, float]:
+    """target_only_psnr_db: what the target alone sees, against the true panorama; what is not shown is black. One gain
+    per channel is allowed for: no picture says which exposure is the true one."""
+    alone = truth.in_target & ~truth.in_reference
+    if not alone.any():
+        return {"target_only_psnr_db": math.nan}
+    picture, _ = on_the_wide_canvas(result, truth)
+    exposed = evened(decode(picture), truth.picture, truth.in_reference)
+    return {"target_only_psnr_db": psnr(exposed, truth.picture, alone)}
 
 
 def evened(light: NDArray[np.float32], true: NDArray[np.uint8], where: NDArray[np.bool_]) -> NDArray[np.uint8]:

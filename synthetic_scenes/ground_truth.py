@@ -105,6 +105,15 @@ def visible(pixels: Array, there: Array, other_depth: NDArray) -> NDArray[np.boo
     return inside & (1.0 / np.where(inside, there, 1.0) >= (1 - SAME_DEPTH) * nearest - 1e-9)
 
 
+def inverse_depth_at(depth: NDArray, x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
+    """1 / depth (N,) of a picture (H, W) at its pixels x, y (N,), which need not be whole."""
+    with np.errstate(divide="ignore"):
+        inverse = (1.0 / depth).astype(np.float32)[..., None]
+    near, between = (fetch(inverse, x[None], y[None], how)[0, :, 0] for how in (cv2.INTER_NEAREST, cv2.INTER_LINEAR))
+    # inverse depth is affine on a plane; across the edge of an object it belongs to nothing
+    return np.where(np.abs(between - near) <= SAME_DEPTH * near, between, near)
+
+
 def steepness(depth: NDArray) -> Array:
     """By what share a depth (H, W) changes from pixel to pixel."""
     inverse = 1.0 / depth.astype(np.float64)

@@ -18,7 +18,7 @@ from ..core.pipeline import StitchResult
 from ..core.raster.arrays import Array
 from ..core.raster.colour import encode
 from ..core.raster.sampling import fetch
-from .ground_truth import SAME_DEPTH, TrueGeometry, pose_errors, seen_from, visible
+from .ground_truth import TrueGeometry, inverse_depth_at, pose_errors, seen_from, visible
 from .rendered import RenderedPair
 from .stitches import ON_REFERENCE
 
@@ -110,13 +110,10 @@ def meeting(result: StitchResult, pair: RenderedPair, truth: Truth) -> dict[str,
     shown, found = (picture_map.arrays() for picture_map in result.warp.maps)
     both = shown.inside() & found.inside() & ~result.occluded[0] & ~result.occluded[1]
     points = np.stack([shown.x[both], shown.y[both]], axis=-1)
-    x, y = (points - np.array(truth.corner)).astype(np.float32).T[:, None]
-    with np.errstate(divide="ignore"):
-        inverse = (1.0 / pair.wide_depth).astype(np.float32)[..., None]
-    near, between = (fetch(inverse, x, y, how)[0, :, 0] for how in (cv2.INTER_NEAREST, cv2.INTER_LINEAR))
-    # inverse depth is affine on a plane; across the edge of an object it belongs to nothing
-    inverse = np.where(np.abs(between - near) <= SAME_DEPTH * near, between, near)
-    seen = fetch(truth.overlap.astype(np.float32)[..., None], x, y, cv2.INTER_NEAREST)[0, :, 0] > 0
+    x, y = (points - np.array(truth.corner)).astype(np.float32).T
+    inverse = inverse_depth_at(pair.wide_depth, x, y)
+    overlap = truth.overlap.astype(np.float32)[..., None]
+    seen = fetch(overlap, x[None], y[None], cv2.INTER_NEAREST)[0, :, 0] > 0
     with np.errstate(divide="ignore"):
         true = truth.geometry.target_pixels(points, 1.0 / inverse.astype(np.float64))
     apart = np.hypot(found.x[both] - true[:, 0], found.y[both] - true[:, 1])[seen]

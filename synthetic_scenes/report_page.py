@@ -37,10 +37,17 @@ MEASURES = {
     "slid_auto_p95_px": ("viewpoint slides as chosen: both pictures meet, 95th", "px", 3),
     "slid_half_px": ("viewpoint slides half-way: both pictures meet, median", "px", 3),
     "slid_half_p95_px": ("viewpoint slides half-way: both pictures meet, 95th", "px", 3),
+    **{f"slid_{how}_{of}_{name}": (f"viewpoint slides {said}: the {of} beside the truth's rays, {what}", "px", 3)
+       for how, said in (("auto", "as chosen"), ("half", "half-way")) for of in ("reference", "target")
+       for name, what in (("px", "median"), ("p95_px", "95th"))},
+    "target_only_psnr_db": ("what the target alone shows, PSNR", "dB", 2),
+    "delivered_target_only_psnr_db": ("delivered: what the target alone shows, PSNR", "dB", 2),
 }  # fmt: skip
 Names = dict[str, tuple[str, str, int]]
 OTHER_NAMES = {
-    "lead_db": "whole picture's lead over the best rival", "model": "model", "status": "status",
+    "lead_db": "whole picture's lead over the best rival",
+    "nearer_share": "share of scenes in which ours is nearer than one homography",
+    "model": "model", "status": "status",
     "undetermined_said": "undetermined focal length said", "position_px": "Position pass from pixel centres",
     "depth_relative": "Position against Depth, relative", "ray_cast_relative": "ray casts against Depth, relative",
     "warp_psnr_db": "target by the true map: PSNR", "half_pixel_psnr_db": "the same, half a pixel off: PSNR",

@@ -17,7 +17,7 @@ from ..core.measure.report import plain
 from ..core.output.outputs import json_bytes
 from ..core.system.errors import StitchError
 from ..core.system.output_files import OutputFiles
-from .finished import finished
+from .finished import finished, target_only
 from .measures import Truth, composition, figures, meeting, on_the_wide_canvas, truth_of, whole_picture
 from .recipes import parse_scene
 from .rendered import RenderedPair, rendered_pair
@@ -25,6 +25,7 @@ from .scene_pictures import scene_pictures
 from .sets.measured_set import measured_set
 from .sets.recipes import parse_set
 from .sets.rendered_set import rendered_set
+from .sliding import pair_beside_rays
 from .stitches import SLIDES, WAYS, Shared, delivered, slid, stitched
 from .suites import heading, is_set
 
@@ -61,7 +62,7 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
     seconds: dict[str, float] = {}
     for way, result in results.items():
         view = result.edges[0].two_view
-        measured = figures(result, truth)
+        measured = figures(result, truth) | target_only(result, truth)
         if common is not None:
             measured |= whole_picture(placed[way][0], common, truth)
         if way == COMPOSED:
@@ -108,13 +109,15 @@ def _write(
 
 
 def _slid_figures(pair: RenderedPair, truth: Truth, shared: Shared) -> dict[str, float]:
-    """`measures.meeting` of the default field by how far the viewpoint slides, slid_auto_px and so on; a slide that is
-    refused has no figures."""
+    """`measures.meeting` and `sliding.pair_beside_rays` of the default field by how far the viewpoint slides,
+    slid_auto_px, slid_auto_target_px and so on; a slide that is refused has no figures."""
     out: dict[str, float] = {}
     for name, slide in SLIDES.items():
         with suppress(StitchError):
-            found = meeting(slid(pair, COMPOSED, slide, shared), pair, truth)
-            out |= {key.replace("meeting", f"slid_{name}"): value for key, value in found.items()}
+            result = slid(pair, COMPOSED, slide, shared)
+            found = {key.removeprefix("meeting_"): value for key, value in meeting(result, pair, truth).items()}
+            found |= pair_beside_rays(result, pair, truth)
+            out |= {f"slid_{name}_{key}": value for key, value in found.items()}
     return out
 
 

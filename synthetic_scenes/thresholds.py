@@ -9,6 +9,7 @@ from statistics import median
 from typing import Any
 
 from .limits import Check, Limit, Result, number
+from .pair_bars import own_limits
 from .sets.set_thresholds import set_checks
 
 # ---- The table. Where one is missed: find out why (render, ground truth or estimate?) before you touch it. ----
@@ -27,7 +28,7 @@ PROOF = (
 MODEL_RUNS = ("known/strict", "known/slack", "unknown/strict", "unknown/slack")
 # Every general scene whose focal length is not determined: this run says so.
 SAYING_RUN = "unknown/strict"
-# Every scene with parallax: five times the suite's bars, so that one bad scene shows though the median holds (ours).
+# Every scene with parallax, those that are made harder too: so far off nothing works. `pair_bars` has narrower ones.
 SCENE = (
     Limit("known/strict", "rotation_deg", "°", at_most=0.15),
     Limit("known/strict", "h_inf_px", "px", at_most=5.0),
@@ -35,6 +36,8 @@ SCENE = (
     Limit("known/strict", "alignment_px", "px", at_most=2.0),
     Limit("known/slack", "slid_auto_px", "px", at_most=1.75),
     Limit("known/slack", "slid_half_px", "px", at_most=1.75),
+    # seen from the reference's place its own pixels have no error: half a pixel of K shows (that is 0.7)
+    Limit("known/slack", "slid_auto_reference_px", "px", at_most=0.2),
     # no bound for one scene, but what enters a median of the suite must be there
     Limit("known/slack", "slid_auto_p95_px", "px", at_most=math.inf),
     Limit("known/slack", "slid_half_p95_px", "px", at_most=math.inf),
@@ -56,40 +59,34 @@ COMPOSED = (
 # that refused the scene, or that does not exist yet, is none.
 OURS, RIVALS = "known/strict", ("known/paper", "known/rew", "known/apap", "known/homography")
 LEAD = Limit(OURS, "whole_psnr_db", "dB", at_least=-0.2)
-# Scenes by name: how far what the target alone shows may be off, median and 90th percentile in px of the full suite's
-# pictures. Rooms and planes go on as they are; elsewhere the 90th percentile is at most half a pixel above that of a
-# field that fades to one plane.
-BEYOND_RUN, BEYOND_MEASURES = "known/slack", ("beyond_px", "beyond_p90_px")
-BEYOND: dict[str, tuple[float, float]] = {
-    "corner_room": (0.4, 2.0), "portrait_pair": (0.4, 2.0), "sideways": (0.4, 2.0), "two_planes": (0.4, 2.0),
-    "exposure_step": (0.4, 2.0), "layered_cards": (math.inf, 20.2), "street": (math.inf, 15.2),
-    "foliage": (2.7, 15.4), "relief": (math.inf, 5.9), "tabletop": (math.inf, 7.6), "zoom_pair": (math.inf, 21.2),
-    "forward": (math.inf, 11.8), "toe_in": (math.inf, 5.6), "hdr_interior": (3.0, 54.7), "low_texture": (3.0, 85.9),
-    "wide": (math.inf, 21.3), "occluder": (math.inf, 19.6),
-}  # fmt: skip
+# What the target alone shows, of the default field, beside one homography's: how far it is off.
+BEYOND_RUN, BEYOND_MEASURES, PLAIN_RUN = "known/slack", ("beyond_px", "beyond_p90_px"), "known/homography"
+# A whole suite: in so many of its scenes, by the median, ours is nearer.
+NEARER = Limit(BEYOND_RUN, "nearer_share", "", at_least=0.75)
 # Scenes with a thing that a picture's border cuts: it is whole in the panorama or gone, but for a tenth of it, which is
 # what its rim takes. Of what the target alone shows there must be a figure.
 CUT_SCENES = ("cut_branch", "cut_person")
 CUT = (
     Limit("known/slack", "things_half", "", at_most=0.1),
-    Limit("known/slack", "target_only_psnr_db", "dB", at_most=math.inf),
+    Limit("known/slack", "delivered_target_only_psnr_db", "dB", at_most=math.inf),
 )
-# The whole suite: medians over its scenes with parallax.
+# The whole suite: medians over its scenes with parallax, 1.3 × the worse of the quick and the full suite's, but for
+# three that are aims: the focal length, the lead and what seam and bands are worth.
 SUITE = (
-    Limit("known/strict", "rotation_deg", "°", at_most=0.03),
-    Limit("known/strict", "h_inf_px", "px", at_most=1.0),
-    Limit("known/strict", "projectivity_px", "px", at_most=0.3),
-    Limit("known/strict", "alignment_px", "px", at_most=0.4),
+    Limit("known/strict", "rotation_deg", "°", at_most=0.02),  # measured: 0.009
+    Limit("known/strict", "h_inf_px", "px", at_most=0.2),  # 0.092
+    Limit("known/strict", "projectivity_px", "px", at_most=0.05),  # 0.015
+    Limit("known/strict", "alignment_px", "px", at_most=0.12),  # 0.085
     Limit("unknown/strict", "focal_percent", "%", at_most=3.0, absolute=True, determined=True),
-    Limit("unknown/strict", "projectivity_px", "px", at_most=0.3),  # "projectivity unchanged": the bar of K known
+    Limit("unknown/strict", "projectivity_px", "px", at_most=0.3),
     Limit(OURS, "lead_db", "dB", at_least=1.0),  # over the best rival of each scene
-    Limit(BEYOND_RUN, "beyond_px", "px", at_most=0.8),
-    Limit(BEYOND_RUN, "beyond_p90_px", "px", at_most=4.0),
+    Limit(BEYOND_RUN, "beyond_px", "px", at_most=0.72),  # 0.55
+    Limit(BEYOND_RUN, "beyond_p90_px", "px", at_most=2.0),  # 1.5
     # in the overlap, on a cylinder, however far the viewpoint slides
-    Limit("known/slack", "slid_auto_px", "px", at_most=0.35),
-    Limit("known/slack", "slid_auto_p95_px", "px", at_most=2.0),
-    Limit("known/slack", "slid_half_px", "px", at_most=0.35),
-    Limit("known/slack", "slid_half_p95_px", "px", at_most=2.0),
+    Limit("known/slack", "slid_auto_px", "px", at_most=0.12),  # 0.085
+    Limit("known/slack", "slid_auto_p95_px", "px", at_most=0.6),  # 0.43
+    Limit("known/slack", "slid_half_px", "px", at_most=0.12),  # 0.083
+    Limit("known/slack", "slid_half_p95_px", "px", at_most=0.6),  # 0.46
     # "by 2 dB in the median", where it can be asked for: what the target alone shows is the same in both, and is most
     # of the whole picture's error
     Limit("known/slack", "overlap_over_average_db", "dB", at_least=2.0),
@@ -144,6 +141,12 @@ def judge(results: Sequence[Result], complete: bool) -> Verdict:
             Check(None, m.limit.run, m.limit.measure, m.value, m.limit.text, m.limit.unit, m.passed)
             for m in medians(results)
         ]
+        nearer, asked = nearer_than_homography(results)
+        if asked:
+            share = nearer / asked
+            checks.append(
+                Check(None, NEARER.run, NEARER.measure, share, NEARER.text, NEARER.unit, NEARER.holds(share))
+            )
     return Verdict(tuple(checks), complete)
 
 
@@ -157,6 +160,15 @@ def medians(results: Sequence[Result]) -> tuple[Median, ...]:
         finite = middle if middle is not None and math.isfinite(middle) else None
         out.append(Median(limit, finite, len(values), values.count(None)))
     return tuple(out)
+
+
+def nearer_than_homography(results: Sequence[Result]) -> tuple[int, int]:
+    """In how many scenes what the target alone shows is nearer to its true place than one homography puts it, of how
+    many in which both can be asked; ours without a figure is not nearer."""
+    ours = [_figure(result, BEYOND_RUN, BEYOND_MEASURES[0]) for result in results]
+    theirs = [_figure(result, PLAIN_RUN, BEYOND_MEASURES[0]) for result in results]
+    both = [(mine, other) for mine, other in zip(ours, theirs, strict=True) if other is not None]
+    return sum(mine is not None and mine < other for mine, other in both), len(both)
 
 
 def value_of(result: Result, limit: Limit) -> float | None:
@@ -191,9 +203,9 @@ def _scene_checks(result: Result) -> list[Check]:
     if result.get("kind") == "set":
         return set_checks(result)
     limits = [
-        limit for limit in (*PROOF, *SCENE, *COMPOSED, *_beyond(scene), *(CUT if scene in CUT_SCENES else ()))
+        limit for limit in (*PROOF, *SCENE, *COMPOSED, *(CUT if scene in CUT_SCENES else ()))
         if limit.run == "proof" or _concerns(limit, result)
-    ]  # fmt: skip
+    ] + own_limits(result)  # fmt: skip
     checks = [_checked(scene, limit, limit.measure, value_of(result, limit)) for limit in limits]
     expected = result["expected_model"]
     for way in MODEL_RUNS:
@@ -208,11 +220,6 @@ def _scene_checks(result: Result) -> list[Check]:
         for rival, lead in (lead_over_rivals(result) or {"any rival": None}).items():
             checks.append(_checked(scene, LEAD, f"{LEAD.measure} over {rival}", lead))
     return checks
-
-
-def _beyond(scene: str) -> list[Limit]:
-    bounds = zip(BEYOND_MEASURES, BEYOND[scene], strict=True) if scene in BEYOND else ()
-    return [Limit(BEYOND_RUN, measure, "px", at_most=bound) for measure, bound in bounds]
 
 
 def _checked(scene: str, limit: Limit, measure: str, value: float | None) -> Check:

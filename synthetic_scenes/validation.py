@@ -35,8 +35,8 @@ PACKAGE = __package__
 # What a scene's figures depend on; judging and showing them anew needs no new measuring.
 PARTS = ("core", "synthetic_scenes")
 ONLY_SHOWING = {
-    "thresholds.py", "set_thresholds.py", "limits.py", "validation_report.py", "report_page.py", "set_page.py",
-    "set_names.py", "slider.py", "validation.py", "demo.py",
+    "thresholds.py", "set_thresholds.py", "pair_bars.py", "limits.py", "validation_report.py", "report_page.py",
+    "set_page.py", "set_names.py", "slider.py", "validation.py", "demo.py",
 }  # fmt: skip
 # A scene of the full suite takes up to 2 GB, and its renders take all cores anyway.
 MOST_AT_ONCE = 4

@@ -15,7 +15,7 @@ from typing import Any
 from .limits import Result
 from .report_page import MEASURES, check_value, named, page
 from .sets.set_page import set_overview, set_section
-from .thresholds import Median, Verdict, judge, medians
+from .thresholds import Median, Verdict, judge, medians, nearer_than_homography
 
 SCHEMA = 1
 # Failed checks that the terminal shows.
@@ -73,6 +73,8 @@ def summary_lines(verdict: Verdict, results: Sequence[Result]) -> list[str]:
                 f"  {'ok  ' if middle.passed else 'FAIL'} {limit.run:14} {named(limit.measure)}: "
                 f"{check_value(middle.value, limit.measure)} {limit.unit} (limit {limit.text})"
             )
+        nearer, asked = nearer_than_homography(pairs)
+        lines.append(f"  what the target alone shows: nearer than one homography in {nearer} of {asked} scenes")
     elif pairs:
         lines.append("not a whole suite: its medians are not judged")
     failed = verdict.failed

@@ -6,7 +6,7 @@ import csv
 import os
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -31,11 +31,11 @@ _NOT_IN_NAMES = re.compile(r'[\x00-\x1f/\\:*?"<>|]')
 
 @dataclass(frozen=True)
 class BatchItem:
-    """One line of a list: pictures of one panorama, or a clip of two cameras that stand still.
+    """One line of a list: pictures of one panorama, or a clip of cameras that stand still.
 
     name: of its outputs; reference, target: files, or for clips patterns like a_%04d.png or a_####.png; frames: the
-    numbers that both sides have, None for pictures; missing: expected numbers that one side or both lack; camera: what
-    this line says about the cameras, instead of the options; more: pictures beyond two; trouble: why a folder or a
+    numbers that all sides have, None for pictures; missing: expected numbers that some side lacks; camera: what this
+    line says about the cameras, instead of the options; more: files or patterns beyond two; trouble: why a folder or a
     pattern stands for no panorama, which is then in place of both files. Raises BadRequest for a name that no file can
     have.
     """
@@ -69,9 +69,8 @@ class BatchItem:
 
     def files(self, frame: int | None = None) -> tuple[Path, ...]:
         """The files of its pictures; of a clip, those of a frame."""
-        if frame is None:
-            return self.reference, self.target, *self.more
-        return _with_number(self.reference, frame), _with_number(self.target, frame)
+        files = self.reference, self.target, *self.more
+        return files if frame is None else tuple(_with_number(one, frame) for one in files)
 
     def numbered(self, frame: int) -> str:
         """The name of a frame's output, with as many digits as the reference's."""
@@ -131,32 +130,32 @@ def same_name(name: str) -> str:
 
 
 def find_frames(
-    reference: Path, target: Path, first: int | None = None, last: int | None = None, step: int = 1
+    patterns: Sequence[Path], first: int | None = None, last: int | None = None, step: int = 1
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Frame numbers of two patterns.
+    """Frame numbers of patterns.
 
     Parameters
     ----------
-    reference, target : Path
-        Patterns like a_%04d.png or a_####.png.
+    patterns : sequence of Path
+        Of each camera, like a_%04d.png or a_####.png.
     first, last : int, optional
-        Bounds; with both, every number between them is expected, otherwise those that either side has.
+        Bounds; with both, every number between them is expected, otherwise those that any camera has.
     step : int
         Of the numbers, from first.
 
     Returns
     -------
     frames : tuple of int
-        Numbers that both sides have.
+        Numbers that all cameras have.
     missing : tuple of int
-        Expected numbers that one side or both lack.
+        Expected numbers that some camera lacks.
 
     Raises
     ------
     BadRequest
         No pattern, or no range.
     """
-    return _find_frames(reference, target, first, last, step, _Folders())
+    return _find_frames(patterns, first, last, step, _Folders())
 
 
 class _Pattern(NamedTuple):
@@ -205,22 +204,22 @@ def _with_number(path: Path, frame: int) -> Path:
 
 
 def _find_frames(
-    reference: Path, target: Path, first: int | None, last: int | None, step: int, folders: _Folders
+    patterns: Sequence[Path], first: int | None, last: int | None, step: int, folders: _Folders
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    sides = []
-    for path in (reference, target):
+    sides: list[set[int]] = []
+    for path in patterns:
         numbers = map(_pattern(path).number, folders[path.parent])
         sides.append({number for number in numbers if number is not None})
-    both, either = sides[0] & sides[1], sides[0] | sides[1]
-    low = min(either, default=0) if first is None else first
-    high = max(either, default=low) if last is None else last
+    in_all, in_any = set.intersection(*sides), set.union(*sides)
+    low = min(in_any, default=0) if first is None else first
+    high = max(in_any, default=low) if last is None else last
     if low < 0 or step < 1 or (first is not None and last is not None and last < first):
         raise BadRequest(f"frames {low} to {high} by {step}: they count from 0, up from first to last, by 1 or more")
     if (high - low) // step >= CLIP.max_frames:
         raise BadRequest(f"frames {low} to {high} in steps of {step} are more than {CLIP.max_frames}; split the clip")
     asked = range(low, high + 1, step)
-    expected = asked if first is not None and last is not None else [n for n in asked if n in either]
-    return tuple(n for n in expected if n in both), tuple(n for n in expected if n not in both)
+    expected = asked if first is not None and last is not None else [n for n in asked if n in in_any]
+    return tuple(n for n in expected if n in in_all), tuple(n for n in expected if n not in in_all)
 
 
 def _item(row: dict[str, str], folder: Path, folders: _Folders) -> BatchItem:
@@ -230,25 +229,25 @@ def _item(row: dict[str, str], folder: Path, folders: _Folders) -> BatchItem:
     for column in ("reference", "target"):
         if not row.get(column):
             raise BadRequest(f"the {column} is missing; {_LAYOUT}")
-        parent = Path(row[column]).parent
+    further = [column for column in row if _FURTHER.fullmatch(column) and row[column]]
+    given = [row[column] for column in ("reference", "target", *further)]
+    for one in given:
+        parent = Path(one).parent
         if _PLACE.search(str(parent)) and not (folder / parent).exists():
-            raise BadRequest(f"{row[column]}: the frame's number may stand in the file's name, not in a folder's")
-    reference, target = folder / row["reference"], folder / row["target"]
+            raise BadRequest(f"{one}: the frame's number may stand in the file's name, not in a folder's")
+    files = [folder / one for one in given]
+    reference, target, *more = files
     camera = _camera(row)
-    more = tuple(folder / row[column] for column in row if _FURTHER.fullmatch(column) and row[column])
     span = {column: _whole_number(row[column], column) for column in ("first", "last", "step") if row.get(column)}
-    if _is_pattern(reference) != _is_pattern(target):
-        raise BadRequest("one side is a pattern of frames and the other is not; both need to be")
+    if len({_is_pattern(one) for one in files}) > 1:
+        raise BadRequest("one side is a pattern of frames and the other is not; all need to be")
     if not _is_pattern(reference):
         if span:
             raise BadRequest(f"{' and '.join(span)} given, but the files are no patterns like a_%04d.png or a_####.png")
-        return BatchItem(row.get("name") or reference.stem, reference, target, camera=camera, more=more)
-    if more:
-        raise BadRequest("a clip has two cameras for now, and this line names more; stitch it pair by pair")
-    frames, missing = _find_frames(
-        reference, target, span.get("first"), span.get("last"), span.get("step", 1), folders
-    )
-    return BatchItem(row.get("name") or _clip_name(reference), reference, target, frames, missing, camera)
+        return BatchItem(row.get("name") or reference.stem, reference, target, camera=camera, more=tuple(more))
+    frames, missing = _find_frames(files, span.get("first"), span.get("last"), span.get("step", 1), folders)
+    name = row.get("name") or _clip_name(reference)
+    return BatchItem(name, reference, target, frames, missing, camera, tuple(more))
 
 
 def _set(row: dict[str, str], source: Path) -> BatchItem:

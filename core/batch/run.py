@@ -22,7 +22,8 @@ from ..output.outputs import json_bytes
 from ..pictures.picture import Picture
 from ..pipeline import StitchResult, Stopwatch, compose, stitch
 from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage
-from ..system.progress import Progress
+from ..system.progress import Progress, stages_of
+from ..system.threads import asking
 from .list import BatchItem
 from .options import CLIP
 from .units import BatchRequest, Job, Unit, UnitFiles, plan, read_json
@@ -167,8 +168,9 @@ def run_batch(
     summary = summed_up()
     try:
         for number, job in enumerate(jobs, 1):
-            meter.begin(f"[{number}/{len(jobs)}]", sum(weights[: number - 1]))
-            outcomes.append(_outcome(job, meter))
+            meter.begin(f"[{number}/{len(jobs)}]", sum(weights[: number - 1]), len(job.item.files()))
+            with asking(cancelled):
+                outcomes.append(_outcome(job, meter))
             summary = summed_up()
             if finished is not None:
                 finished(outcomes[-1], number, len(jobs))
@@ -184,11 +186,11 @@ class _Meter:
     def __init__(self, progress: Tell | None, cancelled: Callable[[], bool] | None, total: float) -> None:
         self.cancelled = cancelled
         self._progress, self._total = progress, total
-        self._label, self._done = "", 0.0
+        self._label, self._done, self._stages = "", 0.0, stages_of(2)
 
-    def begin(self, label: str, done: float) -> None:
-        """Begins an item, after `done` of the total weight."""
-        self._label, self._done = label, done
+    def begin(self, label: str, done: float, pictures: int) -> None:
+        """Begins an item of so many pictures, after `done` of the total weight."""
+        self._label, self._done, self._stages = label, done, stages_of(pictures)
 
     def piece(self, weight: float) -> Tell:
         """The progress callback of the item's next piece, which has this weight in the total."""
@@ -203,7 +205,7 @@ class _Meter:
 
     def stopwatch(self, weight: float) -> Stopwatch:
         """The same for work that has steps of its own."""
-        return Stopwatch(Progress(self.piece(weight), self.cancelled))
+        return Stopwatch(Progress(self.piece(weight), self.cancelled, self._stages))
 
 
 def _weight(job: Job) -> float:
@@ -276,10 +278,11 @@ class _Locked:
 def _clip(job: Job, meter: _Meter) -> Outcome:
     item = job.item
     if not item.frames:
-        raise UnreadableImage(f"no frame of {item.reference} has its like in {item.target}; check names and numbers")
+        others = " and ".join(map(str, (item.target, *item.more)))
+        raise UnreadableImage(f"no frame of {item.reference} has its like in {others}; check names and numbers")
     warnings: dict[str, None] = {}
     if item.missing:
-        warnings[f"frames {_listed(item.missing)} are missing on one side or both and were left out"] = None
+        warnings[f"frames {_listed(item.missing)} are missing of some cameras and were left out"] = None
     failed: list[FrameTrouble] = []
     frames = [unit for unit in job.todo if unit.frame is not None]
     if job.todo:
@@ -317,14 +320,14 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
     quick = replace(options, crop="full", measure=False)
     decided = pooled_decision([
         compose(
-            read_frame(item.files(number), options), alignment, quick, meter.stopwatch(CLIP.frame_weight), keep=True
+            _used(item, number, options, alignment), alignment, quick, meter.stopwatch(CLIP.frame_weight), keep=True
         ).decided
         for number in used
     ])
     reports = [unit for unit in job.todo if unit.frame is None]
     crop = options.crop
     if reports or crop == "inscribed":
-        frame = read_frame(item.files(first), options)
+        frame = _used(item, first, options, alignment)
         result = compose(frame, alignment, options, meter.stopwatch(CLIP.frame_weight), decided)
         if crop == "inscribed":  # one frame decides for all: the frames of a clip have one size
             whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
@@ -333,6 +336,11 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
         for unit in reports:
             unit.write(replace(result, report={**result.report, "clip": about}))
     return _Locked(alignment, decided, sizes, replace(options, crop=crop, measure=False))
+
+
+def _used(item: BatchItem, number: int, options: StitchOptions, alignment: Alignment) -> Frame:
+    """A frame of a clip, with those pictures that connect with others."""
+    return read_frame(item.files(number), options).only(alignment.numbers)
 
 
 def _readable(item: BatchItem, options: StitchOptions, progress: Stopwatch) -> dict[int, Frame]:
@@ -370,6 +378,7 @@ def _frame(unit: Unit, locked: _Locked, progress: Stopwatch) -> tuple[tuple[int,
     if frame.full_sizes != locked.sizes:
         found, needed = (" and ".join(f"{w}×{h}" for w, h in sizes) for sizes in (frame.full_sizes, locked.sizes))
         raise BadRequest(f"the pictures have {found} pixels, the clip {needed}: one alignment is for one camera each")
+    frame = frame.only(locked.alignment.numbers)
     result: StitchResult = compose(frame, locked.alignment, locked.options, progress, locked.decided)
     height, width = result.panorama.alpha.shape
     return (width, height), unit.write(result)

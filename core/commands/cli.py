@@ -128,7 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_validate(
         commands.add_parser("validate", help="render scenes with known cameras and measure", description=_VALIDATE)
     )
-    _add_demo(commands.add_parser("demo", help="make a pair, stitch it, say what was measured", description=_DEMO))
+    _add_demo(commands.add_parser("demo", help="make pictures, stitch them, say what was measured", description=_DEMO))
     return parser
 
 
@@ -145,7 +145,7 @@ slides along its epipolar lines to meet it; more may come in any order, and thos
 out and named. Messages go to stderr; the last line says whether the panorama is good, where to look at it, or why it is
 not usable. Exit codes: 0 done, 1 not usable (with --strict-verdict), 2 the call is wrong, 3 the pictures can't be
 stitched, 4 a file can't be read or written, 130 interrupted."""
-_BATCH = """Stitch every line of LIST.csv: pictures, a folder of them, or a clip of two cameras that stand still
+_BATCH = """Stitch every line of LIST.csv: pictures, a folder of them, or a clip of cameras that stand still
 (a_%04d.png or a_####.png), whose frames share one alignment. A line holds reference,target and, if wanted, a name; a
 header may name picture3 and so on, first, last, step, focal_px and focal35 as well. A bad one is reported and the rest
 goes on; DIR/batch.json says what became of each. Exit codes: 0 all done, 2 the call is wrong, 3 one can't be stitched,
@@ -159,7 +159,7 @@ _VALIDATE = """Render scenes with known cameras in Blender, stitch them, and hol
 gets report.html, report.json and report.csv. Pictures are kept in OUTDIR/pictures and made only once. Exit codes: 0 all
 thresholds held, 1 some did not, 2 the call is wrong, 3 nothing can render, 4 a file can't be read or written, 130
 interrupted (--resume goes on)."""
-_DEMO = "Render two pictures of a small scene through known cameras, stitch them, and compare with the truth."
+_DEMO = "Render a pair and five pictures of a room through known cameras, stitch both, and compare with the truth."
 
 
 def _add_stitch(parser: argparse.ArgumentParser) -> None:

@@ -20,6 +20,7 @@ from ..pipeline import StitchResult, Stopwatch, compose
 from ..system.errors import BadRequest, Cancelled, StitchError
 from ..system.output_files import OutputFiles
 from ..system.progress import Progress
+from ..system.threads import asking
 from .figures import figures_of
 from .page import comparison_page
 from .pairs import PairFiles
@@ -144,7 +145,8 @@ def run_comparison(
         outcomes = []
         for number, pair in enumerate(request.pairs):
             progress = _Meter(show, cancelled, number, len(request.pairs), len(request.fields))
-            outcomes.append(_outcome(pair, request.fields, options, truths, progress))
+            with asking(cancelled):
+                outcomes.append(_outcome(pair, request.fields, options, truths, progress))
             if tell is not None:
                 tell(_in_words(outcomes[-1].entry, number + 1, len(request.pairs)))
         summary = {

@@ -14,6 +14,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
+from ..system.threads import ask
 from .options import SPLINE
 
 
@@ -111,6 +112,7 @@ class SmoothingProblem:
 
     def solve(self, values: Array, smoothing: float) -> tuple[ThinPlateSpline, Array]:
         """The spline of values g (N,) or (N, k) at λ = smoothing, and its residuals g − f = 8πλ D w, shaped as g."""
+        ask()
         n, functions = len(values), self.centres.shape[1] + 1
         solution = scipy.linalg.solve(
             self.system(smoothing), np.concatenate([values, np.zeros((functions, *values.shape[1:]))])
@@ -120,7 +122,9 @@ class SmoothingProblem:
 
     def inverse(self, smoothing: float) -> Inverse:
         """The matrix that turns values into weights, at λ = smoothing."""
+        ask()
         projected, affine = self._projected()
+        ask()
         n = len(self.noise)
         # the affine directions get an eigenvalue of the matrix's own size, which keeps it well conditioned
         size = float(np.trace(projected)) / n
@@ -201,6 +205,7 @@ class Inverse:
 
     def subset(self, keep: NDArray[np.bool_]) -> Inverse:
         """The inverse for the points that the mask `keep` (N,) selects, by a Schur complement."""
+        ask()
         dropped = ~keep
         rows = self.matrix[keep]
         mixed = rows[:, dropped]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from ..cameras.sources import called
 from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_painted, without
+from ..pictures.naming import told_apart
 from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
@@ -60,7 +62,7 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
         The same picture twice, and no other.
     """
     check_count(len(sources), options)
-    pictures = in_same_colour_space(_all_read(sources))
+    pictures = in_same_colour_space(_named_apart(_all_read(sources), sources))
     copies = dict(_copies(pictures))
     if len(pictures) - len(copies) == 1:
         which = "the two pictures are" if len(pictures) == 2 else "all pictures are"
@@ -125,6 +127,18 @@ def _all_read(sources: Sequence[Source]) -> list[Picture]:
     if troubles:
         raise troubles[0]
     return pictures
+
+
+def _named_apart(pictures: list[Picture], sources: Sequence[Source]) -> list[Picture]:
+    """The same, of more than two with as many folders in the names of those from files as tell these apart: cameras
+    count their pictures alike in every folder."""
+    if len(pictures) == 2:
+        return pictures
+    files = [number for number, source in enumerate(sources) if isinstance(source, (str, Path))]
+    out = list(pictures)
+    for number, name in zip(files, told_apart([str(sources[number]) for number in files]), strict=True):
+        out[number] = replace(out[number], name=Path(name).as_posix())
+    return out
 
 
 def _picture_or_trouble(source: Source) -> Picture | UnreadableImage:

@@ -15,6 +15,7 @@ from ..panorama.layers import layer_of
 from ..raster.arrays import Box
 from ..raster.colour import encode
 from ..raster.picture_map import CanvasMap, PictureMap
+from ..system.threads import ask
 from .options import VERDICT
 
 if TYPE_CHECKING:
@@ -100,6 +101,7 @@ def _small(
     picture: Picture, picture_map: CanvasMap, exposure: Exposure, nodes: tuple[slice, slice]
 ) -> tuple[PictureMap, Levels, Levels, NDArray[np.bool_]]:
     """One picture of a small copy: its map, tones as shown and as taken, and where it shows anything."""
+    ask()
     full = picture_map.arrays()
     coarse = PictureMap(full.x[nodes], full.y[nodes], full.size)
     with np.errstate(invalid="ignore"):

@@ -16,6 +16,7 @@ from ..cameras.rig import Rig, RigEdge
 from ..panorama.warp import Warp
 from ..raster.arrays import Array
 from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap
+from ..system.threads import ask
 from .metrics import shown_at
 from .options import RIG
 
@@ -71,6 +72,7 @@ def map_errors(warp: Warp, edges: Sequence[Edge]) -> Array:
     the canvas shows it, and compared with its point of the second one; an even sample of each pair."""
     found = []
     for edge in edges:
+        ask()
         inliers = edge.matches.subset(edge.two_view.inliers).thinned(RIG.matches_looked_up)
         if len(inliers):
             (first, corner), (second, other) = (_known_part(warp.maps[number]) for number in (edge.i, edge.j))
@@ -92,7 +94,8 @@ def shares(labels: NDArray[np.int16] | None, maps: Sequence[CanvasMap], shown: i
 def _known_part(one: CanvasMap) -> tuple[PictureMap, Array]:
     """A map where it is known, and the canvas px (2,) of its first pixel."""
     if isinstance(one, BoxedMap):
-        return one.inner, np.array(one.corner, np.float64)
+        known = one.known()
+        return known.inner, np.array(known.corner, np.float64)
     return one.arrays(), np.zeros(2)
 
 

@@ -22,7 +22,7 @@ from ..pictures.encoding import encode_picture, output_bits
 from ..raster.arrays import cut
 from ..raster.colour import decode
 from ..raster.lazy import whole
-from ..raster.picture_map import BoxedMap
+from ..raster.picture_map import BoxedMap, MapPart
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
 from .camera_file import camera_table
@@ -321,10 +321,10 @@ def warp_bytes(result: StitchResult) -> bytes:
     }  # fmt: skip
     for number, one in enumerate(warp.maps):
         if number or canvas.projection is not None:  # in a flat panorama the reference is only shifted, by `offset`
-            known = one.inner if isinstance(one, BoxedMap) else one.arrays()
-            box = one.box if isinstance(one, BoxedMap) else (0, 0, canvas.width, canvas.height)
+            known = one.known() if isinstance(one, BoxedMap) else MapPart(one.arrays(), (0, 0))
             arrays |= {
-                f"map_x_{number:02d}": known.x, f"map_y_{number:02d}": known.y, f"box_{number:02d}": np.array(box),
+                f"map_x_{number:02d}": known.inner.x, f"map_y_{number:02d}": known.inner.y,
+                f"box_{number:02d}": np.array(known.box),
             }  # fmt: skip
     projection = canvas.projection
     if projection is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import Box, Part, bounds, cut, shown_only
-from ..raster.lazy import AnyImage, Held, LazyImage, Placed, Rooted, Weighed, extent, part_of, whole
+from ..raster.lazy import AnyImage, Held, LazyImage, Placed, Rooted, SideBySide, Weighed, extent, part_of, whole
 from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap
 from ..raster.sampling import fetch
 from .options import LAYER
@@ -70,7 +70,15 @@ def layer_of(picture: Picture, picture_map: CanvasMap, by_root: bool = False) ->
     if isinstance(picture_map, ReferenceMap):
         return _pasted_layer(picture, picture_map)
     if isinstance(picture_map, BoxedMap):
-        return _fetched_layer(picture, picture_map.inner, by_root).within(picture_map.canvas_box)
+        parts = [
+            _fetched_layer(picture, part.inner, by_root).within(part.canvas_box(picture_map.shape))
+            for part in picture_map.parts
+        ]
+        if len(parts) == 1:
+            return parts[0]
+        left, right = parts
+        light = SideBySide(left.light, right.light, picture_map.parts[1].corner[0])
+        return Layer(light, np.maximum(left.alpha, right.alpha))
     return _fetched_layer(picture, picture_map.arrays(), by_root)
 
 

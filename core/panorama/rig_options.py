@@ -15,6 +15,9 @@ class RigWarpOptions:
     deviation_nodes: int = 4_000
     """The same of the grid that the deviation of inverse range is worked out on: it changes slowly."""
 
+    margin_nodes: int = 2
+    """Nodes around those that show a picture up to which its map is worked out: its corner may lie between two rows."""
+
     outline_steps: int = 4
     """Steps by which the ray that shows a picture's border is found: each looks its range up where the last one ended.
     """

@@ -17,9 +17,9 @@ from ..cameras.lens import distort, undistort
 from ..cameras.projective import ahead_of_camera, homogeneous, inverse_intrinsics
 from ..cameras.view import View
 from ..field.sphere_field import SphereField
-from ..raster.arrays import Array, Box, bounds, small_strips
+from ..raster.arrays import Array, Box, Part, small_strips
 from ..raster.grid import Grid
-from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap, falls_inside
+from ..raster.picture_map import BoxedMap, CanvasMap, MapPart, PictureMap, falls_inside
 from ..system.progress import Tick, unwatched
 from ..system.threads import in_order
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
@@ -187,8 +187,8 @@ def build_rig_map(surface: RigSurface, canvas: Canvas, tick: Tick = unwatched) -
             moved = np.stack([grid.to_pixels(values.moved[..., k], *rows) for k in range(3)], axis=-1)
         strip = _Strip(surface, canvas, grid, start, depth[part], moved)
         for view, slack, one in zip(views, values.slacks, maps, strict=True):
-            if isinstance(one, BoxedMap):
-                strip.put(one, view, slack)
+            for known in one.parts if isinstance(one, BoxedMap) else ():
+                strip.put(known, view, slack)
 
     for _ in in_order(put, small_strips(shape)):
         tick()
@@ -217,8 +217,9 @@ class _Strip:
     depth: NDArray[np.float32]
     moved: NDArray[np.float32] | None
 
-    def put(self, one: BoxedMap, view: View, slack: Array | None) -> None:
-        """Writes where a picture is seen in these rows into its map; slack (rows, columns, 2): px at the nodes."""
+    def put(self, one: MapPart, view: View, slack: Array | None) -> None:
+        """Writes where a picture is seen in these rows into a part of its map; slack (rows, columns, 2): px
+        at the nodes."""
         canvas, (left, top, width, height) = self.canvas, one.box
         low, high = max(self.start, top), min(self.start + len(self.depth), top + height)
         if low >= high or not width:
@@ -240,25 +241,41 @@ class _Strip:
 
 
 def _empty_map(places: Array, size: tuple[int, int], canvas: Canvas, grid: Grid) -> BoxedMap:
-    """A map to be filled in, in the box of the canvas that may show a picture of (W, H) px, by where it is seen at the
-    nodes."""
-    part = bounds(falls_inside(places[..., 0], places[..., 1], size))
-    if part is None:
-        left, top, right, bottom = 0, 0, 0, 0
-    else:
-        # the picture ends somewhere between its last node and the next, and its corner may lie between two rows
-        margin = 2 * grid.step
-        ends = [
-            (int(axis[some.start] + offset) - margin, int(axis[some.stop - 1] + offset) + margin + 1)
-            for axis, some, offset in zip((grid.xs, grid.ys), part[::-1], canvas.offset, strict=True)
-        ]
-        sides = canvas.width, canvas.height
-        (left, right), (top, bottom) = (
-            (max(0, low), min(side, high)) for (low, high), side in zip(ends, sides, strict=True)
-        )
+    """A map to be filled in, in the boxes of the canvas that may show a picture of (W, H) px, by where it is seen at
+    the nodes."""
+    shown = falls_inside(places[..., 0], places[..., 1], size)
+    parts = [_empty_part(nodes, size, canvas, grid) for nodes in _apart(shown)]
+    nothing = PictureMap(np.empty((0, 0), np.float32), np.empty((0, 0), np.float32), size)
+    return BoxedMap(tuple(parts) or (MapPart(nothing, (0, 0)),), (canvas.height, canvas.width))
+
+
+def _apart(shown: NDArray[np.bool_]) -> list[Part]:
+    """Rows and columns of the nodes (rows, columns) that show something: on either side of the widest gap between
+    columns that do, which is wide of a picture that goes on at the other end of a sphere."""
+    columns = np.flatnonzero(shown.any(axis=0))
+    gaps = np.diff(columns)
+    widest = int(np.argmax(gaps)) + 1 if gaps.size else 0
+    wide = gaps.size and gaps[widest - 1] > 2 * RIG_WARP.margin_nodes + 1
+    parts = []
+    for side in np.split(columns, [widest]) if wide else [columns]:
+        rows = np.flatnonzero(shown[:, side].any(axis=1))
+        if rows.size:
+            parts.append((slice(int(rows[0]), int(rows[-1]) + 1), slice(int(side[0]), int(side[-1]) + 1)))
+    return parts
+
+
+def _empty_part(nodes: Part, size: tuple[int, int], canvas: Canvas, grid: Grid) -> MapPart:
+    """One such box, about rows and columns of nodes: the picture ends somewhere between its last node and the next, and
+    its corner may lie between two rows."""
+    margin, ends = RIG_WARP.margin_nodes * grid.step, []
+    sides = canvas.width, canvas.height
+    for axis, some, offset, side in zip((grid.xs, grid.ys), nodes[::-1], canvas.offset, sides, strict=True):
+        low, high = int(axis[some.start] + offset) - margin, int(axis[some.stop - 1] + offset) + margin + 1
+        ends.append((min(max(0, low), side), max(0, min(side, high))))
+    (left, right), (top, bottom) = ends
     shape = max(0, bottom - top), max(0, right - left)
     inner = PictureMap(np.empty(shape, np.float32), np.empty(shape, np.float32), size)
-    return BoxedMap(inner, (left, top), (canvas.height, canvas.width))
+    return MapPart(inner, (left, top))
 
 
 def outline_of(field: SphereField, view: View) -> Array:

@@ -46,12 +46,13 @@ def number_of(name: str, names: Sequence[str], asked_by: str) -> int:
 
 
 def told_apart(names: Sequence[str]) -> list[str]:
-    """The last part of each of these paths, and as many folders before it as tell it from the others."""
+    """The last part of each of these paths, and as many folders before it as tell it from all other paths."""
     paths = [Path(one) for one in names]
+    different = set(paths)
 
     def apart(path: Path) -> str:
         ends = [Path(*path.parts[-count:]) for count in range(1, len(path.parts) + 1)]
-        alone = (end for end in ends if sum(_ends_in(other, end) for other in paths) == 1)
+        alone = (end for end in ends if sum(_ends_in(other, end) for other in different) == 1)
         return str(next(alone, path))
 
     return [apart(path) for path in paths]

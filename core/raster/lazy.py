@@ -151,6 +151,29 @@ class Placed(LazyImage):
 
 
 @dataclass(frozen=True, eq=False)
+class SideBySide(LazyImage):
+    """The columns of one light before `column`, and from there on those of another of the same size."""
+
+    left: AnyImage
+    right: AnyImage
+    column: int
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W, C)."""
+        return self.left.shape
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        rows, columns = within(part, self.shape)
+        if columns.stop <= self.column:
+            return self.left[rows, columns]
+        if columns.start >= self.column:
+            return self.right[rows, columns]
+        before, after = slice(columns.start, self.column), slice(self.column, columns.stop)
+        return np.concatenate([self.left[rows, before], self.right[rows, after]], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
 class Retouched(LazyImage):
     """Light of which some pixels are made anew: those touched (h, w), from `at` (row, column) on."""
 

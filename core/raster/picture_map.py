@@ -90,44 +90,23 @@ class PictureMap:
 
 
 @dataclass(frozen=True)
-class BoxedMap:
-    """A map that is known in a box of the canvas only: beyond, the picture is not shown.
-
-    inner: in that box, whose first pixel lies at `corner` (x, y) of the canvas; shape: (H, W) of the canvas.
-    """
+class MapPart:
+    """A map in a box of the canvas, whose first pixel lies at `corner` (x, y) of it."""
 
     inner: PictureMap
     corner: tuple[int, int]
-    shape: tuple[int, int]
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(W, H) px of the picture."""
-        return self.inner.size
 
     @property
     def box(self) -> Box:
         """The box (left, top, width, height) of the canvas."""
         return *self.corner, self.inner.shape[1], self.inner.shape[0]
 
-    @property
-    def canvas_box(self) -> Box:
-        """The canvas as a box of the inner map."""
-        return -self.corner[0], -self.corner[1], self.shape[1], self.shape[0]
+    def canvas_box(self, shape: tuple[int, int]) -> Box:
+        """A canvas of (H, W) px as a box of the inner map."""
+        return -self.corner[0], -self.corner[1], shape[1], shape[0]
 
-    def arrays(self) -> PictureMap:
-        """The map of the whole canvas as arrays, NaN beyond the box."""
-        return self.inner.within(self.canvas_box)
-
-    def inside(self) -> NDArray[np.bool_]:
-        """Where (H, W) the map falls inside the picture."""
-        return cut(self.inner.inside(), self.canvas_box)
-
-    def within(self, box: Box, in_place: bool = False) -> BoxedMap:
-        """The part in a box (left, top, width, height) of the canvas; nothing is copied.
-
-        in_place: see `PictureMap.within`.
-        """
+    def within(self, box: Box) -> MapPart:
+        """The part in a box (left, top, width, height) of the canvas; nothing is copied."""
         (x, y), (left, top, width, height) = self.corner, box
         moved = x - left, y - top
         right, bottom = (
@@ -136,7 +115,61 @@ class BoxedMap:
         )
         first = max(moved[0], 0), max(moved[1], 0)
         inner = (first[0] - moved[0], first[1] - moved[1], max(0, right - first[0]), max(0, bottom - first[1]))
-        return BoxedMap(self.inner.within(inner), first, (height, width))
+        return MapPart(self.inner.within(inner), first)
+
+
+@dataclass(frozen=True)
+class BoxedMap:
+    """A map that is known in some boxes of the canvas only: beyond, the picture is not shown.
+
+    parts: from left to right; two of a picture that goes on at the other end of a sphere; shape: (H, W) of the canvas.
+    """
+
+    parts: tuple[MapPart, ...]
+    shape: tuple[int, int]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(W, H) px of the picture."""
+        return self.parts[0].inner.size
+
+    def arrays(self) -> PictureMap:
+        """The map of the whole canvas as arrays, NaN beyond the boxes."""
+        return self._over((0, 0, self.shape[1], self.shape[0]))
+
+    def inside(self) -> NDArray[np.bool_]:
+        """Where (H, W) the map falls inside the picture."""
+        shown = [cut(part.inner.inside(), part.canvas_box(self.shape)) for part in self.parts]
+        return np.logical_or.reduce(shown) if len(shown) > 1 else shown[0]
+
+    def within(self, box: Box, in_place: bool = False) -> BoxedMap:
+        """The part in a box (left, top, width, height) of the canvas; nothing is copied.
+
+        in_place: see `PictureMap.within`.
+        """
+        parts = [part.within(box) for part in self.parts]
+        known = [part for part in parts if part.inner.x.size]
+        return BoxedMap(tuple(known or parts[:1]), (box[3], box[2]))
+
+    def known(self) -> MapPart:
+        """The map in one box that holds all, NaN in what lies between."""
+        boxes = [part.box for part in self.parts]
+        left, top = (min(box[axis] for box in boxes) for axis in (0, 1))
+        right, bottom = (max(box[axis] + box[axis + 2] for box in boxes) for axis in (0, 1))
+        return MapPart(self._over((left, top, right - left, bottom - top)), (left, top))
+
+    def _over(self, box: Box) -> PictureMap:
+        """The map in a box of the canvas, NaN where it is not known."""
+        left, top, width, height = box
+        found = [
+            part.inner.within((left - part.corner[0], top - part.corner[1], width, height)) for part in self.parts
+        ]
+        if len(found) == 1:
+            return found[0]
+        # they have no pixel in common, and fmax takes what is known
+        return PictureMap(
+            np.fmax.reduce([one.x for one in found]), np.fmax.reduce([one.y for one in found]), self.size
+        )
 
 
 def falls_inside(x: NDArray[Any], y: NDArray[Any], size: tuple[int, int]) -> NDArray[np.bool_]:

@@ -11,6 +11,8 @@ class SystemOptions:
 
     # Threads at once: more would wait for memory, and each holds a part of it.
     max_threads: int = 8
+    # Seconds after which one who waits for a part of work asks again whether to stop: nobody notices so few.
+    ask_seconds: float = 0.05
     # Bytes from which the allocator gives an array pages of its own, and that it keeps when they are freed.
     large_bytes: int = 1 << 30
     # Bytes of all cache entries together; the least recently used go first.

@@ -42,6 +42,11 @@ STAGES_OF_MANY: dict[str, float] = {
 TOLD_AS = {"blend": "seam"}
 
 
+def stages_of(pictures: int) -> dict[str, float]:
+    """The stages of a stitch of so many pictures, and the share of its time that each takes."""
+    return STAGES if pictures == 2 else STAGES_OF_MANY
+
+
 def unwatched() -> None:
     """The tick of work that nobody waits for."""
 

@@ -9,16 +9,42 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TypeVar
 
 import cv2
 
+from .errors import Cancelled
 from .options import SYSTEM
+from .progress import Tick, unwatched
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 _here = threading.local()
+_asking: ContextVar[Tick] = ContextVar("asking", default=unwatched)
+
+
+def ask() -> None:
+    """Ask whether to stop, between steps that take long; see `asking`."""
+    _asking.get()()
+
+
+@contextmanager
+def asking(cancelled: Callable[[], bool] | None) -> Iterator[None]:
+    """Within this, `ask` and whoever waits for parts of work raise Cancelled where asked to stop; parts that are begun
+    are not waited for: these end by themselves, and what they make is not wanted."""
+
+    def stop_if_asked() -> None:
+        if cancelled is not None and cancelled():
+            raise Cancelled()
+
+    before = _asking.set(stop_if_asked)
+    try:
+        yield
+    finally:
+        _asking.reset(before)
 
 
 def count() -> int:
@@ -39,24 +65,37 @@ def in_order(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[
     ------
     result
         At most `count()` results are begun or waiting, so that memory stays bounded. The first error among the parts
-        is raised when it is its turn; then, or if no more results are asked for, no further part is begun.
+        is raised when it is its turn; then, or if no more results are asked for, no further part is begun. Cancelled is
+        raised as soon as it is asked for (see `asking`).
     """
     at_once = count()
     if at_once == 1:
-        yield from map(work, parts)
+        for part in parts:
+            ask()
+            yield work(part)
         return
     begun: deque[Future[Result]] = deque()
-    with ThreadPoolExecutor(at_once, "edf", _start) as pool:
-        try:
-            for part in parts:
-                if len(begun) == at_once:
-                    yield begun.popleft().result()
-                begun.append(pool.submit(work, part))
-            while begun:
-                yield begun.popleft().result()
-        finally:
-            for waiting in begun:
-                waiting.cancel()
+    pool, is_wanted = ThreadPoolExecutor(at_once, "edf", _start), True
+    try:
+        for part in parts:
+            if len(begun) == at_once:
+                yield _waited_for(begun.popleft())
+            begun.append(pool.submit(work, part))
+        while begun:
+            yield _waited_for(begun.popleft())
+    except (Cancelled, KeyboardInterrupt):
+        is_wanted = False
+        raise
+    finally:
+        pool.shutdown(wait=is_wanted, cancel_futures=True)
+
+
+def _waited_for(begun: Future[Result]) -> Result:
+    """What a part gives, asking meanwhile whether to go on."""
+    ask()
+    while not wait([begun], SYSTEM.ask_seconds).done:
+        ask()
+    return begun.result()
 
 
 def each(work: Callable[[Part], object], parts: Iterable[Part]) -> None:

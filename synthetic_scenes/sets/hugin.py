@@ -12,14 +12,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.raster.arrays import Array
 from ...core.raster.colour import decode
 from ...core.system.errors import StitchError
 from ..recipes import View
 from ..scene_camera import SceneCamera
-from .set_measures import SetTruth, colour_figures, common_rotation, sampled
+from .rendered_set import RenderedSet
+from .rival_panorama import RivalPanorama
 from .set_stitches import told_lens
 from .sphere_camera import SphereCamera
 
@@ -37,14 +37,8 @@ def installed() -> bool:
     return all(shutil.which(program) for program in PROGRAMS)
 
 
-def hugin_on_sphere(truth: SetTruth, numbers: Sequence[int]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Its panorama (H, W, 3) of a set, scene-linear, as the true sphere lies, and where (H, W) it shows something.
-
-    What it takes for rotation is partly parallax, so that no one turn brings all onto the truth: of that which fits the
-    rotations of some of its pictures best, by their numbers, and those that fit one of them, the one that shows it in
-    the best light is taken. Raises HuginFailed.
-    """
-    rendered = truth.rendered
+def hugin_panorama(rendered: RenderedSet, numbers: Sequence[int]) -> RivalPanorama:
+    """Its panorama of a set, to be turned by those of its pictures that have these numbers. Raises HuginFailed."""
     size = rendered.sphere.size
     with tempfile.TemporaryDirectory(prefix="edf-hugin-") as temporary:
         folder = Path(temporary)
@@ -62,15 +56,8 @@ def hugin_on_sphere(truth: SetTruth, numbers: Sequence[int]) -> tuple[NDArray[np
     if made is None or made.shape != (size[1], size[0], 4):
         raise HuginFailed("Hugin left no whole sphere")
     light, alpha = decode(np.ascontiguousarray(made[..., 2::-1])), (made[..., 3] > 250).astype(np.float32)
-    true = np.array([camera.R for camera in rendered.cameras])
-    seen, sphere = truth.views_at(numbers) > 0, SphereCamera(rendered.sphere.place, size)
-
-    def turned(chosen: list[int]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        gauge = common_rotation(rotations[chosen], true[chosen])
-        return sampled(light, alpha, np.stack(sphere.pixels(truth.directions @ gauge.T), axis=-1))
-
-    shown = [turned(chosen) for chosen in (list(numbers), *([number] for number in numbers))]
-    return max(shown, key=lambda one: colour_figures(one[0], one[1] & seen, truth)[0]["psnr_db"])
+    sphere = SphereCamera(rendered.sphere.place, size)
+    return RivalPanorama(light, alpha, sphere.pixels, {number: rotations[number] for number in numbers})
 
 
 def with_lenses(project: str, cameras: Sequence[SceneCamera]) -> str:

@@ -12,7 +12,8 @@ from ...core.raster.arrays import bounds, dilated
 from ...core.raster.colour import encode
 from ...core.system.errors import StitchError
 from ..scene_pictures import error_colours, jpeg
-from .hugin import hugin_on_sphere, installed
+from .hugin import hugin_panorama, installed
+from .opencv_stitcher import stitcher_panorama
 from .rendered_set import RenderedSet
 from .set_lines import line_figures
 from .set_measures import (
@@ -26,9 +27,10 @@ from .set_measures import (
     range_figures,
 )
 from .set_seams import seam_figures
-from .set_stitches import WAYS, Shared, stitched
+from .set_sliding import beside_figures
+from .set_stitches import SLID, WAYS, Shared, stitched
 from .set_things import thing_figures
-from .set_thresholds import HUGIN, OURS
+from .set_thresholds import HUGIN, OPENCV, OURS
 from .top_view import top_view
 
 # Pixels of the sphere that are shown beside what pictures see.
@@ -85,14 +87,20 @@ def measured_set(rendered: RenderedSet) -> MeasuredSet:
         seconds |= {f"{way} {stage}": value for stage, value in result.seconds.items()}
         if way == OURS:
             used, seen = found.numbers, truth.views_at(found.numbers) > 0
+            sliding = Found.of(stitched(rendered, SLID, shared), truth)
+            viewpoint = sliding.result.warp.viewpoint
+            runs[way]["figures"]["s1"] = 0.0 if viewpoint is None else viewpoint.s1
+            for name, one in (("still", found), ("slid", sliding)):
+                runs[way]["figures"] |= {f"{name}_{key}": value for key, value in beside_figures(one).items()}
             pictures["map_error"] = jpeg(_map_error(found, truth)[_part_of(seen)])
             pictures["from_above"] = jpeg(top_view(found))
-    if installed() and used:
+    rivals = {OPENCV: stitcher_panorama} | ({HUGIN: hugin_panorama} if installed() else {})
+    for rival, panorama_of in rivals.items() if used else ():
         try:
-            panoramas[HUGIN] = _Shown(*hugin_on_sphere(truth, used))
-            runs[HUGIN] = _run(used=len(rendered.pictures))
+            panoramas[rival] = _Shown(*panorama_of(rendered, used).on_sphere(truth))
+            runs[rival] = _run(used=len(used))
         except StitchError as refusal:
-            runs[HUGIN] = _run(refused=str(refusal))
+            runs[rival] = _run(refused=str(refusal))
     part = _part_of(seen)
     common = np.logical_and.reduce([seen, *(panorama.where for panorama in panoramas.values())])
     for way, panorama in panoramas.items():

@@ -14,6 +14,11 @@ SET_MEASURES = {
     "hidden_precision": ("said to be hidden: precision", "", 3), "hidden_recall": ("said to be hidden: recall", "", 3),
     "range_log": ("range, median |ln|", "", 4), "range_log_p90": ("range, 90th |ln|", "", 3),
     "range_log_sure": ("range, median |ln| of the surer half", "", 4),
+    "still_beside_px": ("beside the truth's rays, from one place, median", "px", 2),
+    "still_beside_p95_px": ("beside the truth's rays, from one place, 95th", "px", 2),
+    "slid_beside_px": ("beside the truth's rays, viewpoint slides, median", "px", 2),
+    "slid_beside_p95_px": ("beside the truth's rays, viewpoint slides, 95th", "px", 2),
+    "s1": ("how far the viewpoint slides", "", 2),
     "psnr_db": ("panorama against the true sphere, PSNR", "dB", 2),
     "ssim": ("panorama against the true sphere, SSIM", "", 4),
     "common_psnr_db": ("the same over what all of these show, PSNR", "dB", 2),
@@ -41,5 +46,6 @@ SET_PICTURES = {
     "sphere": "True sphere (dim: no picture sees it)", "panorama_ours": "Ours",
     "difference": "Difference of both × 4", "map_error": "Error of the maps: black 0, yellow ≥ 4 px",
     "panorama_rotation_only": "Ours as if taken from one place", "panorama_hugin": "Hugin",
+    "panorama_opencv": "OpenCV's Stitcher",
     "from_above": "From above: true green, found pink",
 }  # fmt: skip

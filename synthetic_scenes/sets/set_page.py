@@ -9,7 +9,7 @@ from ...core.output.page import table
 from ..limits import Check, Result
 from ..report_page import BAD, GOOD, address, cell, failures, figure, named, proof_table, slug, unit, warnings_list
 from .set_names import OF_A_PICTURE, SET_MEASURES, SET_PICTURES
-from .set_thresholds import BARS, HUGIN, LEAD, OURS, ROTATION_ONLY
+from .set_thresholds import BARS, HUGIN, LEAD, OPENCV, OURS, ROTATION_ONLY
 from .slider import slider
 
 OVERVIEW = (
@@ -18,7 +18,7 @@ OVERVIEW = (
 )  # fmt: skip
 # The two that a slider shows one over the other.
 BESIDE = ("sphere", "panorama_ours")
-RIVALS = (ROTATION_ONLY, HUGIN)
+RIVALS = (ROTATION_ONLY, HUGIN, OPENCV)
 
 
 def set_overview(results: Sequence[Result], checks: Sequence[Check]) -> str:

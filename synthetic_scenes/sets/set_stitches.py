@@ -10,18 +10,20 @@ from ...core.alignment import Geometry, estimate_geometry, fit_and_warp
 from ...core.frames.frame import Frame
 from ...core.frames.reading import read_frame
 from ...core.options import StitchOptions
-from ...core.pictures.picture import load_picture
+from ...core.pictures.picture import Picture, load_picture
 from ...core.pipeline import StitchResult, Stopwatch, compose
 from ...core.system.progress import STAGES_OF_MANY, Progress
 from ..scene_camera import SceneCamera
 from .rendered_set import RenderedSet
 from .set_thresholds import OURS, ROTATION_ONLY
 
-WAYS = (OURS, ROTATION_ONLY)
+WAYS, SLID = (OURS, ROTATION_ONLY), "slid"
 # The whole sphere from the first picture's place, with all that the defaults do: the truth is known there.
 ON_SPHERE = StitchOptions(
     projection="equirectangular", level="none", slide=0.0, crop="full", holes="transparent", viewpoint=1, measure=False
 )
+# On a cylinder, from a viewpoint that slides as far as is chosen.
+SLIDING = replace(ON_SPHERE, projection="cylindrical", slide="auto")
 # Diagonal of the 36 × 24 mm frame, to which "35 mm equivalent" refers.
 FULL_FRAME_MM = float(np.hypot(36.0, 24.0))
 
@@ -38,23 +40,29 @@ def told_lens(camera: SceneCamera) -> float:
     return equivalent_mm(camera) * float(np.hypot(*camera.size)) / FULL_FRAME_MM
 
 
-def stitched(rendered: RenderedSet, way: str, shared: Shared) -> StitchResult:
-    """The set stitched in one of WAYS; shared: features and geometry, kept from way to way. Raises StitchError.
+def told_pictures(rendered: RenderedSet) -> list[Picture]:
+    """Its pictures, which say what most cameras write: their 35 mm equivalent focal length in whole millimetres."""
+    pictures = []
+    for path, camera in zip(rendered.pictures, rendered.cameras, strict=True):
+        picture = load_picture(path)
+        pictures.append(replace(picture, exif=replace(picture.exif, focal35_mm=equivalent_mm(camera))))
+    return pictures
 
-    A picture says what most cameras write: its 35 mm equivalent focal length in whole millimetres.
+
+def stitched(rendered: RenderedSet, way: str, shared: Shared) -> StitchResult:
+    """The set stitched in one of WAYS, or SLID; shared: features and geometry, kept from way to way.
+
+    Raises StitchError.
     """
     progress = Stopwatch(Progress(stages=STAGES_OF_MANY))
     if not shared:
-        pictures = []
-        for path, camera in zip(rendered.pictures, rendered.cameras, strict=True):
-            picture = load_picture(path)
-            pictures.append(replace(picture, exif=replace(picture.exif, focal35_mm=equivalent_mm(camera))))
-        frame = read_frame(pictures, ON_SPHERE)
+        frame = read_frame(told_pictures(rendered), ON_SPHERE)
         geometry = estimate_geometry([frame], ON_SPHERE, progress)
         shared["read"] = frame.only(geometry.numbers), geometry
     frame, geometry = shared["read"]
+    options = SLIDING if way == SLID else ON_SPHERE
     if way == ROTATION_ONLY and geometry.rig is not None:
         rig = geometry.rig
         one_place = replace(rig, t=np.zeros_like(rig.t), inverse_ranges=np.zeros_like(rig.inverse_ranges))
         geometry = replace(geometry, rig=one_place)
-    return compose(frame, fit_and_warp(geometry, [frame], ON_SPHERE, progress), ON_SPHERE, progress)
+    return compose(frame, fit_and_warp(geometry, [frame], options, progress), options, progress)

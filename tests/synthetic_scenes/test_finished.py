@@ -41,7 +41,7 @@ def test_light_that_is_off_beyond_the_overlap_costs_and_one_gain_does_not(
     result: StitchResult, rendered: RenderedPair, truth: Truth
 ) -> None:
     same, brighter, wrong = (
-        finished(with_light(result, truth, *light), rendered, truth)["target_only_psnr_db"]
+        finished(with_light(result, truth, *light), rendered, truth)["delivered_target_only_psnr_db"]
         for light in ((1.0, 1.0), (0.7, 1.0), (1.0, 0.8))
     )
     assert min(same, brighter) > 45 and wrong < 30

@@ -146,6 +146,18 @@ class PolishingOptions:
 
 
 @dataclass(frozen=True)
+class ValleyOptions:
+    """Other minima along an unsure focal length (`valley`)."""
+
+    # Deviation of log f from which others are tried, the step, and steps at most in each direction.
+    unsure: float = 0.001
+    log_step: float = 0.03
+    steps: int = 3
+    # Share of the cost that a step saves at least.
+    least_gain: float = 0.002
+
+
+@dataclass(frozen=True)
 class JudgeOptions:
     """Comparing hypotheses, and what is said of the result (`registration`, `stations`)."""
 
@@ -184,4 +196,5 @@ POSITIONS = PositionOptions()
 CONTINUITY = ContinuityOptions()
 BUNDLE = BundleOptions()
 POLISHING = PolishingOptions()
+VALLEY = ValleyOptions()
 JUDGE = JudgeOptions()

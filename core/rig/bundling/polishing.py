@@ -37,7 +37,15 @@ def polish(problem: Problem, solution: Solution, tick: Tick) -> Polished:
     solution = _points_anew(problem, solution.seen_from(reference).rescaled())
     prior = depth_prior(solution)
     wide = Settings(BUNDLE.first_kernel_px, POLISHING.first_iterations, POLISHING.first_tolerance, lenses=False)
-    solution = bundle(problem, solution, wide, reference, prior, tick).solution
+    return polished_on(problem, bundle(problem, solution, wide, reference, prior, tick).solution, tick, reference)
+
+
+def polished_on(problem: Problem, solution: Solution, tick: Tick, reference: int | None = None) -> Polished:
+    """The same from a solution with points on, all free from the beginning; reference: see `bundle`, by default the
+    picture in the middle."""
+    if reference is None:
+        reference = _middle(solution)
+        solution = solution.seen_from(reference)
     for iterations, tolerance in zip(POLISHING.revived_iterations, POLISHING.revived_tolerances, strict=True):
         solution = _revived(problem, solution).rescaled()
         solution, _ = _round(problem, solution, reference, Settings(BUNDLE.kernel_px, iterations, tolerance), tick)
@@ -111,9 +119,9 @@ def polish_rotations(problem: Problem, solution: Solution, tick: Tick) -> Polish
     return Polished(problem, solution, total_cost(problem, solution), 0.0, True, None)
 
 
-def total_cost(problem: Problem, solution: Solution) -> float:
+def total_cost(problem: Problem, solution: Solution, kernel_px: float = BUNDLE.kernel_px) -> float:
     """The robust cost, px², of all observations: what is far off costs the same whether its point is solved or not."""
-    kernel = BUNDLE.kernel_px * problem.scale
+    kernel = kernel_px * problem.scale
     most = np.sqrt(JUDGE.missed_kernels) * kernel
     lengths = np.nan_to_num(lengths_of_errors(problem, solution), nan=most)
     return float(robust_cost(np.minimum(lengths, most), kernel).sum())

@@ -22,6 +22,7 @@ from .polishing import Polished, sharpened, start
 from .solution import LENS, Problem, lenses_of
 from .stations import polish_best, proposed, same_places, without_parallax
 from .tracks import build_tracks, fitting_pairs
+from .valley import lowest
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +54,14 @@ def solve(
             break
         known, shared = _cameras_of(cameras, rotated, found[-1].found)
         rotated = averaged(known, points, verified, shared, hold=True, tick=tick)
-    return _sharpened(cameras, points, verified, min(found, key=lambda solved: solved.cost), tick) if found else None
+    return _ended(cameras, points, verified, min(found, key=lambda solved: solved.cost), tick) if found else None
 
 
-def _sharpened(
+def _ended(
     cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, solved: Solved, tick: Tick
 ) -> Solved:
-    found = sharpened(solved.found, tick)
+    """What is done once, with the best of all that was found from there."""
+    found = sharpened(lowest(solved.found, tick), tick)
     cost = judged(cameras, points, verified, solved.averaged.members, solved.pairs, found)
     return replace(solved, found=found, cost=cost)
 

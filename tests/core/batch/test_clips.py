@@ -12,9 +12,11 @@ import pytest
 from edf_stitch.core.batch import run as batch
 from edf_stitch.core.batch.list import read_list
 from edf_stitch.core.batch.units import BatchRequest
+from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.pipeline import StitchOptions, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
+from ...sets import FOCAL, make_set
 from . import batch_work
 from .batch_work import files, lasting, raw, run, save, summary
 
@@ -107,7 +109,7 @@ def test_missing_frames_are_told_and_left_out(work: Path, said: Callable) -> Non
     (work / "in" / "b_0008.png").unlink()
     (work / "clip.csv").write_text("reference,target,name,first,last\nin/a_%04d.png,in/b_%04d.png,shot,7,12\n", "utf-8")
     assert clip(work, "--quiet") == 0
-    assert said() == ["edf: warning: shot: frames 8, 11–12 are missing on one side or both and were left out"]
+    assert said() == ["edf: warning: shot: frames 8, 11–12 are missing of some cameras and were left out"]
     assert list(panoramas(work / "out")) == ["shot_0007", "shot_0009", "shot_0010"]
     assert summary(work / "out")["items"][0]["frames"]["missing"] == [8, 11, 12]
 
@@ -207,3 +209,30 @@ def test_a_clip_on_a_sphere_keeps_one_inscribed_crop(work: Path, known: StitchOp
     assert made[0].shape[2] == 3 and 100 < made[0].shape[0] < made[0].shape[1] < 400, "nothing transparent"
     report = json.loads((work / "out" / "shot.report.json").read_text("utf-8"))
     assert (report["canvas"]["height"], report["canvas"]["width"]) == made[0].shape[:2]
+
+
+def test_a_clip_of_three_cameras_has_one_alignment(tmp_path: Path) -> None:
+    """A fourth camera that shows something else is left out of every frame."""
+    random, cameras = np.random.default_rng(5), make_set().pictures[:3]
+    elsewhere = random.integers(0, 256, cameras[0].light.shape, np.uint8)
+    for at, number in enumerate((3, 4, 5)):
+        for side, picture in zip("abcd", [*cameras, elsewhere], strict=True):
+            shown = picture.view.copy() if side != "d" else elsewhere
+            if side == "a":
+                shown[60 + 10 * at : 80 + 10 * at, 10:30] = random.integers(0, 256, (20, 20, 3), np.uint8)
+            save(tmp_path / f"{side}_{number:04d}.png", shown)
+    (tmp_path / "clip.csv").write_text(
+        "reference,target,picture3,picture4,name\na_%04d.png,b_%04d.png,c_%04d.png,d_%04d.png,shot\n", "utf-8"
+    )
+    options = StitchOptions(camera=CameraRequest(focal_px=(FOCAL,)), blend="feather", slide=0.0)
+    summed_up = batch.run_batch(read_list(tmp_path / "clip.csv"), options, BatchRequest(tmp_path / "out"))
+    (outcome,) = summed_up.outcomes
+    assert outcome.status == "done", outcome.message
+    assert any("d_0003.png is left out" in line for line in outcome.warnings)
+    report = json.loads((tmp_path / "out" / "shot.report.json").read_text("utf-8"))
+    assert [one["name"] for one in report["pictures"]] == ["a_0003.png", "b_0003.png", "c_0003.png"]
+    made = list(panoramas(tmp_path / "out").values())
+    assert len(made) == 3 and len({one.shape for one in made}) == 1
+    changed = [(one != made[0]).any(axis=-1) for one in made[1:]]
+    for mask in changed:
+        assert 0 < mask.mean() < 0.02, "what moves, and nothing else"

@@ -121,12 +121,12 @@ def test_the_frames_an_alignment_is_taken_from() -> None:
 
 def test_frames_for_those_who_have_no_list(tmp_path: Path) -> None:
     touch(tmp_path, "a%d.png", range(9))
-    assert find_frames(tmp_path / "a%d.png", tmp_path / "a%d.png", 2, 8, 3) == ((2, 5, 8), ())
+    assert find_frames([tmp_path / "a%d.png"] * 2, 2, 8, 3) == ((2, 5, 8), ())
     for span in ((5, 4, 1), (0, 4, 0), (-1, 4, 1), (0, 10**9, 1)):
         with pytest.raises(BadRequest, match="frames"):
-            find_frames(tmp_path / "a%d.png", tmp_path / "a%d.png", *span)
+            find_frames([tmp_path / "a%d.png"] * 2, *span)
     with pytest.raises(BadRequest, match="one place for the frame's number"):
-        find_frames(tmp_path / "a.png", tmp_path / "b%d.png")
+        find_frames([tmp_path / "a.png", tmp_path / "b%d.png"])
 
 
 # --- refusals -------------------------------------------------------------------------------------------------------
@@ -215,6 +215,14 @@ def test_a_path_that_no_file_can_have_is_told_with_its_line(listed) -> None:
         listed("a.png,b.png\n" + "x" * 5000 + "\n")
 
 
-def test_clips_of_more_than_two_cameras_are_refused(listed) -> None:
-    with pytest.raises(BadRequest, match="a clip has two cameras"):
-        listed("reference,target,picture3\na_%04d.png,b_%04d.png,c_%04d.png\n")
+def test_a_clip_of_more_than_two_cameras_has_the_frames_of_all(listed, tmp_path: Path) -> None:
+    for side, numbers in (("a", range(1, 9)), ("b", range(2, 9)), ("c", (1, 2, 3, 5, 6, 7, 8))):
+        touch(tmp_path, f"{side}_%04d.png", numbers)
+    header = "reference,target,picture3,first\n"
+    (clip,) = listed(header + "a_%04d.png,b_%04d.png,c_####.png,\n")
+    assert clip.frames == (2, 3, 5, 6, 7, 8) and clip.missing == (1, 4)
+    assert [path.name for path in clip.files(7)] == ["a_0007.png", "b_0007.png", "c_0007.png"]
+    (later,) = listed(header + "a_%04d.png,b_%04d.png,c_####.png,5\n")
+    assert later.frames == (5, 6, 7, 8) and later.missing == ()
+    with pytest.raises(BadRequest, match="one side is a pattern"):
+        listed(header + "a_%04d.png,b_%04d.png,c.png,\n")

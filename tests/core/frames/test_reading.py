@@ -9,6 +9,7 @@ import pytest
 from edf_stitch.core.frames.frame import size_of
 from edf_stitch.core.frames.reading import MOST_PICTURES, check_count, read_frame
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
 from edf_stitch.core.system.errors import BadRequest, NoOverlap, UnreadableImage
 
@@ -92,3 +93,15 @@ def test_some_of_the_pictures_in_another_order() -> None:
     assert frame.only((0, 1, 2, 3)) is frame
     part = frame.only((2, 0))
     assert part.names == ["2.png", "0.png"] and part.full_sizes == ((40, 22), (40, 20))
+
+
+def test_pictures_of_the_same_name_in_different_folders_are_told_apart(tmp_path: Path) -> None:
+    files = [tmp_path / "east" / "1.png", tmp_path / "west" / "1.png", tmp_path / "2.png"]
+    for number, path in enumerate(files):
+        path.parent.mkdir(exist_ok=True)
+        light = np.random.default_rng(number).random((20, 30, 3), np.float32)
+        path.write_bytes(encode_picture(light, np.ones((20, 30), np.float32), 8, ".png")[0])
+    frame = read_frame([*files, files[1]], StitchOptions())
+    assert frame.names == ["east/1.png", "west/1.png", "2.png"]
+    assert frame.warnings == ("west/1.png is the same picture as west/1.png: it is used once",)
+    assert read_frame(files[:2], StitchOptions()).names == ["1.png", "1.png"], "of two the role says which"

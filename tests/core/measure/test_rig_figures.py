@@ -14,7 +14,7 @@ from edf_stitch.core.measure.rig_figures import focal_spread, map_errors, residu
 from edf_stitch.core.measure.rig_report import rig_warnings
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.warp import Warp
-from edf_stitch.core.raster.picture_map import BoxedMap, PictureMap
+from edf_stitch.core.raster.picture_map import BoxedMap, MapPart, PictureMap
 
 from ...conftest import view_of
 from ..rig.known_rigs import known_rig
@@ -90,7 +90,7 @@ def test_maps_are_asked_where_pictures_show_what_matches() -> None:
     """Two pictures of 40 × 30 px on a canvas, the second 10 px further right, its map known in its box only."""
     x, y = (values.astype(np.float32) for values in np.meshgrid(np.arange(60), np.arange(30)))
     whole = PictureMap(x, y, (40, 30))
-    boxed = BoxedMap(PictureMap(x[:, :50], y[:, :50], (40, 30)), (10, 0), (30, 60))
+    boxed = BoxedMap((MapPart(PictureMap(x[:, :50], y[:, :50], (40, 30)), (10, 0)),), (30, 60))
     warp = Warp(Canvas(60, 30, (0, 0)), (whole, boxed), np.zeros((30, 60), np.float32))
     points = np.random.default_rng(0).uniform((12, 2), (36, 28), (50, 2))
     camera = Camera(np.eye(3), (40, 30), "test", 0.0)

@@ -195,27 +195,46 @@ def test_a_map_is_known_where_its_picture_is_shown_and_takes_no_more(ring: Rig, 
     across = 0
     for number, one in enumerate(warp.maps):
         assert isinstance(one, BoxedMap)
-        left, top, width, height = one.box
-        inside = one.inside()
-        if inside[:, 0].any() and inside[:, -1].any():
-            across += 1
-        else:
-            assert one.inner.x.size < 0.35 * area
-        beyond = inside.copy()
-        beyond[top : top + height, left : left + width] = False
+        inside, beyond = one.inside(), one.inside()
+        across += inside[:, 0].any() and inside[:, -1].any()
+        assert len(one.parts) == 1 + (inside[:, 0].any() and inside[:, -1].any())
+        assert sum(part.inner.x.size for part in one.parts) < 0.35 * area
+        for part in one.parts:
+            left, top, width, height = part.box
+            beyond[top : top + height, left : left + width] = False
+            # nothing is cut off: the rim of a box shows nothing, where it is not the canvas's own
+            shown = part.inner.inside()
+            if left > 0:
+                assert not shown[:, 0].any()
+            if top > 0:
+                assert not shown[0].any()
+            if left + width < warp.canvas.width:
+                assert not shown[:, -1].any()
+            if top + height < warp.canvas.height:
+                assert not shown[-1].any()
         assert not beyond.any()
         assert np.array_equal(inside, one.arrays().inside())
         assert np.array_equal(inside, whole_maps.maps[number].inside())
-        # nothing is cut off: the rim of the box shows nothing, where it is not the canvas's own
-        if left > 0:
-            assert not one.inner.inside()[:, 0].any()
-        if top > 0:
-            assert not one.inner.inside()[0].any()
-        if left + width < warp.canvas.width:
-            assert not one.inner.inside()[:, -1].any()
-        if top + height < warp.canvas.height:
-            assert not one.inner.inside()[-1].any()
-    assert across <= 3
+    assert 0 < across <= 3
+
+
+def test_a_picture_at_both_ends_of_a_sphere_has_the_map_that_it_has_in_its_middle(
+    ring: Rig, field: SphereField
+) -> None:
+    """The sphere turned by half a turn: the same pixels, half a canvas further on."""
+    ahead, behind = (
+        build_rig_warp(RigSurface.of(field, ring.views), projection_of(ring, "equirectangular", turned(yaw, 0, 0)))
+        for yaw in (0.0, 180.0)
+    )
+    width = ahead.canvas.width
+    for one, other in zip(ahead.maps, behind.maps, strict=True):
+        rows = slice(*np.flatnonzero(one.inside().any(axis=1))[[0, -1]])
+        shift = rows.start - int(np.flatnonzero(other.inside().any(axis=1))[0])
+        turned_back = np.roll(other.arrays().x, width // 2, axis=1)
+        there = slice(rows.start - shift, rows.stop - shift)
+        both = one.inside()[rows] & np.roll(other.inside(), width // 2, axis=1)[there]
+        assert both.sum() > 0.97 * one.inside()[rows].sum()
+        assert np.abs(one.arrays().x[rows] - turned_back[there])[both].max() < 0.1
 
 
 @pytest.mark.parametrize("box", [(0, 0, 30, 20), (100, 10, 200, 60), (-5, -6, 70, 90), (600, 100, 50, 40)])
@@ -237,9 +256,10 @@ def test_a_part_of_a_boxed_map_is_that_of_the_whole(
 def test_a_layer_of_a_boxed_map_is_that_of_the_whole_map(ring: Rig, field: SphereField) -> None:
     warp = build_rig_warp(RigSurface.of(field, ring.views), projection_of(ring, "equirectangular", np.eye(3)))
     picture = picture_from_array(np.random.default_rng(0).integers(0, 255, (SIZE[1], SIZE[0], 3), np.uint8))
-    boxed, full = layer_of(picture, warp.maps[2]), layer_of(picture, warp.maps[2].arrays())
-    assert np.array_equal(boxed.alpha, full.alpha)
-    assert np.array_equal(boxed.pixels, full.pixels)
+    for one in (warp.maps[2], warp.maps[6]):  # the latter lies on both ends
+        boxed, full = layer_of(picture, one), layer_of(picture, one.arrays())
+        assert np.array_equal(boxed.alpha, full.alpha)
+        assert np.array_equal(boxed.pixels, full.pixels)
 
 
 def test_outlines_are_seen_on_the_border(ring: Rig, field: SphereField) -> None:

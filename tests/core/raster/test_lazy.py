@@ -10,7 +10,7 @@ from edf_stitch.core.compose.tone.toned import Exposed
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.raster.arrays import meet, with_margin, within
 from edf_stitch.core.raster.colour import decode, srgb_curve
-from edf_stitch.core.raster.lazy import AnyImage, Coded, Held, Placed, Weighed, extent, whole
+from edf_stitch.core.raster.lazy import AnyImage, Coded, Held, Placed, SideBySide, Weighed, extent, whole
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -42,6 +42,7 @@ def kinds(channels: int) -> dict[str, AnyImage]:
         "mixed": Mixed(layer(), layer(), np.clip(numbers(H, W), 0, 1)),
         "cut": Cut(light, other, numbers(H, W) > 0.5),
         "evened": Evened(light, (6, 8), change.any(axis=2), change),
+        "side by side": SideBySide(light, Placed(numbers(9, 12, channels), (5, 17), (H, W)), 15),
         "patched": Patched(light, (Patch((6, 8), numbers(9, 17) > 0.5, change),)),
     }  # fmt: skip
 

@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.system import threads
-from edf_stitch.core.system.threads import count, each, in_order
+from edf_stitch.core.system.errors import Cancelled
+from edf_stitch.core.system.threads import asking, count, each, in_order
 
 
 @pytest.fixture(autouse=True, params=[1, 3])
@@ -70,6 +71,22 @@ def test_threads_are_gone_when_nobody_asks_for_more() -> None:
     assert next(results) == 0
     results.close()  # type: ignore[attr-defined]
     assert threading.active_count() == before
+
+
+def test_who_waits_for_a_long_part_stops_when_asked_to(at_once: int) -> None:
+    """Without waiting for what is begun; a single thread asks between parts."""
+    begun: list[int] = []
+    since = time.monotonic()
+
+    def slow(part: int) -> None:
+        begun.append(part)
+        time.sleep(0.6)
+
+    with pytest.raises(Cancelled), asking(lambda: time.monotonic() > since + 0.1):
+        each(slow, range(9))
+    assert len(begun) <= at_once
+    assert time.monotonic() < since + (0.4 if at_once > 1 else 0.9)
+    assert list(in_order(lambda part: part, range(3))) == [0, 1, 2], "only within"
 
 
 def test_what_is_written_by_parts_is_whole() -> None:

@@ -20,6 +20,7 @@ from edf_stitch.synthetic_scenes.sets.set_measures import (
     pose_figures,
     range_figures,
 )
+from edf_stitch.synthetic_scenes.sets.set_sliding import beside_figures
 from edf_stitch.synthetic_scenes.sets.top_view import top_view
 
 from .perfect_stitch import TURN, analytic_truth, perfect
@@ -140,3 +141,28 @@ def test_the_view_from_above_shows_true_and_found_places(truth: SetTruth) -> Non
     result.rig.centres[2] += [0.2, 0, 0]
     other = top_view(Found.of(result, truth))
     assert drawn.shape == (720, 720, 3) and (drawn != 255).any() and (drawn != other).any()
+
+
+@pytest.mark.parametrize("aside", [(0.0, 0.0, 0.0), (0.2, -0.1, 0.05)])
+def test_what_pictures_show_lies_on_the_rays_of_wherever_the_viewpoint_is(
+    aside: tuple[float, float, float], truth: SetTruth
+) -> None:
+    right = beside_figures(Found.of(perfect(truth, aside=aside), truth))
+    assert right["beside_px"] < 0.02
+    # nothing is said to be hidden by the ball
+    assert right["beside_p95_px"] < 20
+    one = perfect(truth, aside=aside)
+    moved(one, 1, 40.0)
+    assert beside_figures(Found.of(one, truth))["beside_p95_px"] > 35
+    off = perfect(truth, aside=aside)
+    for number in range(3):
+        moved(off, number, 2.0)
+    assert beside_figures(Found.of(off, truth))["beside_px"] == pytest.approx(2.0, abs=0.1)
+    elsewhere = perfect(truth, aside=aside)
+    place = elsewhere.warp.viewpoint.places + TURN @ np.array([0.4, 0.0, 0.0])
+    elsewhere.warp.viewpoint = replace(elsewhere.warp.viewpoint, places=place)
+    assert beside_figures(Found.of(elsewhere, truth))["beside_px"] > 1
+
+
+def test_what_one_camera_alone_sees_is_not_asked_for(truth: SetTruth) -> None:
+    assert np.isnan(beside_figures(Found.of(perfect(truth, numbers=(1,)), truth))["beside_px"])

@@ -1,0 +1,48 @@
+"""Other minima along what the pictures hardly tell: the focal length of few pictures, or of what is far."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...raster.robust import sigma_of_lengths
+from ...system.progress import Tick
+from .bundle_options import JUDGE, VALLEY
+from .polishing import Polished, polished_on, total_cost
+from .reprojection import lengths_of_errors
+from .uncertainty import deviations
+
+
+def lowest(found: Polished, tick: Tick) -> Polished:
+    """The cheapest of what is found from longer and shorter focal lengths, step by step as long as the cost falls.
+
+    Focal length, distortion, principal point and places make up for each other there, and the bundle ends in whichever
+    hollow of the valley is nearest to its start. Nothing is tried where the focal length is well known.
+    """
+    if found.one_place or not _unsure(found):
+        return found
+    best, least = found, _cost(found)
+    for step in (-VALLEY.log_step, VALLEY.log_step):
+        for _ in range(VALLEY.steps):
+            lens = best.solution.lens.copy()
+            lens[:, 0] += np.where(best.problem.lenses.free[:, 0], step, 0.0)
+            tried = polished_on(best.problem, replace(best.solution, lens=lens), tick)
+            cost = _cost(tried)
+            if cost > (1 - VALLEY.least_gain) * least:
+                break
+            best, least = tried, cost
+    return best
+
+
+def _cost(found: Polished) -> float:
+    """By the narrow kernel that hypotheses are compared by: with the bundle's own, few wrong matches decide."""
+    return total_cost(found.problem, found.solution, JUDGE.kernel_px)
+
+
+def _unsure(found: Polished) -> bool:
+    lengths = lengths_of_errors(found.problem, found.solution)
+    seen = lengths[found.solution.used & np.isfinite(lengths)]
+    if not len(seen) or not found.problem.lenses.free[:, 0].any():
+        return False
+    return bool(deviations(found, sigma_of_lengths(seen)).log_focal.max() > VALLEY.unsure)
