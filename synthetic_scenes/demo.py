@@ -122,7 +122,7 @@ def true_panorama(found: Found) -> NDArray[np.float32]:
     plane = np.stack(np.meshgrid(canvas.xs, canvas.ys), axis=-1)
     x, y = sphere.pixels(canvas.projection.rays(plane) @ found.gauge)
     # bicubic sampling asks for two pixels to every side, and the sphere goes on behind either end
-    around = np.pad(found.truth.rendered.light, ((0, 0), (2, 2), (0, 0)), mode="wrap")
+    around = np.pad(found.truth.rendered.shown, ((0, 0), (2, 2), (0, 0)), mode="wrap")
     around = np.pad(around, ((2, 2), (0, 0), (0, 0)), mode="edge")
     light: NDArray[np.float32] = fetch(around, (x + 2).astype(np.float32), (y + 2).astype(np.float32))
     return np.maximum(light, 0)

@@ -1,4 +1,4 @@
-"""report.html: one page that opens offline, without scripts; pictures lie beside it."""
+"""report.html: one page that opens offline; pictures lie beside it. Nothing but sliders needs scripts."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from ..core.output.page import STYLE, table
 from .limits import Check, Result
+from .sets import slider
 from .sets.set_names import SET_MEASURES, SET_PROOF_NAMES
 from .thresholds import BEYOND_MEASURES, BEYOND_RUN, LEAD, SAYING_RUN, Median, Verdict
 
@@ -92,7 +93,8 @@ def page(
     return "\n".join([
         '<!doctype html>', '<html lang="en">', "<head>", '<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>Validation {word}: {escape(suite)}</title>", f"<style>{STYLE}</style>", "</head>", "<body>", "<main>",
+        f"<title>Validation {word}: {escape(suite)}</title>", f"<style>{STYLE}{slider.STYLE}</style>", "</head>",
+        "<body>", "<main>",
         f'<header class="{_class(verdict.passed)}"><h1>{"✓" if verdict.passed else "✗"} Validation {word}</h1>',
         f"<p>{escape(counts)}</p>", f'<p class="quiet">{escape(about)}</p></header>',
         failures(general), *(_of_pairs(pairs, verdict, middles) if pairs else ()), *of_sets[:1],
@@ -276,12 +278,17 @@ def _pictures(result: Result) -> Iterable[str]:
 
 def figure(result: Result, kind: str, caption: str) -> str:
     """One picture of a scene with what it shows."""
-    path = escape(quote(result["pictures"][kind], safe="/="))
+    path = escape(address(result, kind))
     alt = escape(f"{result['scene']}: {caption}")
     return (
         f'<figure><a href="{path}"><img loading="lazy" src="{path}" alt="{alt}"></a>'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
+
+
+def address(result: Result, kind: str) -> str:
+    """Where a picture of a scene lies, as seen from the page."""
+    return quote(result["pictures"][kind], safe="/=")
 
 
 def _figures(runs: dict[str, dict[str, Any]]) -> str:

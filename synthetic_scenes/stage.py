@@ -136,8 +136,8 @@ class Stage:
         paint.link(paint.place, cells.inputs["Vector"])
         return paint.finish(paint.stained(cells.outputs["Color"], 3.0))
 
-    def tiles(self, dark: Colour, bright: Colour, size: float = 0.4) -> Any:
-        """A chequered floor with stains."""
+    def tiles(self, dark: Colour, bright: Colour, size: float = 0.4, glossy: bool = False) -> Any:
+        """A chequered floor with stains; glossy: what is above it is mirrored in it, as in polished stone."""
         paint = _Paint(self.random)
         tiles = paint.node("ShaderNodeTexChecker")
         for name, colour in (("Color1", dark), ("Color2", bright)):
@@ -145,7 +145,7 @@ class Stage:
         tiles.inputs["Scale"].default_value = 1 / size
         paint.link(paint.place, tiles.inputs["Vector"])
         # tiles alone look all alike: dirt is what tells one from the next
-        return paint.finish(paint.stained(paint.stained(tiles.outputs["Color"], 2.0), 4.0 / size))
+        return paint.finish(paint.stained(paint.stained(tiles.outputs["Color"], 2.0), 4.0 / size), glossy=glossy)
 
     def light(self, colour: Colour) -> Any:
         """Something that shines: values above 1, with a little pattern."""
@@ -214,8 +214,8 @@ class _Paint:
         self.link(b, product.inputs[1])
         return product.outputs[0]
 
-    def finish(self, colour: Any, shaded: bool = True) -> Any:
-        """The material that emits a colour, shaded by where its surface faces."""
+    def finish(self, colour: Any, shaded: bool = True, glossy: bool = False) -> Any:
+        """The material that emits a colour, shaded by where its surface faces, under a clear coat where glossy."""
         if shaded:
             facing = self.node("ShaderNodeVectorMath", operation="DOT_PRODUCT")
             self.link(self.node("ShaderNodeNewGeometry").outputs["Normal"], facing.inputs[0])
@@ -226,5 +226,12 @@ class _Paint:
             colour = self.times(colour, bright.outputs[0])
         emission, output = self.node("ShaderNodeEmission"), self.node("ShaderNodeOutputMaterial")
         self.link(colour, emission.inputs["Color"])
+        if glossy:
+            mirror, mixed = self.node("ShaderNodeBsdfGlossy"), self.node("ShaderNodeMixShader")
+            mirror.inputs["Roughness"].default_value = 0.0
+            self.link(self.node("ShaderNodeFresnel").outputs[0], mixed.inputs[0])
+            self.link(emission.outputs[0], mixed.inputs[1])
+            self.link(mirror.outputs[0], mixed.inputs[2])
+            emission = mixed
         self.link(emission.outputs[0], output.inputs["Surface"])
         return self.material

@@ -36,7 +36,7 @@ PACKAGE = __package__
 PARTS = ("core", "synthetic_scenes")
 ONLY_SHOWING = {
     "thresholds.py", "set_thresholds.py", "pair_bars.py", "limits.py", "validation_report.py", "report_page.py",
-    "set_page.py", "set_names.py", "validation.py", "demo.py",
+    "set_page.py", "set_names.py", "slider.py", "validation.py", "demo.py",
 }  # fmt: skip
 # A scene of the full suite takes up to 2 GB, and its renders take all cores anyway.
 MOST_AT_ONCE = 4

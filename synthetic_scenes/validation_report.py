@@ -42,7 +42,7 @@ def report_files(results: Sequence[Result], suite: str, complete: bool, version:
                 of sets: count, expected_left_out [name], runs {ours: {refused, warnings, used (how many pictures),
                 left_out [name], figures {name: value or null}, by_picture [{picture, figure: value or null}]}, …}]
     The figures' meanings stand in `measures.figures` and `measures.whole_picture`, the proof's in `proof.prove`; of
-    sets in `sets.set_measures` and `sets.set_proof`.
+    sets in `sets.set_measures`, `set_lines`, `set_things`, `set_seams` and `set_proof`.
 
     report.csv: a row for every run of every scene (one with an empty run where a scene has none): what was expected,
     the model, every figure (empty: undefined, or of the other kind), and whether all checks of the run and of its scene

@@ -67,11 +67,16 @@ def through_lens(
     passes: Passes, camera: SceneCamera, corner: tuple[int, int]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Light (H, W, 3) and depth (H, W) of a camera's picture, of the passes of its ideal camera."""
+    light = np.maximum(bent_picture(passes.light, camera, corner, cv2.INTER_CUBIC), 0)
+    inverse = bent_picture((1 / passes.depth)[..., None], camera, corner, cv2.INTER_LINEAR)[..., 0]
+    with np.errstate(divide="ignore"):
+        return light, 1 / inverse if camera.k1 else passes.depth
+
+
+def bent_picture(picture: NDArray, camera: SceneCamera, corner: tuple[int, int], interpolation: int) -> NDArray:
+    """A camera's picture (H, W, C), of that of its ideal camera; interpolation: OpenCV's flag."""
     if not camera.k1:
-        return passes.light, passes.depth
+        return picture
     x, y = np.meshgrid(*(np.arange(side, dtype=np.float64) for side in camera.size))
     at = (straightened(np.stack([x, y], axis=-1), camera) - corner).astype(np.float32)
-    light = np.maximum(fetch(passes.light, at[..., 0], at[..., 1], cv2.INTER_CUBIC), 0)
-    inverse = fetch((1 / passes.depth)[..., None], at[..., 0], at[..., 1], cv2.INTER_LINEAR)[..., 0]
-    with np.errstate(divide="ignore"):
-        return light, 1 / inverse
+    return fetch(picture, at[..., 0], at[..., 1], interpolation)

@@ -15,6 +15,7 @@ from ..scene_pictures import error_colours, jpeg
 from .hugin import hugin_panorama, installed
 from .opencv_stitcher import stitcher_panorama
 from .rendered_set import RenderedSet
+from .set_lines import line_figures
 from .set_measures import (
     Found,
     SetTruth,
@@ -22,10 +23,13 @@ from .set_measures import (
     map_figures,
     on_the_sphere,
     pose_figures,
+    poses,
     range_figures,
 )
+from .set_seams import seam_figures
 from .set_sliding import beside_figures
 from .set_stitches import SLID, WAYS, Shared, stitched
+from .set_things import thing_figures
 from .set_thresholds import HUGIN, OPENCV, OURS
 from .top_view import top_view
 
@@ -45,10 +49,12 @@ class MeasuredSet:
 
 @dataclass(frozen=True)
 class _Shown:
-    """A panorama as the true sphere lies: light (H, W, 3), where (H, W) it shows something."""
+    """A panorama as the true sphere lies: light (H, W, 3), where (H, W) it shows something; found: how it came to be,
+    unless by another program."""
 
     light: NDArray[np.float32]
     where: NDArray[np.bool_]
+    found: Found | None = None
 
 
 def measured_set(rendered: RenderedSet) -> MeasuredSet:
@@ -73,10 +79,11 @@ def measured_set(rendered: RenderedSet) -> MeasuredSet:
             continue
         found = Found.of(result, truth)
         maps, by_picture = map_figures(found)
-        figures = pose_figures(found) | maps | range_figures(found)
+        by_picture = [line | pose for line, pose in zip(by_picture, poses(found), strict=True)]
+        figures = pose_figures(found) | maps | range_figures(found) | line_figures(found) | thing_figures(found)
         left = [path.stem for number, path in enumerate(rendered.pictures) if number not in found.numbers]
         runs[way] = _run("", result.warnings, len(found.numbers), left, figures, by_picture)
-        panoramas[way] = _Shown(*on_the_sphere(found))
+        panoramas[way] = _Shown(*on_the_sphere(found), found)
         seconds |= {f"{way} {stage}": value for stage, value in result.seconds.items()}
         if way == OURS:
             used, seen = found.numbers, truth.views_at(found.numbers) > 0
@@ -103,12 +110,13 @@ def measured_set(rendered: RenderedSet) -> MeasuredSet:
         runs[way]["figures"] |= {
             **figures, "covered": float(own.sum() / max(int(seen.sum()), 1)),
             **{f"common_{name}": value for name, value in beside.items()},
+            **(seam_figures(panorama.found, exposed, own) if panorama.found else {}),
         }  # fmt: skip
         pictures[f"panorama {way}".replace(" ", "_")] = jpeg(np.where(panorama.where[..., None], exposed, 0)[part])
         if way == OURS:
             apart = np.abs(exposed.astype(int) - truth.picture) * own[..., None]
             pictures["difference"] = jpeg(np.minimum(4 * apart, 255).astype(np.uint8)[part])
-    dim = encode(rendered.light, 8) // 4
+    dim = encode(rendered.shown, 8) // 4
     pictures["sphere"] = jpeg(np.where(seen[..., None], truth.picture, dim).astype(np.uint8)[part])
     return MeasuredSet(runs, pictures, seconds)
 

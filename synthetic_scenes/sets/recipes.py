@@ -26,7 +26,9 @@ class SetRecipe:
 
     world: a function of `sets.worlds`; shoot: makes `count` views by how far from the viewpoint they lie, `spread`
     (standard deviation, m), and chance; noise: σ of the sensor's, levels of 8 bit; strays: how many pictures, the
-    last ones, show another place; parallax: whether one place cannot explain all pictures.
+    last ones, show another place; parallax: whether one place cannot explain all pictures; agx: whether pictures are 8
+    bit by Blender's view AgX, which takes lights back as cameras do, not by Standard; exposures: how often and by how
+    much brighter, EV, each picture is taken, the one that is stitched first.
     """
 
     name: str
@@ -39,6 +41,8 @@ class SetRecipe:
     noise: float = 1.0
     strays: int = 0
     parallax: bool = True
+    agx: bool = False
+    exposures: tuple[float, ...] = (0.0,)
 
     @property
     def views(self) -> tuple[View, ...]:
@@ -106,6 +110,19 @@ def wide_and_tele(step: float, wide: Body, tele: Body) -> Shoot:
 def ring(lens: float) -> Shoot:
     """Views all around, whose ends meet."""
     return lambda count, spread, random: fan(360 / count, lens)(count, spread, random)
+
+
+def rings(lens: float) -> Shoot:
+    """Three rings, 35° apart, that show all but what is overhead and underfoot: of 27 views 11 level, 8 up, 8 down."""
+
+    def shoot(count: int, spread: float, random: np.random.Generator) -> tuple[View, ...]:
+        slanted = round(count * 8 / 27)
+        views = [View(yaw=360 * k / slanted + 15, pitch=-32.0, lens=lens) for k in range(slanted)]
+        views += [View(yaw=360 * k / slanted, pitch=38.0, lens=lens) for k in range(slanted)]
+        level = ring(lens)(count - 2 * slanted, spread, random)
+        return *level, *(in_the_hand(view, spread, random) for view in views)
+
+    return shoot
 
 
 def chain(step: float, link: float, lens: float) -> Shoot:
@@ -178,6 +195,10 @@ _SETS = (
               seed=7, parallax=False),
     SetRecipe("mover", "A room that somebody walks through in four of eight pictures", "walked_through",
               fan(22.0, 26.0), 8, 0.1, seed=13),
+    SetRecipe("room_sphere", "A furnished room all around, up and down, in three rings of pictures", "room",
+              rings(24.0), 27, 0.15, seed=4, agx=True),
+    SetRecipe("brackets", "Five pictures, each exposed three times, of a room with a window, a lamp and a glossy floor",
+              "bright_room", fan(32.0, 24.0), 5, 0.12, seed=14, agx=True, exposures=(0.0, -2.0, 2.0)),
     SetRecipe("mixed", "Six pictures from a tripod, four more from the hand", "room", on_a_tripod(24.0, 26.0, 4), 10,
               0.15, seed=8),
     SetRecipe("stray", "Nine pictures, two of them of another place", "two_rooms",

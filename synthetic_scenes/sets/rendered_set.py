@@ -5,21 +5,24 @@ from __future__ import annotations
 import hashlib
 import json
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.pictures.encoding import encode_picture
 from ...core.pictures.picture import load_picture, picture_from_array
+from ...core.raster.colour import decode
 from ...core.system.output_files import OutputFiles
-from ..blender_process import run_job
+from ..blender_process import RenderFailed, run_job
 from ..passes import read_passes
 from ..rendered import blenders_camera, expose, npy_bytes
 from ..scene_camera import SceneCamera
-from .bent_lens import bent_camera, ideal_camera, through_lens
+from .bent_lens import bent_camera, bent_picture, ideal_camera, through_lens
+from .places import shown_name
 from .recipes import SetRecipe
 from .set_proof import SphereProof
 from .sphere_camera import SphereCamera
@@ -39,19 +42,25 @@ SOURCES = (
 class RenderedSet:
     """Pictures of a world, and the truth about them.
 
-    pictures: files, in order; cameras and depths (H, W) float32, inf where there is nothing, of the same; sphere: what
-    is seen from the first one's place, light (H, W, 3) float32 scene-linear without noise, distance (H, W) float32, inf
-    where there is nothing; proof: see `set_proof`.
+    pictures: files, in order, 8 bit, their linear light beside them as EXR; cameras and depths
+    (H, W) float32, inf where there is nothing, of the same; sphere: what is seen from the first one's place, shown (H,
+    W, 3) float32 as pictures are decoded, in the same view without noise, distance (H, W) float32, inf where there is
+    nothing; proof: see `set_proof`. things: where (H, W) uint8 each picture shows things that the world numbers, from
+    1, and the sphere last; lines (N, 2, 3): ends of straight edges in the world; brackets: every picture's files by
+    exposure, where it is exposed more than once.
     """
 
     pictures: tuple[Path, ...]
     cameras: tuple[SceneCamera, ...]
     depths: tuple[NDArray[np.float32], ...]
     sphere: SphereCamera
-    light: NDArray[np.float32]
+    shown: NDArray[np.float32]
     distance: NDArray[np.float32]
     proof: dict[str, float]
     blender: str
+    things: tuple[NDArray[np.uint8], ...] = ()
+    lines: NDArray = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    brackets: tuple[tuple[Path, ...], ...] = ()
 
 
 def rendered_set(recipe: SetRecipe, size: tuple[int, int], folder: Path) -> RenderedSet:
@@ -67,6 +76,7 @@ def rendered_set(recipe: SetRecipe, size: tuple[int, int], folder: Path) -> Rend
         "views": {name: {"K": c.K.tolist(), "R": c.R.tolist(), "t": c.t.tolist(), "size": list(c.size)}
                   for name, c in rendered.items()},
         "sphere": {"place": first.place.tolist(), "width": 2 * round(SPHERE_WIDTH * max(size) / 2)},
+        "exposures": recipe.exposures if recipe.agx else [],
     }  # fmt: skip
     place = folder / f"{recipe.name}-{_key(job, recipe, cameras)}"
     if not (place / "cameras.json").is_file():
@@ -78,7 +88,8 @@ def rendered_set(recipe: SetRecipe, size: tuple[int, int], folder: Path) -> Rend
 
 def _key(job: dict[str, Any], recipe: SetRecipe, cameras: dict[str, SceneCamera]) -> str:
     bends = [camera.k1 for camera in cameras.values()]
-    content = hashlib.sha256(json.dumps([job, recipe.seed, recipe.noise, bends], sort_keys=True).encode())
+    made = [job, recipe.seed, recipe.noise, recipe.agx, recipe.exposures, bends]
+    content = hashlib.sha256(json.dumps(made, sort_keys=True).encode())
     for name in SOURCES:
         content.update((Path(__file__).parent / name).read_bytes())
     return content.hexdigest()[:16]
@@ -100,14 +111,34 @@ def _keep(rendered: Path, place: Path, recipe: SetRecipe, cameras: dict[str, Sce
             light, depth = through_lens(seen, camera, corner)
             if camera.k1:
                 proof.add_bent(light, depth, camera)
-            taken = expose(light, (1.0, 1.0, 1.0), recipe.noise, False, random)
-            data, _ = encode_picture(picture_from_array(taken).pixels, None, 8, ".png")
-            files.add_to_folder(place, f"{name}.png", data)
+            for exposure in recipe.exposures:
+                file = shown_name(name, exposure)
+                gain, shown = 2.0**exposure, light
+                if recipe.agx:
+                    gain, shown = 1.0, bent_picture(_shown(rendered / file), camera, corner, cv2.INTER_CUBIC)
+                taken = expose(np.maximum(shown, 0), (gain, gain, gain), recipe.noise, False, random)
+                data, _ = encode_picture(picture_from_array(taken).pixels, None, 8, ".png")
+                files.add_to_folder(place, file, data)
+            things = bent_picture(seen.things[..., None], camera, corner, cv2.INTER_NEAREST)[..., 0]
+            files.add_to_folder(place, f"{name}.exr", encode_picture(light, None, 32, ".exr")[0])
             files.add_to_folder(place, f"{name}_depth.npy", npy_bytes(depth))
+            files.add_to_folder(place, f"{name}_things.npy", npy_bytes(things))
         files.add_to_folder(place, "sphere.exr", encode_picture(passes.light, None, 32, ".exr")[0])
+        if recipe.agx:
+            files.add_to_folder(place, "sphere.png", (rendered / "sphere.png").read_bytes())
         files.add_to_folder(place, "sphere_distance.npy", npy_bytes(proof.distance))
+        files.add_to_folder(place, "sphere_things.npy", npy_bytes(passes.things))
+        entries["exposures"] = recipe.exposures
         entries["proof"] = proof.figures()
         files.add_to_folder(place, "cameras.json", json.dumps(entries, indent=1).encode())
+
+
+def _shown(path: Path) -> NDArray[np.float32]:
+    """A picture (H, W, 3) as the engine decodes it: what a screen shows, whatever view it was saved in."""
+    picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if picture is None:
+        raise RenderFailed(f"Blender saved no {path.name}")
+    return decode(np.ascontiguousarray(picture[..., 2::-1]))
 
 
 def _camera_of(entry: dict[str, Any]) -> SceneCamera:
@@ -125,10 +156,14 @@ def _sphere_of(entry: dict[str, Any]) -> SphereCamera:
 def _load(place: Path) -> RenderedSet:
     entries = json.loads((place / "cameras.json").read_text("utf-8"))
     names = list(entries["views"])
+    agx = place / "sphere.png"
+    taken = [tuple(place / shown_name(name, exposure) for exposure in entries["exposures"]) for name in names]
     return RenderedSet(
-        tuple(place / f"{name}.png" for name in names),
+        tuple(files[0] for files in taken),
         tuple(_camera_of(entries["views"][name]) for name in names),
         tuple(np.load(place / f"{name}_depth.npy") for name in names),
-        _sphere_of(entries["sphere"]), load_picture(place / "sphere.exr").pixels,
+        _sphere_of(entries["sphere"]), _shown(agx) if agx.exists() else load_picture(place / "sphere.exr").pixels,
         np.load(place / "sphere_distance.npy"), entries["proof"], entries["blender"],
+        tuple(np.load(place / f"{name}_things.npy") for name in (*names, "sphere")),
+        np.array(entries["lines"], np.float64).reshape(-1, 2, 3), tuple(taken) if len(taken[0]) > 1 else (),
     )  # fmt: skip

@@ -60,7 +60,7 @@ class SetTruth:
             index = np.flatnonzero(in_frame(pixels, camera))
             shown = visible(pixels, there, depth)
             seen.append(Seen(index, pixels.reshape(-1, 2)[index], shown.ravel()[index]))
-        return SetTruth(rendered, directions, encode(rendered.light, 8), tuple(seen))
+        return SetTruth(rendered, directions, encode(rendered.shown, 8), tuple(seen))
 
     def views_at(self, numbers: Sequence[int]) -> NDArray[np.int16]:
         """How many of these cameras see each pixel of the sphere (H, W)."""
@@ -119,6 +119,19 @@ class Found:
         """The same in px of the stitch's maps and masks."""
         return self.points + np.array(self.result.warp.canvas.offset, np.float64)
 
+    @cached_property
+    def labels(self) -> NDArray[np.int16]:
+        """Which of the stitch's pictures each pixel of its maps comes from, by its own order; −1 for none."""
+        labels, canvas = self.result.labels, self.result.warp.canvas
+        return np.full((canvas.height, canvas.width), -1, np.int16) if labels is None else labels
+
+    @cached_property
+    def labels_on_sphere(self) -> NDArray[np.int16]:
+        """The same (H, W) at the sphere's pixels."""
+        x, y = np.moveaxis(self.on_maps().astype(np.float32), -1, 0)
+        # 0 is what is fetched from beyond the picture
+        return fetch((self.labels + 1)[..., None], x, y, cv2.INTER_NEAREST)[..., 0] - np.int16(1)
+
 
 def common_rotation(found: Array, true: Sequence[Array] | Array) -> Array:
     """The rotation G (3, 3) for which R_j G of found rotations (N, 3, 3) come nearest to the true ones."""
@@ -148,22 +161,30 @@ def pose_figures(found: Found) -> dict[str, float]:
     """rotation_deg, rotation_max_deg (after the common turn that fits best: median, max); position_mm, position_max_mm
     (after the similarity that fits best); focal_percent, k1_error, principal_px (worst); places: at how many the
     pictures are said to be; guessed_lengths: how many pairs are said to have a baseline whose length no third tells."""
-    angles = [rotation_angle(R @ found.gauge, camera.R) for R, camera in zip(found.rig.R, found.cameras, strict=True)]
-    placed, _ = found.places
-    off = 1000 * np.linalg.norm(placed - [camera.place for camera in found.cameras], axis=1)
+    angles, off = np.array([[line["rotation_deg"], line["position_mm"]] for line in poses(found)]).T
     focals = [ours.focal / true.K[0, 0] - 1 for ours, true in zip(found.rig.cameras, found.cameras, strict=True)]
     bends = [float(ours.distortion[0]) - true.k1 for ours, true in zip(found.rig.cameras, found.cameras, strict=True)]
     middles = [np.linalg.norm(ours.K[:2, 2] - true.K[:2, 2])
                for ours, true in zip(found.rig.cameras, found.cameras, strict=True)]  # fmt: skip
     tied = sum(len(station) - 1 for station in found.rig.stations)
     return {
-        "rotation_deg": float(np.median(angles)), "rotation_max_deg": max(angles),
+        "rotation_deg": float(np.median(angles)), "rotation_max_deg": float(angles.max()),
         "position_mm": float(np.median(off)), "position_max_mm": float(off.max()),
         "focal_percent": 100 * max(focals, key=abs),
         "k1_error": max(bends, key=abs), "principal_px": float(max(middles)),
         "places": float(len(found.rig) - tied) if found.rig.t.any() else 1.0,
         "guessed_lengths": float(sum(edge.baseline == "continuity" for edge in found.rig.edges)),
     }  # fmt: skip
+
+
+def poses(found: Found) -> list[dict[str, float]]:
+    """The same rotation_deg and position_mm of each picture."""
+    placed, _ = found.places
+    return [
+        {"rotation_deg": rotation_angle(R @ found.gauge, camera.R),
+         "position_mm": 1000 * float(np.linalg.norm(place - camera.place))}
+        for R, place, camera in zip(found.rig.R, placed, found.cameras, strict=True)
+    ]  # fmt: skip
 
 
 def map_figures(found: Found) -> tuple[dict[str, float], list[dict[str, float]]]:

@@ -25,7 +25,19 @@ SET_MEASURES = {
     "common_psnr_db": ("the same over what all of these show, PSNR", "dB", 2),
     "common_ssim": ("the same over what all of these show, SSIM", "", 4),
     "covered": ("share of what is seen that it shows", "", 3),
+    "lines": ("straight edges of the world that it shows", "", 0), "uprights": ("uprights among them", "", 0),
+    "line_px": ("straight edges, off straight in it, median", "px", 2),
+    "line_p90_px": ("straight edges, off straight in it, 90th", "px", 2),
+    "picture_line_px": ("straight edges, off straight by each map, median", "px", 2),
+    "picture_line_p90_px": ("straight edges, off straight by each map, 90th", "px", 2),
+    "upright_deg": ("uprights, lean, median", "°", 3), "upright_p90_deg": ("uprights, lean, 90th", "°", 3),
+    "things": ("things that are seen", "", 0), "things_cut": ("things that are cut or doubled", "", 0),
+    "things_half": ("worst thing, from being whole or gone", "", 3),
+    "seam_levels": ("step of tone along borders, off the true one, median", "levels", 2),
+    "seam_p90_levels": ("step of tone along borders, off the true one, 90th", "levels", 2),
 }  # fmt: skip
+# The same of one picture.
+OF_A_PICTURE = SET_MEASURES | {"rotation_deg": ("rotation", "°", 3), "position_mm": ("position", "mm", 1)}
 SET_PROOF_NAMES = {
     "direction_deg": "sphere's Position from its directions", "distance_relative": "ray casts against it, relative",
     "visibility_wrong": "visible by depth, not by rays: share", "visibility_asked": "rays that were asked",

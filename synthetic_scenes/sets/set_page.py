@@ -7,14 +7,17 @@ from html import escape
 
 from ...core.output.page import table
 from ..limits import Check, Result
-from ..report_page import BAD, GOOD, cell, failures, figure, named, proof_table, slug, unit, warnings_list
-from .set_names import SET_MEASURES, SET_PICTURES
+from ..report_page import BAD, GOOD, address, cell, failures, figure, named, proof_table, slug, unit, warnings_list
+from .set_names import OF_A_PICTURE, SET_MEASURES, SET_PICTURES
 from .set_thresholds import BARS, HUGIN, LEAD, OPENCV, OURS, ROTATION_ONLY
+from .slider import slider
 
 OVERVIEW = (
     "rotation_deg", "rotation_max_deg", "position_max_mm", "focal_percent", "overlap_px", "overlap_p90_px", "alone_px",
-    "range_log", "psnr_db", "ssim", "common_psnr_db",
+    "range_log", "psnr_db", "ssim", "common_psnr_db", "line_px", "upright_deg", "things_cut", "seam_levels",
 )  # fmt: skip
+# The two that a slider shows one over the other.
+BESIDE = ("sphere", "panorama_ours")
 RIVALS = (ROTATION_ONLY, HUGIN, OPENCV)
 
 
@@ -51,6 +54,9 @@ def set_section(result: Result, checks: Sequence[Check]) -> str:
         parts.append(f"<pre>{escape(result['message'])}</pre>")
     parts.append(failures([check for check in checks if not check.passed]))
     kinds = [kind for kind in SET_PICTURES if kind in result["pictures"]]
+    if set(BESIDE) <= set(kinds):
+        true, ours = ((address(result, kind), SET_PICTURES[kind]) for kind in BESIDE)
+        parts.append(slider(true, ours))
     if kinds:
         shown = "".join(figure(result, kind, SET_PICTURES[kind]) for kind in kinds)
         parts.append(f'<div class="pictures">{shown}</div>')
@@ -78,7 +84,7 @@ def _figures(result: Result) -> str:
     all_of_them = table(f"<tr><th></th><th></th>{head}<th>asked of ours</th><th>measured then</th></tr>", rows)
     lines = (result["runs"].get(OURS) or {}).get("by_picture") or []
     names = [name for name in (lines[0] if lines else {}) if name != "picture"]
-    columns = "".join(f"<th class=n>{escape(named(name, SET_MEASURES))}</th>" for name in names)
+    columns = "".join(f"<th class=n>{escape(named(name, OF_A_PICTURE))}</th>" for name in names)
     each = table(f"<tr><th>picture</th>{columns}</tr>", [
         f"<tr><th>{int(line['picture']):02d}</th>{''.join(cell(line[name], name, None) for name in names)}</tr>"
         for line in lines

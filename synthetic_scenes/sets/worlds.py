@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from ..stage import Colour, Place, Stage
 from ..worlds import BRICK, MORTAR, MOSS, SAND, SKY, STONE, person
@@ -19,22 +20,37 @@ WALK = {2: (-0.45, 2.05), 1: (0.25, 2.0), 3: (1.05, 1.75), 5: (1.6, 0.9)}
 Pose = Callable[[int | None], None]
 
 
-def room(stage: Stage) -> None:
-    """Four walls with pictures, floor and ceiling, things of all sizes from 1.4 to 4 m away."""
-    _shell(stage)
+def room(stage: Stage, glossy: bool = False) -> None:
+    """Four walls with pictures, floor and ceiling, things of all sizes from 1.4 to 4 m away, with numbers from 1."""
+    _shell(stage, glossy)
     _pictures(stage, 14)
-    _table(stage, 0.3, 3.1)
+    stage.thing(1, *_table(stage, 0.3, 3.1))
     paints = (stage.poster(10), stage.wood(*OAK), stage.stone(STONE, 6))
     for k, (x, y) in enumerate(((-1.8, 1.7), (2.4, 0.7), (-1.6, -1.8), (1.1, -2.0), (2.6, 2.7), (-2.5, -0.1))):
         height = stage.random.uniform(0.5, 1.5)
         width, depth = stage.random.uniform(0.3, 0.6), stage.random.uniform(0.3, 0.6)
-        stage.box((x, y, height / 2), (width, depth, height), paints[k % 3], yaw=stage.random.uniform(-40, 40))
-    stage.post((1.6, 1.4, 0), (1.6, 1.4, ROOM[4]), 0.07, stage.stone(BRICK, 9))
-    stage.post((-1.2, -1.1, 0), (-1.2, -1.1, ROOM[4]), 0.07, stage.wood(*OAK))
-    stage.ball((-0.9, 2.0, 1.35), 0.18, stage.poster(10))
+        size = width, depth, height
+        stage.thing(5 + k, stage.box((x, y, height / 2), size, paints[k % 3], yaw=stage.random.uniform(-40, 40)))
+    stage.thing(2, stage.post((1.6, 1.4, 0), (1.6, 1.4, ROOM[4]), 0.07, stage.stone(BRICK, 9)))
+    stage.thing(3, stage.post((-1.2, -1.1, 0), (-1.2, -1.1, ROOM[4]), 0.07, stage.wood(*OAK)))
+    stage.thing(4, stage.ball((-0.9, 2.0, 1.35), 0.18, stage.poster(10)))
 
 
-def _shell(stage: Stage) -> None:
+def bright_room(stage: Stage) -> None:
+    """A room with a window and a lamp, both far brighter than all else, that its floor mirrors."""
+    room(stage, glossy=True)
+    _, right, _, front, _ = ROOM
+    daylight = stage.light((5.0, 6.0, 7.5))
+    for side in (-1, 1):
+        stage.card((0.9 + 0.36 * side, front - 0.1, 1.75), 0.66, 1.3, daylight)
+    for x in (0.15, 0.9, 1.65):
+        stage.box((x, front - 0.1, 1.75), (0.07, 0.06, 1.44), stage.wood(*OAK))
+    for z in (1.06, 2.44):
+        stage.box((0.9, front - 0.1, z), (1.57, 0.06, 0.07), stage.wood(*OAK))
+    stage.ball((right - 0.9, 1.9, 2.1), 0.14, stage.light((9.0, 7.0, 4.5)))
+
+
+def _shell(stage: Stage, glossy: bool) -> None:
     left, right, back, front, height = ROOM
     middle, across, along = ((left + right) / 2, (back + front) / 2), right - left, front - back
     x, y = middle
@@ -43,7 +59,8 @@ def _shell(stage: Stage) -> None:
         ((right, y), along, 90, stage.stone(STONE, 2.5)), ((left, y), along, -90, stage.bricks(BLUE, MORTAR, 0.4)),
     ):  # fmt: skip
         stage.card((*at, height / 2), width, height, paint, yaw=yaw)
-    stage.card((x, y, 0), across, along, stage.tiles((0.16, 0.12, 0.1), (0.5, 0.44, 0.36), 0.35), tilt=90)
+    floor = stage.tiles((0.16, 0.12, 0.1), (0.5, 0.44, 0.36), 0.35, glossy)
+    stage.card((x, y, 0), across, along, floor, tilt=90)
     stage.card((x, y, height), across, along, stage.stone(((0.3, 0.3, 0.33), (0.8, 0.8, 0.76)), 2.5, 2.0), tilt=-90)
 
 
@@ -60,16 +77,16 @@ def _pictures(stage: Stage, count: int) -> None:
         stage.card((*at, z), size, 1.3 * size, stage.poster(8 / size), yaw=yaw)
 
 
-def _table(stage: Stage, x: float, y: float) -> None:
-    """A table with a box and a ball on it."""
-    stage.box((x, y, 0.73), (1.3, 0.7, 0.06), stage.wood(*OAK), yaw=15)
+def _table(stage: Stage, x: float, y: float) -> list[Any]:
+    """The parts of a table with a box and a ball on it."""
+    parts = [stage.box((x, y, 0.73), (1.3, 0.7, 0.06), stage.wood(*OAK), yaw=15)]
     cosine, sine = math.cos(math.radians(15)), math.sin(math.radians(15))
     for right in (-0.58, 0.58):
         for ahead in (-0.28, 0.28):
             foot = x + right * cosine + ahead * sine, y - right * sine + ahead * cosine
-            stage.post((*foot, 0), (*foot, 0.7), 0.035, stage.wood(*OAK))
-    stage.box((x - 0.25, y, 0.92), (0.3, 0.25, 0.32), stage.poster(14), yaw=35)
-    stage.ball((x + 0.35, y - 0.1, 0.91), 0.15, stage.stone(BRICK, 9))
+            parts.append(stage.post((*foot, 0), (*foot, 0.7), 0.035, stage.wood(*OAK)))
+    parts.append(stage.box((x - 0.25, y, 0.92), (0.3, 0.25, 0.32), stage.poster(14), yaw=35))
+    return [*parts, stage.ball((x + 0.35, y - 0.1, 0.91), 0.15, stage.stone(BRICK, 9))]
 
 
 def posts(stage: Stage) -> None:
@@ -80,12 +97,10 @@ def posts(stage: Stage) -> None:
     for k in range(7):
         a = math.radians(-66 + 22 * k)
         x, y = 1.7 * math.sin(a), 1.7 * math.cos(a)
-        stage.post((x, y, 0), (x, y, 2.2), 0.02 + 0.012 * (k % 3), (iron, pale)[k % 2], 16)
-    for height in (0.6, 1.1):
-        stage.post((-1.4, 1.9, height), (1.2, 1.9, height), 0.022, iron, 12)
-    for k in range(11):
-        x = -1.4 + 0.26 * k
-        stage.post((x, 1.9, 0.6), (x, 1.9, 1.1), 0.013, iron, 12)
+        stage.thing(11 + k, stage.post((x, y, 0), (x, y, 2.2), 0.02 + 0.012 * (k % 3), (iron, pale)[k % 2], 16))
+    rails = [stage.post((-1.4, 1.9, height), (1.2, 1.9, height), 0.022, iron, 12) for height in (0.6, 1.1)]
+    bars = [-1.4 + 0.26 * k for k in range(11)]
+    stage.thing(18, *rails, *(stage.post((x, 1.9, 0.6), (x, 1.9, 1.1), 0.013, iron, 12) for x in bars))
     leaves: list[Place] = []
     for _ in range(60):
         x, y, z = (stage.random.uniform(*span) for span in ((-1.9, 1.9), (1.5, 2.2), (1.6, 2.4)))
@@ -114,10 +129,11 @@ def street(stage: Stage) -> None:
                 stage.post((*at, 3.0), (*at, 3.9), 0.025, stage.stone(STONE, 9), 12)
     for k in range(4):
         x = -5.0 + 4.6 * k
-        stage.box((x, 4.6, 0.55), (1.9, 0.9, 1.1), stage.poster(3), yaw=stage.random.uniform(-8, 8))
+        paint, yaw = stage.poster(3), stage.random.uniform(-8, 8)
+        stage.thing(1 + k, stage.box((x, 4.6, 0.55), (1.9, 0.9, 1.1), paint, yaw=yaw))
         tree = x + 2.2, 4.0
-        stage.post((*tree, 0), (*tree, 2.6), 0.09, stage.wood((0.05, 0.03, 0.02), (0.3, 0.2, 0.12), 20))
-        stage.ball((*tree, 3.3), 0.85, stage.stone(MOSS, 7))
+        trunk = stage.post((*tree, 0), (*tree, 2.6), 0.09, stage.wood((0.05, 0.03, 0.02), (0.3, 0.2, 0.12), 20))
+        stage.thing(5 + k, trunk, stage.ball((*tree, 3.3), 0.85, stage.stone(MOSS, 7)))
 
 
 def walked_through(stage: Stage) -> Pose:
@@ -163,12 +179,13 @@ def outdoor(stage: Stage) -> None:
         at, size = (away * math.sin(a), away * math.cos(a)), stage.random.uniform(0.3, 0.8)
         if k % 3:
             paint = stage.poster(4) if k % 2 else stage.stone(STONE, 5)
-            stage.box((*at, size), (size, size, 2 * size), paint, yaw=31.0 * k)
+            parts = [stage.box((*at, size), (size, size, 2 * size), paint, yaw=31.0 * k)]
         else:
-            stage.post((*at, 0), (*at, 2.4), 0.1, stage.wood(*OAK))
-            stage.ball((*at, 3.0), 1.1, stage.stone(MOSS, 6))
+            parts = [stage.post((*at, 0), (*at, 2.4), 0.1, stage.wood(*OAK))]
+            parts.append(stage.ball((*at, 3.0), 1.1, stage.stone(MOSS, 6)))
+        stage.thing(1 + k, *parts)
 
 
 SET_WORLDS: dict[str, Callable[[Stage], Pose | None]] = {
-    build.__name__: build for build in (room, posts, street, walked_through, two_rooms, outdoor)
+    build.__name__: build for build in (room, bright_room, posts, street, walked_through, two_rooms, outdoor)
 }

@@ -86,7 +86,7 @@ def test_the_true_panorama_lies_as_the_sets_does(tmp_path: Path, monkeypatch: py
     canvas = found.result.canvas
     x, y = (canvas.projection.points(rays @ found.gauge.T) + np.array(canvas.offset)).astype(np.float32).T[:, None]
     x_true, y_true = (part.astype(np.float32)[None] for part in found.truth.rendered.sphere.pixels(rays))
-    there = fetch(found.truth.rendered.light, x_true, y_true)
+    there = fetch(found.truth.rendered.shown, x_true, y_true)
     assert fetch(true(found), x, y) == pytest.approx(there, abs=0.05)
 
 

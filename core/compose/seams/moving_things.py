@@ -75,7 +75,8 @@ def moving_labels(
         thing = labels[part] == label
         if _has_moved(thing, both[part], same[part], [values[part] for values in moves], step):
             whole = dilated(thing, 1)
-            far_before, far = (float(np.median(values[part][thing])) for values in distances)
+            # where a picture shows nothing alone, its distances are too large to be added in float32
+            far_before, far = (float(np.median(values[part][thing].astype(np.float64))) for values in distances)
             out[part][whole & both[part]] = SECOND if far < far_before else FIRST
     full: NDArray[np.int8] = cv2.resize(out, overlap.both.shape[::-1], interpolation=cv2.INTER_NEAREST)
     return full * overlap.both

@@ -59,6 +59,16 @@ def test_who_moved_belongs_to_the_picture_that_is_alone_nearer_by(across: int, m
     assert (when != 0).sum() < 2 * 72 * 34, "and nothing further than 6 px off did"
 
 
+def test_who_moved_where_the_added_picture_shows_nothing_alone_belongs_to_what_does() -> None:
+    reference, target = ground(), ground()
+    reference[WALKER], target[FAR] = 0.02, 0.9
+    first, second = layer(slice(0, W), reference), layer(RIGHT, target)
+    overlap = overlap_of(first, second, NOTHING)
+    assert overlap is not None
+    when = moving_labels(overlap, flat(), first, second, NOTHING)
+    assert (when == -1).sum() > 2 * 50 * 18 and not (when == 1).any()
+
+
 def test_who_walks_out_of_the_reference_is_seen_once() -> None:
     """He stands in the overlap in the reference, beyond it in the target; the cheapest cut alone shows both."""
     reference, target = ground(), ground()

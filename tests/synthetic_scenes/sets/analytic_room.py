@@ -28,7 +28,15 @@ def passes_along(place: np.ndarray, directions: np.ndarray, ahead: np.ndarray) -
     position = place + away[..., None] * directions
     light = 0.5 + 0.4 * np.sin(position @ np.array([[6.0, 3, 1], [2, 5, 3], [3, 2, 6]]))
     depth = away * ahead
-    return Passes(*(part.astype(np.float32) for part in (light, depth, position)), np.zeros(depth.shape, np.uint8))
+    on_ball = np.linalg.norm(position - BALL, axis=-1) < RADIUS + 1e-6
+    return Passes(*(part.astype(np.float32) for part in (light, depth, position)), on_ball.astype(np.uint8))
+
+
+def lines() -> np.ndarray:
+    """Ends (12, 2, 3) of the edges in which its walls meet."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    ends = [(a, b) for k, a in enumerate(corners) for b in corners[k + 1 :] if np.abs(a - b).sum() == 1]
+    return LOW + np.array(ends) * (HIGH - LOW)
 
 
 def directions_of(camera: SceneCamera) -> np.ndarray:

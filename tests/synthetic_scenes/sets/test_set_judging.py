@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from html.parser import HTMLParser
 from typing import Any
 
 import pytest
@@ -19,14 +20,14 @@ def measured(scene: str = "small_room") -> dict[str, Any]:
     ours, left = {bar.measure: bar.measured for bar in BARS[scene]}, heading(scene, (640, 480))["expected_left_out"]
     runs = {
         OURS: {"refused": "", "warnings": ["<odd>"], "used": 5, "left_out": left, "figures": {**ours, LEAD: 25.0},
-               "by_picture": [{"picture": 0.0, "overlap_px": 0.25}]},
+               "by_picture": [{"picture": 0.0, "overlap_px": 0.25, "rotation_deg": 0.1}]},
         ROTATION_ONLY: {"refused": "", "warnings": [], "used": 5, "left_out": [], "by_picture": [],
                         "figures": {**ours, LEAD: 22.0}},
     }  # fmt: skip
     return {
         "schema": 1, **heading(scene, (640, 480)), "status": "done", "message": "", "blender": "", "made_from": "",
         "proof": {limit.measure: limit.at_least or 0.0 for limit in PROOF}, "runs": runs,
-        "pictures": {"sphere": f"scenes/{scene}/sphere.jpg", "from_above": f"scenes/{scene}/from_above.jpg"},
+        "pictures": {kind: f"scenes/{scene}/{kind}.jpg" for kind in ("sphere", "panorama_ours", "from_above")},
     }  # fmt: skip
 
 
@@ -96,9 +97,44 @@ def test_the_report_shows_sets_and_what_was_measured_when_bars_were_set() -> Non
     files = report_files([result], "sets", False, "1.0")
     page = files["report.html"].decode()
     for text in ("Sets of many pictures", "True sphere", "From above", "measured then", 'id="scene-small_room"',
-                 "&lt;odd&gt;", "Each picture"):  # fmt: skip
+                 "&lt;odd&gt;", "Each picture", "<th class=n>rotation</th>"):  # fmt: skip
         assert text in page, text
     assert "The suite’s bars" not in page and "Outside the overlap" not in page, "there is no pair"
     assert b"small_room" in files["report.csv"] and b"rotation_max_deg" in files["report.csv"]
     lines = summary_lines(judge([result], complete=False), [result])
     assert lines[0].startswith("PASSED: 1 of 1 scenes") and len(lines) == 1
+
+
+class Sliders(HTMLParser):
+    """The pictures and inputs inside each slider of a page."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[list[dict[str, str | None]]] = []
+        self.depth = 0
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        held = dict(attrs)
+        if tag == "div" and (self.depth or held.get("class") == "slider"):
+            self.depth += 1
+            self.found += [[]] if self.depth == 1 else []
+        if self.depth and tag in ("img", "input"):
+            self.found[-1].append({"tag": tag, **held})
+
+    def handle_endtag(self, tag: str) -> None:
+        self.depth -= tag == "div" and self.depth > 0
+
+
+def test_true_and_ours_lie_one_over_the_other_under_a_slider() -> None:
+    result = measured()
+    page = report_files([result], "sets", False, "1.0")["report.html"].decode()
+    ((under, over, moved),) = Sliders(page).found
+    assert under["src"] == "scenes/small_room/sphere.jpg" and over["src"] == "scenes/small_room/panorama_ours.jpg"
+    assert over["class"] == "over" and moved["type"] == "range"
+    # the input sets what the upper picture is cut by
+    assert "'--at', this.value + '%'" in str(moved["oninput"]) and "clip-path: inset(0 0 0 var(--at))" in page
+    assert 'src="http' not in page and "<script" not in page
+    del result["pictures"]["panorama_ours"]
+    page = report_files([result], "sets", False, "1.0")["report.html"].decode()
+    assert not Sliders(page).found, "of one picture there is nothing to compare"

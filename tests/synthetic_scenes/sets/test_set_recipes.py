@@ -61,6 +61,18 @@ def test_the_ends_of_a_ring_meet(name: str) -> None:
     assert np.diff(turns, append=turns[0] + 360).max() < 45
 
 
+def test_three_rings_show_all_but_what_is_overhead_and_underfoot() -> None:
+    cameras = list(SETS["room_sphere"].cameras(SIZE).values())
+    up = np.degrees([np.arcsin(camera.R[2, 2]) for camera in cameras])
+    assert [int(part.sum()) for part in (np.abs(up) < 15, up > 25, up < -25)] == [11, 8, 8]
+    sphere = SphereCamera(np.array([0, 0, EYE]), (360, 180))
+    seen = np.sum([in_frame(seen_by(camera, sphere, sphere.all_directions(), np.full((180, 360), 3.0))[0], camera)
+                   for camera in cameras], axis=0)  # fmt: skip
+    assert (seen[40:145] > 0).all() and (seen[65:115] > 1).mean() > 0.95, "50° up to 55° down"
+    away = np.array([camera.place for camera in cameras[1:]]) - cameras[0].place
+    assert away.std(axis=0) == pytest.approx([0.15, 0.15, 0.1], rel=0.4)
+
+
 def test_no_third_picture_sees_what_two_links_of_the_chain_have_in_common() -> None:
     sphere = SphereCamera(np.array([0, 0, EYE]), (720, 360))
     for away in (1.4, 4.0):  # all that the room holds lies between
