@@ -153,8 +153,11 @@ class ValleyOptions:
     unsure: float = 0.001
     log_step: float = 0.03
     steps: int = 3
-    # Share of the cost that a step saves at least.
+    # Share of the cost that a step saves at least, and of the points that may lie beyond infinity after it; how often
+    # it is bundled again with points anew where more do.
     least_gain: float = 0.002
+    most_behind: float = 0.05
+    anew: int = 2
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ import numpy as np
 from ...raster.robust import sigma_of_lengths
 from ...system.progress import Tick
 from .bundle_options import JUDGE, VALLEY
-from .polishing import Polished, polished_on, total_cost
+from .polishing import Polished, polish, polished_on, total_cost
 from .reprojection import lengths_of_errors
+from .solution import Problem, Solution
 from .uncertainty import deviations
 
 
@@ -18,7 +19,8 @@ def lowest(found: Polished, tick: Tick) -> Polished:
     """The cheapest of what is found from longer and shorter focal lengths, step by step as long as the cost falls.
 
     Focal length, distortion, principal point and places make up for each other there, and the bundle ends in whichever
-    hollow of the valley is nearest to its start. Nothing is tried where the focal length is well known.
+    hollow of the valley is nearest to its start. Where many points lie beyond infinity the lens fits what the places
+    should. Nothing is tried where the focal length is well known.
     """
     if found.one_place or not _unsure(found):
         return found
@@ -27,12 +29,23 @@ def lowest(found: Polished, tick: Tick) -> Polished:
         for _ in range(VALLEY.steps):
             lens = best.solution.lens.copy()
             lens[:, 0] += np.where(best.problem.lenses.free[:, 0], step, 0.0)
-            tried = polished_on(best.problem, replace(best.solution, lens=lens), tick)
+            tried = _tried(best.problem, replace(best.solution, lens=lens), tick)
             cost = _cost(tried)
-            if cost > (1 - VALLEY.least_gain) * least:
+            if cost > (1 - VALLEY.least_gain) * least or tried.behind > max(VALLEY.most_behind, best.behind):
                 break
             best, least = tried, cost
     return best
+
+
+def _tried(problem: Problem, solution: Solution, tick: Tick) -> Polished:
+    """Bundled from there; where that ends with many points beyond infinity, again with all of them triangulated anew,
+    from where those begin at infinity."""
+    tried = polished_on(problem, solution, tick)
+    for _ in range(VALLEY.anew):
+        if tried.behind <= VALLEY.most_behind:
+            break
+        tried = polish(problem, tried.solution, tick)
+    return tried
 
 
 def _cost(found: Polished) -> float:

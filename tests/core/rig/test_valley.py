@@ -36,13 +36,26 @@ def _found(problem: Problem, true: Solution) -> Polished:
 def test_it_goes_down_the_valley(monkeypatch: pytest.MonkeyPatch, bottom: float, found_at: float) -> None:
     """In steps of .03, three at most each way, from where the bundle ended."""
     problem, true = _far()
-    begun = replace(_found(problem, true), solution=replace(true, lens=np.zeros((1, LENS))))
+    found = _found(problem, true)
+    begun = replace(found, solution=replace(true, lens=np.zeros((1, LENS))), behind=0.0)
     monkeypatch.setattr(valley, "_unsure", lambda _: True)
     monkeypatch.setattr(
         valley, "polished_on", lambda problem, solution, tick: replace(begun, problem=problem, solution=solution)
     )
     monkeypatch.setattr(valley, "_cost", lambda found: 1 + (found.solution.lens[0, 0] - bottom) ** 2 * 1e3)
     assert lowest(begun, lambda: None).solution.lens[0, 0] == pytest.approx(found_at)
+
+
+def test_what_puts_points_beyond_infinity_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is tried again with points anew; here that changes nothing."""
+    begun = _found(*_far())
+    monkeypatch.setattr(valley, "_unsure", lambda _: True)
+    for name in ("polished_on", "polish"):
+        monkeypatch.setattr(
+            valley, name, lambda problem, solution, tick: replace(begun, solution=solution, behind=begun.behind + 0.3)
+        )
+    monkeypatch.setattr(valley, "_cost", lambda found: 1 + abs(found.solution.lens[0, 0] - 1))
+    assert lowest(begun, lambda: None) is begun
 
 
 def test_few_pictures_of_what_is_far_are_unsure_and_near_ones_are_not() -> None:
