@@ -16,13 +16,13 @@ from ..raster.arrays import Array
 from ..raster.robust import sigma_of_lengths
 from ..system.errors import NoOverlap
 from ..system.progress import Progress, ReportProgress
-from .averaging.averaged import Verified
+from .averaging.averaged import PairGeometry, Verified
 from .averaging.averaging import hypotheses
 from .averaging.graph import components
 from .averaging.options import PAIRS
 from .averaging.pairs import verified as verify
 from .averaging.turns import degrees_between
-from .bundling.baselines import baselines
+from .bundling.baselines import baselines, guessed_places
 from .bundling.bundle_options import JUDGE
 from .bundling.polishing import Polished
 from .bundling.reprojection import lengths_of_errors
@@ -108,8 +108,12 @@ def _registration_of(
 ) -> Registration:  # fmt: skip
     best = found[0]
     framed = replace(best.found, solution=best.found.solution.seen_from(0).rescaled())
-    edges = _edges(best, framed)
+    pairs = sorted(best.averaged.pairs, key=lambda pair: (pair.i, pair.j))
+    lengths = baselines(pairs, best.averaged.members, framed)
+    edges = _edges(best, framed, pairs, lengths)
     rig = _rig(cameras, points, best, framed, edges, _guesses(found))
+    guessed = guessed_places(pairs, best.averaged.members, lengths, framed)
+    rig = replace(rig, position_deviation=np.hypot(rig.position_deviation, guessed))
     members = best.averaged.members
     return Registration(rig, members, _left_out(names, members, verified))
 
@@ -171,13 +175,13 @@ def _stations(found: Polished) -> tuple[tuple[int, ...], ...]:
     return tuple(group for group in groups if len(group) > 1)
 
 
-def _edges(best: Solved, found: Polished) -> tuple[RigEdge, ...]:
+def _edges(
+    best: Solved, found: Polished, pairs: Sequence[PairGeometry], lengths: Sequence[str]
+) -> tuple[RigEdge, ...]:
     R = found.solution.R
-    members = best.averaged.members
-    place = {member: k for k, member in enumerate(members)}
-    pairs = sorted(best.averaged.pairs, key=lambda pair: (pair.i, pair.j))
+    place = {member: k for k, member in enumerate(best.averaged.members)}
     told = []
-    for pair, baseline in zip(pairs, baselines(pairs, members, found), strict=True):
+    for pair, baseline in zip(pairs, lengths, strict=True):
         i, j = place[pair.i], place[pair.j]
         off = float(degrees_between(pair.R, R[j] @ R[i].T))
         told.append(RigEdge(i, j, pair.found, len(pair.index), pair.noise_px, pair.parallax_px, off, baseline))

@@ -159,17 +159,19 @@ def onto(points: Array, true: Array) -> tuple[Array, float]:
 
 def pose_figures(found: Found) -> dict[str, float]:
     """rotation_deg, rotation_max_deg (after the common turn that fits best: median, max); position_mm, position_max_mm
-    (after the similarity that fits best); focal_percent, k1_error (worst); places: at how many the pictures are said to
-    be; guessed_lengths: how many pairs are said to have a baseline whose length no third picture tells."""
+    (after the similarity that fits best); focal_percent, k1_error, principal_px (worst); places: at how many the
+    pictures are said to be; guessed_lengths: how many pairs are said to have a baseline whose length no third tells."""
     angles, off = np.array([[line["rotation_deg"], line["position_mm"]] for line in poses(found)]).T
     focals = [ours.focal / true.K[0, 0] - 1 for ours, true in zip(found.rig.cameras, found.cameras, strict=True)]
     bends = [float(ours.distortion[0]) - true.k1 for ours, true in zip(found.rig.cameras, found.cameras, strict=True)]
+    middles = [np.linalg.norm(ours.K[:2, 2] - true.K[:2, 2])
+               for ours, true in zip(found.rig.cameras, found.cameras, strict=True)]  # fmt: skip
     tied = sum(len(station) - 1 for station in found.rig.stations)
     return {
         "rotation_deg": float(np.median(angles)), "rotation_max_deg": float(angles.max()),
         "position_mm": float(np.median(off)), "position_max_mm": float(off.max()),
         "focal_percent": 100 * max(focals, key=abs),
-        "k1_error": max(bends, key=abs),
+        "k1_error": max(bends, key=abs), "principal_px": float(max(middles)),
         "places": float(len(found.rig) - tied) if found.rig.t.any() else 1.0,
         "guessed_lengths": float(sum(edge.baseline == "continuity" for edge in found.rig.edges)),
     }  # fmt: skip

@@ -4,6 +4,7 @@ SET_MEASURES = {
     "rotation_deg": ("rotation, median", "°", 3), "rotation_max_deg": ("rotation, worst", "°", 3),
     "position_mm": ("position, median", "mm", 1), "position_max_mm": ("position, worst", "mm", 1),
     "focal_percent": ("focal length, worst", "%", 2), "k1_error": ("k1, worst", "", 4),
+    "principal_px": ("principal point, worst", "px", 2),
     "places": ("places that pictures are at", "", 0),
     "guessed_lengths": ("pairs whose distance is said to be guessed", "", 0),
     "overlap_px": ("map, what several see, median", "px", 2),

@@ -7,7 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...raster.arrays import Array
 from ..averaging.averaged import PairGeometry
+from ..averaging.graph import components
+from .bundle_options import CONTINUITY
 from .parts import parts_of_pairs
 from .polishing import Polished
 
@@ -26,6 +29,20 @@ def baselines(pairs: Sequence[PairGeometry], members: Sequence[int], found: Poli
         else:
             told.append("measured" if any({i, j} <= group for group in groups) else "continuity")
     return told
+
+
+def guessed_places(
+    pairs: Sequence[PairGeometry], members: Sequence[int], known: Sequence[str], found: Polished
+) -> Array:
+    """Deviations (N,) of places by what nothing measured: the lengths of parts that only depth's continuity ties to the
+    first picture's, known: what `baselines` says of each pair."""
+    place = {member: k for k, member in enumerate(members)}
+    centres = found.solution.centres
+    joined = [(place[pair.i], place[pair.j]) for pair, how in zip(pairs, known, strict=True) if how != "continuity"]
+    first = next(group for group in components(len(members), joined) if 0 in group)
+    apart = np.linalg.norm(centres[:, None] - centres[list(first)], axis=2).min(axis=1)
+    deviation: Array = CONTINUITY.log_sigma * apart
+    return deviation
 
 
 def _rigid_groups(found: Polished) -> list[set[int]]:

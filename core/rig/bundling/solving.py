@@ -20,7 +20,7 @@ from .judging import judged
 from .parts import supported
 from .polishing import Polished, sharpened, start
 from .solution import LENS, Problem, lenses_of
-from .stations import polish_best, proposed, same_places, without_parallax
+from .stations import at_one_place, no_parallax, polish_best, proposed, same_places
 from .tracks import build_tracks, fitting_pairs
 from .valley import lowest
 
@@ -84,10 +84,12 @@ def _bundled(
     lens[~lenses.free] = 0
     given = _Given(own, held)
     begun = start(problem, given.turned(rotated.R[list(members)]), lens)
-    found = without_parallax(problem, begun, pairs, tick)
-    if found is None:
+    turned = at_one_place(problem, begun, pairs, tick)
+    if turned is not None and no_parallax(turned):
+        found = turned
+    else:
         stations = proposed(pairs, members) or ([tuple(range(len(members)))] if rotated.one_place else [])
-        found = polish_best(problem, begun, stations, same_places(pairs, members), given.placed, tick)
+        found = polish_best(problem, begun, stations, same_places(pairs, members), given.placed, tick, turned)
     moved = float(np.abs(found.solution.lens[:, 0] - lens[:, 0]).max())
     return Solved(rotated, pairs, found, judged(cameras, points, verified, members, pairs, found), moved)
 

@@ -47,32 +47,40 @@ def same_places(pairs: Sequence[PairGeometry], members: Sequence[int]) -> list[S
     return [SamePlace(place[pair.i], place[pair.j], len(pair.index)) for pair in pairs if pair.rotates]
 
 
-def without_parallax(problem: Problem, start: Solution, pairs: Sequence[PairGeometry], tick: Tick) -> Polished | None:
-    """All at one place, where rotations leave nothing to be seen, whatever pairs prefer: matches err by more than their
-    noise tells, and places and depth would only explain how. None elsewhere, or where poses are given."""
+def at_one_place(problem: Problem, start: Solution, pairs: Sequence[PairGeometry], tick: Tick) -> Polished | None:
+    """Rotations alone; None where they leave too much of the matches, or where poses are given."""
     left = np.repeat([pair.parallax_px for pair in pairs], [len(pair.index) for pair in pairs])
     if problem.held.any() or np.median(left) > JUDGE.hardly_apart_px * problem.scale:
         return None
-    turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
+    return _turned(problem, start, tick)
+
+
+def _turned(problem: Problem, start: Solution, tick: Tick) -> Polished:
+    return polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
+
+
+def no_parallax(turned: Polished) -> bool:
+    """Whether rotations leave nothing to be seen, whatever pairs prefer: matches err by more than their noise tells,
+    and places and depth would only explain how."""
     errors = lengths_of_errors(turned.problem, turned.solution)
-    most = np.array(JUDGE.no_parallax_px) * problem.scale
-    return turned if (np.nanpercentile(errors, JUDGE.no_parallax_percentiles) < most).all() else None
+    most = np.array(JUDGE.no_parallax_px) * turned.problem.scale
+    return bool((np.nanpercentile(errors, JUDGE.no_parallax_percentiles) < most).all())
 
 
 def polish_best(
     problem: Problem, start: Solution, stations: Sequence[Station], same: Sequence[SamePlace],
-    framed: Callable[[Array], Array], tick: Tick,
+    framed: Callable[[Array], Array], tick: Tick, turned: Polished | None = None,
 ) -> Polished:  # fmt: skip
     """The cheapest of: every picture at a place of its own and, where there are stations, those of each at one place,
     and all at one place: pairs with few matches do not show that they rotate. What more places cost is counted (BIC).
     Where there is little parallax, rotations bundled as if at one place are better to start from than averaged ones,
     and are tried too.
 
-    framed: brings places (N, 3) to where the start's poses stand.
+    framed: brings places (N, 3) to where the start's poses stand; turned: rotations alone, where already known.
     """
     if not stations or problem.held.any():  # given poses say themselves what is at one place
         return _placed_and_polished(problem, start, same, framed, tick)
-    turned = polish_rotations(problem.with_stations([tuple(range(problem.pictures))]), start, tick)
+    turned = turned or _turned(problem, start, tick)
     most = information_criterion(turned)
     candidates = [turned, _placed_and_polished(problem, start, same, framed, tick, most=most)]
     if _little_parallax(turned):

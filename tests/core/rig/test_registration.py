@@ -134,8 +134,11 @@ def test_half_tripod_half_hand_held() -> None:
 
 
 def test_lengths_along_a_chain_are_not_measured() -> None:
-    found = registered(make_rig("chain", 1))
-    assert {edge.baseline for edge in found.rig.edges} == {"continuity"}
+    """And how far any other picture is from the first one is a guess, to about half of it."""
+    found = registered(make_rig("chain", 1)).rig
+    assert {edge.baseline for edge in found.edges} == {"continuity"}
+    away = np.linalg.norm(found.centres, axis=1)
+    assert (found.position_deviation[1:] >= 0.45 * away[1:]).all()
 
 
 def test_a_wrong_pair_changes_little() -> None:
