@@ -107,7 +107,10 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         worked_on.append(resized(shown, options.scale))
         sizes.append(size_of(picture))
     warnings = tuple(
-        f"{names[number]} is the same picture as {names[first]}: it is used once" for number, first in copies.items()
+        f"{names[number]} is given twice: it is used once"
+        if names[number] == names[first]
+        else f"{names[number]} is the same picture as {names[first]}: it is used once"
+        for number, first in copies.items()
     )
     painted = None if options.mask is None else read_painted(options.mask)
     return Frame(tuple(worked_on), tuple(sizes), painted, warnings, tuple(shown_by))

@@ -212,7 +212,7 @@ def _left_out(names: Sequence[str], members: Sequence[int], verified: Verified) 
         if not others:
             told[k] = (
                 f"connects to no other picture: at best {best} matches agree on how the camera moved, "
-                f"{PAIRS.min_inliers} are needed; take a picture in between"
+                f"{PAIRS.min_inliers} are needed; take a picture in between, or leave it out if it shows another place"
             )
         elif set(others).isdisjoint(members):
             told[k] = (

@@ -106,7 +106,7 @@ def test_a_picture_that_does_not_belong_is_left_out_and_named(four: PictureSet) 
     assert numbers_of(result) == [0, 1, 2]
     assert [entry["name"] for entry in result.report["left_out"]] == ["stranger.png"]
     assert any("stranger.png is left out" in warning for warning in result.warnings)
-    assert any("2.png is the same picture as 2.png" in warning for warning in result.warnings)
+    assert any("2.png is given twice" in warning for warning in result.warnings)
     assert result.report["verdict"]["is"] == "look" and "stranger.png" in result.report["verdict"]["because"]
     with pytest.raises(NoOverlap, match="stranger.png: connects to no other picture"):
         stitch(given, replace(KNOWN, require_all=True))

@@ -97,7 +97,7 @@ class MatchedRays:
     def of_pairs(self, numbers: Sequence[int] | NDArray[np.intp]) -> MatchedRays:
         """Those pairs, in this order; one may come several times."""
         rows = [np.arange(self.starts[k], self.starts[k + 1]) for k in numbers]
-        return self._rows(np.concatenate(rows), np.array([len(row) for row in rows]))
+        return self._rows(np.concatenate([np.zeros(0, np.intp), *rows]), np.array([len(row) for row in rows], np.intp))
 
     def thinned(self, most: int) -> MatchedRays:
         """At most so many matches of each pair, evenly."""

@@ -80,7 +80,7 @@ def _lost(problem: Problem, before: Solution, after: Solution) -> float:
         )
         for solution in (before, after)
     ]
-    return float(np.max(1 - fitting[1] / np.maximum(fitting[0], 1)))
+    return float(np.max(1 - fitting[1] / np.maximum(fitting[0], 1), where=fitting[0] > 0, initial=0.0))
 
 
 def _settled(

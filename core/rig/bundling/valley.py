@@ -31,7 +31,7 @@ def lowest(found: Polished, tick: Tick) -> Polished:
             lens[:, 0] += np.where(best.problem.lenses.free[:, 0], step, 0.0)
             tried = _tried(best.problem, replace(best.solution, lens=lens), tick)
             cost = _cost(tried)
-            if cost > (1 - VALLEY.least_gain) * least or tried.behind > max(VALLEY.most_behind, best.behind):
+            if cost >= (1 - VALLEY.least_gain) * least or tried.behind > max(VALLEY.most_behind, best.behind):
                 break
             best, least = tried, cost
     return best

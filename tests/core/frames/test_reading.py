@@ -103,5 +103,5 @@ def test_pictures_of_the_same_name_in_different_folders_are_told_apart(tmp_path:
         path.write_bytes(encode_picture(light, np.ones((20, 30), np.float32), 8, ".png")[0])
     frame = read_frame([*files, files[1]], StitchOptions())
     assert frame.names == ["east/1.png", "west/1.png", "2.png"]
-    assert frame.warnings == ("west/1.png is the same picture as west/1.png: it is used once",)
+    assert frame.warnings == ("west/1.png is given twice: it is used once",)
     assert read_frame(files[:2], StitchOptions()).names == ["1.png", "1.png"], "of two the role says which"

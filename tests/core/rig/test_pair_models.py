@@ -164,3 +164,8 @@ def test_an_essential_matrix_is_a_turn_and_a_direction():
     moved = EpipolarModel(rays, 1.5).stepped(poses, np.full((2, 5), 0.1))
     E = skew(moved.t) @ moved.R
     np.testing.assert_allclose(np.linalg.svd(E)[1], [[1, 1, 0]] * 2, atol=1e-12)
+
+
+def test_no_pairs_of_some_are_none():
+    rays, *_ = two_pairs(0)
+    assert len(rays.of_pairs([])) == 0 and len(rays.of_pairs([1, 1])) == 2

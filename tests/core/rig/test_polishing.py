@@ -38,6 +38,14 @@ def test_a_narrow_kernel_that_loses_a_part_of_a_picture_is_not_taken() -> None:
     assert sharpened(wide, lambda: None) is wide
 
 
+def test_a_picture_that_fitted_nothing_before_loses_nothing() -> None:
+    problem, _, wide = _polished(0.0, 0.0, 4)
+    tracks = problem.tracks
+    pixels = tracks.pixels + np.where(tracks.picture == 3, 1e3, 0)[:, None]
+    found = replace(wide, problem=replace(problem, tracks=replace(tracks, pixels=pixels)))
+    assert sharpened(found, lambda: None) is not found
+
+
 def test_what_has_no_observations_stays() -> None:
     problem, _, wide = _polished(0.0, 0.0, 4)
     unseen = replace(wide, solution=replace(wide.solution, used=np.zeros(len(problem.tracks.point), bool)))
