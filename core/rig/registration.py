@@ -13,7 +13,6 @@ from ..cameras.lens import undistort
 from ..cameras.rig import FocalGuess, Observations, PictureMatches, Registration, Rig, RigEdge
 from ..pose.options import FOCAL
 from ..raster.arrays import Array
-from ..raster.robust import sigma_of_lengths
 from ..system.errors import NoOverlap
 from ..system.progress import Progress, ReportProgress
 from .averaging.averaged import PairGeometry, Verified
@@ -24,8 +23,7 @@ from .averaging.pairs import verified as verify
 from .averaging.turns import degrees_between
 from .bundling.baselines import baselines, guessed_places
 from .bundling.bundle_options import JUDGE
-from .bundling.polishing import Polished
-from .bundling.reprojection import lengths_of_errors
+from .bundling.polishing import Polished, used_and_noise
 from .bundling.solution import lens_of, with_lens
 from .bundling.solving import Solved, solve
 from .bundling.uncertainty import deviations
@@ -110,23 +108,21 @@ def _registration_of(
     framed = replace(best.found, solution=best.found.solution.seen_from(0).rescaled())
     pairs = sorted(best.averaged.pairs, key=lambda pair: (pair.i, pair.j))
     lengths = baselines(pairs, best.averaged.members, framed)
-    edges = _edges(best, framed, pairs, lengths)
-    rig = _rig(cameras, points, best, framed, edges, _guesses(found))
-    guessed = guessed_places(pairs, best.averaged.members, lengths, framed)
-    rig = replace(rig, position_deviation=np.hypot(rig.position_deviation, guessed))
     members = best.averaged.members
+    edges = _edges(best, framed, pairs, lengths)
+    guessed = guessed_places(pairs, members, lengths, framed)
+    rig = _rig(cameras, points, best, framed, edges, _guesses(found), guessed)
     return Registration(rig, members, _left_out(names, members, verified))
 
 
 def _rig(
     cameras: Sequence[Camera], points: Sequence[Array], best: Solved, found: Polished, edges: tuple[RigEdge, ...],
-    guesses: tuple[FocalGuess, ...],
+    guesses: tuple[FocalGuess, ...], guessed: Array,
 ) -> Rig:  # fmt: skip
+    """guessed (N,): deviations of places by what nothing measured."""
     problem, solution, members = found.problem, found.solution, best.averaged.members
     tracks, lens = problem.tracks, problem.lenses.of
-    lengths = lengths_of_errors(problem, solution)
-    used = solution.used & np.isfinite(lengths)
-    noise = sigma_of_lengths(lengths[used]) if used.any() else float("nan")
+    used, noise = used_and_noise(problem, solution)
     sure = deviations(found, noise)
     log_focal = np.where(sure.log_focal > 0, np.hypot(sure.log_focal, _apart(guesses)), 0.0)
     whole = solution.solved & (np.bincount(tracks.point[used], minlength=len(tracks)) >= 2)
@@ -148,7 +144,7 @@ def _rig(
         _stations(found),
         tuple(int(k) for k in lens),
         log_focal,
-        sure.places,
+        np.hypot(sure.places, guessed),
         guesses,
         noise,
         best.averaged.loop_degrees,

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.cameras.projective import project
 from ...core.raster.arrays import Array
 from ...core.raster.picture_map import PictureMap
 from ..ground_truth import SAME_DEPTH
 from ..scene_camera import SceneCamera
-from .bent_lens import bent
+from ..sliding import seen_at
 from .set_measures import Found, SetTruth, percentile
 from .sphere_truth import in_frame
 
@@ -110,10 +109,9 @@ def line_figures(found: Found) -> dict[str, float]:
 
 def pixels_of(points: Array, camera: SceneCamera, depth: NDArray[np.float32]) -> Array:
     """Where (N, 2) a camera sees points (N, 3) of the world, NaN where it does not; depth: of its picture."""
-    there = points @ camera.R.T + camera.t
-    there[there[:, 2] <= 0] = np.nan
-    pixels = bent(project(there @ camera.K.T), camera)
-    seen = in_frame(pixels, camera) & is_there(depth, pixels[:, 0], pixels[:, 1], there[:, 2])
+    pixels = seen_at(camera, points)
+    away = np.where(np.isfinite(pixels[:, 0]), (points @ camera.R.T + camera.t)[:, 2], np.nan)
+    seen = in_frame(pixels, camera) & is_there(depth, pixels[:, 0], pixels[:, 1], away)
     return np.where(seen[:, None], pixels, np.nan)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ...raster.arrays import Array
@@ -37,15 +38,17 @@ def polish(problem: Problem, solution: Solution, tick: Tick) -> Polished:
     solution = _points_anew(problem, solution.seen_from(reference).rescaled())
     prior = depth_prior(solution)
     wide = Settings(BUNDLE.first_kernel_px, POLISHING.first_iterations, POLISHING.first_tolerance, lenses=False)
-    return polished_on(problem, bundle(problem, solution, wide, reference, prior, tick).solution, tick, reference)
+    return _all_free(problem, bundle(problem, solution, wide, reference, prior, tick).solution, reference, tick)
 
 
-def polished_on(problem: Problem, solution: Solution, tick: Tick, reference: int | None = None) -> Polished:
-    """The same from a solution with points on, all free from the beginning; reference: see `bundle`, by default the
-    picture in the middle."""
-    if reference is None:
-        reference = _middle(solution)
-        solution = solution.seen_from(reference)
+def polished_on(problem: Problem, solution: Solution, tick: Tick) -> Polished:
+    """The same from a solution with points on, all free from the beginning."""
+    reference = _middle(solution)
+    return _all_free(problem, solution.seen_from(reference), reference, tick)
+
+
+def _all_free(problem: Problem, solution: Solution, reference: int, tick: Tick) -> Polished:
+    """Rounds with all observations again, then until nothing changes."""
     for iterations, tolerance in zip(POLISHING.revived_iterations, POLISHING.revived_tolerances, strict=True):
         solution = _revived(problem, solution).rescaled()
         solution, _ = _round(problem, solution, reference, Settings(BUNDLE.kernel_px, iterations, tolerance), tick)
@@ -57,11 +60,10 @@ def sharpened(found: Polished, tick: Tick) -> Polished:
     """The same bundled on with a kernel as wide as the noise, where that keeps the pictures together: to be done last,
     for a narrow kernel stays in the minimum that it begins in."""
     problem, wide = found.problem, found.solution
-    lengths = lengths_of_errors(problem, wide)
-    seen = lengths[wide.used & np.isfinite(lengths)]
-    if not len(seen):
+    _, noise_px = used_and_noise(problem, wide)
+    if np.isnan(noise_px):
         return found
-    kernel = BUNDLE.last_kernel_sigmas * sigma_of_lengths(seen) / problem.scale
+    kernel = BUNDLE.last_kernel_sigmas * noise_px / problem.scale
     kernel = float(np.clip(kernel, BUNDLE.least_kernel_px, BUNDLE.kernel_px))
     reference = 0 if found.one_place else _middle(wide)
     sharp = _settled(problem, wide.seen_from(reference), reference, kernel, not found.one_place, tick).rescaled()
@@ -69,6 +71,14 @@ def sharpened(found: Polished, tick: Tick) -> Polished:
         return found
     cost, behind = total_cost(problem, sharp), _behind(sharp)
     return replace(found, solution=sharp, cost=cost, behind=behind, prior=depth_prior(sharp))
+
+
+def used_and_noise(problem: Problem, solution: Solution) -> tuple[NDArray[np.bool_], float]:
+    """Which observations (O,) are used, of those that have a point; and robust σ, px, of what is left of one coordinate
+    of them, NaN without any."""
+    lengths = lengths_of_errors(problem, solution)
+    used = solution.used & np.isfinite(lengths)
+    return used, sigma_of_lengths(lengths[used]) if used.any() else float("nan")
 
 
 def _lost(problem: Problem, before: Solution, after: Solution) -> float:

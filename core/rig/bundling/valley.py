@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...raster.robust import sigma_of_lengths
 from ...system.progress import Tick
 from .bundle_options import JUDGE, VALLEY
-from .polishing import Polished, polish, polished_on, total_cost
-from .reprojection import lengths_of_errors
+from .polishing import Polished, polish, polished_on, total_cost, used_and_noise
 from .solution import Problem, Solution
 from .uncertainty import deviations
 
@@ -54,8 +52,7 @@ def _cost(found: Polished) -> float:
 
 
 def _unsure(found: Polished) -> bool:
-    lengths = lengths_of_errors(found.problem, found.solution)
-    seen = lengths[found.solution.used & np.isfinite(lengths)]
-    if not len(seen) or not found.problem.lenses.free[:, 0].any():
+    _, noise_px = used_and_noise(found.problem, found.solution)
+    if np.isnan(noise_px) or not found.problem.lenses.free[:, 0].any():
         return False
-    return bool(deviations(found, sigma_of_lengths(seen)).log_focal.max() > VALLEY.unsure)
+    return bool(deviations(found, noise_px).log_focal.max() > VALLEY.unsure)
