@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 from .options import SMOOTHING
 
+Weights = tuple[NDArray[np.float32], NDArray[np.float32]]
+"""Connections of neighbours along rows (H, W−1) and columns (H−1, W)."""
+
 
 def edge_weights(guide: NDArray[np.float32], sigma: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Weights exp(−|difference| / σ) between neighbours along rows (H, W−1) and along columns (H−1, W) of a guide

@@ -28,28 +28,6 @@ from .options import LINES
 Places = NDArray[np.intp]
 
 
-def coarse_places(shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """x and y of the centres of cells of `coarse_step` px a side, over a picture of `shape` (rows, columns) and one
-    cell around it, in its pixels."""
-    step = LINES.coarse_step
-    rows, columns = ((np.arange(-1, -(-count // step) + 1) + 0.5) * step - 0.5 for count in shape[:2])
-    return columns, rows
-
-
-def in_between(shape: tuple[int, ...], coarse: Array) -> list[Plane]:
-    """k planes (rows, columns), bilinear between the values (m, n, k) of a smooth function at `coarse_places`.
-
-    NaN spreads by one cell.
-    """
-    step = LINES.coarse_step
-    size = step * coarse.shape[1], step * coarse.shape[0]
-    part = slice(step, step + shape[0]), slice(step, step + shape[1])
-    return [
-        cv2.resize(coarse[..., k].astype(np.float32), size, interpolation=cv2.INTER_LINEAR)[part]
-        for k in range(coarse.shape[-1])
-    ]
-
-
 @dataclass(frozen=True)
 class SparseMap:
     """A field on every `step`th raw pixel of a box around the reference.

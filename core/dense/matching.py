@@ -18,11 +18,13 @@ from ..cameras.lens import distort
 from ..cameras.matches import Matches
 from ..field.transfer import inverse_depths
 from ..raster.arrays import Array, Plane, eroded
+from ..raster.coarse import COARSE_STEP, coarse_places, in_between
 from ..system.threads import each, in_order
-from .epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
+from .epipolar_lines import EpipolarLines, SparseMap
 from .epipolar_rows import EpipolarRows
 from .options import LINES, MATCHING
 from .rim_options import RIM
+from .tones import rounded_levels, tone_curves
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,7 @@ def search(
 def comparable_levels(reference: ComparedPicture, target: ComparedPicture) -> tuple[NDArray[np.uint8], ...]:
     """Levels of both pictures (…, C), in colour where both are."""
     both_colour = reference.levels.shape[2] == target.levels.shape[2]
-    return tuple(view.levels if both_colour else _levels(view.gray)[..., None] for view in (reference, target))
+    return tuple(view.levels if both_colour else rounded_levels(view.gray)[..., None] for view in (reference, target))
 
 
 def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -173,36 +175,12 @@ def in_tones_of(first: NDArray[np.uint8], second: NDArray[np.uint16], both: NDAr
     Each channel goes through the monotone curve that matches its histogram over the mask `both` (h, w) to the first's.
     """
     if not both.any():
-        return _levels(second / np.float32(MATCHING.sublevels))
+        return rounded_levels(second / np.float32(MATCHING.sublevels))
     out = np.empty(second.shape, np.uint8)
     for k, curve in enumerate(tone_curves(first, second, both, 256 * MATCHING.sublevels)):
         channel = np.s_[..., k] if second.ndim == 3 else np.s_[...]
         out[channel] = np.take(curve, second[channel], mode="clip")
     return out
-
-
-def tone_curves(
-    first: NDArray[np.uint8], second: NDArray[Any], both: NDArray[np.bool_], levels: int
-) -> list[NDArray[np.uint8]]:
-    """For each channel of a second picture (h, w[, C]) the curve (levels,) from its levels to those of the first that
-    matches its histogram over the mask `both` (h, w) to the first's."""
-    mask, share = both.view(np.uint8), np.linspace(0, 1, MATCHING.tone_quantiles + 1)
-
-    def quantiles(picture: NDArray[Any], k: int, count: int) -> Array:
-        """Quantiles of channel k, of `count` levels; a level's own pixels count half below it, half above."""
-        n = cv2.calcHist([picture], [k], mask, [count], [0, count]).ravel().astype(np.float64)
-        occupied = np.flatnonzero(n)
-        return np.interp(share * n.sum(), (np.cumsum(n) - n / 2)[occupied], occupied)
-
-    channels = range(second.shape[2] if second.ndim == 3 else 1)
-    return [
-        _levels(np.interp(np.arange(levels), quantiles(second, k, levels), quantiles(first, k, 256))) for k in channels
-    ]
-
-
-def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
-    result: NDArray[np.uint8] = np.clip(np.rint(values), 0, 255).astype(np.uint8)
-    return result
 
 
 def _inside(both: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -285,13 +263,13 @@ class ArcLengths:
         direction = np.where(np.isfinite(direction), direction, 0.0).sum(axis=1, keepdims=True)
         direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-300)
         px = (target * direction).sum(axis=-1).astype(np.float32)
-        step = LINES.coarse_step
+        step = COARSE_STEP
         px = cv2.resize(px, (px.shape[1], step * px.shape[0]), interpolation=cv2.INTER_LINEAR)
         return ArcLengths(px[step : step + rows.shape[0]])
 
     def at(self, u: Plane, row: NDArray[np.intp]) -> Plane:
         """px (…), linear, at columns u (…) of rows with index row (…)."""
-        step = LINES.coarse_step
+        step = COARSE_STEP
         position = u * np.float32(1 / step) + np.float32(0.5 + 0.5 / step)
         before = np.clip(position.astype(np.intp), 0, self.px.shape[1] - 2)
         position -= before

@@ -132,9 +132,6 @@ class MatchingOptions:
 class LinesOptions:
     """Evaluating epipolar lines and rows (`epipolar_lines`, `epipolar_rows`)."""
 
-    coarse_step: int = 2
-    """Rows and columns between places where what is smooth is worked out; between them it is interpolated."""
-
     strip_rows: int = 32
     """Rows of nodes that a thread works on at once, so that they stay near the processor. No result depends on it."""
 

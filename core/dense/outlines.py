@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from ..raster.arrays import Plane
 from .edge_aware_smoothing import Smoother
 from .epipolar_lines import EpipolarLines, Places
-from .matching import ComparedPicture, comparable_levels, tone_curves
+from .matching import ComparedPicture, comparable_levels
 from .options import OUTLINES
+from .tones import tone_curves
 
 Indices = tuple[Places, Places]
 """Rows and columns of nodes or cells (…)."""

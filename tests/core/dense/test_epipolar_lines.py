@@ -10,8 +10,7 @@ import pytest
 from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.projective import distance_to_line, homogeneous, project
 from edf_stitch.core.cameras.two_view import TwoView
-from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap, coarse_places, in_between
-from edf_stitch.core.dense.options import LINES
+from edf_stitch.core.dense.epipolar_lines import EpipolarLines, SparseMap
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -203,23 +202,6 @@ def test_behind_the_target_there_is_no_line(by_hand: SimpleNamespace) -> None:
     assert (third < 0).any() and (third > 0.1).any()
     assert np.isnan(x[third < 0]).all() and np.isnan(y[third < 0]).all()
     assert np.isfinite(x[third > 0.1]).all() and np.isfinite(y[third > 0.1]).all()
-
-
-@pytest.mark.parametrize("shape", [(30, 41), (7, 3), (1, 9)])
-def test_what_is_smooth_is_right_between_the_places_it_is_worked_out_at(shape: tuple[int, int]) -> None:
-    """Up to the border, for a function that is nearly straight; and NaN does not spread far."""
-
-    def work(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        x, y = u[None, :], v[:, None]
-        return np.stack([3 * x - 2 * y + 500 + 0.001 * x * y, np.where(x + 0 * y > 30, np.nan, y)], axis=-1)
-
-    whole = work(np.arange(shape[1]), np.arange(shape[0]))
-    bent, broken = in_between(shape, work(*coarse_places(shape)))
-    assert bent.shape == shape and bent.dtype == np.float32
-    np.testing.assert_allclose(bent, whole[..., 0], atol=1e-3)
-    near = 30 - LINES.coarse_step
-    np.testing.assert_allclose(broken[:, :near], whole[:, :near, 1], atol=1e-4)
-    assert np.isnan(broken[:, 31:]).all()
 
 
 @pytest.mark.parametrize(
