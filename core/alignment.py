@@ -24,6 +24,7 @@ from .cameras.two_view import TwoView
 from .cameras.view import View, views_of
 from .continuation.continuation import Continuation
 from .dense.refine import Dense, refine
+from .dense.sphere.refine_sphere import DenseSphere, refine_sphere
 from .field.field import Field
 from .field.slack import SlackField
 from .field.sphere_field import SphereField, fit_sphere_field
@@ -51,6 +52,8 @@ from .system.memory import give_back
 from .system.progress import ReportProgress
 from .system.threads import in_order
 
+SMOOTH_CLIP = "one smooth field serves all frames of a clip, so that nothing swims"
+
 
 @dataclass(frozen=True)
 class Alignment:
@@ -71,7 +74,7 @@ class Alignment:
     warnings : tuple of str
         In plain words.
     dense : Dense or None
-        Dense refinement of the field; None where it was not asked for.
+        Dense refinement of a pair's field; None where it was not asked for.
     continuation : Continuation or None
         What goes on beyond the overlap; None where the field itself does.
     slide : SlideChoice
@@ -82,6 +85,8 @@ class Alignment:
         Names of the pictures that connect with no others, and why.
     numbers : tuple of int
         Which of the frame's pictures are used, in their order here.
+    dense_sphere : DenseSphere or None
+        Dense refinement of the field of more than two pictures; None where it was not asked for.
     """
 
     cameras: tuple[Camera, ...]
@@ -96,6 +101,7 @@ class Alignment:
     rig: Rig | None = None
     left_out: tuple[tuple[str, str], ...] = ()
     numbers: tuple[int, ...] = (0, 1)
+    dense_sphere: DenseSphere | None = None
 
     @property
     def pair_field(self) -> Field:
@@ -272,7 +278,7 @@ def fit_and_warp(
         There is no canvas for it (see `build_warp`).
     """
     if geometry.rig is not None:
-        return _many_mapped(geometry, geometry.rig, frames[0], options, progress)
+        return _many_mapped(geometry, geometry.rig, frames, options, progress)
     cameras = geometry.cameras
     (edge,) = geometry.edges
     progress("field", 0.0)
@@ -305,7 +311,7 @@ def fit_and_warp(
 
 
 def _many_mapped(
-    geometry: Geometry, rig: Rig, frame: Frame, options: StitchOptions, progress: ReportProgress
+    geometry: Geometry, rig: Rig, frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress
 ) -> Alignment:
     """The second half of `align` for the pictures of a rig."""
     progress("field", 0.0)
@@ -313,13 +319,30 @@ def _many_mapped(
     field = Cache(options.cache).remember(
         "sphere", (rig, slack), lambda: fit_sphere_field(rig, slack, lambda: progress("field", 0.0))
     )
+    dense = None
+    if options.dense:
+        seen = tuple((picture.view, picture.alpha) for picture in frames[0].pictures)
+        dense = Cache(options.cache).remember(
+            "dense_sphere", (len(frames), rig, field, seen), lambda: _refined_sphere(field, rig, frames, progress)
+        )
+        give_back()
     progress("warp", 0.0)
-    mapped = map_rig(rig, field, frame.pictures, options, progress)
+    refined = None if dense is None else dense.refined
+    mapped = map_rig(rig, field, frames[0].pictures, options, progress, refined)
     warnings = (*geometry.warnings, *field.warnings)
     return Alignment(
         geometry.cameras, geometry.edges, rig.views, field, mapped.warp, warnings, None, mapped.continuation,
-        mapped.slide, rig, geometry.left_out, geometry.numbers,
+        mapped.slide, rig, geometry.left_out, geometry.numbers, dense,
     )  # fmt: skip
+
+
+def _refined_sphere(
+    field: SphereField, rig: Rig, frames: Sequence[Frame], progress: ReportProgress
+) -> DenseSphere:
+    """The dense refinement of a field on the sphere, or why there is none."""
+    if len(frames) > 1:
+        return DenseSphere(None, SMOOTH_CLIP)
+    return refine_sphere(field, rig, frames[0].pictures, lambda share: progress("dense", share))
 
 
 def _refined(
@@ -327,7 +350,7 @@ def _refined(
 ) -> Dense:
     """The field's dense refinement, or why there is none."""
     if len(frames) > 1:
-        return Dense(None, "one smooth field serves all frames of a clip, so that nothing swims")
+        return Dense(None, SMOOTH_CLIP)
     if not isinstance(field, (StrictField, SlackField)):
         return Dense(None, f"the field {field.name!r} is shown as it is")
     return refine(field, field.two_view, inliers, edge.pair(frames[0].pictures), cameras)

@@ -20,6 +20,7 @@ from .compose.seams.rough_seam import RoughSeam
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
 from .field.refined_depth import RefinedDepth
+from .field.refined_sphere import RefinedSphere
 from .field.remembered import Remembered
 from .field.slack import SlackField
 from .field.sphere_field import SphereField
@@ -158,7 +159,8 @@ def map_pictures(
 
 
 def map_rig(
-    rig: Rig, field: SphereField, pictures: Sequence[Picture], options: StitchOptions, progress: ReportProgress
+    rig: Rig, field: SphereField, pictures: Sequence[Picture], options: StitchOptions, progress: ReportProgress,
+    refined: RefinedSphere | None = None,
 ) -> Mapped:
     """Choose a frame, and map N pictures onto the canvas, seen from the first one's place.
 
@@ -192,7 +194,7 @@ def map_rig(
         progress("warp", done)
 
     tell()
-    surface = RigSurface.of(field, views)
+    surface = RigSurface.of(field, views, refined)
     if options.surface[0] == "reference":
         still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
         return Mapped(build_rig_warp(surface, tick=tell), None, still)

@@ -110,10 +110,9 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
         "does), plane (it fades to the one that carries on beyond the border), or infinity",
     )  # fmt: skip
     how.add_argument(
-        "--dense", action=argparse.BooleanOptionalAction, default=None,
-        help="of two pictures, seek every pixel of the overlap along its epipolar line (default; --no-dense: the "
-        "smooth field alone)",
-    )  # fmt: skip
+        "--dense", action=argparse.BooleanOptionalAction, default=True,
+        help="seek every pixel of the overlap along its epipolar lines (default; --no-dense: the smooth field alone)",
+    )
     how.add_argument(
         "--slide", default="auto", type=_slide, metavar="SLIDE",
         help="how far the viewpoint slides from REF's place to TARGET's across the overlap, or among the places of "
@@ -204,7 +203,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         fov=args.fov,
         scale=args.scale,
         crop=parse_crop(args.crop),
-        dense=args.dense is not False,
+        dense=args.dense,
         blend=args.blend,
         seam=args.seam,
         mask=args.mask,

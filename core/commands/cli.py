@@ -295,8 +295,6 @@ def _stitch(args: argparse.Namespace) -> int:
             show("write", MESSAGES.written_share)
             warnings = [*result.warnings, *write(result, outputs, files)]
         _too_late_to_interrupt()
-    if args.dense and len(pictures) > 2:
-        warnings.append("--dense has no effect: more than two pictures have the smooth field, for now")
     for warning in warnings:
         print(f"edf: warning: {warning}", file=sys.stderr)
     if not args.quiet:

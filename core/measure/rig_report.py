@@ -29,6 +29,7 @@ from .rig_figures import focal_spread, map_errors, residuals, scale_kind, shares
 if TYPE_CHECKING:
     from ..alignment import Alignment
     from ..compose.decided import Decided
+    from ..dense.sphere.refine_sphere import DenseSphere
     from ..options import StitchOptions
     from ..pictures.picture import Picture
 
@@ -86,7 +87,7 @@ def make_rig_report(
             "kind": options.field, "smoothing": field.depth.smoothing, "centres": len(field.depth.inner.centres),
             "leave_one_out_px": field.leave_one_out_px,
             "negative_share": float((rig.inverse_ranges < 0).mean()) if len(rig.inverse_ranges) else 0.0,
-            "dense": {"used": False, "why": "more than two pictures have the smooth field, for now"},
+            "dense": _dense_entry(alignment.dense_sphere),
         },
         "slide": slide_entry(alignment.slide),
         "canvas": canvas_entry(canvas, rig.cameras[0].K),
@@ -185,6 +186,12 @@ def rig_warnings(rig: Rig, names: Sequence[str]) -> list[str]:
             f"({rig.cameras[0].focal:.0f} px) are doubtful, and with them depth"
         )
     return out
+
+
+def _dense_entry(dense: DenseSphere | None) -> dict[str, Any]:
+    if dense is None or dense.refined is None:
+        return {"used": False, "why": "not asked for" if dense is None else dense.why}
+    return {"used": True, "found": dense.found}
 
 
 def _of(values: Sequence[Any] | NDArray[Any], number: int) -> Any:

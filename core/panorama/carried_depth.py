@@ -54,7 +54,7 @@ class Surface:
         if projection is None:
             raise ValueError("the surface is carried over from a cylinder or sphere")
         depth = np.maximum(np.nan_to_num(base.inverse_depth), np.float32(0))
-        return Surface(base.canvas, projection, _sharpened(depth, projection), views[0], base.maps[1].inside())
+        return Surface(base.canvas, projection, sharpened(depth, projection.focal), views[0], base.maps[1].inside())
 
     def places(self, own: Rays) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Where rays (…) of the reference's place, in the projection's axes, meet the canvas, px x and y (…)."""
@@ -125,7 +125,6 @@ def carried_depth(surface: Surface, viewpoint: Viewpoint, projection: Projection
     """
     every = max(1, int(lattice.step * surface.projection.focal / projection.focal))
     nearest = np.full(lattice.shape, -1, np.float32)
-    flat = nearest.ravel()
 
     def appear(rows: slice) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
         return _places_of(surface, viewpoint, projection, lattice, rows, every)
@@ -136,12 +135,18 @@ def carried_depth(surface: Surface, viewpoint: Viewpoint, projection: Projection
         for part in small_strips((-(-height // every), -(-width // every)))
     )
     for cells, d in in_order(appear, parts):
-        # of equal indices NumPy keeps the last, so that what is nearer than that has another try
-        nearer = np.flatnonzero(d > flat[cells])
-        while nearer.size:
-            flat[cells[nearer]] = d[nearer]
-            nearer = nearer[d[nearer] > flat[cells[nearer]]]
-    return _filled(nearest)
+        put_nearest(nearest, cells, d)
+    return filled_surface(nearest)
+
+
+def put_nearest(nearest: Plane, cells: NDArray[np.intp], d: NDArray[np.float32]) -> None:
+    """Raises values (H, W) at flat indices (N,) to d (N,), where that is more."""
+    flat = nearest.ravel()
+    # of equal indices NumPy keeps the last, so that what is nearer than that has another try
+    nearer = np.flatnonzero(d > flat[cells])
+    while nearer.size:
+        flat[cells[nearer]] = d[nearer]
+        nearer = nearer[d[nearer] > flat[cells[nearer]]]
 
 
 def _places_of(
@@ -159,12 +164,12 @@ def _places_of(
             for values, start in zip(points, lattice.start, strict=True)
         )
         there = (column >= -1) & (row >= -1) & (column < width) & (row < height)
-    # a point covers the four cells around it: the one above and left of it stands for them (see `_filled`)
+    # a point covers the four cells around it: the one above and left of it stands for them (see `filled_surface`)
     column, row = (np.maximum(values[there], 0).astype(np.intp) for values in (column, row))
     return row * width + column, (depth / length)[there]
 
 
-def _filled(nearest: Plane) -> Plane:
+def filled_surface(nearest: Plane) -> Plane:
     """Inverse depth (H, W) everywhere, from that of points by the cell above and left of each, -1 where none is.
 
     Gaps that are narrower than a point are closed by it; others go on from their farthest neighbours, and what lies
@@ -230,11 +235,11 @@ def _from_far(values: Plane, halvings: int) -> Plane:
     return out
 
 
-def _sharpened(depth: Plane, projection: Projection) -> Plane:
-    """Inverse depth (H, W) without what is in between at jumps: it belongs to neither surface, and would be seen
-    between them as specks. Steep surfaces, which go on rising, stay."""
+def sharpened(depth: Plane, per_radian: float) -> Plane:
+    """Inverse depth (H, W), of so many px per radian, without what is in between at jumps: it belongs to neither
+    surface, and would be seen between them as specks. Steep surfaces, which go on rising, stay."""
     out, square, wider = np.empty_like(depth), np.ones((3, 3), np.uint8), np.ones((CARRY.jump_side,) * 2, np.uint8)
-    least, share = np.float32(CARRY.jump_px / projection.focal), np.float32(1 - CARRY.jump_share)
+    least, share = np.float32(CARRY.jump_px / per_radian), np.float32(1 - CARRY.jump_share)
 
     def put(rows: slice) -> None:
         some, own = beside(rows, CARRY.sharpenings + CARRY.jump_side // 2, len(depth))

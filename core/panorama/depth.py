@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..cameras.camera import Camera
 from ..cameras.view import View
 from ..field.refined_depth import RefinedDepth
+from ..field.refined_sphere import RefinedSphere
 from ..field.visibility import nearness_of
 from ..raster.arrays import Array, Part, strips, within
 from ..raster.grid import Grid
@@ -129,6 +130,24 @@ class Confidence(OnCanvas):
         if self.canvas.projection is None:
             return self.refined.part_over(self.refined.confidence, xs, ys)
         return _refined_at(self.refined, *self.canvas.on_reference(xs, ys, self.camera))[2]
+
+
+@dataclass(frozen=True, eq=False)
+class OfSphere(OnCanvas):
+    """What dense refinement found on the sphere, at the pixels (H, W) of a canvas.
+
+    K (3, 3): the first picture's; what: confidence or the standard deviation of inverse depth.
+    """
+
+    K: Array
+    refined: RefinedSphere
+    what: Literal["confidence", "deviation"]
+
+    def __getitem__(self, part: Part) -> NDArray[np.float32]:
+        rows, columns = within(part, self.shape)
+        rays, length = self.canvas.rays_at(self.K, self.canvas.xs[columns], self.canvas.ys[rows], self.camera)
+        _, confidence, deviation = self.refined.at(rays)
+        return confidence if self.what == "confidence" else deviation * length.astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)

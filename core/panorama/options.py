@@ -323,6 +323,9 @@ class CarryOptions:
     least_behind_px: int = 3
     """px, side of the square below which what the reference cannot see is rounding."""
 
+    beside_nodes: int = 64
+    """Nodes beyond either end of a sphere that gaps are filled by: it goes on there."""
+
     widest_gap_px: int = 256
     """px of a gap between two surfaces at most that is filled from the farther one."""
 

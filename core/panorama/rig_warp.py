@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +17,17 @@ from numpy.typing import NDArray
 from ..cameras.lens import distort, undistort
 from ..cameras.projective import ahead_of_camera, homogeneous, inverse_intrinsics
 from ..cameras.view import View
+from ..field.refined_sphere import RefinedSphere
 from ..field.sphere_field import SphereField
 from ..raster.arrays import Array, Box, Part, small_strips
 from ..raster.grid import Grid
+from ..raster.lazy import AnyImage
 from ..raster.picture_map import BoxedMap, CanvasMap, MapPart, PictureMap, falls_inside
 from ..system.progress import Tick, unwatched
 from ..system.threads import in_order
 from .canvas import Canvas, border, bounding_canvas, expected_reach, round_reach
-from .depth import AtNodes
+from .carried_sphere import carried_sphere
+from .depth import AtNodes, OfSphere
 from .projection import Projection
 from .reference_map import ReferenceMap
 from .rig_options import RIG_WARP
@@ -36,18 +40,20 @@ class RigSurface:
     """A field on the sphere as its pictures see it, from one place or from where a viewpoint slides to.
 
     outlines: of each picture unit rays (N, 3) from the first picture's place to what it shows along its border, in
-    order; viewpoint: None if all is seen from that place.
+    order; viewpoint: None if all is seen from that place; refined: what dense refinement found from that place, None
+    without it.
     """
 
     field: SphereField
     views: Sequence[View]
     outlines: tuple[Array, ...]
     viewpoint: RigViewpoint | None = None
+    refined: RefinedSphere | None = None
 
     @staticmethod
-    def of(field: SphereField, views: Sequence[View]) -> RigSurface:
+    def of(field: SphereField, views: Sequence[View], refined: RefinedSphere | None = None) -> RigSurface:
         """The field from the first picture's place."""
-        return RigSurface(field, views, tuple(outline_of(field, view) for view in views))
+        return RigSurface(field, views, tuple(outline_of(field, view) for view in views), None, refined)
 
     def seen_from(self, viewpoint: RigViewpoint | None) -> RigSurface:
         """The same from where a viewpoint slides to; None or one that does not slide: the first picture's place."""
@@ -57,8 +63,18 @@ class RigSurface:
     def _carried(self) -> CarriedDepth | None:
         return None if self.viewpoint is None else CarriedDepth.of(self.field, self.views, self.viewpoint)
 
+    @cached_property
+    def dense(self) -> RefinedSphere | None:
+        """What dense refinement found, from where the viewpoint slides to."""
+        return self.refined if self.refined is None or self.viewpoint is None else carried_sphere(
+            self.refined, self.viewpoint
+        )
+
     def depth(self, rays: Array) -> tuple[Array, Array | None]:
         """Inverse range d (…) along unit rays (…, 3), and d C (…, 3) where the viewpoint slides."""
+        if self.dense is not None:
+            d = self.dense.at(rays)[0].astype(np.float64)
+            return d, None if self.viewpoint is None else d[..., None] * self.viewpoint.place(rays)
         return (self.field.at(rays), None) if self._carried is None else self._carried.at(rays)
 
     def brought_along(self, view: View, infinite: list[Array], moved: Array | None) -> list[Array]:
@@ -166,7 +182,7 @@ def build_rig_map(surface: RigSurface, canvas: Canvas, tick: Tick = unwatched) -
     -------
     Warp
     """
-    field, views = surface.field, surface.views
+    views = surface.views
     left, top = -canvas.offset[0], -canvas.offset[1]
     shape = canvas.height, canvas.width
     grid = Grid.over(left, top, canvas.width, canvas.height, RIG_WARP.nodes)
@@ -181,9 +197,14 @@ def build_rig_map(surface: RigSurface, canvas: Canvas, tick: Tick = unwatched) -
     def put(part: slice) -> None:
         start, stop = part.start, part.stop
         rows = (left, top + start, canvas.width, stop - start)
-        depth[part] = grid.to_pixels(values.inverse_depth, *rows)
         moved = None
-        if values.moved is not None:
+        if surface.dense is not None:
+            rays, length = canvas.rays_at(views[0].K, canvas.xs, canvas.ys[part], views[0].camera)
+            inverse_range, moved = surface.depth(rays)
+            depth[part] = inverse_range * length
+        else:
+            depth[part] = grid.to_pixels(values.inverse_depth, *rows)
+        if surface.dense is None and values.moved is not None:
             moved = np.stack([grid.to_pixels(values.moved[..., k], *rows) for k in range(3)], axis=-1)
         strip = _Strip(surface, canvas, grid, start, depth[part], moved)
         for view, slack, one in zip(views, values.slacks, maps, strict=True):
@@ -192,17 +213,21 @@ def build_rig_map(surface: RigSurface, canvas: Canvas, tick: Tick = unwatched) -
 
     for _ in in_order(put, small_strips(shape)):
         tick()
-    return Warp(
-        canvas, tuple(maps), depth, viewpoint=surface.viewpoint, deviation=_deviation(field, views, canvas)
-    )
+    known = _sureness(surface, canvas)
+    return Warp(canvas, tuple(maps), depth, known[0], viewpoint=surface.viewpoint, deviation=known[1])
 
 
-def _deviation(field: SphereField, views: Sequence[View], canvas: Canvas) -> AtNodes:
-    """The standard deviation (H, W) of inverse depth on a canvas."""
+def _sureness(surface: RigSurface, canvas: Canvas) -> tuple[AnyImage | None, AnyImage]:
+    """Confidence (H, W) of dense refinement on a canvas, None without it, and the standard deviation (H, W) of inverse
+    depth."""
+    field, views = surface.field, surface.views
     camera, (left, top) = views[0].camera, canvas.offset
+    if surface.dense is not None:
+        confidence = OfSphere(canvas, camera, views[0].K, surface.dense, "confidence")
+        return confidence, OfSphere(canvas, camera, views[0].K, surface.dense, "deviation")
     grid = Grid.over(-left, -top, canvas.width, canvas.height, RIG_WARP.deviation_nodes)
     rays, length = canvas.rays_at(views[0].K, grid.xs, grid.ys, camera)
-    return AtNodes(canvas, camera, grid, field.deviation(rays) * length)
+    return None, AtNodes(canvas, camera, grid, field.deviation(rays) * length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +240,7 @@ class _Strip:
     grid: Grid
     start: int
     depth: NDArray[np.float32]
-    moved: NDArray[np.float32] | None
+    moved: NDArray[Any] | None
 
     def put(self, one: MapPart, view: View, slack: Array | None) -> None:
         """Writes where a picture is seen in these rows into a part of its map; slack (rows, columns, 2): px

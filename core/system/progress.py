@@ -27,17 +27,17 @@ STAGES: dict[str, float] = {
 }
 # The same of more than two pictures. Seams and blends take turns, picture by picture: both are told as seam.
 STAGES_OF_MANY: dict[str, float] = {
-    "read": 0.03,
-    "features": 0.12,
-    "matches": 0.25,
+    "read": 0.02,
+    "features": 0.07,
+    "matches": 0.13,
     "geometry": 0.16,
     "field": 0.04,
-    "dense": 0.04,
-    "warp": 0.08,
+    "dense": 0.34,
+    "warp": 0.07,
     "occlusion": 0.03,
-    "exposure": 0.03,
-    "seam": 0.16,
-    "write": 0.06,
+    "exposure": 0.02,
+    "seam": 0.08,
+    "write": 0.04,
 }
 TOLD_AS = {"blend": "seam"}
 

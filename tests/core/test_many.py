@@ -69,6 +69,33 @@ def test_one_panorama_shows_all_and_misses_no_match(set_result: StitchResult) ->
     assert set_result.report["verdict"]["is"] == "good" and not set_result.warnings
 
 
+@pytest.fixture(scope="module")
+def dense_result(four: PictureSet) -> StitchResult:
+    return stitch(four.pictures, replace(KNOWN, dense=True))
+
+
+def test_dense_refinement_makes_the_pictures_agree(dense_result: StitchResult, set_result: StitchResult) -> None:
+    """Every pixel is searched for: the layers show the same, and where they do not is told."""
+    apart = []
+    for result in (set_result, dense_result):
+        first, second = (np.asarray(layer.pixels) for layer in result.layers[:2])
+        both = (np.asarray(result.layers[0].alpha) > 0.99) & (np.asarray(result.layers[1].alpha) > 0.99)
+        apart.append(float(np.abs(first - second).mean(axis=-1)[both].mean()))
+    assert apart[1] < 0.97 * apart[0]  # of two planes the smooth field is nearly right
+    entry = dense_result.report["field"]["dense"]
+    assert entry["used"] and 0.5 < entry["found"] <= 1
+    assert (dense_result.confidence > 0.5).mean() > 0.2 and not set_result.confidence.any()
+    assert set_result.report["field"]["dense"] == {"used": False, "why": "not asked for"}
+
+
+def test_a_dense_panorama_slides_as_well(four: PictureSet, dense_result: StitchResult) -> None:
+    slid = stitch(four.pictures, replace(KNOWN, dense=True, slide=1.0))
+    assert slid.warp.viewpoint is not None and np.isfinite(slid.warp.inverse_depth).all()
+    measured = slid.report["measured"]
+    assert measured["alignment_median_px"] < 0.5 and measured["folds"] < 0.02
+    assert measured["alignment_median_px"] < 1.5 * dense_result.report["measured"]["alignment_median_px"] + 0.05
+
+
 def test_every_edge_has_the_rigs_geometry_and_the_matches_that_agree(set_result: StitchResult) -> None:
     assert len(set_result.edges) >= 3
     for edge in set_result.edges:

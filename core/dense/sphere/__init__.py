@@ -1,0 +1,1 @@
+"""Dense refinement of inverse range on the sphere, from many pictures."""

@@ -1,0 +1,133 @@
+"""Which of what the sweep found is to be believed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...raster.arrays import Array, Plane
+from ...raster.distance import distance_inside
+from .choice import Compared
+from .options import SWEEP
+from .sweep import Swept, swept
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Moves along (h, w) px from the base, and where (h, w) they were found."""
+
+    along: Plane
+    where: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Hints:
+    """What is known before the search: inverse ranges (N,) of points at columns and rows (N,) of the chart; d and where
+    it was found at half the size, on the chart (H, W) of that size, None there itself."""
+
+    columns: Array
+    rows: Array
+    inverse_ranges: Array
+    coarse: tuple[Plane, NDArray[np.bool_]] | None = None
+
+
+def found_on(compared: Compared, hints: Hints) -> Found:
+    """Search a patch, as far as hints ask for; without any from half the size, as far as is usual there."""
+    least, most = _range(compared, hints) if hints.coarse is not None else SWEEP.coarse_range_px
+    best = swept(compared, least, most)
+    where = best.unique & compared.several & _agreed(compared, best)
+    where &= ~(_rim(compared) & (np.abs(best.along - compared.field_px) > SWEEP.rim_px))
+    if where.any():
+        usual = SWEEP.usual_factor * float(np.percentile(best.cost[where], SWEEP.usual_percent))
+        where &= best.cost <= max(SWEEP.least_cost, usual)
+    where &= ~_small(best.along, where, SWEEP.speckle)
+    where &= ~_wrong_islands(best, where)
+    return Found(best.along, where)
+
+
+def _range(compared: Compared, hints: Hints) -> tuple[int, int]:
+    """px from the base, to both sides, that are to be searched."""
+    patch, lows, highs = compared.patch, [0.0], [0.0]
+    height, width = patch.shape
+    row, column = hints.rows - patch.top, (hints.columns - patch.left) % patch.chart.circumference
+    here = (row >= 0) & (row < height) & (column < width)
+    if here.any():
+        at = row[here].astype(int), column[here].astype(int)
+        px = (hints.inverse_ranges[here] - compared.base[at]) / compared.per_px[at]
+        percent = SWEEP.points_percent
+        lows.append(float(np.percentile(px, percent)))
+        highs.append(float(np.percentile(px, 100 - percent)))
+    if hints.coarse is not None:
+        d, where = (_at_half(compared, values) for values in hints.coarse)
+        if where.sum() > SWEEP.least_found:
+            px = ((d - compared.base) / compared.per_px)[where]
+            lows.append(float(np.percentile(px, SWEEP.range_percent)))
+            highs.append(float(np.percentile(px, 100 - SWEEP.range_percent)))
+    margin, few, many = SWEEP.margin_px, SWEEP.least_range_px, SWEEP.most_range_px
+    low, high = np.floor(min(lows) - margin), np.ceil(max(highs) + margin)
+    return int(np.clip(low, -many, -few)), int(np.clip(high, few, many))
+
+
+def _at_half(compared: Compared, values: NDArray[Any]) -> NDArray[Any]:
+    """Values (H, W) of a chart of half the size at the nodes (h, w) of the patch."""
+    patch = compared.patch
+    rows = np.clip(np.arange(patch.top, patch.top + patch.shape[0]) // 2, 0, len(values) - 1)
+    columns = np.arange(patch.left, patch.left + patch.shape[1]) // 2
+    columns = columns % values.shape[1] if patch.chart.closed else np.clip(columns, 0, values.shape[1] - 1)
+    here: NDArray[Any] = values[rows[:, None], columns]
+    return here
+
+
+def _agreed(compared: Compared, best: Swept) -> NDArray[np.bool_]:
+    """The nodes (h, w) that some other picture agrees with: of all that fall on its pixel the best lies as far."""
+    agreed, d = np.zeros(best.along.shape, bool), compared.at(best.along)
+    for number, seen in enumerate(compared.seen):
+        height, width = seen.picture.levels.shape[:2]
+        x, y = seen.places(d)
+        here = np.nonzero((x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1) & (compared.owner != number))
+        cell = np.rint(y[here]).astype(np.int64) * width + np.rint(x[here]).astype(np.int64)
+        order = np.lexsort((best.summed[here], cell))
+        begins = np.flatnonzero(np.diff(cell[order], prepend=-1))
+        along = best.along[here][order]
+        of_best = np.repeat(along[begins], np.diff(begins, append=len(order)))
+        agree = np.zeros(len(order), bool)
+        agree[order] = np.abs(along - of_best) <= SWEEP.agreement_px
+        agreed[here] |= agree
+    return agreed
+
+
+def _rim(compared: Compared) -> NDArray[np.bool_]:
+    """Where (h, w) only one picture goes on nearby: its border, and another's, disturb the comparison there."""
+    width = SWEEP.rim * compared.patch.chart.per_radian
+    near: NDArray[np.bool_] = distance_inside(compared.several) < width
+    return near
+
+
+def _small(along: Plane, where: NDArray[np.bool_], share: float) -> NDArray[np.bool_]:
+    """The found nodes (h, w) of patches that are small; share: the side of such a patch in sides of all."""
+    sixteenths = np.where(where, np.rint(along * 16), np.iinfo(np.int16).min).astype(np.int16)
+    cv2.filterSpeckles(sixteenths, np.iinfo(np.int16).min, int(share**2 * along.size), SWEEP.speckle_px * 16)
+    small: NDArray[np.bool_] = where & (sixteenths == np.iinfo(np.int16).min)
+    return small
+
+
+def _wrong_islands(best: Swept, where: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The nodes (h, w) of islands in which the pictures are not much more alike than where the field lies."""
+    island = _small(best.along, where, SWEEP.island)
+    if not island.any():
+        return island
+    count, numbers = cv2.connectedComponents(island.astype(np.uint8), connectivity=4)
+    flat = numbers.ravel()
+    size = np.maximum(np.bincount(flat, minlength=count), 1)
+    cost, at_field = (
+        np.bincount(flat, values.ravel().astype(np.float64), count) / size for values in (best.cost, best.field_cost)
+    )
+    usual = max(float(np.median(best.cost[where])), SWEEP.island_floor)
+    wrong = (at_field - cost <= SWEEP.island_gain) | (cost >= SWEEP.island_cost * usual)
+    wrong[0] = False
+    found: NDArray[np.bool_] = wrong[numbers]
+    return found
