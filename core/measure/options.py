@@ -62,6 +62,9 @@ class RigOptions:
     most_named: int = 4
     """Pairs that a warning names."""
 
+    most_place_deviation: float = 1.0
+    """Deviation of a place, in units of the longest baseline, up to which anything is known of it."""
+
 
 @dataclass(frozen=True)
 class IndependentOptions:

@@ -130,7 +130,7 @@ def _pictures(
             "principal": camera.K[:2, 2], "R": rig.R[number], "t": rig.t[number],
         }  # fmt: skip
         entries.append(entry | {
-            "place": rig.centres[number], "place_deviation": _of(rig.position_deviation, number),
+            "place": rig.centres[number], "place_deviation": place_deviation(rig, number),
             "inliers": int(own.sum()), "residual_px": float(np.median(error[own])) if own.any() else None,
             "hidden_px": int(decided[number].hidden.sum()), "share": share[number],
         })  # fmt: skip
@@ -185,6 +185,12 @@ def rig_warnings(rig: Rig, names: Sequence[str]) -> list[str]:
             f"({rig.cameras[0].focal:.0f} px) are doubtful, and with them depth"
         )
     return out
+
+
+def place_deviation(rig: Rig, number: int) -> float | None:
+    """The deviation of a picture's place; None where it may be anywhere, however large a number the bundle gives."""
+    deviation = _of(rig.position_deviation, number)
+    return None if deviation is None or not deviation <= RIG.most_place_deviation else float(deviation)
 
 
 def _of(values: Sequence[Any] | NDArray[Any], number: int) -> Any:

@@ -70,7 +70,7 @@ def known(table: dict) -> list[str]:
 def test_those_that_are_given_are_held_and_the_others_found() -> None:
     assert known({name: {"K": K} for name in NAMES}) == ["camera file"] * 3
     some = known({"a.png": {"K": K}, "c.png": {"K": K}})
-    assert some == ["camera file", "the other picture (camera file)", "camera file"]
+    assert some == ["camera file", "a.png (camera file)", "camera file"]
     posed = {"K": K, "R": EYE, "t": [0, 0, 0]}
     assert known({"a.png": posed, "b.png": posed, "c.png": {"K": K}}) == [
         "camera file and pose", "camera file and pose", "camera file",
