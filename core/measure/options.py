@@ -230,6 +230,9 @@ class VerdictOptions:
     hidden: float = 0.25
     """Share of the overlap that one picture cannot see: 0.12 at most where the picture is right."""
 
+    contradicting: float = 0.1
+    """Share of the given matches that contradict the rest, from which that is said: one in ten is no slip."""
+
     deep_px: float = 2.0
     """px by which half the points are off where each is predicted from the others, of more than two pictures."""
 

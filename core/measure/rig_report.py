@@ -72,14 +72,17 @@ def make_rig_report(
     names = [picture.name for picture in pictures]
     holes, folds = sum(one.holes for one in decided), max(one.folds for one in decided)
     error = map_errors(warp, alignment.edges)
+    found, inliers = (sum(int(one) for one in counts) for counts in zip(
+        *((len(edge.matches), edge.two_view.inliers.sum()) for edge in alignment.edges), strict=True
+    ))  # fmt: skip
+    contradicting = found - inliers if alignment.edges[0].matches.given else 0
     report = {
         "schema": SCHEMA,
         "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum()))),
         "left_out": left_out_entry(alignment.left_out),
         "options": options_entry(options, alignment) | {"fade": options.fade, "viewpoint": options.viewpoint},
         "matches": {
-            "found": sum(len(edge.matches) for edge in alignment.edges),
-            "inliers": sum(int(edge.two_view.inliers.sum()) for edge in alignment.edges), "noise_px": rig.noise_px,
+            "found": found, "inliers": inliers, "noise_px": rig.noise_px, "contradicting": contradicting,
         },
         "rig": _rig_entry(rig, names),
         "field": {
@@ -99,7 +102,8 @@ def make_rig_report(
             "folds": folds, **appearance,
         },
     }  # fmt: skip
-    warnings = [*rig_warnings(rig, names), *exposure_warnings(pictures, [one.exposure for one in decided])]
+    warnings = [*rig_warnings(rig, names), *_about_given(contradicting, found)]
+    warnings += exposure_warnings(pictures, [one.exposure for one in decided])
     if canvas.cropped and canvas.projection is not None:
         warnings.append(
             f"the pictures reach too far for a {canvas.projection.kind} panorama and were cropped there; "
@@ -185,6 +189,13 @@ def rig_warnings(rig: Rig, names: Sequence[str]) -> list[str]:
             f"({rig.cameras[0].focal:.0f} px) are doubtful, and with them depth"
         )
     return out
+
+
+def _about_given(contradicting: int, found: int) -> list[str]:
+    """A warning about matches that the user gave and that are not used."""
+    if not contradicting:
+        return []
+    return [f"{contradicting} of the {found} given matches contradict the rest and are left out: correct them"]
 
 
 def place_deviation(rig: Rig, number: int) -> float | None:
