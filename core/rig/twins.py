@@ -53,10 +53,10 @@ def _show_the_same(cameras: Sequence[Camera], points: Sequence[Array], pair: Pic
     known = first.fixed and second.fixed and not np.array_equal(first.K, second.K)
     if len(pair) < TWINS.matches or first.size != second.size or first.pose or second.pose or known:
         return False
-    return bool((_moved(points, pair) < TWINS.still_px * scale).mean() >= TWINS.share)
+    return bool((_shifts(points, pair) < TWINS.still_px * scale).mean() >= TWINS.share)
 
 
-def _moved(points: Sequence[Array], pair: PictureMatches) -> Array:
+def _shifts(points: Sequence[Array], pair: PictureMatches) -> Array:
     """px (M,) by which matches move from one picture to the other."""
     moved: Array = np.linalg.norm(points[pair.i][pair.index[:, 0]] - points[pair.j][pair.index[:, 1]], axis=1)
     return moved
@@ -102,11 +102,11 @@ def with_twins(
             left_out[twin] = f"shows the same as {names[first]}, which is left out as well: {left_out[first]}"
             continue
         pair = pairs[min(twin, first), max(twin, first)]
-        still = _moved(points, pair) < TWINS.still_px * scale
+        still = _shifts(points, pair) < TWINS.still_px * scale
         index = pair.index[still] if pair.i == first else pair.index[still, ::-1]
         edge = RigEdge(
             numbers.index(first), len(numbers), len(pair), len(index),
-            sigma_of_lengths(_moved(points, pair)[still]), 0.0, 0.0, "none",
+            sigma_of_lengths(_shifts(points, pair)[still]), 0.0, 0.0, "none",
         )  # fmt: skip
         rig = _with_twin(rig, edge, points[first][index[:, 0]], points[twin][index[:, 1]])
         numbers.append(twin)
