@@ -82,8 +82,10 @@ def register(
     kept = [number for number in range(len(cameras)) if number not in twins]
     if not twins or len(kept) < 2:
         return _registered(cameras, points, matches, scale, seed, progress, names)
-    own, seen, called = ([every[number] for number in kept] for every in (cameras, points, names))
-    found = _registered(own, seen, without(twins, matches, kept), scale, seed, progress, called)
+    found = _registered(
+        [cameras[number] for number in kept], [points[number] for number in kept], without(twins, matches, kept), scale,
+        seed, progress, [names[number] for number in kept],
+    )  # fmt: skip
     return with_twins(found, kept, twins, points, matches, scale, names)
 
 

@@ -41,7 +41,7 @@ def twins_of(
         By the number of each picture that shows the same as another one, the number of that.
     """
     same = {(pair.i, pair.j) for pair in matches if _show_the_same(cameras, points, pair, scale)}
-    found = {}
+    found: dict[int, int] = {}
     for group in components(len(cameras), sorted(same)):
         first = min(group, key=lambda k: (cameras[k].log_sigma, k))
         found |= {k: first for k in group if k != first and (min(k, first), max(k, first)) in same}
