@@ -77,6 +77,13 @@ def test_those_that_are_given_are_held_and_the_others_found() -> None:
     ]  # fmt: skip
 
 
+def test_a_borrowed_focal_length_says_whose_it_is() -> None:
+    exifs = [Exif(), Exif(focal35_mm=28.0), Exif()]
+    found, _ = cameras_for(CameraRequest(), NAMES, [(400, 300)] * 3, exifs)
+    assert [camera.lens_of for camera in found] == ["b.png", "", "b.png"]
+    assert found[0].source == "b.png (EXIF 35 mm equivalent)"
+
+
 def test_names_that_are_none_of_the_pictures_are_told() -> None:
     def told(*more: str) -> list[str]:
         request = CameraRequest(cameras={"cameras": {name: {"K": K} for name in (*NAMES, *more)}})
