@@ -43,7 +43,7 @@ from .pose.estimation import estimate
 from .pose.match_files import read_matches
 from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
 from .rig.given_matches import given_matches
-from .rig.left_out import check_connected
+from .rig.left_out import check_connected, left_out_warnings
 from .rig.pair_edges import edges_of
 from .rig.reframing import seen_from
 from .system.cache import Cache
@@ -222,7 +222,7 @@ def _of_many(
     found = registered(pictures, order, cameras, matched, options.seed, cache, progress)
     check_connected(found, frame.names, options.require_all)
     left_out = tuple((frame.names[number], why) for number, why in found.left_out.items())
-    warnings = (*warnings, *(f"{name} is left out: {why}" for name, why in left_out))
+    warnings = (*warnings, *left_out_warnings(found, cameras, frame.names))
     found = seen_from(found, options.viewpoint, frame.names, frame.shown_by)
     if len(found.numbers) == 2:
         pair = estimate_geometry([frame.only(found.numbers)], replace(options, viewpoint=None), progress)

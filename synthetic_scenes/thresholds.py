@@ -130,13 +130,13 @@ class Verdict:
 def judge(results: Sequence[Result], complete: bool) -> Verdict:
     """The verdict over scene results (see `scene_process`), in their order.
 
-    complete: they are a whole suite, so its medians are judged too. A value that is missing where one is due fails, so
-    do a scene without figures and a list without scenes.
+    complete: they are a whole suite, so the medians over its pairs are judged too, if it has any. A value that is
+    missing where one is due fails, so do a scene without figures and a list without scenes.
     """
     if not results:
         return Verdict((Check(None, "", "scenes", 0.0, "≥ 1", "", False),), complete)
     checks = [check for result in results for check in _scene_checks(result)]
-    if complete:
+    if complete and any(result.get("kind") != "set" for result in results):
         checks += [
             Check(None, m.limit.run, m.limit.measure, m.value, m.limit.text, m.limit.unit, m.passed)
             for m in medians(results)

@@ -115,7 +115,8 @@ def _json(
         "medians": [
             {
                 "run": m.limit.run, "measure": m.limit.measure, "unit": m.limit.unit, "value": m.value,
-                "limit": m.limit.text, "scenes": m.scenes, "missing": m.missing, "judged": verdict.complete,
+                "limit": m.limit.text, "scenes": m.scenes, "missing": m.missing,
+                "judged": verdict.complete and m.scenes > 0,
                 "passed": m.passed,
             }
             for m in middles

@@ -7,12 +7,12 @@ import os
 import re
 import unicodedata
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 from ..cameras.sources import CameraRequest
-from ..pictures.listing import listed
+from ..pictures.listing import SUFFIXES, listed
 from ..system.errors import BadRequest, StitchError
 from ..system.text_files import read_lines
 from .options import CLIP
@@ -26,6 +26,8 @@ _LAYOUT = (
 _FURTHER = re.compile(r"picture([3-9]|[1-5]\d|60)")
 # Where the frame's number stands in a file's name: %d, %04d, or #### as Blender and Nuke have it.
 _PLACE = re.compile(r"%(?:0(\d{1,2}))?d|#{2,}")
+# What a pattern like IMG_*.jpg holds.
+_MANY = re.compile(r"[*?\[]")
 _NOT_IN_NAMES = re.compile(r'[\x00-\x1f/\\:*?"<>|]')
 
 
@@ -92,7 +94,8 @@ def read_list(path: str | Path) -> list[BatchItem]:
     Returns
     -------
     list of BatchItem
-        Whether the pictures of pairs exist is not checked; a folder or pattern without pictures is in trouble.
+        Whether the pictures of pairs exist is not checked; a folder that does not exist, and a folder or pattern
+        without pictures, is in trouble.
 
     Raises
     ------
@@ -113,6 +116,8 @@ def read_list(path: str | Path) -> list[BatchItem]:
         except OSError as error:
             raise BadRequest(f"{path}, line {number}: no name that files can have: {error.strerror}") from error
         before = lines.setdefault(same_name(item.name), number)
+        if item.trouble is not None:
+            item = replace(item, trouble=type(item.trouble)(f"{path}, line {number}: {item.trouble}"))
         if before != number:
             raise BadRequest(
                 f"{path}, line {number}: its outputs would be named {item.name!r} like those of line {before}; give "
@@ -224,7 +229,7 @@ def _find_frames(
 
 def _item(row: dict[str, str], folder: Path, folders: _Folders) -> BatchItem:
     alone = folder / row.get("reference", "")
-    if row.get("reference") and not row.get("target") and (alone.is_dir() or re.search(r"[*?\[]", alone.name)):
+    if row.get("reference") and not row.get("target") and _stands_for_many(alone):
         return _set(row, alone)
     for column in ("reference", "target"):
         if not row.get(column):
@@ -250,6 +255,13 @@ def _item(row: dict[str, str], folder: Path, folders: _Folders) -> BatchItem:
     return BatchItem(name, reference, target, frames, missing, camera, tuple(more))
 
 
+def _stands_for_many(path: Path) -> bool:
+    """Whether a path is a folder or a pattern, or would be a folder if it were there: it has no picture's ending."""
+    if path.is_dir() or _MANY.search(path.name):
+        return True
+    return not (path.exists() or _is_pattern(path) or path.suffix.lower() in SUFFIXES)
+
+
 def _set(row: dict[str, str], source: Path) -> BatchItem:
     """The item of a folder or pattern that stands for all its pictures; in trouble where these are fewer than two."""
     camera = _camera(row)
@@ -258,7 +270,8 @@ def _set(row: dict[str, str], source: Path) -> BatchItem:
         if len(files) < 2:
             raise BadRequest(f"{source}: only one picture ({files[0].name}); a panorama needs two or more")
     except StitchError as trouble:
-        called = source.resolve().name if source.is_dir() else _NOT_IN_NAMES.sub("_", row["reference"]).strip(" ._")
+        pattern = _MANY.search(source.name) and not source.is_dir()
+        called = _NOT_IN_NAMES.sub("_", row["reference"]).strip(" ._") if pattern else source.resolve().name
         return BatchItem(row.get("name") or called or "pictures", source, source, camera=camera, trouble=trouble)
     name = row.get("name") or (source.resolve().name if source.is_dir() else files[0].stem)
     return BatchItem(name, files[0], files[1], camera=camera, more=tuple(files[2:]))

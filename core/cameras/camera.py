@@ -42,6 +42,8 @@ class Camera:
         Standard deviation of the principal point in units of the longer side; 0 if it is fixed.
     knowledge : Knowledge
         How the focal length is known.
+    lens_of : str
+        Name of the picture whose focal length was taken, this one's own not being known; empty where it is.
     """
 
     K: NDArray[np.float64]
@@ -52,6 +54,7 @@ class Camera:
     pose: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     principal_sigma: float = 0.0
     knowledge: Knowledge = Knowledge.GIVEN
+    lens_of: str = ""
 
     @property
     def focal(self) -> float:

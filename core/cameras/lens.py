@@ -68,6 +68,15 @@ def undistort(points: Array, camera: Camera) -> Array:
     return _pixels(ideal, camera)
 
 
+def fold_radius(camera: Camera) -> tuple[float, float] | None:
+    """The raw normalised radius at which the radial polynomial folds back, and that of the farthest corner, if the
+    first is the smaller one: no ray is seen beyond it; else None."""
+    r, slope, raw = _radial(camera)
+    farthest = _corner_radius(camera)
+    folded = np.flatnonzero((slope <= 0) & (np.maximum.accumulate(raw) < farthest))
+    return (float(raw[: folded[0] + 1].max()), farthest) if folded.size else None
+
+
 def _stretch(ideal: Array, camera: Camera, limit: float) -> Array:
     """Derivative (…, 1) of the raw radius by the ideal one."""
     k1, k2, _, _, k3 = camera.distortion
@@ -81,15 +90,24 @@ def _stretch(ideal: Array, camera: Camera, limit: float) -> Array:
 def _trusted_radius(camera: Camera) -> float:
     """The largest ideal normalised radius where the radial polynomial still grows by half of an ideal lens, up to where
     its raw radius is 1.2 × the corner's."""
+    r, slope, raw = _radial(camera)
+    return float(r[int(np.argmax((slope < LENS.least_slope) | (raw > LENS.reach * _corner_radius(camera))))])
+
+
+def _corner_radius(camera: Camera) -> float:
+    """The raw normalised radius of the farthest corner."""
     width, height = camera.size
     corners = _normalised(np.array([[0.0, 0], [width, 0], [0, height], [width, height]]), camera)
-    reach = LENS.reach * float(np.hypot(corners[:, 0], corners[:, 1]).max())
-    # while the slope is at least a half, twice `reach` is as far as it takes
-    r = np.linspace(0, 3 * reach, LENS.radius_samples)
+    return float(np.hypot(corners[:, 0], corners[:, 1]).max())
+
+
+def _radial(camera: Camera) -> tuple[Array, Array, Array]:
+    """Samples of the ideal normalised radius, and the slope and value there of the raw one."""
+    # while the slope is at least a half, twice the reach is as far as it takes
+    r = np.linspace(0, 3 * LENS.reach * _corner_radius(camera), LENS.radius_samples)
     k1, k2, _, _, k3 = camera.distortion
     slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
-    raw = r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
-    return float(r[int(np.argmax((slope < LENS.least_slope) | (raw > reach)))])
+    return r, slope, r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
 
 
 def _distorted(ideal: Array, distortion: Array, limit: float) -> Array:

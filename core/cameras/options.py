@@ -43,5 +43,21 @@ class LensOptions:
     tolerance: float = 1e-12
 
 
+@dataclass(frozen=True)
+class PlausibleOptions:
+    """Intrinsics beyond which something else was given than a camera's (`plausible`)."""
+
+    # Focal length in units of the longer side: a 6 mm fisheye has 0.17 on full frame, a 1200 mm lens 33 there and 200
+    # on the smallest sensors; some room is left for pictures that were cropped.
+    least_focal: float = 0.1
+    most_focal: float = 500.0
+    # Ratio of the two focal lengths of K: pixels of anamorphic pictures are twice as wide as high.
+    most_aspect: float = 3.0
+    # Distance of the principal point from the middle, in units of the longer side: of a corner that was cut out of a
+    # larger picture it lies far outside.
+    principal_reach: float = 20.0
+
+
 INTRINSICS = IntrinsicsOptions()
+PLAUSIBLE = PlausibleOptions()
 LENS = LensOptions()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..system.errors import BadRequest, UnreadableImage
 from .camera import Camera, Knowledge
 from .options import INTRINSICS
+from .plausible import check_plausible, fold_warning
 from .sensors import sensor_diagonal
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ FULL_FRAME_DIAGONAL = float(np.hypot(36.0, 24.0))
 
 @dataclass(frozen=True)
 class CameraRequest:
-    """What the user said about the cameras; one value serves both pictures, two are reference and target.
+    """What the user said about the cameras; one value serves all pictures, two are reference and target of a pair.
 
     focal_px, focal_mm with sensor_mm (sensor width), focal35; principal (x, y) or (x, y, x', y') px; cameras: a camera
     file's path or its content (see `read_camera_file`).
@@ -61,9 +62,12 @@ class CameraRequest:
             if any(not np.isfinite(v) or v <= 0 for v in values):
                 raise BadRequest(f"a {name} must be a number above 0")
         if any(len(v) > 2 for v in (self.focal_px, self.focal_mm, self.sensor_mm, self.focal35)):
-            raise BadRequest("give one focal length for both pictures, or two: reference,target")
+            raise BadRequest(
+                "give one focal length for all pictures, or two of a pair: reference,target; of more pictures each has "
+                "its own in --cameras FILE.json"
+            )
         if len(self.principal) not in (0, 2, 4) or not np.isfinite(self.principal).all():
-            raise BadRequest("--principal takes X,Y for both pictures or X,Y,X2,Y2")
+            raise BadRequest("--principal takes X,Y for all pictures, or X,Y,X2,Y2 of a pair")
 
 
 def role(number: int) -> str:
@@ -98,12 +102,12 @@ def cameras_for(
     -------
     cameras : list of Camera
     warnings : list of str
-        Where EXIF contradicts itself, or a camera file names what is no picture.
+        Where EXIF contradicts itself, a camera file names what is no picture, or a distortion folds the picture.
 
     Raises
     ------
     BadRequest
-        The camera file lacks a picture or holds something else.
+        The camera file lacks a picture or holds something else, or what is given is no lens's.
     UnreadableImage
         The camera file cannot be read.
     """
@@ -119,23 +123,29 @@ def cameras_for(
         for number, (camera, size, exif) in enumerate(zip(held, sizes, exifs, strict=True))
     ]
     if None in held:
-        known = [camera for camera in cameras if not camera.assumed]
-        if known:  # one lens took all pictures more often than not
-            cameras = [_with_lens_of(known[0], camera) if camera.assumed else camera for camera in cameras]
+        lender = next((number for number, camera in enumerate(cameras) if not camera.assumed), None)
+        if lender is not None:  # one lens took all pictures more often than not
+            known, name = cameras[lender], "the other picture" if len(names) == 2 else names[lender]
+            cameras = [_with_lens_of(known, camera, name) if camera.assumed else camera for camera in cameras]
     if request.principal:
         values = [request.principal[i : i + 2] for i in range(0, len(request.principal), 2)]
         cameras = [
             _with_principal_point(camera, values[min(number, len(values) - 1)]) for number, camera in enumerate(cameras)
         ]
+    for number, camera in enumerate(cameras):
+        check_plausible(camera, called(number, names))
+        folds = fold_warning(camera, called(number, names))
+        warnings += [folds] if folds else []
     return cameras, warnings
 
 
-def _with_lens_of(known: Camera, unknown: Camera) -> Camera:
-    """An unknown camera with the lens of a known one."""
+def _with_lens_of(known: Camera, unknown: Camera, name: str) -> Camera:
+    """An unknown camera with the lens of a known one, that of the picture of this name."""
     guess = known.focal * max(unknown.size) / max(known.size)
     # the same knowledge as the other picture's, so that the focal prior does not count it twice
-    source = f"the other picture ({known.source})"
-    return _camera(guess, unknown.size, source, INTRINSICS.cropped_sigma, known.knowledge)
+    source = f"{name} ({known.source})"
+    found = _camera(guess, unknown.size, source, INTRINSICS.cropped_sigma, known.knowledge)
+    return replace(found, lens_of=name)
 
 
 def _one_camera(

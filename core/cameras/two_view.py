@@ -41,6 +41,8 @@ class TwoView:
         px that H_inf moves when log f changes by two deviations, the median over the target; NaN if unknown.
     warnings : tuple of str
         For the user.
+    contradicting : int
+        How many matches that the user gave contradict the rest.
     """
 
     K: Array
@@ -58,3 +60,4 @@ class TwoView:
     focal_deviation: float
     h_inf_spread: float
     warnings: tuple[str, ...] = ()
+    contradicting: int = 0

@@ -41,7 +41,9 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
 def _add_cameras(parser: argparse.ArgumentParser) -> None:
     """What is known of the cameras."""
     camera = parser.add_argument_group(
-        "cameras", "One value serves all pictures; two are for REF,TARGET. Without any: EXIF, or an estimate."
+        "cameras",
+        "One value serves all pictures; two are REF,TARGET of a pair; of more pictures each has its own in --cameras. "
+        "Without any: EXIF, or an estimate.",
     )
     camera.add_argument("--focal-px", type=_numbers, default=(), metavar="F[,F2]", help="focal length in pixels")
     camera.add_argument(
@@ -81,12 +83,13 @@ def _add_control(parser: argparse.ArgumentParser) -> None:
     control = parser.add_argument_group("control")
     control.add_argument(
         "--matches", type=Path, metavar="FILE.csv",
-        help="x,y,x2,y2[,weight] in px: used as given, nothing is searched; a report's own: as they were found; of "
-        "more than two pictures the columns picture and picture2 name them",
+        help="x,y,x2,y2[,weight] in px of REF and TARGET; of more than two pictures the columns picture and picture2 "
+        "name whose: used as given, nothing is searched; a report's own: as they were found",
     )  # fmt: skip
     control.add_argument(
-        "--ignore-ref", type=Path, metavar="MASK", help="a picture, white where REF is to be ignored altogether"
-    )
+        "--ignore-ref", type=Path, metavar="MASK",
+        help="of a pair: a picture, white where REF is to be ignored altogether",
+    )  # fmt: skip
     control.add_argument("--ignore-target", type=Path, metavar="MASK", help="the same for TARGET")
     control.add_argument(
         "--ignore", type=_named_mask, action="append", default=[], metavar="NAME=MASK",
@@ -155,8 +158,8 @@ def _add_composition(how: argparse._ArgumentGroup) -> None:
     )  # fmt: skip
     how.add_argument(
         "--exposure", default="auto", type=_exposure, metavar="EXPOSURE",
-        help="auto (default: both pictures meet at one exposure, and no light is blown), reference (TARGET is matched "
-        "to REF), none (the light stays as it is), or a number of stops to add to auto, as --exposure=-0.5",
+        help="auto (default: all pictures meet at one exposure, and no light is blown), reference (the others are "
+        "matched to REF), none (the light stays as it is), or a number of stops to add to auto, as --exposure=-0.5",
     )  # fmt: skip
     how.add_argument(
         "--no-exposure", dest="exposure", action="store_const", const="none", help="the same as --exposure none"

@@ -25,7 +25,8 @@ _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        self.print_usage(sys.stderr)
+        if not message.startswith("argument -"):  # what is wrong with one option's value, its own line says
+            self.print_usage(sys.stderr)
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(2)
 

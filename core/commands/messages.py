@@ -37,7 +37,8 @@ def print_summary(report: dict[str, Any], seconds: dict[str, float]) -> None:
         f"{view['model']}: {view['why']}",
         f"focal length {focal} px ({view['focal_source']}; ± {said(view['focal_deviation'], '.1%')}, at infinity ± "
         f"{said(view['h_inf_spread_px'], '.1f')} px)",
-        f"field {field['kind']}: {field['centres']} points, {field['pruned']} left out, λ {field['smoothing']:.1e}",
+        f"field {field['kind']}: {field['centres']} points, {field['pruned']} left out, "
+        f"λ {said(field['smoothing'], '.1e')}",
         f"alignment {said(measured['alignment_median_px'], '.2f')} px (median), "
         f"{said(measured['alignment_p95_px'], '.2f')} px (95 %), {said(measured['off_line_mean_px'], '.2f')} px off "
         "their lines (mean)",
@@ -101,7 +102,8 @@ def verdict_line(verdict: dict[str, Any]) -> str:
     found = "; ".join(f"{what} ({', '.join(boxes)})" for what, boxes in places.items())
     if not found:
         return f"look at it: {verdict['because']}; {verdict['what_to_do']}"
-    return f"look at these places: {found}; {verdict['what_to_do']}"
+    elsewhere = "".join(f"{why}; " for why in verdict["because"].split("; ") if why not in places)
+    return f"look at these places: {found}; {elsewhere}{verdict['what_to_do']}"
 
 
 @contextmanager

@@ -62,6 +62,9 @@ class RigOptions:
     most_named: int = 4
     """Pairs that a warning names."""
 
+    most_place_deviation: float = 1.0
+    """Deviation of a place, in units of the longest baseline, up to which anything is known of it."""
+
 
 @dataclass(frozen=True)
 class IndependentOptions:
@@ -226,6 +229,9 @@ class VerdictOptions:
 
     hidden: float = 0.25
     """Share of the overlap that one picture cannot see: 0.12 at most where the picture is right."""
+
+    contradicting: float = 0.1
+    """Share of the given matches that contradict the rest, from which that is said: one in ten is no slip."""
 
     deep_px: float = 2.0
     """px by which half the points are off where each is predicted from the others, of more than two pictures."""

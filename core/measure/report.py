@@ -77,7 +77,10 @@ def make_report(
         "schema": SCHEMA,
         "pictures": [picture_entry(p, c) for p, c in zip(pictures, cameras, strict=True)],
         "options": options_entry(options, alignment),
-        "matches": {"found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma},
+        "matches": {
+            "found": len(matches), "inliers": int(two_view.inliers.sum()), "noise_px": two_view.sigma,
+            "contradicting": two_view.contradicting,
+        },
         "two_view": {
             "model": two_view.model, "why": two_view.why, "focal_source": two_view.focal_source,
             "focal_px": [two_view.K[0, 0], two_view.K_prime[0, 0]], "focal_deviation": two_view.focal_deviation,

@@ -73,14 +73,17 @@ def make_rig_report(
     names = [picture.name for picture in pictures]
     holes, folds = sum(one.holes for one in decided), max(one.folds for one in decided)
     error = map_errors(warp, alignment.edges)
+    found, inliers = (sum(int(one) for one in counts) for counts in zip(
+        *((len(edge.matches), edge.two_view.inliers.sum()) for edge in alignment.edges), strict=True
+    ))  # fmt: skip
+    contradicting = found - inliers if alignment.edges[0].matches.given else 0
     report = {
         "schema": SCHEMA,
         "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum()))),
         "left_out": left_out_entry(alignment.left_out),
         "options": options_entry(options, alignment) | {"fade": options.fade, "viewpoint": options.viewpoint},
         "matches": {
-            "found": sum(len(edge.matches) for edge in alignment.edges),
-            "inliers": sum(int(edge.two_view.inliers.sum()) for edge in alignment.edges), "noise_px": rig.noise_px,
+            "found": found, "inliers": inliers, "noise_px": rig.noise_px, "contradicting": contradicting,
         },
         "rig": _rig_entry(rig, names),
         "field": {
@@ -100,7 +103,8 @@ def make_rig_report(
             "folds": folds, **appearance,
         },
     }  # fmt: skip
-    warnings = [*rig_warnings(rig, names), *exposure_warnings(pictures, [one.exposure for one in decided])]
+    warnings = [*rig_warnings(rig, names), *_about_given(contradicting, found)]
+    warnings += exposure_warnings(pictures, [one.exposure for one in decided])
     if canvas.cropped and canvas.projection is not None:
         warnings.append(
             f"the pictures reach too far for a {canvas.projection.kind} panorama and were cropped there; "
@@ -131,7 +135,7 @@ def _pictures(
             "principal": camera.K[:2, 2], "R": rig.R[number], "t": rig.t[number],
         }  # fmt: skip
         entries.append(entry | {
-            "place": rig.centres[number], "place_deviation": _of(rig.position_deviation, number),
+            "place": rig.centres[number], "place_deviation": place_deviation(rig, number),
             "inliers": int(own.sum()), "residual_px": float(np.median(error[own])) if own.any() else None,
             "hidden_px": int(decided[number].hidden.sum()), "share": share[number],
         })  # fmt: skip
@@ -192,6 +196,19 @@ def _dense_entry(dense: DenseSphere | None) -> dict[str, Any]:
     if dense is None or dense.refined is None:
         return {"used": False, "why": "not asked for" if dense is None else dense.why}
     return {"used": True, "found": dense.found}
+
+
+def _about_given(contradicting: int, found: int) -> list[str]:
+    """A warning about matches that the user gave and that are not used."""
+    if not contradicting:
+        return []
+    return [f"{contradicting} of the {found} given matches contradict the rest and are left out: correct them"]
+
+
+def place_deviation(rig: Rig, number: int) -> float | None:
+    """The deviation of a picture's place; None where it may be anywhere, however large a number the bundle gives."""
+    deviation = _of(rig.position_deviation, number)
+    return None if deviation is None or not deviation <= RIG.most_place_deviation else float(deviation)
 
 
 def _of(values: Sequence[Any] | NDArray[Any], number: int) -> Any:

@@ -34,6 +34,8 @@ CLIPPED = (
 FOCAL = "give the focal length (--focal35, --focal-px) if it is known"
 FOCAL_OR_STAY = f"{FOCAL}, or keep the reference's place (--slide 0)"
 FILL = "fill holes (--holes inpaint)"
+MORE = "take more pictures, from places closer together"
+UNTIED = "how far apart some pictures were taken is not known"
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,7 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
     cause = _cause(look, pairs, missed, folded)
     if cause:
         return Verdict(NOT_USABLE, *cause, tuple(places[: VERDICT.most_places]))
+    places += _untied_places(look, report, shift)
     doubts = dict(_doubts(report))
     if not places and not doubts:
         return Verdict(GOOD, "the pictures agree where the seam changes from one to the other", "")
@@ -120,21 +123,38 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
 
 
 def _doubts(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """What is doubtful about the cameras of more than two pictures, and what would help."""
-    more = "take more pictures, from places closer together"
+    """What is doubtful about given matches and the cameras of more than two pictures, and what would help."""
+    matches = report["matches"]
+    if matches["contradicting"] > VERDICT.contradicting * matches["found"]:
+        what = f"{matches['contradicting']} of the {matches['found']} given matches contradict the rest"
+        yield what, "correct those that are wrong in the file of --matches, or leave them out"
     if report.get("left_out"):
         names = ", ".join(entry["name"] for entry in report["left_out"])
-        yield f"what does not connect with the others is left out: {names}", more
+        yield f"what does not connect with the others is left out: {names}", MORE
     if "rig" not in report:
         return
     if report["rig"]["scale"] in ("continuity", "none"):
-        yield "how far apart some pictures were taken is not known", more
+        yield UNTIED, MORE
     if (report["field"]["leave_one_out_px"] or 0.0) > VERDICT.deep_px:
-        yield "the scene is too near and deep for the points that were found", more
+        yield "the scene is too near and deep for the points that were found", MORE
     if (report["measured"]["folds"] or 0.0) > VERDICT.folded:
-        yield f"the map folds over in {report['measured']['folds']:.0%} of a picture: depth is doubtful there", more
+        yield f"the map folds over in {report['measured']['folds']:.0%} of a picture: depth is doubtful there", MORE
     if report["rig"]["focal_spread"] > RIG.same_focal:
         yield "the focal length is not sure", "give the focal length (--focal35, --focal-px)"
+
+
+def _untied_places(look: Look, report: dict[str, Any], shift: tuple[int, int]) -> list[Place]:
+    """Where two pictures meet whose distance is not known, the first few of many."""
+    rig = report.get("rig", {"scale": "measured", "edges": []})
+    found = []
+    for edge in rig["edges"] if rig["scale"] in ("continuity", "none") else ():
+        one, other = edge["numbers"]
+        both = look.shows[one] & look.shows[other]
+        shown = both & (look.shown(one) | look.shown(other))
+        parts = list(_parts(shown if shown.any() else both, 1)) if edge["baseline"] == rig["scale"] else []
+        if parts:
+            found.append(Place(look.box(max(parts, key=np.sum), shift), UNTIED, 0.0, MORE))
+    return found[: RIG.most_named]
 
 
 def _cause(look: Look, pairs: Sequence[_Pair], missed: float, folded: float) -> tuple[str, str] | None:

@@ -68,7 +68,7 @@ def _pictures(entries: list[dict[str, Any]]) -> str:
         rows.append(
             f"<tr><th>{escape(one['name'])}</th><td class=n>{camera['focal_px']:.1f} px"
             f"<td class=n>{_said(camera['focal_deviation'], '.2%')}<td>{escape(camera['source'])}<td class=n>{place}"
-            f"<td class=n>{_said(one['place_deviation'], '.4f')}<td class=n>{one['inliers']}"
+            f"<td class=n>{_said(one['place_deviation'], '.4f', 'not known')}<td class=n>{one['inliers']}"
             f"<td class=n>{_said(one['residual_px'], '.2f')} px<td class=n>{one['hidden_px']} px"
             f"<td class=n>{one['share']:.1%}</tr>"
         )
@@ -94,5 +94,5 @@ def _pairs(edges: list[dict[str, Any]]) -> str:
     return table(head, rows)
 
 
-def _said(value: float | None, form: str) -> str:
-    return "–" if value is None else format(value, form)
+def _said(value: float | None, form: str, none: str = "–") -> str:
+    return none if value is None else format(value, form)

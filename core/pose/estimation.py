@@ -112,13 +112,15 @@ def estimate(matches: Matches, camera: Camera, camera_prime: Camera, seed: int =
     warnings = [*focal_warnings(pose, camera, camera_prime), *known.warnings]
     if camera.fixed and camera_prime.fixed:
         warnings += _contradiction(matches, F, inliers, sigma)
-    warnings += _about_given(matches, np.abs(sampson_residuals(pose.F, matches.x, matches.y)))
+    off = np.abs(sampson_residuals(pose.F, matches.x, matches.y))
+    warnings += _about_given(matches, off)
     return TwoView(
         K=pose.K, K_prime=pose.K_prime, R=pose.R, t=pose.t, F=pose.F,
         H_inf=infinite_homography(pose.K, pose.K_prime, pose.R), e_prime=pose.K_prime @ pose.t,
         inliers=inliers | matches.given, sigma=sigma, model="general" if parallax else "plane",
         why=_why(inliers, homography, parallax, zoom), focal_source=known.source, focal_deviation=known.deviation,
         h_inf_spread=known.h_inf_spread, warnings=tuple(warnings),
+        contradicting=int(_contradicting(matches, off).sum()),
     )  # fmt: skip
 
 
@@ -170,7 +172,7 @@ def _same_viewpoint(
         focal_deviation=0.0 if camera.fixed else math.nan, h_inf_spread=math.nan,
         warnings=(
             "the pictures were taken from the same place: there is no depth in them", *_about_given(matches, error),
-        ),
+        ), contradicting=int(_contradicting(matches, error).sum()),
     )  # fmt: skip
 
 
@@ -192,7 +194,7 @@ def _plane_without_pose(
             "all that matches lies on one plane: the cameras cannot be told from it, and depth is meaningless; give "
             "the focal length if you need them",
             *_about_given(matches, homography.error),
-        ),
+        ), contradicting=int(_contradicting(matches, homography.error).sum()),
     )  # fmt: skip
 
 
@@ -207,10 +209,16 @@ def _contradiction(matches: Matches, F: Array, inliers: NDArray[np.bool_], sigma
     ]
 
 
+def _contradicting(matches: Matches, off: Array) -> NDArray[np.bool_]:
+    """Which matches (N,) that the user gave lie too far, `off` (N,) px, from where they should; none that were found.
+    """
+    return (off > ESTIMATION.given_match_px * matches.scale) & matches.given
+
+
 def _about_given(matches: Matches, off: Array) -> list[str]:
-    """A warning about matches that the user gave, hence all used, and that lie `off` (N,) px from where they should."""
-    wrong = off > ESTIMATION.given_match_px * matches.scale
-    if not matches.given or not wrong.any():
+    """A warning about matches that the user gave, hence all used, and that contradict the rest."""
+    wrong = _contradicting(matches, off)
+    if not wrong.any():
         return []
     worst = int(np.argmax(off))
     (x, y), (x2, y2) = matches.x[worst], matches.y[worst]
@@ -360,4 +368,5 @@ def _from_known_cameras(
         H_inf=infinite_homography(relative.K, relative.K_prime, R), e_prime=relative.K_prime @ relative.t,
         inliers=inliers | matches.given, sigma=sigma, model="general", why=why, focal_source=camera.source,
         focal_deviation=0.0, h_inf_spread=0.0, warnings=tuple(_about_given(matches, residual)),
+        contradicting=int(_contradicting(matches, residual).sum()),
     )  # fmt: skip

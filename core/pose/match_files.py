@@ -112,7 +112,9 @@ def read_matches_of_pairs(
     pairs = np.array([[numbers[name] for name in named] for named in table.pictures.tolist()])
     table = table._replace(pictures=pairs)
     return {
-        (i, j): _matches_in(table.between(i, j), source, (sizes[i], sizes[j]), (worked[i], worked[j]))
+        (i, j): _matches_in(
+            table.between(i, j), source, (sizes[i], sizes[j]), (worked[i], worked[j]), (names[i], names[j])
+        )
         for i, j in np.unique(np.sort(pairs, axis=1), axis=0).tolist()
     }
 
@@ -158,12 +160,13 @@ def read_matches(
 
 
 def _matches_in(
-    table: _Table, source: str | Path | NDArray[Any], sizes: tuple[Size, Size], worked: tuple[Size, Size] | None
-) -> Matches:
-    """The matches of two pictures; see `read_matches`."""
+    table: _Table, source: str | Path | NDArray[Any], sizes: tuple[Size, Size], worked: tuple[Size, Size] | None,
+    called: tuple[str, str] = ("the reference", "the target"),
+) -> Matches:  # fmt: skip
+    """The matches of two pictures, which messages call so; see `read_matches`."""
     if not len(table.points):
         raise BadRequest(f"{_whole(source)}: no matches between these two pictures in it; it names others")
-    _check(table, *sizes)
+    _check(table, sizes, called)
     if table.state is None:
         weight = table.weight
         kept = np.flatnonzero(weight > 0)
@@ -352,7 +355,7 @@ def _shortened(cell: str) -> str:
     return repr(cell if len(cell) <= 30 else cell[:29] + "…")
 
 
-def _check(table: _Table, size: Size, size_prime: Size) -> None:
+def _check(table: _Table, sizes: tuple[Size, Size], called: tuple[str, str]) -> None:
     """Raises BadRequest for the first row with a value that is not finite, a negative weight, no noise, or a point
     outside its picture."""
 
@@ -369,14 +372,13 @@ def _check(table: _Table, size: Size, size_prime: Size) -> None:
         refuse(bad, f"the weight is {table.weight[bad.argmax()]:g}", "0 leaves a match out, larger counts more")
     if (bad := table.noise <= 0).any():
         refuse(bad, f"{NOISE} is {table.noise[bad.argmax()]:g}", "it is a length above 0")
-    for name, columns, (width, height) in (("reference", (0, 1), size), ("target", (2, 3), size_prime)):
+    for name, columns, (width, height) in zip(called, (slice(2), slice(2, 4)), sizes, strict=True):
         points = table.points[:, columns]
         # pixel centres are integers: the picture's own edges lie half a pixel beyond the outer centres
         bad = ((points < -0.5) | (points > np.array([width, height]) - 0.5)).any(axis=1)
         if bad.any():
             x, y = points[bad.argmax()]
             refuse(
-                bad,
-                f"the point ({x:g}, {y:g}) lies outside the {name}, which has {width}×{height} pixels",
-                "x,y are pixels of the upright reference, x2,y2 of the upright target, both at full size",
-            )
+                bad, f"the point ({x:g}, {y:g}) lies outside {name}, which has {width}×{height} pixels",
+                "x,y are pixels of the line's first picture, x2,y2 of its second one, both upright and at full size",
+            )  # fmt: skip

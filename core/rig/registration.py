@@ -28,6 +28,7 @@ from .bundling.solution import lens_of, with_lens
 from .bundling.solving import Solved, solve
 from .bundling.uncertainty import deviations
 from .given_poses import check_given_poses
+from .twins import twins_of, with_twins, without
 
 # Shares of the work that are done when pairs are verified, and when their rotations are averaged.
 _VERIFIED, _AVERAGED = 0.1, 0.4
@@ -44,7 +45,8 @@ def register(
 ) -> Registration:
     """Find the cameras of all pictures that connect, in the frame of the first of them.
 
-    The order of the pictures matters for nothing else.
+    The order of the pictures matters for nothing else. Of pictures that show the same from the same place one is
+    registered, and the others stand where it does.
 
     Parameters
     ----------
@@ -75,9 +77,25 @@ def register(
         If given cameras do not fit the matches.
     """
     progress = progress or Progress()
+    names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
+    twins = twins_of(cameras, points, matches, scale)
+    kept = [number for number in range(len(cameras)) if number not in twins]
+    if not twins or len(kept) < 2:
+        return _registered(cameras, points, matches, scale, seed, progress, names)
+    found = _registered(
+        [cameras[number] for number in kept], [points[number] for number in kept], without(twins, matches, kept), scale,
+        seed, progress, [names[number] for number in kept],
+    )  # fmt: skip
+    return with_twins(found, kept, twins, points, matches, scale, names)
+
+
+def _registered(
+    cameras: Sequence[Camera], points: Sequence[Array], matches: Sequence[PictureMatches], scale: float, seed: int,
+    progress: ReportProgress, names: Sequence[str],
+) -> Registration:  # fmt: skip
+    """The same of pictures of which none shows just what another one does."""
     ideal = [undistort(p, camera) for p, camera in zip(points, cameras, strict=True)]
     plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
-    names = names or [f"picture {number}" for number in range(1, len(cameras) + 1)]
     verified = verify(ideal, _watched(matches, progress), scale, seed)
     check_given_poses(plain, ideal, verified, names)
     averages = hypotheses(plain, ideal, verified, partial(progress, "geometry", _VERIFIED))

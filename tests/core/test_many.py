@@ -197,6 +197,28 @@ def test_matches_that_were_written_make_the_same_rig(
     assert len(again.edges) == len(set_result.edges)
 
 
+def test_given_matches_that_contradict_each_other_are_told_and_not_good(
+    four: PictureSet, set_result: StitchResult, tmp_path: Path
+) -> None:
+    random, lines = np.random.default_rng(0), ["picture,picture2,x,y,x2,y2"]
+    wrong = 0
+    for edge in set_result.edges:
+        one, other = (set_result.pictures[number].name for number in (edge.i, edge.j))
+        used = edge.matches.subset(edge.two_view.inliers).thinned(120)
+        width, height = set_result.cameras[edge.j].size
+        for x, y in zip(used.x, used.y, strict=True):
+            if random.random() < 0.3:
+                y, wrong = random.uniform((0, 0), (width - 1, height - 1)), wrong + 1
+            lines.append(f"{one},{other},{x[0]},{x[1]},{y[0]},{y[1]}")
+    (tmp_path / "m.csv").write_text("\n".join(lines))
+    result = stitch(four.pictures, replace(KNOWN, matches=tmp_path / "m.csv"))
+    verdict, matches = result.report["verdict"], result.report["matches"]
+    assert 0.8 * wrong <= matches["contradicting"] <= 1.5 * wrong
+    assert verdict["is"] == "look" and "given matches contradict the rest" in verdict["because"]
+    assert any("given matches contradict the rest and are left out" in warning for warning in result.warnings)
+    assert set_result.report["matches"]["contradicting"] == 0
+
+
 def test_warp_and_layers_hold_every_picture(set_result: StitchResult, tmp_path: Path) -> None:
     with np.load(io.BytesIO(warp_bytes(set_result))) as warp:
         assert warp["R"].shape == (4, 3, 3) and warp["t"].shape == (4, 3) and warp["dist"].shape == (4, 5)

@@ -34,6 +34,17 @@ class PairOptions:
 
 
 @dataclass(frozen=True)
+class TwinOptions:
+    """Pictures that show the same from the same place (`twins`)."""
+
+    # px within which this share of at least so many matches stay where they are. Copies with noise of 2 levels have
+    # 98 % there.
+    still_px: float = 1.0
+    share: float = 0.9
+    matches: int = 100
+
+
+@dataclass(frozen=True)
 class CandidateOptions:
     """The poses that the matches of a pair allow (`candidates`)."""
 
@@ -179,6 +190,7 @@ class AveragingOptions:
 
 
 PAIRS = PairOptions()
+TWINS = TwinOptions()
 CANDIDATES = CandidateOptions()
 PAIR_FIT = PairFitOptions()
 LADDER = LadderOptions()

@@ -72,7 +72,8 @@ def polish_best(
     framed: Callable[[Array], Array], tick: Tick, turned: Polished | None = None,
 ) -> Polished:  # fmt: skip
     """The cheapest of: every picture at a place of its own and, where there are stations, those of each at one place,
-    and all at one place: pairs with few matches do not show that they rotate. What more places cost is counted (BIC).
+    those of all of them at one, and all pictures at one: pairs with few matches do not show that they rotate. What more
+    places cost is counted (BIC).
     Where there is little parallax, rotations bundled as if at one place are better to start from than averaged ones,
     and are tried too.
 
@@ -86,12 +87,24 @@ def polish_best(
     if _little_parallax(turned):
         begun = replace(start, R=turned.solution.R, lens=turned.solution.lens)
         candidates.append(_placed_and_polished(problem, begun, same, framed, tick, most=most))
-    if not any(len(station) == problem.pictures for station in stations):
-        assigned = problem.with_stations(stations)
-        apart = min(candidates[1:], key=lambda found: found.cost)
+    apart = min(candidates[1:], key=lambda found: found.cost)
+    for together in _assignments(stations, same, problem.pictures):
+        assigned = problem.with_stations(together)
         known = _joined(assigned, apart.solution)
         candidates.append(_placed_and_polished(assigned, start, same, framed, tick, known, most))
     return min(candidates, key=information_criterion)
+
+
+def _assignments(stations: Sequence[Station], same: Sequence[SamePlace], pictures: int) -> list[list[Station]]:
+    """Stations as they are proposed and, of several, as one, without and with the pictures that were taken out again:
+    pairs between them may have too few matches to show that they rotate. All pictures at one place are another
+    candidate already."""
+    found = [list(stations)]
+    if len(stations) > 1:
+        joined = {picture for station in stations for picture in station}
+        turning = joined.union(*((pair.i, pair.j) for pair in same))
+        found += [[tuple(sorted(one))] for one in ((joined, turning) if turning != joined else (joined,))]
+    return [one for one in found if all(len(station) < pictures for station in one)]
 
 
 def _placed_and_polished(

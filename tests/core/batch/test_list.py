@@ -199,6 +199,20 @@ def test_a_folder_or_a_pattern_stands_for_its_pictures(listed, tmp_path: Path) -
     assert named.name == "court" and named.frames is None
 
 
+def test_a_folder_that_does_not_exist_stops_none_of_the_others(listed, tmp_path: Path) -> None:
+    touch(tmp_path, "p%d.png", [1, 2])
+    gone, here = listed("reference,target,name\nyard/gone,,\np1.png,p2.png,\n")
+    assert gone.name == "gone" and here.trouble is None
+    assert isinstance(gone.trouble, UnreadableImage)
+    assert "list.csv, line 2: " in str(gone.trouble) and f"{tmp_path / 'yard/gone'}: no such file or folder" in str(
+        gone.trouble
+    )
+    with pytest.raises(BadRequest, match="line 1: the target is missing"):
+        listed("p1.png\n")
+    with pytest.raises(BadRequest, match="line 1: the target is missing"):
+        listed("p7.png\n")
+
+
 def test_a_folder_or_pattern_without_pictures_is_an_item_in_trouble(listed, tmp_path: Path) -> None:
     for name in ("empty", "yard", "one"):
         (tmp_path / name).mkdir()

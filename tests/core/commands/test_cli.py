@@ -281,6 +281,13 @@ def test_a_wrong_call_gives_2(
     assert out == "" and len(err.splitlines()[-1]) > 20 and files(tmp_path) == {}
 
 
+def test_a_wrong_choice_is_one_line_that_names_the_choices(pictures: list[str], tmp_path: Path, said: Callable) -> None:
+    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), "--projection", "fisheye"]) == 2
+    (line,) = said()[1].splitlines()
+    assert line.startswith("edf stitch: argument --projection: 'fisheye' is not known")
+    assert all(kind in line for kind in ("auto", "reference", "pannini", "cylindrical", "equirectangular"))
+
+
 @pytest.mark.parametrize("arguments", [
     [], ["nonsense"], ["stitch"], ["stitch", "a.png"], ["stitch", "a.png", "b.png"], ["batch"], ["batch", "list.csv"],
     ["compare"], ["compare", "x"], ["validate"], ["demo", "what"],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from edf_stitch.core.commands.messages import print_summary
+from edf_stitch.core.commands.messages import print_summary, verdict_line
 
 
 @pytest.mark.parametrize(("degrees", "said"), [(0.126, "noise 0.50 px, worst loop 0.13°\n"), (None, "noise 0.50 px\n")])
@@ -30,3 +30,27 @@ def test_it_is_said_when_all_pictures_are_from_one_place(scale: str, capsys: pyt
     }  # fmt: skip
     print_summary(report, {})
     assert ("taken from one place" in capsys.readouterr().err) == (scale == "one place")
+
+
+def test_what_is_doubtful_without_a_place_is_said_beside_the_places() -> None:
+    verdict = {
+        "is": "look", "because": "9 matches are wrong; near and far do not meet", "what_to_do": "correct them",
+        "places": [{"box": [1, 2, 30, 40], "what": "near and far do not meet"}],
+    }  # fmt: skip
+    assert verdict_line(verdict) == (
+        "look at these places: near and far do not meet (1,2 30×40); 9 matches are wrong; correct them"
+    )
+
+
+def test_a_field_without_smoothing_is_told_too(capsys: pytest.CaptureFixture[str]) -> None:
+    report = {
+        "two_view": {"model": "general", "why": "told", "focal_px": [9.0, 9.0], "focal_source": "EXIF",
+                     "focal_deviation": None, "h_inf_spread_px": None},
+        "field": {"kind": "homography", "centres": 9, "pruned": 0, "smoothing": None},
+        "measured": dict.fromkeys((
+            "alignment_median_px", "alignment_p95_px", "off_line_mean_px", "held_out_rms_px", "held_out_towards_rms_px",
+            "projectivity_own_px", "projectivity_independent_px", "overlap_psnr_db", "overlap_ssim",
+        )),
+    }  # fmt: skip
+    print_summary(report, {})
+    assert "λ -" in capsys.readouterr().err

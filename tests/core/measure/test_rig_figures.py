@@ -11,7 +11,7 @@ from edf_stitch.core.cameras.edge import Edge
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.rig import FocalGuess, Rig, RigEdge
 from edf_stitch.core.measure.rig_figures import focal_spread, map_errors, residuals, scale_kind, shares, weak_links
-from edf_stitch.core.measure.rig_report import rig_warnings
+from edf_stitch.core.measure.rig_report import place_deviation, rig_warnings
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.warp import Warp
 from edf_stitch.core.raster.picture_map import BoxedMap, MapPart, PictureMap
@@ -76,6 +76,12 @@ def test_guesses_of_the_focal_length_are_compared() -> None:
     assert focal_spread(rig) == 0
     guesses = tuple(FocalGuess(focal, 0.0, 1.0) for focal in (471.0, 480.0, 475.0))
     assert focal_spread(replace(rig, guesses=guesses)) == pytest.approx(480 / 471 - 1)
+
+
+def test_a_place_that_hardly_anything_ties_is_not_known() -> None:
+    rig = replace(known_rig(4)[0], position_deviation=np.array([0.0, 0.03, 1.2e9, np.inf]))
+    assert [place_deviation(rig, number) for number in range(4)] == [0.0, 0.03, None, None]
+    assert place_deviation(replace(rig, position_deviation=np.zeros(0)), 1) is None
 
 
 def test_shares_add_up() -> None:

@@ -17,7 +17,7 @@ from edf_stitch.synthetic_scenes.two_planes import Pair
 
 RIGHT = {
     "measured": {"alignment_p95_px": 1.0, "folds": 0.001}, "composition": {"holes": []},
-    "options": {"projection": "auto", "slide": "auto"},
+    "options": {"projection": "auto", "slide": "auto"}, "matches": {"found": 200, "contradicting": 0},
 }  # fmt: skip
 # Rows and columns across the seam, which runs down the middle (column 200).
 PATCH = np.s_[100:140, 180:220]
@@ -233,7 +233,7 @@ def test_the_report_has_the_verdict(small_pair: Pair, known: StitchOptions) -> N
 
 SURE = {
     **RIGHT, "pictures": [{"name": name} for name in ("a.png", "b.png", "c.png")], "left_out": [],
-    "rig": {"scale": "measured", "focal_spread": 0.002}, "field": {"leave_one_out_px": 0.4},
+    "rig": {"scale": "measured", "focal_spread": 0.002, "edges": []}, "field": {"leave_one_out_px": 0.4},
 }  # fmt: skip
 
 
@@ -292,14 +292,41 @@ def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:
 
 @pytest.mark.parametrize(("changes", "why", "advice"), [
     ({"left_out": [{"name": "d.png", "why": ""}]}, "left out: d.png", "take more pictures"),
-    ({"rig": {"scale": "none", "focal_spread": 0.0}}, "how far apart", "take more pictures"),
-    ({"rig": {"scale": "measured", "focal_spread": 0.03}}, "focal length is not sure", "--focal35"),
+    ({"rig": {**SURE["rig"], "scale": "none"}}, "how far apart", "take more pictures"),
+    ({"rig": {**SURE["rig"], "focal_spread": 0.03}}, "focal length is not sure", "--focal35"),
     ({"measured": {"alignment_p95_px": 1.0, "folds": 0.2}}, "folds over in 20%", "take more pictures"),
     ({"field": {"leave_one_out_px": 2.5}}, "too near and deep", "take more pictures"),
 ])  # fmt: skip
 def test_what_is_doubtful_about_the_cameras_is_said(changes: dict, why: str, advice: str) -> None:
     found = judge(look_of_three(), (0, 0), {**SURE, **changes})
     assert found.rating == "look" and why in found.because and advice in found.what_to_do and not found.places
+
+
+def test_given_matches_that_contradict_each_other_are_not_good() -> None:
+    for contradicting, rating in ((0, "good"), (20, "good"), (21, "look"), (120, "look")):
+        found = judge(look(), (0, 0), {**RIGHT, "matches": {"found": 200, "contradicting": contradicting}})
+        assert found.rating == rating
+        assert rating == "good" or f"{contradicting} of the 200 given matches contradict" in found.because
+
+
+@pytest.mark.parametrize(("scale", "baseline", "count"), [
+    ("continuity", "continuity", 1), ("none", "none", 1), ("none", "continuity", 0), ("measured", "none", 0),
+])  # fmt: skip
+def test_pictures_whose_distance_is_not_known_have_a_place_where_they_meet(
+    scale: str, baseline: str, count: int
+) -> None:
+    seen = look_of_three()
+    shows = [seen.shows[0].copy(), seen.shows[1].copy(), seen.shows[2].copy()]
+    shows[0][:, 220:], shows[1][:, :180] = False, False
+    seen = replace(seen, shows=tuple(shows))
+    edges = [
+        {"numbers": [0, 1], "baseline": baseline}, {"numbers": [1, 2], "baseline": "measured"},
+    ]  # fmt: skip
+    found = judge(seen, (7, 5), {**SURE, "rig": {"scale": scale, "focal_spread": 0.0, "edges": edges}})
+    assert [place.box for place in found.places] == [(180 + 7, 5, 40, 300)] * count
+    assert found.rating == ("good" if scale == "measured" else "look")
+    if count:
+        assert found.because == found.places[0].what, "it is said once"
 
 
 def test_without_a_seam_nothing_is_compared_and_nothing_crashes() -> None:

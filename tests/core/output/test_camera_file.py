@@ -70,11 +70,18 @@ def known(table: dict) -> list[str]:
 def test_those_that_are_given_are_held_and_the_others_found() -> None:
     assert known({name: {"K": K} for name in NAMES}) == ["camera file"] * 3
     some = known({"a.png": {"K": K}, "c.png": {"K": K}})
-    assert some == ["camera file", "the other picture (camera file)", "camera file"]
+    assert some == ["camera file", "a.png (camera file)", "camera file"]
     posed = {"K": K, "R": EYE, "t": [0, 0, 0]}
     assert known({"a.png": posed, "b.png": posed, "c.png": {"K": K}}) == [
         "camera file and pose", "camera file and pose", "camera file",
     ]  # fmt: skip
+
+
+def test_a_borrowed_focal_length_says_whose_it_is() -> None:
+    exifs = [Exif(), Exif(focal35_mm=28.0), Exif()]
+    found, _ = cameras_for(CameraRequest(), NAMES, [(400, 300)] * 3, exifs)
+    assert [camera.lens_of for camera in found] == ["b.png", "", "b.png"]
+    assert found[0].source == "b.png (EXIF 35 mm equivalent)"
 
 
 def test_names_that_are_none_of_the_pictures_are_told() -> None:

@@ -406,6 +406,8 @@ def test_given_matches_are_all_kept_and_a_wrong_one_is_named(name: str, camera: 
     assert view.inliers.all() and view.model == usual.model
     (warning,) = set(view.warnings) - set(usual.warnings)
     assert warning.startswith("1 of the given matches")
+    assert (usual.contradicting, view.contradicting) == (0, 1)
+    assert estimate(replace(clean, y=y, given=False), camera, camera).contradicting == 0
     assert f"{clean.x[7, 0]:.1f},{clean.x[7, 1]:.1f} and {y[7, 0]:.1f},{y[7, 1]:.1f}" in warning
     # it moves nothing
     assert infinity_off(view, usual.H_inf) < 1

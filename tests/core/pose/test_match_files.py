@@ -102,7 +102,7 @@ BEYOND = "lies outside the target, which has 320×200 pixels"
     ("639.51,2,3,4\n", ("line 1", "(639.51, 2)", "outside the reference")),
     ("1,479.51,3,4\n", ("line 1", "outside the reference")), ("1,-0.51,3,4\n", ("line 1", "outside the reference")),
     ("1,2,319.51,4\n", ("line 1", "(319.51, 4)", BEYOND)), ("1,2,-0.51,4\n", ("line 1", BEYOND)),
-    ("1,2,3,199.51\n1,2,3,4\n1,2,3,300\n1,2,3,301\n", ("line 1", BEYOND, "(and 2 more lines)", "upright target")),
+    ("1,2,3,199.51\n1,2,3,4\n1,2,3,300\n1,2,3,301\n", ("line 1", BEYOND, "(and 2 more lines)", "at full size")),
     ("1,2,3,-0.51\n", ("line 1", BEYOND)), ("1,2,3,900,0\n", ("line 1", BEYOND)),
     (b"\x89PNG\r\n\x1a\n" + bytes(range(256)), ("not a text in UTF-8", "CSV")),
     ("1,2,3,4\n".encode("utf-16"), ("not a text in UTF-8",)),

@@ -77,7 +77,8 @@ def test_a_pair_takes_its_own_rows(tmp_path: Path) -> None:
     ("x,y,x2,y2\n1,2,3,4\n", "of 3 pictures, a header must name the columns picture and picture2"),
     (TABLE + "d.png,a.png,1,2,3,4,1\n", r"line 7: no picture is called 'd\.png'; there are: a\.png"),
     (TABLE + "a.png,a,1,2,3,4,1\n", r"line 7: both points lie in a\.png"),
-    (TABLE + "a.png,b.png,1,99,3,4,1\n", "line 7: the point .* lies outside"),
+    (TABLE + "a.png,b.png,1,99,3,4,1\n", r"line 7: the point .* lies outside a\.png, which has 40×30"),
+    (TABLE + "c.png,b.png,1,2,41,4,1\n", r"line 7: the point .* lies outside b\.png"),
 ])  # fmt: skip
 def test_a_file_that_does_not_fit_is_refused(
     tmp_path: Path, pictures: list[Picture], text: str, words: str

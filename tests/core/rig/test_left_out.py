@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import pytest
 from edf_stitch.core.cameras.rig import Registration
-from edf_stitch.core.rig.left_out import check_connected
+from edf_stitch.core.cameras.sources import CameraRequest, cameras_for
+from edf_stitch.core.pictures.metadata import Exif
+from edf_stitch.core.rig.left_out import check_connected, left_out_warnings
 from edf_stitch.core.rig.reframing import seen_from
 from edf_stitch.core.system.errors import BadRequest, NoOverlap
 
@@ -31,6 +33,16 @@ def test_a_picture_may_be_left_out_unless_all_are_required() -> None:
 def test_fewer_than_two_make_no_panorama() -> None:
     with pytest.raises(NoOverlap, match="no two of these 5 pictures connect.*take pictures between them"):
         check_connected(found(), NAMES, False)
+
+
+def test_it_is_told_when_the_focal_length_came_from_a_picture_that_is_left_out() -> None:
+    for lender, told in ((3, 1), (2, 0)):  # d.png is left out, c.png is not
+        exifs = [Exif(focal35_mm=28.0 if number == lender else None) for number in range(5)]
+        cameras, _ = cameras_for(CameraRequest(), NAMES, [(400, 300)] * 5, exifs)
+        first, *rest = left_out_warnings(found(0, 1, 2, 4), cameras, NAMES)
+        assert first == "d.png is left out: at most 3 matches"
+        assert len(rest) == told
+        assert not rest or ("first taken from it" in rest[0] and "EXIF 35 mm" in rest[0])
 
 
 @pytest.mark.parametrize(("viewpoint", "first"), [

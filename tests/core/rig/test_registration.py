@@ -133,6 +133,15 @@ def test_half_tripod_half_hand_held() -> None:
     assert placed_off(found, rig).max() < 0.2
 
 
+def test_one_tripod_whose_pictures_are_proposed_as_two_stations_is_one() -> None:
+    """No pair between its halves has matches: what they share with the others tells that they stand at one place."""
+    rig, halves = make_rig("half", 1, points=4000), (set(range(3)), set(range(3, 6)))
+    kept = [pair for pair in rig.matches if not all({pair.i, pair.j} & half for half in halves)]
+    found = register(rig.cameras, rig.points, kept)
+    assert found.rig.stations == (tuple(range(6)),)
+    assert (found.rig.inverse_ranges < 0).mean() < 0.02
+
+
 def test_lengths_along_a_chain_are_not_measured() -> None:
     """And how far any other picture is from the first one is a guess, to about half of it."""
     found = registered(make_rig("chain", 1)).rig

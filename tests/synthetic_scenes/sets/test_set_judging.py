@@ -9,7 +9,17 @@ from typing import Any
 import pytest
 from edf_stitch.synthetic_scenes.limits import Check
 from edf_stitch.synthetic_scenes.sets.recipes import SETS
-from edf_stitch.synthetic_scenes.sets.set_thresholds import BARS, LEAD, OURS, PROOF, ROTATION_ONLY, set_checks
+from edf_stitch.synthetic_scenes.sets.set_thresholds import (
+    BARS,
+    BESIDE,
+    BESIDE_MEASURES,
+    LEAD,
+    LEAST,
+    OURS,
+    PROOF,
+    ROTATION_ONLY,
+    set_checks,
+)
 from edf_stitch.synthetic_scenes.suites import heading
 from edf_stitch.synthetic_scenes.thresholds import judge, medians
 from edf_stitch.synthetic_scenes.validation_report import report_files, summary_lines
@@ -39,14 +49,25 @@ def failed(result: dict[str, Any]) -> list[str]:
 def test_every_bar_holds_for_what_was_measured_and_none_is_loose(scene: str) -> None:
     assert failed(measured(scene)) == []
     for bar in BARS[scene]:
-        if bar.at_most is not None and bar.measured > 0:
-            assert bar.at_most <= 2 * bar.measured, bar
+        if bar.at_most is not None:
+            assert bar.at_most <= max(2 * abs(bar.measured), LEAST.get(bar.measure, 0.0)), bar
         if bar.at_least is not None:
             assert bar.at_least >= bar.measured - 1.01, bar
 
 
 def test_every_set_has_bars() -> None:
     assert set(BARS) == set(SETS)
+    beside = {scene for scene, bars in BARS.items() if {bar.measure for bar in bars} >= set(BESIDE_MEASURES)}
+    assert beside == set(BESIDE) == set(SETS) - {"small_room"}
+
+
+def test_what_lies_beside_its_ray_fails_from_one_place_and_from_a_place_that_slides() -> None:
+    for name, figure in zip(BESIDE_MEASURES, BESIDE["ring"], strict=True):
+        result = measured("ring")
+        result["runs"][OURS]["figures"][name] = 1.29 * figure
+        assert failed(result) == []
+        result["runs"][OURS]["figures"][name] = 1.32 * figure
+        assert failed(result) == [name]
 
 
 @pytest.mark.parametrize("bar", BARS["small_room"], ids=lambda bar: bar.measure)
@@ -87,6 +108,7 @@ def test_sets_are_judged_beside_pairs_and_enter_no_median() -> None:
     result = measured()
     verdict = judge([result], complete=False)
     assert verdict.passed and all(isinstance(check, Check) for check in verdict.checks)
+    assert judge([result], complete=True).passed, "of a suite without pairs no median is due"
     assert all(middle.scenes == 0 for middle in medians([result]))
     crashed = copy.deepcopy(result) | {"status": "failed", "message": "gone", "runs": {}, "proof": {}}
     assert [check.measure for check in judge([crashed], complete=False).failed] == ["status"]
