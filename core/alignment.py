@@ -19,6 +19,7 @@ from .cameras.edge import Edge
 from .cameras.lens import undistort
 from .cameras.matches import Matches
 from .cameras.rig import Rig
+from .cameras.scale import Places, Scale, scale_for
 from .cameras.sources import cameras_for, role
 from .cameras.two_view import TwoView
 from .cameras.view import View, views_of
@@ -82,6 +83,8 @@ class Alignment:
         Names of the pictures that connect with no others, and why.
     numbers : tuple of int
         Which of the frame's pictures are used, in their order here.
+    scale : Scale
+        How long the unit of depth is.
     """
 
     cameras: tuple[Camera, ...]
@@ -96,6 +99,7 @@ class Alignment:
     rig: Rig | None = None
     left_out: tuple[tuple[str, str], ...] = ()
     numbers: tuple[int, ...] = (0, 1)
+    scale: Scale = Scale()
 
     @property
     def pair_field(self) -> Field:
@@ -110,7 +114,7 @@ class Geometry:
 
     Attributes
     ----------
-    cameras, edges, warnings, rig, left_out
+    cameras, edges, warnings, rig, left_out, scale
         As in `Alignment`.
     numbers : tuple of int
         Which of the frame's pictures are used, in their order from here on.
@@ -122,6 +126,15 @@ class Geometry:
     numbers: tuple[int, ...] = (0, 1)
     rig: Rig | None = None
     left_out: tuple[tuple[str, str], ...] = ()
+    scale: Scale = Scale()
+
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """The places (N, 3) of the pictures, NaN where they are not known."""
+        if self.rig is not None:
+            return self.rig.centres
+        pose = self.edges[0].two_view
+        return np.stack([np.zeros(3), -pose.R.T @ pose.t])
 
 
 def align(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Alignment:
@@ -156,7 +169,7 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     frames : sequence of Frame
         Of the same cameras; of more than two, the first frame alone is looked at.
     options : StitchOptions
-        What is known of cameras and matches; preview, seed and cache. The field does not matter.
+        What is known of cameras, matches and a distance; seed and cache. The field does not matter.
     progress : callable
         As for `align`.
 
@@ -179,7 +192,20 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     full, warnings = cameras_for(options.camera, frames[0].names, sizes, [picture.exif for picture in pictures])
     cameras = tuple(camera.resized(size_of(picture)) for camera, picture in zip(full, pictures, strict=True))
     if len(pictures) > 2:
-        return _of_many(frames[0], cameras, warnings, options, progress)
+        found = _of_many(frames[0], cameras, warnings, options, progress)
+    else:
+        found = _of_pair(frames, cameras, warnings, options, progress)
+    frame = frames[0]
+    places = Places(frame.names, frame.shown_by, found.numbers, found.centres)
+    return replace(found, scale=scale_for(options.scale_metres, cameras, places))
+
+
+def _of_pair(
+    frames: Sequence[Frame], cameras: tuple[Camera, ...], warnings: Sequence[str], options: StitchOptions,
+    progress: ReportProgress,
+) -> Geometry:  # fmt: skip
+    """The geometry of two pictures."""
+    pictures = frames[0].pictures
     cache = Cache(options.cache)
     if options.matches is None:
         progress("features", 0.0)
@@ -219,7 +245,8 @@ def _of_many(
     warnings = (*warnings, *(f"{name} is left out: {why}" for name, why in left_out))
     found = seen_from(found, options.viewpoint, frame.names, frame.shown_by)
     if len(found.numbers) == 2:
-        pair = estimate_geometry([frame.only(found.numbers)], replace(options, viewpoint=None), progress)
+        pair_options = replace(options, viewpoint=None, scale_metres=None)
+        pair = estimate_geometry([frame.only(found.numbers)], pair_options, progress)
         return replace(pair, warnings=(*warnings, *pair.warnings), numbers=found.numbers, left_out=left_out)
     edges = edges_of(found.rig, matched, found.numbers)
     return Geometry(found.rig.cameras, edges, warnings, found.numbers, found.rig, left_out)
@@ -300,7 +327,7 @@ def fit_and_warp(
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(
         cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide,
-        left_out=geometry.left_out, numbers=geometry.numbers,
+        left_out=geometry.left_out, numbers=geometry.numbers, scale=geometry.scale,
     )  # fmt: skip
 
 
@@ -318,7 +345,7 @@ def _many_mapped(
     warnings = (*geometry.warnings, *field.warnings)
     return Alignment(
         geometry.cameras, geometry.edges, rig.views, field, mapped.warp, warnings, None, mapped.continuation,
-        mapped.slide, rig, geometry.left_out, geometry.numbers,
+        mapped.slide, rig, geometry.left_out, geometry.numbers, geometry.scale,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .cameras.scale import ScaleMetres
 from .cameras.sources import CameraRequest
 from .choices import (
     BLENDS,
@@ -63,6 +64,9 @@ class StitchOptions:
         "centre" for the one that is best connected with all others. By default the first that connects with others.
     require_all : bool, default False
         Whether a picture that connects with no others is an error, and not left out.
+    scale_metres : (int or str, int or str, float), optional
+        Two pictures, each by its number, counted from 1, or its name, and how many metres apart they were taken: then
+        ranges are in metres. Else they are if the cameras that are given are, and in baselines if nothing is known.
     slide : float or "auto", default "auto"
         How far the viewpoint slides from the reference's place to the target's across the overlap: 0 stays, 1 goes all
         the way, "auto" chooses (docs/method.md).
@@ -96,7 +100,7 @@ class StitchOptions:
         reference's.
     holes : str, default "auto"
         What becomes of pixels that no camera saw, one of HOLES: "auto" fills small closed holes, "inpaint" all that
-        something near hid. `linear` blending has none of the latter.
+        something near hid, which `linear` blending has none of; of more than two pictures all closed holes.
     seed : int, default 0
         Of every random choice, 0 to 2³¹ − 1.
     measure : bool, default True
@@ -115,6 +119,7 @@ class StitchOptions:
     ignore_in: tuple[tuple[str, Path | NDArray[Any]], ...] = ()
     viewpoint: int | str | None = None
     require_all: bool = False
+    scale_metres: ScaleMetres | None = None
     slide: Slide = "auto"
     projection: str = "auto"
     level: Level = "auto"
@@ -218,6 +223,13 @@ class StitchOptions:
             raise BadRequest("the seed must be a whole number from 0 to 2147483647")
         if isinstance(self.viewpoint, int) and self.viewpoint < 1:
             raise BadRequest(f"the viewpoint {self.viewpoint}: pictures are counted from 1")
+        if self.scale_metres is not None:
+            one, other, metres = self.scale_metres
+            if not 0 < metres < np.inf or one == other:
+                raise BadRequest(
+                    f"the scale {one}, {other}, {metres:g}: two different pictures, and their distance in metres above "
+                    "0, are needed"
+                )
         self._check_projection()
         self._check_level()
         self._check_frame()

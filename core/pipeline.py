@@ -20,6 +20,7 @@ from .cameras.camera import Camera
 from .cameras.edge import Edge
 from .cameras.matches import Matches
 from .cameras.rig import Rig
+from .cameras.scale import Scale
 from .cameras.view import View
 from .compose.composition import Composition, composed
 from .compose.crop import crop_box
@@ -86,6 +87,8 @@ class StitchResult:
         As they were known before estimation; of more than two pictures, as they were estimated.
     rig : Rig or None
         The cameras and points of more than two pictures.
+    scale : Scale
+        How long a baseline is, the unit of depth.
     warnings : tuple of str
         In plain words.
     report : dict
@@ -114,6 +117,7 @@ class StitchResult:
     seconds: dict[str, float]
     full_sizes: tuple[tuple[int, int], ...]
     rig: Rig | None = None
+    scale: Scale = Scale()
 
     @property
     def pixels(self) -> NDArray[np.float32]:
@@ -303,12 +307,14 @@ def compose(
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))
 
     progress("write", 0.0)
-    hidden = np.logical_or.reduce([one.hidden for one in made.decided])
     told = (
         options, pictures, alignment, canvas, made.decided, looks, panorama.alpha > 0, int(made.filled.sum()),
-        int((hidden & (made.panorama.alpha == 0)).sum()),
     )  # fmt: skip
-    report, more = make_report(*told) if alignment.rig is None else make_rig_report(*told, labels)
+    if alignment.rig is None:
+        hidden = np.logical_or.reduce([one.hidden for one in made.decided])
+        report, more = make_report(*told, int((hidden & (made.panorama.alpha == 0)).sum()))
+    else:
+        report, more = make_rig_report(*told, labels)
     named = (line for picture in pictures for line in _named(picture))
     warnings = (*frame.warnings, *named, *alignment.warnings, *more)
     report["warnings"] = list(warnings)
@@ -323,7 +329,7 @@ def compose(
         warp=warp, occluded=occluded, labels=labels, inpainted=cut(made.filled, box),
         decided=made.decided, edges=alignment.edges, views=alignment.views, field=alignment.field,
         cameras=alignment.cameras, warnings=warnings, report=report, seconds=progress.seconds,
-        full_sizes=frame.full_sizes, rig=alignment.rig,
+        full_sizes=frame.full_sizes, rig=alignment.rig, scale=alignment.scale,
     )  # fmt: skip
 
 

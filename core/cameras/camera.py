@@ -42,6 +42,8 @@ class Camera:
         Standard deviation of the principal point in units of the longer side; 0 if it is fixed.
     knowledge : Knowledge
         How the focal length is known.
+    in_metres : bool
+        Whether the pose is in metres, and not in a unit of its own.
     """
 
     K: NDArray[np.float64]
@@ -52,6 +54,7 @@ class Camera:
     pose: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     principal_sigma: float = 0.0
     knowledge: Knowledge = Knowledge.GIVEN
+    in_metres: bool = False
 
     @property
     def focal(self) -> float:

@@ -62,6 +62,13 @@ def _add_cameras(parser: argparse.ArgumentParser) -> None:
     )
 
 
+    camera.add_argument(
+        "--scale-metres", type=_scale_metres, metavar="A,B,D",
+        help="the pictures A and B, by number, counted from 1, or name, were taken D metres apart: ranges are in "
+        "metres",
+    )  # fmt: skip
+
+
 def _add_many(parser: argparse.ArgumentParser) -> None:
     """What is decided about more than two pictures."""
     many = parser.add_argument_group("more than two pictures")
@@ -164,8 +171,8 @@ def _add_composition(how: argparse._ArgumentGroup) -> None:
     )
     how.add_argument(
         "--holes", default="auto", type=_choice(HOLES), metavar="HOLES",
-        help="what neither camera saw: auto (default: small closed holes are filled smoothly), transparent, or "
-        "inpaint (all that something near hid)",
+        help="what no camera saw: auto (default: small closed holes are filled smoothly), transparent, or inpaint (of "
+        "two pictures all that something near hid, of more all holes that are closed)",
     )  # fmt: skip
 
 
@@ -197,6 +204,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         ignore_in=tuple(args.ignore),
         viewpoint=args.viewpoint,
         require_all=args.require_all,
+        scale_metres=args.scale_metres,
         slide=args.slide,
         projection=args.projection,
         level=parse_level(args.level),
@@ -239,7 +247,15 @@ def numbered(options: StitchOptions, pictures: Sequence[Path]) -> StitchOptions:
         raise BadRequest(f"the viewpoint is picture {viewpoint}, and only {count} are given")
     if isinstance(viewpoint, str) and viewpoint != CENTRE:
         viewpoint = number_of(viewpoint, names, "--viewpoint") + 1
-    return replace(options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint)
+    scale = options.scale_metres
+    if scale is not None:
+        one, other = (
+            number_of(name, names, "--scale-metres") + 1 if isinstance(name, str) else name for name in scale[:2]
+        )
+        scale = one, other, scale[2]
+    return replace(
+        options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint, scale_metres=scale
+    )  # fmt: skip
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -253,6 +269,20 @@ def _viewpoint(text: str) -> int | str:
     if text.casefold() in (CENTRE, "center"):
         return CENTRE
     return int(text) if text.isdecimal() else text
+
+
+def _scale_metres(text: str) -> tuple[int | str, int | str, float]:
+    parts = text.split(",")
+    try:
+        one, other, metres = parts[0], ",".join(parts[1:-1]), float(parts[-1])
+    except ValueError:
+        metres = 0.0
+    if len(parts) < 3 or not metres > 0 or not one or not other:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not like A,B,D: two pictures, by number or name, and their distance in metres"
+        )
+    first, second = (int(name) if name.isdecimal() else name for name in (one, other))
+    return first, second, metres
 
 
 def _named_mask(text: str) -> tuple[str, Path]:

@@ -31,7 +31,7 @@ def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "continue", "camera": CameraRequest(), "matches": None, "ignore": (),
-        "ignore_in": (), "viewpoint": None, "require_all": False,
+        "ignore_in": (), "viewpoint": None, "require_all": False, "scale_metres": None,
         "slide": "auto", "projection": "auto", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
         "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": "auto",
         "holes": "auto", "seed": 0, "measure": True, "cache": None,
