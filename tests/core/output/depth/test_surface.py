@@ -123,12 +123,27 @@ def test_a_spike_is_taken_away() -> None:
 
 def test_a_wide_slope_is_a_real_one() -> None:
     """It is seen under a small angle, as the ground is by a telephoto: neither cut nor made a step."""
-    d = np.full((ROWS, COLUMNS), 1.0)
-    d[30:90] = np.linspace(1.0, 16.0, 60)[:, None]
-    d[90:] = 16.0
+    d = np.full((ROWS, COLUMNS), 0.1)
+    d[40:51], d[51:] = np.linspace(0.1, 1.0, 11)[:, None], 1.0
     surface = cut_surface(grid(d, np.full((ROWS - 1, COLUMNS - 1), 1.0)))
-    away = np.unique((1 / np.linalg.norm(surface.vertices, axis=1)).round(6))
-    assert len(away) > 50
+    assert len(surface.vertices) == ROWS * COLUMNS
+    assert len(np.unique((1 / np.linalg.norm(surface.vertices, axis=1)).round(6))) == 11
+    narrow = np.full((ROWS, COLUMNS), 0.1)
+    narrow[40:46], narrow[46:] = np.linspace(0.1, 1.0, 6)[:, None], 1.0
+    surface = cut_surface(grid(narrow, np.full((ROWS - 1, COLUMNS - 1), 1.0)))
+    assert len(np.unique((1 / np.linalg.norm(surface.vertices, axis=1)).round(6))) == 2
+
+
+@pytest.mark.parametrize("turn", range(4))
+@pytest.mark.parametrize("middle", [0.47, 0.53])
+def test_a_cell_is_continued_from_all_corners_of_its_side(turn: int, middle: float) -> None:
+    """Two corners are near, and the others take their mean, whichever way round they lie."""
+    ring = np.roll([0.5, 0.52, 0.2, 0.2], turn)  # from the lower left counter-clockwise
+    d = np.array([[ring[3], ring[2]], [ring[0], ring[1]]])
+    corners = np.ix_([0, 1], [0, 1])
+    one = DepthGrid(RAYS[corners], d, np.ones((2, 2), bool), np.zeros((2, 2, 2)), None, np.array([[middle]]))
+    found = 1 / np.linalg.norm(cut_surface(one).vertices, axis=1)
+    np.testing.assert_allclose(np.sort(found), [0.5, 0.51, 0.51, 0.52], rtol=1e-6)
 
 
 def test_without_middles_a_cell_across_an_edge_is_far() -> None:
