@@ -210,7 +210,7 @@ def _of_pair(
     if options.matches is None:
         progress("features", 0.0)
         seen = tuple((picture.view, picture.alpha) for frame in frames for picture in frame.pictures)
-        quick = options.preview
+        quick = options.few_features
         matches = cache.remember("matches", (*seen, quick), lambda: _found_in(frames, progress, quick))
     else:
         matches = _given(options.matches, frames[0], cameras)
@@ -235,7 +235,7 @@ def _of_many(
     pictures, cache = frame.pictures, Cache(options.cache)
     order = content_order(pictures)
     if options.matches is None:
-        matched = matched_pictures(pictures, order, options.preview, cache, progress)
+        matched = matched_pictures(pictures, order, options.few_features, cache, progress)
     else:
         worked = [camera.size for camera in cameras]
         matched = given_matches(options.matches, pictures, frame.full_sizes, worked)

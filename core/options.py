@@ -101,6 +101,9 @@ class StitchOptions:
     holes : str, default "auto"
         What becomes of pixels that no camera saw, one of HOLES: "auto" fills small closed holes, "inpaint" all that
         something near hid, which `linear` blending has none of; of more than two pictures all closed holes.
+    preview : bool, default False
+        Whether the panorama is only to be looked at, at one or two megapixels. Its geometry is found on the full
+        pictures, so that with a cache the same call without it takes that over.
     seed : int, default 0
         Of every random choice, 0 to 2³¹ − 1.
     measure : bool, default True
@@ -133,6 +136,7 @@ class StitchOptions:
     mask: Path | NDArray[Any] | None = None
     exposure: Exposing = "auto"
     holes: str = "auto"
+    preview: bool = False
     seed: int = 0
     measure: bool = True
     cache: Path | None = dataclasses.field(default=None, compare=False)
@@ -197,8 +201,8 @@ class StitchOptions:
         return self.surface[0] != "reference" and self.slide != 0
 
     @property
-    def preview(self) -> bool:
-        """A plain average by a smooth field is only looked at: it gets fewer features, at a smaller size."""
+    def few_features(self) -> bool:
+        """A plain average by a smooth field is only looked at: it gets fewer features, found at a smaller size."""
         return self.blend == "linear" and not self.dense
 
     @property
@@ -230,6 +234,7 @@ class StitchOptions:
                     f"the scale {one}, {other}, {metres:g}: two different pictures, and their distance in metres above "
                     "0, are needed"
                 )
+        self._check_preview()
         self._check_projection()
         self._check_level()
         self._check_frame()
@@ -239,6 +244,10 @@ class StitchOptions:
             raise BadRequest(
                 f"the crop {self.crop} is no box: X, Y, W, H in px are needed, X and Y from 0, W and H at least 1"
             )
+
+    def _check_preview(self) -> None:
+        if self.preview and not isinstance(self.crop, str):
+            raise BadRequest("a crop in px is one of the full panorama: of a preview leave it out")
 
     def _check_exposure(self) -> None:
         if isinstance(self.exposure, str) and self.exposure not in EXPOSURES:

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .alignment import Alignment, estimate_geometry, fit_and_warp
+from .alignment import Alignment, Geometry, estimate_geometry, fit_and_warp
 from .cameras.camera import Camera
 from .cameras.edge import Edge
 from .cameras.matches import Matches
+from .cameras.resized import resized_edge, resized_rig
 from .cameras.rig import Rig
 from .cameras.scale import Scale
 from .cameras.view import View
@@ -27,7 +28,9 @@ from .compose.crop import crop_box
 from .compose.decided import Decided
 from .field.field import Field
 from .field.sphere_field import SphereField
-from .frames.frame import Frame
+from .frames.frame import Frame, size_of
+from .frames.options import PREVIEW
+from .frames.preview import first_share, next_share
 from .frames.reading import Source, read_frame
 from .measure.fallback import first_usable
 from .measure.look import look_at
@@ -240,11 +243,34 @@ def stitch(
         frame = read_frame(pictures, options)
         geometry = estimate_geometry([frame], options, stopwatch)
         frame = frame.only(geometry.numbers)
+        return (_preview if options.preview else _made)(frame, geometry, options, stopwatch)
 
-        def made(by: StitchOptions) -> StitchResult:
-            return compose(frame, fit_and_warp(geometry, [frame], by, stopwatch), by, stopwatch)
 
-        return first_usable(made, options) if geometry.rig is None else made(options)
+def _made(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:
+    """The panorama of a geometry, of a pair the first that is usable."""
+
+    def made(by: StitchOptions) -> StitchResult:
+        return compose(frame, fit_and_warp(geometry, [frame], by, progress), by, progress)
+
+    return first_usable(made, options) if geometry.rig is None else made(options)
+
+
+def _preview(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:
+    """A small panorama of a geometry that was found on the full pictures."""
+    turns = [np.eye(3), geometry.edges[0].two_view.R] if geometry.rig is None else geometry.rig.R
+    share = first_share(geometry.cameras, list(turns))
+    for tries_left in range(PREVIEW.tries - 1, -1, -1):
+        small = frame.resized(share)
+        sizes = [size_of(picture) for picture in small.pictures]
+        edges = tuple(resized_edge(edge, geometry.cameras, sizes) for edge in geometry.edges)
+        rig = None if geometry.rig is None else resized_rig(geometry.rig, sizes)
+        cameras = tuple(camera.resized(size) for camera, size in zip(geometry.cameras, sizes, strict=True))
+        result = _made(small, replace(geometry, cameras=cameras, edges=edges, rig=rig), options, progress)
+        better = next_share(share, result.canvas.width * result.canvas.height)
+        if better == share or not tries_left:
+            break
+        share = better
+    return result
 
 
 def compose(

@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
     ----------
     parser : argparse.ArgumentParser
     with_field : bool
-        Whether `--field` is among them; not where one command stitches with several.
+        Whether `--field` and `--preview` are among them; not where one command stitches with several fields.
     """
     _add_cameras(parser)
     _add_control(parser)
@@ -35,6 +35,8 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         )  # fmt: skip
     _add_alignment(how)
     _add_composition(how)
+    if with_field:
+        _add_preview(how)
     _add_repetition(how)
 
 
@@ -176,6 +178,15 @@ def _add_composition(how: argparse._ArgumentGroup) -> None:
     )  # fmt: skip
 
 
+def _add_preview(how: argparse._ArgumentGroup) -> None:
+    """Whether the panorama is only to be looked at."""
+    how.add_argument(
+        "--preview", action="store_true",
+        help="a panorama of one or two megapixels, by the geometry of the full pictures, which the same call without "
+        "it takes from the cache",
+    )  # fmt: skip
+
+
 def _add_repetition(how: argparse._ArgumentGroup) -> None:
     """What another stitch of the same pictures takes from this one: what was kept, and the random choices."""
     how.add_argument(
@@ -218,6 +229,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         mask=args.mask,
         exposure=args.exposure,
         holes=args.holes,
+        preview=getattr(args, "preview", False),
         seed=args.seed,
         measure=measure,
         cache=default_folder() if args.cache else None,

@@ -9,9 +9,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core import pipeline
 from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.projective import distance_to_line, project, rotation_angle, rotation_from_vector
 from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.frames import preview
+from edf_stitch.core.frames.options import PREVIEW
 from edf_stitch.core.measure.report import plain
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.camera_file import camera_table
@@ -21,6 +24,7 @@ from edf_stitch.core.output.outputs import OutputRequest, check, warp_bytes, wri
 from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchResult, stitch
+from edf_stitch.core.pose import features
 from edf_stitch.core.system.errors import BadRequest, Cancelled, NoOverlap
 from edf_stitch.core.system.output_files import OutputFiles
 
@@ -128,6 +132,33 @@ def test_depth_and_mesh_of_a_set_are_written(set_result: StitchResult, tmp_path:
     assert image.range.shape == set_result.alpha.shape and image.deviation is not None
     shown = set_result.alpha > 0
     assert np.isfinite(image.range[shown]).mean() > 0.9 and np.isnan(image.range[~shown]).all()
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_a_preview_is_small_and_the_full_panorama_has_its_geometry(
+    four: PictureSet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
+) -> None:
+    """Nothing is found twice, and the full one is that of a call without a preview before it."""
+    options = replace(KNOWN, projection="cylindrical", cache=tmp_path)
+    for number in (preview, pipeline):
+        monkeypatch.setattr(number, "PREVIEW", replace(PREVIEW, pixels=30_000, least_pixels=20_000, most_pixels=45_000))
+    small = stitch(four.pictures[:count], replace(options, preview=True))
+    height, width = small.alpha.shape
+    assert 20_000 < width * height < 45_000 and small.report["options"]["preview"]
+    found: list[str] = []
+    real = features.detect
+    monkeypatch.setattr(features, "detect", lambda *asked: found.append("features") or real(*asked))
+    full = stitch(four.pictures[:count], options)
+    assert not found, "its features are kept"
+    assert np.array_equal(full.panorama.pixels, stitch(four.pictures[:count], replace(options, cache=None)).pixels)
+    assert full.alpha.size > 2 * small.alpha.size
+    for one, other in zip(small.views, full.views, strict=True):
+        np.testing.assert_array_equal(one.R, other.R)
+        np.testing.assert_array_equal(one.t, other.t)
+    shown = [
+        cv2.resize(one.alpha * one.pixels[..., 1], (80, 30), interpolation=cv2.INTER_AREA) for one in (small, full)
+    ]
+    assert np.abs(shown[0] - shown[1]).mean() < 0.03 * shown[1].mean() + 0.02, "it shows the same"
 
 
 def test_a_picture_that_does_not_belong_is_left_out_and_named(four: PictureSet) -> None:

@@ -205,3 +205,12 @@ def test_the_pictures_of_a_scale_may_be_called_by_their_paths() -> None:
     assert found.scale_metres == (2, 3, 4.0)
     with pytest.raises(BadRequest, match="--scale-metres"):
         numbered(options("--scale-metres", "1.jpg,2.jpg,4"), pictures)
+
+
+def test_a_preview_is_one_of_a_stitch() -> None:
+    assert options("--preview").preview and not options().preview
+    parser = argparse.ArgumentParser()
+    add_options(parser, with_field=False)
+    assert not options_from(parser.parse_args([]), measure=False).preview
+    with pytest.raises(BadRequest, match="leave it out"):
+        options("--preview", "--crop", "1,2,30,40")
