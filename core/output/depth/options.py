@@ -22,9 +22,10 @@ class MeshOptions:
     """Distance from the viewpoint, in ranges of the nearest thing, by which the plane of a face has to pass it: a real
     surface that is seen at all passes beside it, a skin between near and far almost through it."""
 
-    ramp_nodes: int = 4
+    ramp_nodes: int = 10
     """Nodes from either side over which a step of depth may be spread and still be one: a smooth field and dense
-    refinement blur it by so much; wider slopes are real ones, like the ground of a telephoto."""
+    refinement blur it by so much (with 4 a person before a wall was smeared over it); wider slopes are real ones, like
+    the ground of a telephoto."""
 
     texture_px: int = 8192
     """px along the longer side of the texture: what every graphics card takes."""

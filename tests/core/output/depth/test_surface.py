@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from edf_stitch.core.output.depth import surface as surface_module
+from edf_stitch.core.output.depth.options import MESH
 from edf_stitch.core.output.depth.surface import DepthGrid, Surface, cut_surface, whole_surface
 from scipy.ndimage import gaussian_filter
 
@@ -121,8 +125,9 @@ def test_a_spike_is_taken_away() -> None:
     np.testing.assert_allclose(np.linalg.norm(surface.vertices, axis=1), 5.0)
 
 
-def test_a_wide_slope_is_a_real_one() -> None:
+def test_a_wide_slope_is_a_real_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is seen under a small angle, as the ground is by a telephoto: neither cut nor made a step."""
+    monkeypatch.setattr(surface_module, "MESH", replace(MESH, ramp_nodes=4))
     d = np.full((ROWS, COLUMNS), 0.1)
     d[40:51], d[51:] = np.linspace(0.1, 1.0, 11)[:, None], 1.0
     surface = cut_surface(grid(d, np.full((ROWS - 1, COLUMNS - 1), 1.0)))
