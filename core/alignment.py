@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +17,8 @@ from .cameras.edge import Edge
 from .cameras.lens import undistort
 from .cameras.matches import Matches
 from .cameras.rig import Rig
-from .cameras.sources import cameras_for, role
+from .cameras.scale import Places, Scale, scale_for
+from .cameras.sources import cameras_for
 from .cameras.two_view import TwoView
 from .cameras.view import View, views_of
 from .continuation.continuation import Continuation
@@ -37,20 +36,18 @@ from .panorama.choosing_slide import SlideChoice
 from .panorama.upright_edges import straight_edges
 from .panorama.warp import Warp
 from .pictures.picture import Picture
-from .pose import features
 from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
-from .pose.match_files import read_matches
-from .pose.options import EDGE_FOCAL, ESTIMATION, FEATURES
+from .pose.options import EDGE_FOCAL
+from .pose.pair_matches import found_in, given_of
 from .rig.given_matches import given_matches
 from .rig.left_out import check_connected, left_out_warnings
 from .rig.pair_edges import edges_of
 from .rig.reframing import seen_from
 from .system.cache import Cache
-from .system.errors import BadRequest, NoOverlap, StitchError, TooFewMatches
+from .system.errors import BadRequest, StitchError
 from .system.memory import give_back
 from .system.progress import ReportProgress
-from .system.threads import in_order
 
 SMOOTH_CLIP = "one smooth field serves all frames of a clip, so that nothing swims"
 
@@ -87,6 +84,8 @@ class Alignment:
         Which of the frame's pictures are used, in their order here.
     dense_sphere : DenseSphere or None
         Dense refinement of the field of more than two pictures; None where it was not asked for.
+    scale : Scale
+        How long the unit of depth is.
     """
 
     cameras: tuple[Camera, ...]
@@ -102,6 +101,7 @@ class Alignment:
     left_out: tuple[tuple[str, str], ...] = ()
     numbers: tuple[int, ...] = (0, 1)
     dense_sphere: DenseSphere | None = None
+    scale: Scale = Scale()
 
     @property
     def pair_field(self) -> Field:
@@ -116,7 +116,7 @@ class Geometry:
 
     Attributes
     ----------
-    cameras, edges, warnings, rig, left_out
+    cameras, edges, warnings, rig, left_out, scale
         As in `Alignment`.
     numbers : tuple of int
         Which of the frame's pictures are used, in their order from here on.
@@ -128,6 +128,15 @@ class Geometry:
     numbers: tuple[int, ...] = (0, 1)
     rig: Rig | None = None
     left_out: tuple[tuple[str, str], ...] = ()
+    scale: Scale = Scale()
+
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """The places (N, 3) of the pictures, NaN where they are not known."""
+        if self.rig is not None:
+            return self.rig.centres
+        pose = self.edges[0].two_view
+        return np.stack([np.zeros(3), -pose.R.T @ pose.t])
 
 
 def align(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Alignment:
@@ -162,7 +171,7 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     frames : sequence of Frame
         Of the same cameras; of more than two, the first frame alone is looked at.
     options : StitchOptions
-        What is known of cameras and matches; preview, seed and cache. The field does not matter.
+        What is known of cameras, matches and a distance; seed and cache. The field does not matter.
     progress : callable
         As for `align`.
 
@@ -185,15 +194,29 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     full, warnings = cameras_for(options.camera, frames[0].names, sizes, [picture.exif for picture in pictures])
     cameras = tuple(camera.resized(size_of(picture)) for camera, picture in zip(full, pictures, strict=True))
     if len(pictures) > 2:
-        return _of_many(frames[0], cameras, warnings, options, progress)
+        found = _of_many(frames[0], cameras, warnings, options, progress)
+    else:
+        found = _of_pair(frames, cameras, warnings, options, progress)
+    frame = frames[0]
+    places = Places(frame.names, frame.shown_by, found.numbers, found.centres)
+    return replace(found, scale=scale_for(options.scale_metres, cameras, places))
+
+
+def _of_pair(
+    frames: Sequence[Frame], cameras: tuple[Camera, ...], warnings: Sequence[str], options: StitchOptions,
+    progress: ReportProgress,
+) -> Geometry:  # fmt: skip
+    """The geometry of two pictures."""
+    pictures = frames[0].pictures
     cache = Cache(options.cache)
     if options.matches is None:
         progress("features", 0.0)
         seen = tuple((picture.view, picture.alpha) for frame in frames for picture in frame.pictures)
-        quick = options.preview
-        matches = cache.remember("matches", (*seen, quick), lambda: _found_in(frames, progress, quick))
+        quick = options.few_features
+        shown = [frame.pictures for frame in frames]
+        matches = cache.remember("matches", (*seen, quick), lambda: found_in(shown, progress, quick))
     else:
-        matches = _given(options.matches, frames[0], cameras)
+        matches = given_of(options.matches, pictures, frames[0].names, frames[0].full_sizes, cameras)
 
     progress("geometry", 0.0)
     ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
@@ -215,7 +238,7 @@ def _of_many(
     pictures, cache = frame.pictures, Cache(options.cache)
     order = content_order(pictures)
     if options.matches is None:
-        matched = matched_pictures(pictures, order, options.preview, cache, progress)
+        matched = matched_pictures(pictures, order, options.few_features, cache, progress)
     else:
         worked = [camera.size for camera in cameras]
         matched = given_matches(options.matches, pictures, frame.full_sizes, worked)
@@ -225,7 +248,8 @@ def _of_many(
     warnings = (*warnings, *left_out_warnings(found, cameras, frame.names))
     found = seen_from(found, options.viewpoint, frame.names, frame.shown_by)
     if len(found.numbers) == 2:
-        pair = estimate_geometry([frame.only(found.numbers)], replace(options, viewpoint=None), progress)
+        pair_options = replace(options, viewpoint=None, scale_metres=None)
+        pair = estimate_geometry([frame.only(found.numbers)], pair_options, progress)
         return replace(pair, warnings=(*warnings, *pair.warnings), numbers=found.numbers, left_out=left_out)
     edges = edges_of(found.rig, matched, found.numbers)
     return Geometry(found.rig.cameras, edges, warnings, found.numbers, found.rig, left_out)
@@ -306,7 +330,7 @@ def fit_and_warp(
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(
         cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide,
-        left_out=geometry.left_out, numbers=geometry.numbers,
+        left_out=geometry.left_out, numbers=geometry.numbers, scale=geometry.scale,
     )  # fmt: skip
 
 
@@ -332,7 +356,7 @@ def _many_mapped(
     warnings = (*geometry.warnings, *field.warnings)
     return Alignment(
         geometry.cameras, geometry.edges, rig.views, field, mapped.warp, warnings, None, mapped.continuation,
-        mapped.slide, rig, geometry.left_out, geometry.numbers, dense,
+        mapped.slide, rig, geometry.left_out, geometry.numbers, dense, geometry.scale,
     )  # fmt: skip
 
 
@@ -354,42 +378,3 @@ def _refined(
     if not isinstance(field, (StrictField, SlackField)):
         return Dense(None, f"the field {field.name!r} is shown as it is")
     return refine(field, field.two_view, inliers, edge.pair(frames[0].pictures), cameras)
-
-
-def _found_in(frames: Sequence[Frame], progress: ReportProgress, quick: bool) -> Matches:
-    """Features matched in each frame and pooled, in px of the pictures as worked on; quick: a preview's few."""
-    found = []
-    most = (FEATURES.preview_budget, FEATURES.preview_pixels) if quick else ()
-    for i, frame in enumerate(frames):
-        seen = []
-        for keypoints in in_order(lambda p: features.detect(p.view, p.alpha, *most), frame.pictures):
-            seen.append(keypoints)
-            progress("features", (i + 0.9 * len(seen) / len(frame.pictures)) / len(frames))
-        found.append(features.match(seen[0], seen[1]))
-        if len(frames) == 1 and len(found[0]) < ESTIMATION.min_matches:
-            _refuse_scarce(len(found[0]), frame, [len(one.points) for one in seen])
-    x, y = np.concatenate([m.x for m in found]), np.concatenate([m.y for m in found])
-    return Matches(x, y, max(m.scale for m in found))
-
-
-def _refuse_scarce(matches: int, frame: Frame, details: Sequence[int]) -> None:
-    """Raises TooFewMatches where there are few because one picture has hardly any points of detail; else it is the
-    pair's fault, which `estimate` says."""
-    for number, (picture, count) in enumerate(zip(frame.pictures, details, strict=True)):
-        if count < FEATURES.scarce_points:
-            width, height = size_of(picture)
-            raise TooFewMatches(
-                f"only {matches} matching points found, at least {ESTIMATION.min_matches} needed: the "
-                f"{role(number)} ({width}×{height} pixels) shows only {count} points of detail; choose a larger or "
-                "sharper picture of something with texture, or give matches by hand (--matches)"
-            )
-
-
-def _given(source: Path | NDArray[Any], frame: Frame, cameras: tuple[Camera, ...]) -> Matches:
-    """Matches from a file or array, at the scale of the work, without those in masked parts."""
-    worked, names = (cameras[0].size, cameras[1].size), (frame.names[0], frame.names[1])
-    matches = read_matches(source, frame.full_sizes[0], frame.full_sizes[1], worked, names)
-    seen = frame.pictures[0].shows(matches.x) & frame.pictures[1].shows(matches.y)
-    if not seen.any():
-        raise NoOverlap("all the given matches lie in parts of the pictures that are masked or transparent")
-    return matches.subset(seen)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .cameras.scale import ScaleMetres
 from .cameras.sources import CameraRequest
 from .choices import (
     BLENDS,
@@ -63,6 +64,9 @@ class StitchOptions:
         "centre" for the one that is best connected with all others. By default the first that connects with others.
     require_all : bool, default False
         Whether a picture that connects with no others is an error, and not left out.
+    scale_metres : (int or str, int or str, float), optional
+        Two pictures, each by its number, counted from 1, or its name, and how many metres apart they were taken: then
+        ranges are in metres. Else they are if the cameras that are given are, and in baselines if nothing is known.
     slide : float or "auto", default "auto"
         How far the viewpoint slides from the reference's place to the target's across the overlap: 0 stays, 1 goes all
         the way, "auto" chooses (docs/method.md).
@@ -96,7 +100,10 @@ class StitchOptions:
         reference's.
     holes : str, default "auto"
         What becomes of pixels that no camera saw, one of HOLES: "auto" fills small closed holes, "inpaint" all that
-        something near hid. `linear` blending has none of the latter.
+        something near hid, which `linear` blending has none of; of more than two pictures all closed holes.
+    preview : bool, default False
+        Whether the panorama is only to be looked at, at one or two megapixels. Its geometry is found on the full
+        pictures, so that with a cache the same call without it takes that over.
     seed : int, default 0
         Of every random choice, 0 to 2³¹ − 1.
     measure : bool, default True
@@ -115,6 +122,7 @@ class StitchOptions:
     ignore_in: tuple[tuple[str, Path | NDArray[Any]], ...] = ()
     viewpoint: int | str | None = None
     require_all: bool = False
+    scale_metres: ScaleMetres | None = None
     slide: Slide = "auto"
     projection: str = "auto"
     level: Level = "auto"
@@ -128,6 +136,7 @@ class StitchOptions:
     mask: Path | NDArray[Any] | None = None
     exposure: Exposing = "auto"
     holes: str = "auto"
+    preview: bool = False
     seed: int = 0
     measure: bool = True
     cache: Path | None = dataclasses.field(default=None, compare=False)
@@ -192,8 +201,8 @@ class StitchOptions:
         return self.surface[0] != "reference" and self.slide != 0
 
     @property
-    def preview(self) -> bool:
-        """A plain average by a smooth field is only looked at: it gets fewer features, at a smaller size."""
+    def few_features(self) -> bool:
+        """A plain average by a smooth field is only looked at: it gets fewer features, found at a smaller size."""
         return self.blend == "linear" and not self.dense
 
     @property
@@ -218,6 +227,14 @@ class StitchOptions:
             raise BadRequest("the seed must be a whole number from 0 to 2147483647")
         if isinstance(self.viewpoint, int) and self.viewpoint < 1:
             raise BadRequest(f"the viewpoint {self.viewpoint}: pictures are counted from 1")
+        if self.scale_metres is not None:
+            one, other, metres = self.scale_metres
+            if not 0 < metres < np.inf or one == other:
+                raise BadRequest(
+                    f"the scale {one}, {other}, {metres:g}: two different pictures, and their distance in metres above "
+                    "0, are needed"
+                )
+        self._check_preview()
         self._check_projection()
         self._check_level()
         self._check_frame()
@@ -227,6 +244,10 @@ class StitchOptions:
             raise BadRequest(
                 f"the crop {self.crop} is no box: X, Y, W, H in px are needed, X and Y from 0, W and H at least 1"
             )
+
+    def _check_preview(self) -> None:
+        if self.preview and not isinstance(self.crop, str):
+            raise BadRequest("a crop in px is one of the full panorama: of a preview leave it out")
 
     def _check_exposure(self) -> None:
         if isinstance(self.exposure, str) and self.exposure not in EXPOSURES:

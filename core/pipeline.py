@@ -15,18 +15,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .alignment import Alignment, estimate_geometry, fit_and_warp
+from .alignment import Alignment, Geometry, estimate_geometry, fit_and_warp
 from .cameras.camera import Camera
 from .cameras.edge import Edge
 from .cameras.matches import Matches
+from .cameras.resized import resized_edge, resized_rig
 from .cameras.rig import Rig
+from .cameras.scale import Scale
 from .cameras.view import View
 from .compose.composition import Composition, composed
 from .compose.crop import crop_box
 from .compose.decided import Decided
 from .field.field import Field
 from .field.sphere_field import SphereField
-from .frames.frame import Frame
+from .frames.frame import Frame, size_of
+from .frames.options import PREVIEW
+from .frames.preview import first_share, next_share
 from .frames.reading import Source, read_frame
 from .measure.fallback import first_usable
 from .measure.look import look_at
@@ -86,6 +90,8 @@ class StitchResult:
         As they were known before estimation; of more than two pictures, as they were estimated.
     rig : Rig or None
         The cameras and points of more than two pictures.
+    scale : Scale
+        How long a baseline is, the unit of depth.
     warnings : tuple of str
         In plain words.
     report : dict
@@ -114,6 +120,7 @@ class StitchResult:
     seconds: dict[str, float]
     full_sizes: tuple[tuple[int, int], ...]
     rig: Rig | None = None
+    scale: Scale = Scale()
 
     @property
     def pixels(self) -> NDArray[np.float32]:
@@ -236,11 +243,34 @@ def stitch(
         frame = read_frame(pictures, options)
         geometry = estimate_geometry([frame], options, stopwatch)
         frame = frame.only(geometry.numbers)
+        return (_preview if options.preview else _made)(frame, geometry, options, stopwatch)
 
-        def made(by: StitchOptions) -> StitchResult:
-            return compose(frame, fit_and_warp(geometry, [frame], by, stopwatch), by, stopwatch)
 
-        return first_usable(made, options) if geometry.rig is None else made(options)
+def _made(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:
+    """The panorama of a geometry, of a pair the first that is usable."""
+
+    def made(by: StitchOptions) -> StitchResult:
+        return compose(frame, fit_and_warp(geometry, [frame], by, progress), by, progress)
+
+    return first_usable(made, options) if geometry.rig is None else made(options)
+
+
+def _preview(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:
+    """A small panorama of a geometry that was found on the full pictures."""
+    turns = [np.eye(3), geometry.edges[0].two_view.R] if geometry.rig is None else geometry.rig.R
+    share = first_share(geometry.cameras, list(turns))
+    for tries_left in range(PREVIEW.tries - 1, -1, -1):
+        small = frame.resized(share)
+        sizes = [size_of(picture) for picture in small.pictures]
+        edges = tuple(resized_edge(edge, geometry.cameras, sizes) for edge in geometry.edges)
+        rig = None if geometry.rig is None else resized_rig(geometry.rig, sizes)
+        cameras = tuple(camera.resized(size) for camera, size in zip(geometry.cameras, sizes, strict=True))
+        result = _made(small, replace(geometry, cameras=cameras, edges=edges, rig=rig), options, progress)
+        better = next_share(share, result.canvas.width * result.canvas.height)
+        if better == share or not tries_left:
+            break
+        share = better
+    return result
 
 
 def compose(
@@ -303,12 +333,14 @@ def compose(
     box = common(box, (0, 0, whole.canvas.width, whole.canvas.height))
 
     progress("write", 0.0)
-    hidden = np.logical_or.reduce([one.hidden for one in made.decided])
     told = (
         options, pictures, alignment, canvas, made.decided, looks, panorama.alpha > 0, int(made.filled.sum()),
-        int((hidden & (made.panorama.alpha == 0)).sum()),
     )  # fmt: skip
-    report, more = make_report(*told) if alignment.rig is None else make_rig_report(*told, labels)
+    if alignment.rig is None:
+        hidden = np.logical_or.reduce([one.hidden for one in made.decided])
+        report, more = make_report(*told, int((hidden & (made.panorama.alpha == 0)).sum()))
+    else:
+        report, more = make_rig_report(*told, labels)
     named = (line for picture in pictures for line in _named(picture))
     warnings = (*frame.warnings, *named, *alignment.warnings, *more)
     report["warnings"] = list(warnings)
@@ -323,7 +355,7 @@ def compose(
         warp=warp, occluded=occluded, labels=labels, inpainted=cut(made.filled, box),
         decided=made.decided, edges=alignment.edges, views=alignment.views, field=alignment.field,
         cameras=alignment.cameras, warnings=warnings, report=report, seconds=progress.seconds,
-        full_sizes=frame.full_sizes, rig=alignment.rig,
+        full_sizes=frame.full_sizes, rig=alignment.rig, scale=alignment.scale,
     )  # fmt: skip
 
 

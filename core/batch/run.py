@@ -280,6 +280,8 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
     if not item.frames:
         others = " and ".join(map(str, (item.target, *item.more)))
         raise UnreadableImage(f"no frame of {item.reference} has its like in {others}; check names and numbers")
+    if job.options.preview:
+        raise BadRequest("a clip has no preview: leave out --preview, or give a smaller --scale")
     warnings: dict[str, None] = {}
     if item.missing:
         warnings[f"frames {_listed(item.missing)} are missing of some cameras and were left out"] = None

@@ -23,6 +23,7 @@ from ..options import StitchOptions
 from ..output.outputs import (
     CANVAS,
     OutputRequest,
+    add_depth,
     add_report,
     json_bytes,
     layer_files,
@@ -44,9 +45,9 @@ STAMPS = ".edf"
 class BatchRequest:
     """Where and how a batch is written.
 
-    folder: created if missing; suffix: of the panoramas; warp, layers: whether these are written too; resume: skip what
-    is up to date; overwrite: replace what exists; shard: (I, N), the I-th (from 1) of N runs that share the work.
-    Raises BadRequest.
+    folder: created if missing; suffix: of the panoramas; warp, layers, depth, mesh: whether these are written too;
+    resume: skip what is up to date; overwrite: replace what exists; shard: (I, N), the I-th (from 1) of N runs that
+    share the work. Raises BadRequest.
     """
 
     folder: Path
@@ -56,6 +57,8 @@ class BatchRequest:
     resume: bool = False
     overwrite: bool = False
     shard: tuple[int, int] = (1, 1)
+    depth: bool = False
+    mesh: bool = False
 
     def __post_init__(self) -> None:
         output_bits((8,), self.suffix)
@@ -111,6 +114,7 @@ class Unit:
         if self.report:
             out += [self.report, self._named(".matches.csv"), self._named(".timing.json")]
             out += [self._named(".warp.npz")] if self.request.warp else []
+            out += [path for path in self._depth if path is not None]
         return out
 
     @property
@@ -129,6 +133,7 @@ class Unit:
                 warnings += write(result, OutputRequest(self.panorama, layers=self._layers), files)
             if self.report:
                 matches, timing = self._named(".matches.csv"), self._named(".timing.json")
+                warnings += add_depth(result, *self._depth, files)
                 add_report(result, warnings, self.report, matches, timing, files)
                 if self.request.warp:
                     files.add(self._named(".warp.npz"), warp_bytes(result))
@@ -160,6 +165,12 @@ class Unit:
     @property
     def _layers(self) -> Path | None:
         return self._named(".layers") if self.request.layers and not self._is_clips_report else None
+
+    @property
+    def _depth(self) -> tuple[Path | None, Path | None]:
+        """The files of ranges and mesh, where they are asked for."""
+        depth, mesh = self.request.depth, self.request.mesh
+        return self._named(".depth.exr") if depth else None, self._named(".mesh.glb") if mesh else None
 
     def _named(self, suffix: str) -> Path:
         folder, name = self.request.folder, self.item.name
@@ -274,7 +285,10 @@ def _options_for(item: BatchItem, options: StitchOptions) -> StitchOptions:
 
 
 def _units(item: BatchItem, options: StitchOptions, request: BatchRequest, version: str) -> Iterator[Unit]:
-    decided = [version, asdict(replace(options, cache=None)), request.suffix.lower(), request.warp, request.layers]
+    decided = [
+        version, asdict(replace(options, cache=None)), request.suffix.lower(), request.warp, request.layers,
+        request.depth, request.mesh,
+    ]  # fmt: skip
     shared = [path for frame in item.aligned_on for path in item.files(frame)]
     known = [*decided, *(_identity(path) for path in (*options.files_read, *shared))]
     frames: Sequence[int | None] = (None,) if item.frames is None else (None, *item.frames)

@@ -44,6 +44,8 @@ class Camera:
         How the focal length is known.
     lens_of : str
         Name of the picture whose focal length was taken, this one's own not being known; empty where it is.
+    in_metres : bool
+        Whether the pose is in metres, and not in a unit of its own.
     """
 
     K: NDArray[np.float64]
@@ -55,6 +57,7 @@ class Camera:
     principal_sigma: float = 0.0
     knowledge: Knowledge = Knowledge.GIVEN
     lens_of: str = ""
+    in_metres: bool = False
 
     @property
     def focal(self) -> float:

@@ -29,7 +29,7 @@ class CameraRequest:
     """What the user said about the cameras; one value serves all pictures, two are reference and target of a pair.
 
     focal_px, focal_mm with sensor_mm (sensor width), focal35; principal (x, y) or (x, y, x', y') px; cameras: a camera
-    file's path or its content (see `read_camera_file`).
+    file's path or its content (see `read_camera_file`), whose `unit` may be "metres".
     """
 
     focal_px: tuple[float, ...] = ()
@@ -114,8 +114,8 @@ def cameras_for(
     warnings: list[str] = []
     held: Sequence[Camera | None] = [None] * len(names)
     if request.cameras is not None:
-        table = _camera_table(request.cameras)
-        held = read_camera_file({"cameras": table}, names, sizes)
+        table, unit = _camera_table(request.cameras)
+        held = read_camera_file({"cameras": table, "unit": unit}, names, sizes)
         if len(names) > 2 and set(table) - set(names):
             warnings.append(f"the camera file names what is none of the pictures: {_strangers(table, names)}")
     cameras = [
@@ -226,8 +226,9 @@ def read_camera_file(
     Parameters
     ----------
     source : str, path or dict
-        {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "R": 3×3?, "t": [3]?}}} with NAME the
-        picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes, integer pixel centres.
+        {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "R": 3×3?, "t": [3]?}}, "unit": UNIT?} with
+        NAME the picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes, integer pixel centres;
+        UNIT is "metres" if t is in metres, "baselines" if in none that is known.
     names : sequence of str
         The pictures' file names.
     sizes : sequence of (int, int)
@@ -245,7 +246,7 @@ def read_camera_file(
     UnreadableImage
         For the file.
     """
-    table = _camera_table(source)
+    table, unit = _camera_table(source)
     out: list[Camera | None] = []
     several = len(names) > 2
     for number, (name, size) in enumerate(zip(names, sizes, strict=True)):
@@ -260,7 +261,7 @@ def read_camera_file(
                 f"the camera file has no camera named {name!r} or {role(number)!r}; it has: "
                 f"{', '.join(map(str, table))}"
             )
-        out.append(_camera_from_entry(entry, name, size))
+        out.append(replace(_camera_from_entry(entry, name, size), in_metres=unit == "metres"))
     named = [camera for camera in out if camera is not None]
     if not named:
         raise BadRequest(
@@ -278,19 +279,24 @@ def read_camera_file(
     return out
 
 
-def _camera_table(source: str | Path | dict[str, Any]) -> dict[str, Any]:
-    """What a camera file, or its content, holds by the names of pictures. Raises as `read_camera_file` does."""
+def _camera_table(source: str | Path | dict[str, Any]) -> tuple[dict[str, Any], str]:
+    """What a camera file, or its content, holds by the names of pictures, and its unit. Raises as `read_camera_file`
+    does."""
+    content: Any = source
     if not isinstance(source, dict):
         try:
-            source = json.loads(Path(source).read_text(encoding="utf-8"))
+            content = json.loads(Path(source).read_text(encoding="utf-8"))
         except OSError as error:
             raise UnreadableImage(f"the camera file cannot be read: {error}") from error
         except (ValueError, RecursionError) as error:
             raise BadRequest(f"the camera file is not JSON: {error}") from error
-    table = source.get("cameras", source) if isinstance(source, dict) else None
+    table = content.get("cameras", content) if isinstance(content, dict) else None
     if not isinstance(table, dict):
         raise BadRequest('a camera file holds {"cameras": {"NAME": {"K": [[…]], "R": [[…]], "t": […]}}}')
-    return table
+    unit = content.get("unit", "baselines") if table is not content else "baselines"
+    if unit not in ("metres", "baselines"):
+        raise BadRequest(f"the unit of the camera file is {unit!r}: it is metres, or baselines if it is not known")
+    return table, str(unit)
 
 
 def _strangers(table: dict[str, Any], names: Sequence[str]) -> str:

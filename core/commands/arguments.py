@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
     ----------
     parser : argparse.ArgumentParser
     with_field : bool
-        Whether `--field` is among them; not where one command stitches with several.
+        Whether `--field` and `--preview` are among them; not where one command stitches with several fields.
     """
     _add_cameras(parser)
     _add_control(parser)
@@ -35,6 +35,8 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         )  # fmt: skip
     _add_alignment(how)
     _add_composition(how)
+    if with_field:
+        _add_preview(how)
     _add_repetition(how)
 
 
@@ -62,6 +64,13 @@ def _add_cameras(parser: argparse.ArgumentParser) -> None:
         "--cameras", type=Path, metavar="FILE.json",
         help="per picture K, optionally distortion, R and t; of more than two, those that are in it are held",
     )
+
+
+    camera.add_argument(
+        "--scale-metres", type=_scale_metres, metavar="A,B,D",
+        help="the pictures A and B, by number, counted from 1, or name, were taken D metres apart: ranges are in "
+        "metres",
+    )  # fmt: skip
 
 
 def _add_many(parser: argparse.ArgumentParser) -> None:
@@ -166,8 +175,17 @@ def _add_composition(how: argparse._ArgumentGroup) -> None:
     )
     how.add_argument(
         "--holes", default="auto", type=_choice(HOLES), metavar="HOLES",
-        help="what neither camera saw: auto (default: small closed holes are filled smoothly), transparent, or "
-        "inpaint (all that something near hid)",
+        help="what no camera saw: auto (default: small closed holes are filled smoothly), transparent, or inpaint (of "
+        "two pictures all that something near hid, of more all holes that are closed)",
+    )  # fmt: skip
+
+
+def _add_preview(how: argparse._ArgumentGroup) -> None:
+    """Whether the panorama is only to be looked at."""
+    how.add_argument(
+        "--preview", action="store_true",
+        help="a panorama of one or two megapixels, by the geometry of the full pictures, which the same call without "
+        "it takes from the cache",
     )  # fmt: skip
 
 
@@ -199,6 +217,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         ignore_in=tuple(args.ignore),
         viewpoint=args.viewpoint,
         require_all=args.require_all,
+        scale_metres=args.scale_metres,
         slide=args.slide,
         projection=args.projection,
         level=parse_level(args.level),
@@ -212,6 +231,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         mask=args.mask,
         exposure=args.exposure,
         holes=args.holes,
+        preview=getattr(args, "preview", False),
         seed=args.seed,
         measure=measure,
         cache=default_folder() if args.cache else None,
@@ -241,7 +261,15 @@ def numbered(options: StitchOptions, pictures: Sequence[Path]) -> StitchOptions:
         raise BadRequest(f"the viewpoint is picture {viewpoint}, and only {count} are given")
     if isinstance(viewpoint, str) and viewpoint != CENTRE:
         viewpoint = number_of(viewpoint, names, "--viewpoint") + 1
-    return replace(options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint)
+    scale = options.scale_metres
+    if scale is not None:
+        one, other = (
+            number_of(name, names, "--scale-metres") + 1 if isinstance(name, str) else name for name in scale[:2]
+        )
+        scale = one, other, scale[2]
+    return replace(
+        options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint, scale_metres=scale
+    )  # fmt: skip
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -255,6 +283,20 @@ def _viewpoint(text: str) -> int | str:
     if text.casefold() in (CENTRE, "center"):
         return CENTRE
     return int(text) if text.isdecimal() else text
+
+
+def _scale_metres(text: str) -> tuple[int | str, int | str, float]:
+    parts = text.split(",")
+    try:
+        one, other, metres = parts[0], ",".join(parts[1:-1]), float(parts[-1])
+    except ValueError:
+        metres = 0.0
+    if len(parts) < 3 or not metres > 0 or not one or not other:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not like A,B,D: two pictures, by number or name, and their distance in metres"
+        )
+    first, second = (int(name) if name.isdecimal() else name for name in (one, other))
+    return first, second, metres
 
 
 def _named_mask(text: str) -> tuple[str, Path]:

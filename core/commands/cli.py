@@ -17,6 +17,7 @@ from typing import NoReturn
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
 from .arguments import add_options, numbered, options_from
+from .file_arguments import add_batch_files, add_files, shard
 from .messages import print_summary, progress_shown, say, shortened, verdict_line
 from .options import MESSAGES
 
@@ -174,20 +175,7 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
         "-o", "--output", type=Path, required=True, metavar="OUT", help=".png, .jpg, .tif (8 or 16 bit) or .exr (float)"
     )
     add_options(parser)
-    files = parser.add_argument_group("files")
-    files.add_argument(
-        "--report", type=Path, metavar="FILE.json",
-        help="everything that was measured and decided; FILE.matches.csv: all matches, as --matches takes them",
-    )  # fmt: skip
-    files.add_argument(
-        "--layers", type=Path, metavar="DIR",
-        help="each picture on the canvas before blending, with alpha; what it cannot see; which is shown where",
-    )
-    files.add_argument("--warp", type=Path, metavar="FILE.npz", help="the maps, the inverse depth and the geometry")
-    files.add_argument(
-        "--cameras-out", type=Path, metavar="FILE.json", help="the cameras that were found, as --cameras takes them"
-    )
-    files.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    add_files(parser)
     _add_loudness(parser)
     parser.add_argument(
         "--strict-verdict", action="store_true", help="exit with 1 where the panorama is found not to be usable"
@@ -199,22 +187,8 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("list", metavar="LIST.csv", type=Path, help="the list; relative paths start at its folder")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for all outputs")
     add_options(parser)
-    files = parser.add_argument_group("files")
-    files.add_argument("--format", default=".png", metavar="SUFFIX", help=".png (default), .jpg, .tif or .exr")
-    files.add_argument("--layers", action="store_true", help="NAME.layers: each picture on the canvas, with alpha")
-    files.add_argument("--warp", action="store_true", help="NAME.warp.npz: maps, inverse depth and geometry")
-    files.add_argument("--resume", action="store_true", help="make only what is missing, or was made otherwise")
-    files.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="the I-th of N runs that share LIST")
-    files.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    add_batch_files(parser)
     _add_loudness(parser)
-
-
-def _shard(text: str) -> tuple[int, int]:
-    try:
-        index, count = map(int, text.split("/"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not like 2/3: which of how many runs") from None
-    return index, count
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
@@ -243,7 +217,7 @@ def _add_validate(parser: argparse.ArgumentParser) -> None:
         help="these only; NAME:baseline=2,turn=1.5,overlap=0.4,noise=3 makes a scene harder, "
         "NAME:n=12,spread=0.3,noise=3 a set",
     )  # fmt: skip
-    parser.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="the I-th of N runs sharing OUTDIR")
+    parser.add_argument("--shard", type=shard, default=(1, 1), metavar="I/N", help="the I-th of N runs sharing OUTDIR")
     parser.add_argument("--resume", action="store_true", help="measure only what is missing or was measured otherwise")
     parser.add_argument("--overwrite", action="store_true", help="measure everything again")
     _add_loudness(parser)
@@ -287,7 +261,9 @@ def _stitch(args: argparse.Namespace) -> int:
         print(f"edf: {len(pictures)} pictures: {shortened(names)}", file=sys.stderr)
     options = numbered(options_from(args, measure=bool(args.report or args.verbose)), pictures)
     check_count(len(pictures), options)
-    outputs = OutputRequest(args.output, args.report, args.layers, args.warp, args.cameras_out)
+    outputs = OutputRequest(
+        args.output, args.report, args.layers, args.warp, args.cameras_out, args.depth, args.mesh
+    )  # fmt: skip
     with OutputFiles(args.overwrite, [*pictures, *options.files_read]) as files:
         names = [path.name for path in pictures]
         check(outputs, files, names, options.has_seam, options.fills_holes, options.may_slide)
@@ -320,7 +296,9 @@ def _batch(args: argparse.Namespace) -> int:
 
     use_again()
     suffix = args.format if args.format.startswith(".") else f".{args.format}"
-    request = BatchRequest(args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard)
+    request = BatchRequest(
+        args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard, args.depth, args.mesh
+    )  # fmt: skip
 
     def tell(outcome: Outcome, number: int, count: int) -> None:
         more = len(outcome.warnings) - MESSAGES.max_warnings

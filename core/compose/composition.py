@@ -17,17 +17,19 @@ from ..cameras.view import View
 from ..options import StitchOptions
 from ..panorama.layers import Layer
 from ..panorama.warp import Warp
-from ..raster.arrays import bounds, with_margin
+from ..raster.arrays import bounds, dilated, with_margin
+from ..raster.lazy import whole
 from ..system.progress import ReportProgress
 from .decided import Decided
 from .growing import Panorama, SetPanorama
 from .inpaint import closed_holes, inpainted
-from .options import EXPOSURE
+from .options import EXPOSURE, INPAINT
 from .placing import Placing, adding_order
 from .tone.exposure import Exposure, exposures_for
 from .tone.graph_exposure import graph_exposures
 from .unseen import Unseen, unseen_by_each
-from .window import window_of
+from .window import goes_round, window_of
+from .wraparound import middle_of_widest, rolled, rolled_layer
 
 
 @dataclass(frozen=True)
@@ -122,8 +124,21 @@ def composed(
 
         found[number] = panorama.add(number, found[number], fetched, painted, (decided is not None, keep), report)
     out, labels = panorama.layer, panorama.labels(found)
-    filled = closed_holes(out.alpha > 0, small=True)[0] if options.holes == "auto" else panorama.open_holes()
-    return Composition(inpainted(out, filled, warp.depth), tuple(exposed), tuple(found), labels, filled)
+    if options.holes == "auto":
+        filled = closed_holes(out.alpha > 0, True, goes_round(warp.canvas))[0]
+    else:
+        filled = panorama.open_holes()
+    return Composition(_without_holes(out, filled, warp), tuple(exposed), tuple(found), labels, filled)
+
+
+def _without_holes(panorama: Layer, holes: NDArray[np.bool_], warp: Warp) -> Layer:
+    """A panorama with its holes (H, W) filled, also where they lie across ±180°."""
+    columns = dilated(holes, INPAINT.reach_px).any(axis=0)
+    roll = 0
+    if goes_round(warp.canvas) and (columns[0] or columns[-1]) and not columns.all():
+        roll = middle_of_widest(~columns)
+    depth = rolled(whole(warp.depth), roll) if roll else warp.depth
+    return rolled_layer(inpainted(rolled_layer(panorama, roll), rolled(holes, roll), depth), -roll)
 
 
 def _exposures(

@@ -16,10 +16,11 @@ from ..raster.lazy import part_of, whole
 from ..system.progress import ReportProgress
 from .adding import Added, add
 from .decided import Decided
+from .inpaint import closed_holes
 from .multiband import bands_for
 from .options import BANDS, PLACING, WINDOW
 from .placing import Placing
-from .window import Window
+from .window import Window, goes_round
 
 if TYPE_CHECKING:
     from ..panorama.warp import Warp
@@ -142,6 +143,12 @@ class SetPanorama(Panorama):
     def labels(self, decided: Sequence[Decided]) -> NDArray[np.int16] | None:
         """See `Panorama.labels`."""
         return self._labels if self._options.has_seam else None
+
+    def open_holes(self) -> NDArray[np.bool_]:
+        """Holes (H, W) that are to be inpainted: those that no picture shows, and the panorama is closed around."""
+        if self._options.holes != "inpaint":
+            return np.broadcast_to(np.False_, self._alpha.shape)
+        return closed_holes(self._alpha > 0, None, goes_round(self._warp.canvas))[0]
 
     def _window(self, number: int) -> Window:
         """Where a picture is added: with a margin for the seam and the bands."""

@@ -8,6 +8,8 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ..panorama.layers import Layer
 from ..raster.arrays import Box, Part, dilated, meet, strips
@@ -23,27 +25,41 @@ def holes_of(hidden: NDArray[np.bool_], before: Layer, layer: Layer) -> NDArray[
     return holes
 
 
-def closed_holes(shows: NDArray[np.bool_], small: bool) -> tuple[NDArray[np.bool_], list[Box]]:
+def closed_holes(
+    shows: NDArray[np.bool_], small: bool | None, goes_round: bool = False
+) -> tuple[NDArray[np.bool_], list[Box]]:
     """Holes of a panorama that do not reach its border.
 
     Parameters
     ----------
     shows : (H, W) bool array
         What the panorama shows.
-    small : bool
-        Only those of at most `InpaintOptions.small_share` of it, or only those that are larger.
+    small : bool or None
+        Only those of at most `InpaintOptions.small_share` of it, or only those that are larger; None: all.
+    goes_round : bool
+        Whether the last column lies beside the first, so that neither is a border.
 
     Returns
     -------
     holes : (H, W) bool array
     boxes : list of Box
-        That hold each of them, px, the largest hole first.
+        That hold each of them, px, the largest hole first; one that lies across the ends has a box at either.
     """
-    height, width = shows.shape
+    height = len(shows)
     count, number, about, _ = cv2.connectedComponentsWithStats((~shows).view(np.uint8), connectivity=4)
     left, top, across, down, area = about.T
-    picked = (left > 0) & (top > 0) & (left + across < width) & (top + down < height)
-    picked &= (area <= INPAINT.small_share * shows.size) == small
+    within = (top > 0) & (top + down < height)
+    if goes_round:
+        ends = number[:, 0], number[:, -1]
+        both = (ends[0] > 0) & (ends[1] > 0)
+        # int32 is what SciPy's graphs take
+        pairs = tuple(one[both].astype(np.int32) for one in ends)
+        joined = connected_components(coo_array((np.ones(both.sum()), pairs), (count, count)), directed=False)[1]
+        within = ~np.isin(joined, joined[~within & (np.arange(count) > 0)])
+        area = np.bincount(joined, area)[joined].astype(int)
+    else:
+        within &= (left > 0) & (left + across < shows.shape[1])
+    picked = within if small is None else within & ((area <= INPAINT.small_share * shows.size) == small)
     picked[0] = False  # what is shown
     largest_first = about[picked][np.argsort(-area[picked], kind="stable")].tolist()
     boxes = [(x, y, w, h) for x, y, w, h, _ in largest_first]

@@ -41,13 +41,17 @@ def roll_for(canvas: Canvas, before: Layer, layer: Layer) -> int:
     crowd = np.logical_and(*shown).sum(axis=0) * (canvas.height + 1) + np.logical_or(*shown).sum(axis=0)
     if crowd[0] == crowd[-1] == 0:
         return 0
-    # the longest run of columns with the least, also across the end
-    least = np.flatnonzero(crowd == crowd.min())
-    gaps = np.split(least, np.flatnonzero(np.diff(least) > 1) + 1)
-    if len(gaps) > 1 and gaps[0][0] == 0 and gaps[-1][-1] == canvas.width - 1:
-        gaps[0] = np.concatenate([gaps.pop(), gaps[0] + canvas.width])
+    return middle_of_widest(crowd == crowd.min())
+
+
+def middle_of_widest(columns: NDArray[np.bool_]) -> int:
+    """The middle of the longest run of those columns (W,) that are True, at least one, also across the end."""
+    found = np.flatnonzero(columns)
+    gaps = np.split(found, np.flatnonzero(np.diff(found) > 1) + 1)
+    if len(gaps) > 1 and gaps[0][0] == 0 and gaps[-1][-1] == len(columns) - 1:
+        gaps[0] = np.concatenate([gaps.pop(), gaps[0] + len(columns)])
     widest = max(gaps, key=len)
-    return int(widest[len(widest) // 2]) % canvas.width
+    return int(widest[len(widest) // 2]) % len(columns)
 
 
 def rolled(values: NDArray[Any], columns: int) -> NDArray[Any]:

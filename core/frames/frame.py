@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..pictures.picture import Picture
+from ..pictures.picture import Picture, resized
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,10 @@ class Frame:
             return self
         pictures = tuple(self.pictures[number] for number in numbers)
         return replace(self, pictures=pictures, full_sizes=tuple(self.full_sizes[number] for number in numbers))
+
+    def resized(self, share: float) -> Frame:
+        """The same with its pictures shrunk to a share of their sides."""
+        return replace(self, pictures=tuple(resized(picture, share) for picture in self.pictures))
 
 
 def size_of(picture: Picture) -> tuple[int, int]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compose.inpaint import closed_holes
+from ..compose.window import goes_round
 from ..field.slack import SlackField
 from ..panorama.canvas import Canvas
 from ..panorama.levelling import angles_of
@@ -26,6 +27,7 @@ from .projectivity import independent_fundamental, projectivity
 if TYPE_CHECKING:
     from ..alignment import Alignment
     from ..cameras.camera import Camera
+    from ..cameras.scale import Scale
     from ..compose.decided import Decided
     from ..dense.refine import Dense
     from ..options import StitchOptions
@@ -98,11 +100,12 @@ def make_report(
         },
         "slide": slide_entry(alignment.slide),
         "canvas": canvas_entry(canvas, two_view.K),
+        "depth": depth_entry(alignment.scale),
         "composition": {
             "exposure_gain": further.exposure.gain / decided[0].exposure.gain,
             "exposure_spread": further.exposure.spread, "exposure_blocks": further.exposure.blocks,
             "light": exposure_entry(pictures, decided), "occluded_px": int(further.hidden.sum()),
-            "hole_px": holes, "inpainted_px": inpainted, "holes": closed_holes(shows, small=False)[1],
+            "hole_px": holes, "inpainted_px": inpainted, "holes": closed_holes(shows, False, goes_round(canvas))[1],
         },
         "measured": measured,
     }  # fmt: skip
@@ -195,6 +198,7 @@ def options_entry(options: StitchOptions, alignment: Alignment) -> dict[str, Any
         "slide": options.slide if options.may_slide else 0, "level": options.level, "centre": options.centre,
         "fov": options.fov, "scale": options.scale, "crop": options.crop, "blend": options.blend,
         "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
+        "scale_metres": options.scale_metres, "preview": options.preview,
     }  # fmt: skip
 
 
@@ -206,6 +210,11 @@ def left_out_entry(left_out: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
 def slide_entry(slide: SlideChoice) -> dict[str, Any]:
     """How far the viewpoint slides."""
     return {"s1": slide.s1, "costs": [asdict(one) for one in slide.costs], "why": slide.why}
+
+
+def depth_entry(scale: Scale) -> dict[str, Any]:
+    """In which unit depth is given out, and how that is known."""
+    return {"unit": scale.unit, "metres_per_baseline": scale.metres, "source": scale.source}
 
 
 def how_holes_are_shown(options: StitchOptions) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..cameras.rig import Rig
 from ..compose.inpaint import closed_holes
+from ..compose.window import goes_round
 from ..field.sphere_field import SphereField
 from ..panorama.canvas import Canvas
 from .exposure_entry import exposure_entry, exposure_warnings
@@ -17,6 +18,7 @@ from .options import RIG, WARNING
 from .report import (
     SCHEMA,
     canvas_entry,
+    depth_entry,
     how_holes_are_shown,
     left_out_entry,
     options_entry,
@@ -50,13 +52,13 @@ _UNSURE_SCALE = {
 def make_rig_report(
     options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment, canvas: Canvas,
     decided: Sequence[Decided], appearance: dict[str, float], shows: NDArray[np.bool_], inpainted: int,
-    open_px: int, labels: NDArray[np.int16] | None,
+    labels: NDArray[np.int16] | None,
 ) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
     """The report of a stitch of more than two pictures.
 
     Parameters
     ----------
-    options, pictures, alignment, canvas, decided, appearance, shows, inpainted, open_px
+    options, pictures, alignment, canvas, decided, appearance, shows, inpainted
         As for `make_report`; the alignment has a rig.
     labels : (H, W) int array, optional
         Which picture each pixel of the panorama comes from.
@@ -71,7 +73,8 @@ def make_rig_report(
     rig, field, warp = alignment.rig, alignment.field, alignment.warp
     assert rig is not None and isinstance(field, SphereField)
     names = [picture.name for picture in pictures]
-    holes, folds = sum(one.holes for one in decided), max(one.folds for one in decided)
+    folds, around = max(one.folds for one in decided), goes_round(canvas)
+    open_px = int(closed_holes(shows, None, around)[0].sum())
     error = map_errors(warp, alignment.edges)
     found, inliers = (sum(int(one) for one in counts) for counts in zip(
         *((len(edge.matches), edge.two_view.inliers.sum()) for edge in alignment.edges), strict=True
@@ -94,9 +97,10 @@ def make_rig_report(
         },
         "slide": slide_entry(alignment.slide),
         "canvas": canvas_entry(canvas, rig.cameras[0].K),
+        "depth": depth_entry(alignment.scale),
         "composition": {
             "light": exposure_entry(pictures, decided), "occluded_px": sum(int(one.hidden.sum()) for one in decided),
-            "hole_px": holes, "inpainted_px": inpainted, "holes": closed_holes(shows, small=False)[1],
+            "hole_px": open_px + inpainted, "inpainted_px": inpainted, "holes": closed_holes(shows, False, around)[1],
         },
         "measured": {
             "alignment_median_px": _percentile(error, 50), "alignment_p95_px": _percentile(error, 95),
@@ -112,12 +116,9 @@ def make_rig_report(
         )
     if folds > WARNING.fold_share:
         warnings.append(f"the warp folds over in {folds:.1%} of a picture: look for doubled or torn things there")
-    open_holes = open_px if options.holes == "auto" else holes
-    if open_holes > WARNING.hole_share * shows.size:
-        warnings.append(
-            f"{open_holes} pixels were seen by no camera, hidden behind something near: the panorama is "
-            f"{how_holes_are_shown(options)}"
-        )
+    holes = inpainted if options.holes == "inpaint" else open_px
+    if holes > WARNING.hole_share * shows.size:
+        warnings.append(f"{holes} pixels are shown by no picture: the panorama is {how_holes_are_shown(options)}")
     return plain(report), warnings
 
 

@@ -22,12 +22,12 @@ def camera_table(result: StitchResult) -> dict[str, Any]:
     -------
     dict
         Of each picture that was used, by its name: K in px of the full picture, `distortion`, and `R`, `t` in the frame
-        of the first one, unless the geometry knows no pose.
+        of the first one, unless the geometry knows no pose; and the `unit` of t.
     """
     posed = all(np.isfinite(view.R).all() and np.isfinite(view.t).all() for view in result.views)
     table = {}
     for picture, view, size in zip(result.pictures, result.views, result.full_sizes, strict=True):
         full = replace(view.camera, K=view.K).resized(size)
-        pose = {"R": view.R, "t": view.t} if posed else {}
+        pose = {"R": view.R, "t": view.t * result.scale.factor} if posed else {}
         table[picture.name] = {"K": full.K, "distortion": full.distortion, **pose}
-    return {"cameras": table}
+    return {"cameras": table, "unit": result.scale.unit}

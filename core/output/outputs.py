@@ -26,6 +26,8 @@ from ..raster.picture_map import BoxedMap, MapPart
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
 from .camera_file import camera_table
+from .depth.mesh import mesh_bytes
+from .depth.range_image import range_bytes, range_image
 from .match_table import match_file
 from .rig_page import rig_page
 
@@ -61,6 +63,10 @@ class OutputRequest:
         .npz.
     cameras : Path, optional
         .json.
+    depth : Path, optional
+        .exr.
+    mesh : Path, optional
+        .glb.
     """
 
     panorama: Path
@@ -68,6 +74,8 @@ class OutputRequest:
     layers: Path | None = None
     warp: Path | None = None
     cameras: Path | None = None
+    depth: Path | None = None
+    mesh: Path | None = None
 
     @property
     def timing(self) -> Path | None:
@@ -114,12 +122,18 @@ def check(
         The system does not let it be written, or it exists and is not to be replaced.
     """
     output_bits((8,), request.panorama.suffix)
-    if request.warp is not None and request.warp.suffix.lower() != ".npz":
-        raise BadRequest(f"the warp is written as .npz, not {request.warp.suffix or 'a file of no kind'}")
+    for what, path, suffix in (
+        ("warp", request.warp, ".npz"), ("depth", request.depth, ".exr"), ("mesh", request.mesh, ".glb"),
+    ):  # fmt: skip
+        if path is not None and path.suffix.lower() != suffix:
+            raise BadRequest(f"the {what} is written as {suffix}, not {path.suffix or 'a file of no kind'}")
     if request.cameras is not None and len(set(pictures)) < len(pictures):
         twice = next(name for number, name in enumerate(pictures) if name in pictures[:number])
         raise BadRequest(f"cameras are written by name, and two pictures are called {twice}: rename one of them")
-    named = (request.panorama, request.report, request.timing, request.matches, request.warp, request.cameras)
+    named = (
+        request.panorama, request.report, request.timing, request.matches, request.warp, request.cameras,
+        request.depth, request.mesh,
+    )  # fmt: skip
     page = request.page if len(pictures) > 2 else None
     single = [path for path in (*named, page) if path is not None]
     files.check(*single)
@@ -198,6 +212,8 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     ------
     UnwritableOutput
         A panorama that its format cannot hold, or a file that cannot be written.
+    DegenerateGeometry
+        Depth is asked for, and there is none.
     """
     reference = result.pictures[0]
     alpha = None if result.panorama.alpha.min() >= 1.0 else result.panorama.alpha
@@ -212,8 +228,24 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
         files.add(request.warp, warp_bytes(result))
     if request.cameras is not None:
         files.add(request.cameras, json_bytes(camera_table(result)))
+    warnings += add_depth(result, request.depth, request.mesh, files)
     if request.report is not None and request.timing is not None and request.matches is not None:
         add_report(result, [*result.warnings, *warnings], request.report, request.matches, request.timing, files)
+    return warnings
+
+
+def add_depth(result: StitchResult, depth: Path | None, mesh: Path | None, files: OutputFiles) -> list[str]:
+    """Stages the ranges and the mesh, where they are asked for; returns warnings. Raises DegenerateGeometry."""
+    if depth is None and mesh is None:
+        return []
+    ranges = range_image(result)
+    warnings: list[str] = []
+    if depth is not None:
+        files.add(depth, range_bytes(ranges))
+    if mesh is not None:
+        data, warned = mesh_bytes(result, ranges)
+        warnings += warned
+        files.add(mesh, data)
     return warnings
 
 

@@ -84,11 +84,8 @@ def encode_picture(
     kind, _ = _writable(suffix)
     depth = output_bits((bits,), suffix)
     exif = exif or Exif()
-    profile = parse_icc(icc) if icc is not None else None
     if kind == "exr":
-        if profile is not None and pixels.shape[2] == 3:
-            pixels = cv2.transform(np.ascontiguousarray(whole(pixels), np.float32), profile.to_srgb.astype(np.float32))
-        return write_exr(pixels, alpha, exif), ()
+        return write_exr(in_srgb(pixels, icc), alpha, exif), ()
     height, width = pixels.shape[:2]
     if kind == "jpeg" and max(width, height) > _JPEG_LONGEST_SIDE:
         raise UnwritableOutput(f"JPEG holds {_JPEG_LONGEST_SIDE} pixels a side, not {width} × {height}; use .png")
@@ -107,6 +104,16 @@ def encode_picture(
         lost = f", and {brighter:.2%} of its pixels, brighter than white, were clipped" if brighter else ""
         warnings = (f"float input was written display-encoded with {depth} bits{lost}; .exr keeps it",)
     return embed(encoded, kind, exif, icc, straight_alpha=levels.shape[2] == 4), warnings
+
+
+def in_srgb(pixels: AnyImage, icc: bytes | None) -> AnyImage:
+    """Light (H, W, C) in the primaries of a profile, in those of sRGB."""
+    profile = parse_icc(icc) if icc is not None else None
+    if profile is None or pixels.shape[2] != 3:
+        return pixels
+    light = np.ascontiguousarray(whole(pixels), np.float32)
+    converted: NDArray[Any] = cv2.transform(light, profile.to_srgb.astype(np.float32))
+    return converted
 
 
 def _by_opencv(coded: NDArray[Any], suffix: str) -> bytes:

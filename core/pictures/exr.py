@@ -129,8 +129,6 @@ def write_exr(pixels: AnyImage, alpha: NDArray[Any] | None, exif: Exif) -> bytes
     pixels: float32 H×W×C (1 or 3), scene-linear in Rec. 709 primaries, straight; stored premultiplied. alpha: float32
     H×W or None. Photographer, time and camera go into the standard attributes.
     """
-    import OpenEXR
-
     names = "RGB" if pixels.shape[2] == 3 else "Y"
     channels = {name: np.empty(pixels.shape[:2], np.float32) for name in names}
 
@@ -147,8 +145,15 @@ def write_exr(pixels: AnyImage, alpha: NDArray[Any] | None, exif: Exif) -> bytes
         "owner": exif.text(33432) or exif.text(315), "capDate": exif.text(36867) or exif.text(306),
         "comments": " ".join(filter(None, (exif.make, exif.model, exif.lens))), "software": SOFTWARE,
     }
+    return exr_of_channels(channels, {name: text for name, text in texts.items() if text})
+
+
+def exr_of_channels(channels: dict[str, NDArray[np.float32]], texts: dict[str, str]) -> bytes:
+    """A 32-bit ZIP-compressed EXR file in memory of channels (H, W) by their names, with attributes of text."""
+    import OpenEXR
+
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     stream = io.BytesIO()
-    with OpenEXR.File(header | {name: text for name, text in texts.items() if text}, channels) as file:
+    with OpenEXR.File(header | texts, channels) as file:
         file.write(stream)
     return stream.getvalue()

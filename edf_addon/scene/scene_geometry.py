@@ -6,14 +6,15 @@ unit, unless told otherwise; under a levelled panorama it is that which looks al
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.cameras.blender_camera import BlenderLens, lens_for, matrix_world_of
 from ...core.cameras.projective import homogeneous
+from ...core.output.depth.options import MESH
+from ...core.output.depth.surface import DepthGrid, Surface, whole_surface
 from ...core.panorama.projection import Projection
 from ...core.panorama.viewpoint import Viewpoint
 from ...core.raster.arrays import Array
@@ -44,16 +45,6 @@ class PlacedCamera:
     lens: BlenderLens | RoundLens
     matrix_world: Array
     place: str
-
-
-@dataclass(frozen=True)
-class DepthMesh:
-    """vertices (N, 3) in the world; faces (M, 4) of vertex indices, seen from the camera counter-clockwise; uvs (N, 2)
-    of the vertices in the panorama."""
-
-    vertices: Array
-    faces: NDArray[np.int32]
-    uvs: Array
 
 
 def projection_of(known: dict[str, Any]) -> Projection | None:
@@ -167,43 +158,28 @@ def square_pixels(K: Array) -> Array:
     return out
 
 
-def depth_mesh(known: dict[str, Any], baseline: float = 1.0, farthest: float = 20.0) -> DepthMesh:
+def depth_mesh(known: dict[str, Any], baseline: float = 1.0, farthest: float = MESH.farthest) -> Surface:
     """The panorama as a surface: nodes on their rays from where each is seen, at the depth that was found.
 
     known: a result's `geometry`, `report` and `depth`: `columns`, `rows`, `inverse_depth` (in 1/baseline) and `shows`,
     row by row from the top, nodes corner to corner of the canvas; farthest: × the median depth, where everything beyond
-    ends, infinity (d ≤ 0) too. A face is left out where the panorama shows nothing at all four corners, or its depth is
-    not known. Raises ValueError where nothing is left.
+    ends, infinity (d ≤ 0) too. See `whole_surface`; vertices in the world. Raises ValueError where nothing is left.
     """
     grid, (width, height) = known["depth"], known["geometry"]["canvas"]
     columns, rows = int(grid["columns"]), int(grid["rows"])
-    d = matrix(grid["inverse_depth"]).ravel()
-    shows = np.asarray(grid["shows"], bool).ravel()
+    d = matrix(grid["inverse_depth"]).reshape(rows, columns)
+    shows = np.asarray(grid["shows"], bool).reshape(rows, columns)
     x, y = np.linspace(0, width - 1, columns), np.linspace(0, height - 1, rows)
-    pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-
-    there = np.isfinite(d)
-    near = d[there & shows & (d > 0)]
-    if not near.size:
-        raise ValueError("the panorama has no depth: nothing of it lies nearer than infinity")
-    d = np.maximum(np.where(there, d, 0.0), float(np.median(near)) / farthest)
+    pixels = np.stack(np.meshgrid(x, y), axis=-1)
     viewpoint, seen = viewpoint_of(known), rays(known, pixels)
-    points = seen / d[:, None]
-    if viewpoint is not None:
-        points += viewpoint.place(seen)
-    vertices = points * baseline @ axes(known).T
-
-    at = np.arange(columns * rows).reshape(rows, columns)
-    # the lower left corner first, then on to the right
-    corners = np.stack([at[1:, :-1], at[1:, 1:], at[:-1, 1:], at[:-1, :-1]], axis=-1).reshape(-1, 4)
-    faces = corners[shows[corners].any(axis=1) & there[corners].all(axis=1)]
-    used, faces = np.unique(faces, return_inverse=True)
-    uvs = np.stack([(pixels[:, 0] + 0.5) / width, 1 - (pixels[:, 1] + 0.5) / height], axis=-1)
-    return DepthMesh(vertices[used], faces.reshape(-1, 4).astype(np.int32), uvs[used])
+    uvs = np.stack([(pixels[..., 0] + 0.5) / width, 1 - (pixels[..., 1] + 0.5) / height], axis=-1)
+    places = None if viewpoint is None else viewpoint.place(seen)
+    surface = whole_surface(DepthGrid(seen, d, shows, uvs, places), farthest)
+    return replace(surface, vertices=surface.vertices * baseline @ axes(known).T)
 
 
 def rays(known: dict[str, Any], pixels: Array) -> Array:
-    """What canvas px (N, 2) show, in the reference camera's frame, as long as 1/d is to be taken: with z = 1 on the
+    """What canvas px (…, 2) show, in the reference camera's frame, as long as 1/d is to be taken: with z = 1 on the
     reference's own plane, unit rays elsewhere."""
     projection = projection_of(known)
     if projection is not None:

@@ -9,18 +9,23 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core import pipeline
 from edf_stitch.core.cameras.lens import distort
 from edf_stitch.core.cameras.projective import distance_to_line, project, rotation_angle, rotation_from_vector
 from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.frames import preview
+from edf_stitch.core.frames.options import PREVIEW
 from edf_stitch.core.measure.report import plain
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.camera_file import camera_table
+from edf_stitch.core.output.depth.range_image import range_image
 from edf_stitch.core.output.match_table import match_file
 from edf_stitch.core.output.outputs import OutputRequest, check, warp_bytes, write
 from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchResult, stitch
-from edf_stitch.core.system.errors import Cancelled, NoOverlap
+from edf_stitch.core.pose import features
+from edf_stitch.core.system.errors import BadRequest, Cancelled, NoOverlap
 from edf_stitch.core.system.output_files import OutputFiles
 
 from ..conftest import camera_of
@@ -123,6 +128,64 @@ def test_it_is_seen_from_the_picture_that_is_asked_for(four: PictureSet) -> None
     turned, moved = pose_errors(four, third)
     assert turned < 0.2 and moved < 0.02
     assert third.report["options"]["viewpoint"] == 3 and third.report["options"]["fade"] == KNOWN.fade
+
+
+def test_a_distance_between_two_pictures_makes_metres_of_baselines(four: PictureSet, set_result: StitchResult) -> None:
+    places = [camera.place for camera in four.cameras]
+    apart = float(np.linalg.norm(places[3] - places[1]))
+    result = stitch(four.pictures, replace(KNOWN, scale_metres=("2.png", 4, apart)))
+    longest = max(np.linalg.norm(place - places[0]) for place in places)
+    assert result.scale.metres == pytest.approx(longest, rel=0.03)
+    told = result.report["depth"]
+    assert told["unit"] == "metres" and told["metres_per_baseline"] == result.scale.metres
+    assert result.report["options"]["scale_metres"] == ["2.png", 4, apart]
+    assert set_result.report["depth"] == {"unit": "baselines", "metres_per_baseline": None,
+                                          "source": "pictures alone do not tell it"}
+    again = stitch(four.pictures, StitchOptions(
+        camera=CameraRequest(cameras=plain(camera_table(result))), blend="feather", dense=False
+    ))
+    assert again.scale.metres == pytest.approx(result.scale.metres, rel=1e-3), "the file of cameras is in metres too"
+    with pytest.raises(BadRequest, match="only 4 are given"):
+        stitch(four.pictures, replace(KNOWN, scale_metres=(1, 5, 2.0)))
+
+
+def test_depth_and_mesh_of_a_set_are_written(set_result: StitchResult, tmp_path: Path) -> None:
+    asked = OutputRequest(tmp_path / "out.png", depth=tmp_path / "d.exr", mesh=tmp_path / "m.glb")
+    with OutputFiles() as files:
+        check(asked, files, [picture.name for picture in set_result.pictures])
+        write(set_result, asked, files)
+    assert {path.name for path in tmp_path.iterdir()} == {"out.png", "d.exr", "m.glb"}
+    image = range_image(set_result)
+    assert image.range.shape == set_result.alpha.shape and image.deviation is not None
+    shown = set_result.alpha > 0
+    assert np.isfinite(image.range[shown]).mean() > 0.9 and np.isnan(image.range[~shown]).all()
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_a_preview_is_small_and_the_full_panorama_has_its_geometry(
+    four: PictureSet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
+) -> None:
+    """Nothing is found twice, and the full one is that of a call without a preview before it."""
+    options = replace(KNOWN, projection="cylindrical", cache=tmp_path)
+    for number in (preview, pipeline):
+        monkeypatch.setattr(number, "PREVIEW", replace(PREVIEW, pixels=30_000, least_pixels=20_000, most_pixels=45_000))
+    small = stitch(four.pictures[:count], replace(options, preview=True))
+    height, width = small.alpha.shape
+    assert 20_000 < width * height < 45_000 and small.report["options"]["preview"]
+    found: list[str] = []
+    real = features.detect
+    monkeypatch.setattr(features, "detect", lambda *asked: found.append("features") or real(*asked))
+    full = stitch(four.pictures[:count], options)
+    assert not found, "its features are kept"
+    assert np.array_equal(full.panorama.pixels, stitch(four.pictures[:count], replace(options, cache=None)).pixels)
+    assert full.alpha.size > 2 * small.alpha.size
+    for one, other in zip(small.views, full.views, strict=True):
+        np.testing.assert_array_equal(one.R, other.R)
+        np.testing.assert_array_equal(one.t, other.t)
+    shown = [
+        cv2.resize(one.alpha * one.pixels[..., 1], (80, 30), interpolation=cv2.INTER_AREA) for one in (small, full)
+    ]
+    assert np.abs(shown[0] - shown[1]).mean() < 0.03 * shown[1].mean() + 0.02, "it shows the same"
 
 
 def test_a_picture_that_does_not_belong_is_left_out_and_named(four: PictureSet) -> None:

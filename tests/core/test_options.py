@@ -31,17 +31,17 @@ def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "continue", "camera": CameraRequest(), "matches": None, "ignore": (),
-        "ignore_in": (), "viewpoint": None, "require_all": False,
+        "ignore_in": (), "viewpoint": None, "require_all": False, "scale_metres": None,
         "slide": "auto", "projection": "auto", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
         "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": "auto",
-        "holes": "auto", "seed": 0, "measure": True, "cache": None,
+        "holes": "auto", "preview": False, "seed": 0, "measure": True, "cache": None,
     }  # fmt: skip
 
 
 @pytest.mark.parametrize("dense", [True, False])
 @pytest.mark.parametrize("blend", BLENDS)
-def test_a_preview_is_an_average_without_dense_refinement(blend: str, dense: bool) -> None:
-    assert StitchOptions(blend=blend, dense=dense).preview == (blend == "linear" and not dense)
+def test_an_average_without_dense_refinement_has_few_features(blend: str, dense: bool) -> None:
+    assert StitchOptions(blend=blend, dense=dense).few_features == (blend == "linear" and not dense)
 
 
 def test_nothing_changes_them_afterwards() -> None:

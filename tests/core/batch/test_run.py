@@ -134,11 +134,11 @@ def test_options_reach_every_pair_and_a_line_may_have_its_own_camera(
 
 
 def test_layers_warp_and_the_kind_of_file(work: Path, quick: list) -> None:
-    assert run(work, "--quiet", "--layers", "--warp", "--format", "jpg") == 0
+    assert run(work, "--quiet", "--layers", "--warp", "--depth", "--mesh", "--format", "jpg") == 0
     expected = {f"p1{suffix}" for suffix in (
-        ".jpg", ".report.json", ".matches.csv", ".timing.json", ".warp.npz", ".layers/00_reference1.png",
-        ".layers/01_target1.png",
-        ".layers/occluded_01.png", ".layers/confidence.png", ".layers/labels.png", ".layers/seam.png",
+        ".jpg", ".report.json", ".matches.csv", ".timing.json", ".warp.npz", ".depth.exr", ".mesh.glb",
+        ".layers/00_reference1.png", ".layers/01_target1.png", ".layers/occluded_01.png", ".layers/confidence.png",
+        ".layers/labels.png", ".layers/seam.png",
         ".layers/canvas.json")}  # fmt: skip
     assert {name for name in files(work / "out") if name.startswith("p1")} == expected
 

@@ -182,3 +182,35 @@ def test_pictures_are_named_by_any_end_of_their_paths() -> None:
 def test_names_that_are_not_clear_are_refused(words: str, said: str) -> None:
     with pytest.raises(BadRequest, match=said):
         numbers(*words.split())
+
+
+@pytest.mark.parametrize(("words", "expected"), [
+    ("1,2,0.5", (1, 2, 0.5)), ("left.jpg,2,3", ("left.jpg", 2, 3.0)),
+    ("a.jpg,b, c.jpg,1e1", ("a.jpg", "b, c.jpg", 10.0)),
+])  # fmt: skip
+def test_a_scale_is_two_pictures_and_their_distance(words: str, expected: tuple) -> None:
+    assert options("--scale-metres", words).scale_metres == expected
+
+
+@pytest.mark.parametrize("words", ["1,2", "1,2,far", "1,2,0", "1,2,-3", "1,2,nan", ",2,3", "1,,3"])
+def test_a_scale_of_another_kind_is_refused(words: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit):
+        parsed("--scale-metres", words)
+    assert "A,B,D" in capsys.readouterr().err
+
+
+def test_the_pictures_of_a_scale_may_be_called_by_their_paths() -> None:
+    pictures = [Path("east/1.jpg"), Path("west/1.jpg"), Path("north/2.jpg")]
+    found = numbered(options("--scale-metres", "west/1.jpg,2.jpg,4"), pictures)
+    assert found.scale_metres == (2, 3, 4.0)
+    with pytest.raises(BadRequest, match="--scale-metres"):
+        numbered(options("--scale-metres", "1.jpg,2.jpg,4"), pictures)
+
+
+def test_a_preview_is_one_of_a_stitch() -> None:
+    assert options("--preview").preview and not options().preview
+    parser = argparse.ArgumentParser()
+    add_options(parser, with_field=False)
+    assert not options_from(parser.parse_args([]), measure=False).preview
+    with pytest.raises(BadRequest, match="leave it out"):
+        options("--preview", "--crop", "1,2,30,40")

@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 from edf_stitch.core import pipeline
 from edf_stitch.core.cameras.sources import CameraRequest
@@ -94,6 +95,16 @@ def test_a_stitch_from_files_to_files(
     assert report["measured"] == small_result.report["measured"] and report["pictures"][0]["name"] == "reference.png"
     with np.load(tmp_path / "warp.npz") as warp:
         assert np.array_equal(warp["map_x_01"], small_result.warp.maps[1].x)
+
+
+def test_depth_and_mesh_are_written(pictures: list[str], tmp_path: Path, said: Callable, quick: list) -> None:
+    wanted = ["--depth", str(tmp_path / "d.exr"), "--mesh", str(tmp_path / "m.glb"), "--scale-metres", "1,target,0.5"]
+    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), "--quiet", *wanted]) == 0
+    assert set(files(tmp_path)) == {"out.png", "d.exr", "m.glb"}
+    assert quick[0][-1].scale_metres == (1, 2, 0.5)
+    ranges = OpenEXR.File(str(tmp_path / "d.exr"), separate_channels=True).channels()["Z"].pixels
+    assert ranges.shape == load_picture(tmp_path / "out.png").light.shape[:2]
+    assert (tmp_path / "m.glb").read_bytes()[:4] == b"glTF"
 
 
 def test_a_folder_stands_for_its_pictures_which_are_counted(
@@ -305,7 +316,8 @@ def test_a_kind_of_file_that_is_not_written_gives_2(
 ) -> None:
     assert main(["stitch", *pictures, "-o", str(tmp_path / name)]) == 2
     assert ".png" in said()[1] and quick == []
-    assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), "--warp", str(tmp_path / "warp.exr")]) == 2
+    for file in ("--warp", "warp.exr"), ("--depth", "depth.png"), ("--mesh", "mesh.obj"):
+        assert main(["stitch", *pictures, "-o", str(tmp_path / "out.png"), file[0], str(tmp_path / file[1])]) == 2
     assert ".npz" in said()[1] and quick == []
 
 

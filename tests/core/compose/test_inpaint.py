@@ -96,3 +96,20 @@ def test_holes_far_from_each_other_are_filled_each_from_its_surroundings() -> No
     out = inpainted(before, holes, np.zeros((90, 300), np.float32))
     assert np.allclose(out.pixels, light, rtol=1e-3) and (out.alpha == 1).all()
     assert np.array_equal(out.light[38:50, 0:300], out.pixels[38:50])
+
+
+def test_on_a_sphere_a_hole_across_the_ends_is_one_and_closed() -> None:
+    shows = np.ones((100, 200), bool)
+    shows[50:54, :3] = shows[50:54, -4:] = False  # 28 px
+    shows[20:22, :2] = False  # 4 px
+    shows[98:, 60:70] = False  # at the pole
+    shows[10:90, 100:110] = False
+    small, boxes = closed_holes(shows, True, goes_round=True)
+    assert boxes == [(0, 20, 2, 2)] and small.sum() == 4
+    large, boxes = closed_holes(shows, False, goes_round=True)
+    assert boxes == [(100, 10, 10, 80), (0, 50, 3, 4), (196, 50, 4, 4)] and large.sum() == 28 + 800
+    both, boxes = closed_holes(shows, None, goes_round=True)
+    assert np.array_equal(both, small | large) and len(boxes) == 4
+    shows[54:, -2:] = False  # one of both halves now reaches the pole
+    assert closed_holes(shows, None, goes_round=True)[1] == [(100, 10, 10, 80), (0, 20, 2, 2)]
+    assert closed_holes(shows, None)[1] == [(100, 10, 10, 80)]

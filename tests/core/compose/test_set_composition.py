@@ -194,6 +194,26 @@ def test_small_closed_holes_are_filled() -> None:
     assert not compose(layers, warp_of(), exposure="none").panorama.alpha[hole].any()
 
 
+@pytest.mark.parametrize("columns", [np.arange(280, 340), np.arange(-25, 25)], ids=["inside", "across the ends"])
+def test_what_no_picture_shows_is_inpainted_where_that_is_asked_for(columns: np.ndarray) -> None:
+    hole = np.zeros((HEIGHT, WIDTH), bool)
+    hole[160:200, columns % WIDTH] = True
+    layers = [Layer(one.light, one.alpha & ~hole) for one in ring()]
+    made = compose(layers, warp_of(), exposure="none", holes="inpaint")
+    assert np.array_equal(made.filled, hole) and (made.panorama.alpha[hole] == 1).all()
+    light = made.panorama.pixels
+    assert np.array_equal(light[~hole & shown((0, WIDTH))], compose(layers, warp_of(), exposure="none").panorama.pixels[
+        ~hole & shown((0, WIDTH))])
+    turn, warp = 200, warp_of()
+    turned = replace(
+        warp, maps=tuple(PictureMap(rolled(at.x, turn), rolled(at.y, turn), at.size) for at in warp.maps)
+    )
+    layers_turned = [Layer(rolled(one.pixels, turn), rolled(one.alpha, turn)) for one in layers]
+    other = compose(layers_turned, turned, exposure="none", holes="inpaint").panorama.pixels
+    assert np.allclose(other, rolled(light, turn), atol=1e-5), "it is filled alike wherever the sphere was cut open"
+    assert not compose(layers, warp_of(), exposure="none", holes="auto").filled.any(), "it is not small"
+
+
 def test_paint_decides_between_the_reference_and_all_others() -> None:
     painted = np.zeros((HEIGHT, WIDTH), np.int8)
     with_next = shown(RING[0]) & shown(RING[1])

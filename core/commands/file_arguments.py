@@ -1,0 +1,54 @@
+"""The arguments that say which files a stitch and a batch leave."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_files(parser: argparse.ArgumentParser) -> None:
+    """Adds the files that one stitch may leave beside its panorama."""
+    files = parser.add_argument_group("files")
+    files.add_argument(
+        "--report", type=Path, metavar="FILE.json",
+        help="everything that was measured and decided; FILE.matches.csv: all matches, as --matches takes them",
+    )  # fmt: skip
+    files.add_argument(
+        "--layers", type=Path, metavar="DIR",
+        help="each picture on the canvas before blending, with alpha; what it cannot see; which is shown where",
+    )
+    files.add_argument("--warp", type=Path, metavar="FILE.npz", help="the maps, the inverse depth and the geometry")
+    files.add_argument(
+        "--depth", type=Path, metavar="FILE.exr",
+        help="the range of each pixel from its viewpoint, its deviation and confidence, as float channels",
+    )
+    files.add_argument(
+        "--mesh", type=Path, metavar="FILE.glb",
+        help="the panorama as a surface that stands as far away as it was found to be (glTF, which Blender imports)",
+    )
+    files.add_argument(
+        "--cameras-out", type=Path, metavar="FILE.json", help="the cameras that were found, as --cameras takes them"
+    )
+    files.add_argument("--overwrite", action="store_true", help="replace files that exist")
+
+
+def add_batch_files(parser: argparse.ArgumentParser) -> None:
+    """Adds what a batch leaves of each item, and what it makes again."""
+    files = parser.add_argument_group("files")
+    files.add_argument("--format", default=".png", metavar="SUFFIX", help=".png (default), .jpg, .tif or .exr")
+    files.add_argument("--layers", action="store_true", help="NAME.layers: each picture on the canvas, with alpha")
+    files.add_argument("--warp", action="store_true", help="NAME.warp.npz: maps, inverse depth and geometry")
+    files.add_argument("--depth", action="store_true", help="NAME.depth.exr: ranges, their deviation and confidence")
+    files.add_argument("--mesh", action="store_true", help="NAME.mesh.glb: the panorama as a surface with depth")
+    files.add_argument("--resume", action="store_true", help="make only what is missing, or was made otherwise")
+    files.add_argument("--shard", type=shard, default=(1, 1), metavar="I/N", help="the I-th of N runs that share LIST")
+    files.add_argument("--overwrite", action="store_true", help="replace files that exist")
+
+
+def shard(text: str) -> tuple[int, int]:
+    """I and N of I/N."""
+    try:
+        index, count = map(int, text.split("/"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not like 2/3: which of how many runs") from None
+    return index, count
