@@ -123,6 +123,13 @@ class Geometry:
     rig: Rig | None = None
     left_out: tuple[tuple[str, str], ...] = ()
 
+    def of_resized(self, sizes: Sequence[tuple[int, int]]) -> Geometry:
+        """The same of pictures of a rig that were resized to (W, H) px; edges stay in px of the first ones."""
+        if self.rig is None or [camera.size for camera in self.cameras] == list(sizes):
+            return self
+        rig = self.rig.resized(sizes)
+        return replace(self, cameras=rig.cameras, rig=rig)
+
 
 def align(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Alignment:
     """Finds how the pictures of frames lie on their reference.

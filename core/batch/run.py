@@ -20,7 +20,8 @@ from ..frames.reading import read_frame
 from ..options import StitchOptions
 from ..output.outputs import json_bytes
 from ..pictures.picture import Picture
-from ..pipeline import StitchResult, Stopwatch, compose, stitch
+from ..pipeline import Stopwatch, compose, stitch
+from ..stitch_result import StitchResult
 from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage
 from ..system.progress import Progress, stages_of
 from ..system.threads import asking

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
+from ..raster.resizing import resized_points
 from .camera import Camera
 from .projective import inverse_intrinsics
 from .view import View
@@ -116,6 +118,17 @@ class Rig:
 
     def __len__(self) -> int:
         return len(self.cameras)
+
+    def resized(self, sizes: Sequence[tuple[int, int]]) -> Rig:
+        """The same of pictures that were resized to (W, H) px; what is said of edges and guesses stays in the px of the
+        first ones."""
+        seen = self.observations
+        pixels = seen.pixels.copy()
+        for number, (camera, size) in enumerate(zip(self.cameras, sizes, strict=True)):
+            own = seen.picture == number
+            pixels[own] = resized_points(pixels[own], camera.size, size)
+        cameras = tuple(camera.resized(size) for camera, size in zip(self.cameras, sizes, strict=True))
+        return replace(self, cameras=cameras, observations=replace(seen, pixels=pixels))
 
     @property
     def centres(self) -> Array:

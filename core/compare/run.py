@@ -16,7 +16,8 @@ from ..frames.reading import read_frame
 from ..measure.projectivity import independent_fundamental
 from ..options import StitchOptions
 from ..output.outputs import json_bytes
-from ..pipeline import StitchResult, Stopwatch, compose
+from ..pipeline import Stopwatch, compose
+from ..stitch_result import StitchResult
 from ..system.errors import BadRequest, Cancelled, StitchError
 from ..system.output_files import OutputFiles
 from ..system.progress import Progress

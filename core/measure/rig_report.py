@@ -12,6 +12,7 @@ from ..cameras.rig import Rig
 from ..compose.inpaint import closed_holes
 from ..field.sphere_field import SphereField
 from ..panorama.canvas import Canvas
+from ..raster.enlarging import enlarged_box
 from .exposure_entry import exposure_entry, exposure_warnings
 from .options import RIG, WARNING
 from .report import (
@@ -49,7 +50,7 @@ _UNSURE_SCALE = {
 def make_rig_report(
     options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment, canvas: Canvas,
     decided: Sequence[Decided], appearance: dict[str, float], shows: NDArray[np.bool_], inpainted: int,
-    open_px: int, labels: NDArray[np.int16] | None,
+    open_px: int, labels: NDArray[np.int16] | None, times: int = 1,
 ) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
     """The report of a stitch of more than two pictures.
 
@@ -59,6 +60,9 @@ def make_rig_report(
         As for `make_report`; the alignment has a rig.
     labels : (H, W) int array, optional
         Which picture each pixel of the panorama comes from.
+    times : int
+        How many px of the panorama lie along one of the alignment's warp, of labels and of what was decided and
+        counted there.
 
     Returns
     -------
@@ -70,11 +74,12 @@ def make_rig_report(
     rig, field, warp = alignment.rig, alignment.field, alignment.warp
     assert rig is not None and isinstance(field, SphereField)
     names = [picture.name for picture in pictures]
-    holes, folds = sum(one.holes for one in decided), max(one.folds for one in decided)
-    error = map_errors(warp, alignment.edges)
+    area, looked_at = times**2, shows[times // 2 :: times, times // 2 :: times]
+    holes, folds = area * sum(one.holes for one in decided), max(one.folds for one in decided)
+    error = times * map_errors(warp, alignment.edges, rig.cameras)
     report = {
         "schema": SCHEMA,
-        "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum()))),
+        "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum())), area),
         "left_out": left_out_entry(alignment.left_out),
         "options": options_entry(options, alignment) | {"fade": options.fade, "viewpoint": options.viewpoint},
         "matches": {
@@ -84,15 +89,17 @@ def make_rig_report(
         "rig": _rig_entry(rig, names),
         "field": {
             "kind": options.field, "smoothing": field.depth.smoothing, "centres": len(field.depth.inner.centres),
-            "leave_one_out_px": field.leave_one_out_px,
+            "leave_one_out_px": times * field.leave_one_out_px,
             "negative_share": float((rig.inverse_ranges < 0).mean()) if len(rig.inverse_ranges) else 0.0,
             "dense": {"used": False, "why": "more than two pictures have the smooth field, for now"},
         },
         "slide": slide_entry(alignment.slide),
         "canvas": canvas_entry(canvas, rig.cameras[0].K),
         "composition": {
-            "light": exposure_entry(pictures, decided), "occluded_px": sum(int(one.hidden.sum()) for one in decided),
-            "hole_px": holes, "inpainted_px": inpainted, "holes": closed_holes(shows, small=False)[1],
+            "light": exposure_entry(pictures, decided),
+            "occluded_px": area * sum(int(one.hidden.sum()) for one in decided), "hole_px": holes,
+            "inpainted_px": area * inpainted,
+            "holes": [enlarged_box(box, times) for box in closed_holes(looked_at, small=False)[1]],
         },
         "measured": {
             "alignment_median_px": _percentile(error, 50), "alignment_p95_px": _percentile(error, 95),
@@ -107,7 +114,7 @@ def make_rig_report(
         )
     if folds > WARNING.fold_share:
         warnings.append(f"the warp folds over in {folds:.1%} of a picture: look for doubled or torn things there")
-    open_holes = open_px if options.holes == "auto" else holes
+    open_holes = area * open_px if options.holes == "auto" else holes
     if open_holes > WARNING.hole_share * shows.size:
         warnings.append(
             f"{open_holes} pixels were seen by no camera, hidden behind something near: the panorama is "
@@ -117,9 +124,10 @@ def make_rig_report(
 
 
 def _pictures(
-    pictures: Sequence[Picture], rig: Rig, decided: Sequence[Decided], share: Sequence[float]
+    pictures: Sequence[Picture], rig: Rig, decided: Sequence[Decided], share: Sequence[float], area: int
 ) -> list[dict[str, Any]]:
-    """What is known of each picture, and what became of it; `place` in units of the longest baseline."""
+    """What is known of each picture, and what became of it; `place` in units of the longest baseline; area: px of the
+    panorama in each that was decided about."""
     seen, error = rig.observations, residuals(rig)
     entries = []
     for number, (picture, camera) in enumerate(zip(pictures, rig.cameras, strict=True)):
@@ -132,7 +140,7 @@ def _pictures(
         entries.append(entry | {
             "place": rig.centres[number], "place_deviation": _of(rig.position_deviation, number),
             "inliers": int(own.sum()), "residual_px": float(np.median(error[own])) if own.any() else None,
-            "hidden_px": int(decided[number].hidden.sum()), "share": share[number],
+            "hidden_px": area * int(decided[number].hidden.sum()), "share": share[number],
         })  # fmt: skip
     return entries
 

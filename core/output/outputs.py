@@ -6,10 +6,10 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from ..measure.report import plain
 from ..panorama.layers import Layer
 from ..panorama.rig_viewpoint import RigViewpoint
-from ..pictures.encoding import encode_picture, output_bits
+from ..pictures.encoding import encode_into, encode_picture, output_bits
 from ..raster.arrays import cut
 from ..raster.colour import decode
-from ..raster.lazy import whole
+from ..raster.enlarging import EnlargedImage, repeated
+from ..raster.lazy import Placed, whole
 from ..raster.picture_map import BoxedMap, MapPart
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
@@ -30,7 +31,7 @@ from .match_table import match_file
 from .rig_page import rig_page
 
 if TYPE_CHECKING:
-    from ..pipeline import StitchResult
+    from ..stitch_result import StitchResult
 
 # Versions of the layers' folder and of the warp's file (docs/formats.md).
 LAYERS_FORMAT, WARP_FORMAT = 2, 2
@@ -201,15 +202,14 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     """
     reference = result.pictures[0]
     alpha = None if result.panorama.alpha.min() >= 1.0 else result.panorama.alpha
-    data, warned = encode_picture(
-        result.panorama.light, alpha, result.bits, request.panorama.suffix, reference.icc, reference.exif
-    )
-    files.add(request.panorama, data)
-    warnings = list(warned)
+    suffix = request.panorama.suffix
+    warnings = list(files.add_by(request.panorama, lambda file: encode_into(
+        file.write, result.panorama.light, alpha, result.bits, suffix, reference.icc, reference.exif
+    )))  # fmt: skip
     if request.layers is not None:
         _add_layers(result, request.layers, files)
     if request.warp is not None:
-        files.add(request.warp, warp_bytes(result))
+        files.add_by(request.warp, lambda file: write_warp(result, file))
     if request.cameras is not None:
         files.add(request.cameras, json_bytes(camera_table(result)))
     if request.report is not None and request.timing is not None and request.matches is not None:
@@ -232,21 +232,26 @@ def add_report(
 def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
     """Stages everything of a layers' folder."""
     place, names = result.spread, [picture.name for picture in result.pictures]
+
+    def in_full(values: NDArray[Any]) -> NDArray[Any]:
+        """What lies on the warp's canvas (h, w) in px of the panorama."""
+        return cut(repeated(values, result.times), place)
+
     if result.rig is not None:
         _refuse_other_files(folder, layer_files(names, (".png", ".exr")))
-    for number, (picture, layer) in enumerate(zip(result.pictures, result.layers, strict=True)):
-        _add_layer(files, folder, layer_stem(number, picture.name), layer.within(place), result)
+    for number, picture in enumerate(result.pictures):
+        _add_layer(files, folder, layer_stem(number, picture.name), result.full_layer(number).within(place), result)
     asked = result.report["options"]
     first = 0 if asked["slide"] else 1  # from its own place the reference sees all that it shows
     masks = {
-        _occluded(number): _mask_bytes(cut(mask, place)) for number, mask in enumerate(result.occluded)
+        _occluded(number): _mask_bytes(in_full(mask)) for number, mask in enumerate(result.occluded)
         if number >= first
     }  # fmt: skip
-    masks[CONFIDENCE] = _mask_bytes(cut(result.confidence, place))
+    masks[CONFIDENCE] = _mask_bytes(in_full(result.confidence))
     if asked["holes"] != "transparent":
-        masks[INPAINTED] = _mask_bytes(cut(result.inpainted, place))
-    if result.labels is not None:
-        labels = cut(result.labels, place, -1)
+        masks[INPAINTED] = _mask_bytes(in_full(result.inpainted))
+    labels = result.full_labels()
+    if labels is not None:
         masks[LABELS] = _label_bytes(labels, len(result.pictures))
         if result.rig is None:
             masks[SEAM] = _mask_bytes(labels > 0, result.panorama.alpha > 0)
@@ -284,8 +289,8 @@ def _mask_bytes(mask: NDArray[Any], shown: NDArray[np.bool_] | None = None) -> b
     return encode_picture(decode(levels[..., None]), alpha, 8, ".png")[0]
 
 
-def warp_bytes(result: StitchResult) -> bytes:
-    """The content of the warp's file: geometry and maps, from which each layer can be made again.
+def write_warp(result: StitchResult, file: IO[bytes]) -> None:
+    """Writes the warp's file: geometry and maps, from which each layer can be made again.
 
     Canvas pixel p + offset is seen at x ~ H_inf p + inverse_depth e_prime. On other surfaces p = K r for the unit
     ray r of the pixel instead; there is no offset, but `projection` (its name), `focal` (px per radian), `centre`
@@ -297,58 +302,72 @@ def warp_bytes(result: StitchResult) -> bytes:
     Parameters
     ----------
     result : StitchResult
-
-    Returns
-    -------
-    bytes
-        An .npz file; NaN stands for what a model does not know. The same result gives the same bytes.
+    file : binary file
+        Becomes an .npz file; NaN stands for what a model does not know. The same result gives the same bytes.
     """
-    views, warp = result.views, result.warp.within(result.spread)
-    canvas = warp.canvas
-    e_prime = np.stack([view.e_prime for view in views])
-    if not np.isfinite(warp.inverse_depth).any():
+    write_npz(file, _warp_arrays(result))
+
+
+def warp_bytes(result: StitchResult) -> bytes:
+    """The same as bytes."""
+    buffer = io.BytesIO()
+    write_warp(result, buffer)
+    return buffer.getvalue()
+
+
+def _warp_arrays(result: StitchResult) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Names and arrays of the warp's file, each made when it is its turn: those of all pictures may be more than
+    fits."""
+    views, place, canvas = result.views, result.spread, result.canvas
+    warp = result.warp if result.times > 1 else result.warp.within(place)
+    e_prime, projection = np.stack([view.e_prime for view in views]), canvas.projection
+    inverse_depth = warp.inverse_depth
+    if not np.isfinite(inverse_depth).any():
         # inside, e' is 0 without depth; in a file that would say that all cameras stand in one place
         e_prime[1:] = np.nan
-    arrays: dict[str, NDArray[Any]] = {
+    if result.times > 1:
+        size = place[3], place[2]
+        inverse_depth = whole(Placed(EnlargedImage(inverse_depth, result.times), (-place[1], -place[0]), size, np.nan))
+    yield from {
         "format": np.array(WARP_FORMAT), "sizes": np.array([view.size for view in views]),
         "canvas": np.array([canvas.width, canvas.height]),
-        "offset": np.array(canvas.offset, np.int64), "inverse_depth": warp.inverse_depth,
+        "offset": np.array(canvas.offset, np.int64) if projection is None else np.full(2, np.nan),
+        "inverse_depth": inverse_depth,
         "K": np.stack([view.K for view in views]), "R": np.stack([view.R for view in views]),
         "t": np.stack([view.t for view in views]), "dist": np.stack([view.camera.distortion for view in views]),
         "H_inf": np.stack([view.H_inf for view in views]), "e_prime": e_prime,
         "F": np.stack([edge.two_view.F for edge in result.edges]),
         "edges": np.array([(edge.i, edge.j) for edge in result.edges]),
-    }  # fmt: skip
-    for number, one in enumerate(warp.maps):
-        if number or canvas.projection is not None:  # in a flat panorama the reference is only shifted, by `offset`
+    }.items()  # fmt: skip
+    del inverse_depth
+    for number in range(len(views)):
+        if number or projection is not None:  # in a flat panorama the reference is only shifted, by `offset`
+            one = result.full_map(number).within(place)
             known = one.known() if isinstance(one, BoxedMap) else MapPart(one.arrays(), (0, 0))
-            arrays |= {
-                f"map_x_{number:02d}": known.inner.x, f"map_y_{number:02d}": known.inner.y,
-                f"box_{number:02d}": np.array(known.box),
-            }  # fmt: skip
-    projection = canvas.projection
+            yield f"map_x_{number:02d}", known.inner.x
+            yield f"map_y_{number:02d}", known.inner.y
+            yield f"box_{number:02d}", np.array(known.box)
     if projection is not None:
-        arrays |= {
-            "offset": np.full(2, np.nan), "projection": np.array(projection.kind), "focal": np.array(projection.focal),
+        yield from {
+            "projection": np.array(projection.kind), "focal": np.array(projection.focal),
             "distance": np.array(projection.distance),
             "centre": np.array(projection.centre) + canvas.offset, "rotation": projection.rotation,
-        }  # fmt: skip
+        }.items()  # fmt: skip
     if warp.slide is not None and warp.viewpoint is not None:
-        arrays |= {"slide": whole(warp.slide), "s1": np.array(warp.viewpoint.s1)}
+        yield from {"slide": whole(warp.slide), "s1": np.array(warp.viewpoint.s1)}.items()
     elif isinstance(warp.viewpoint, RigViewpoint):
         places = warp.viewpoint.s1 * warp.viewpoint.places
-        arrays |= {"s1": np.array(warp.viewpoint.s1), "places": places, "upright": warp.viewpoint.rotation}
-    return npz_bytes(arrays)
+        s1 = np.array(warp.viewpoint.s1)
+        yield from {"s1": s1, "places": places, "upright": warp.viewpoint.rotation}.items()
 
 
-def npz_bytes(arrays: dict[str, NDArray[Any]]) -> bytes:
-    """An .npz file of arrays: the same arrays give the same bytes, while numpy.savez stores the time of day."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
-        for name, array in arrays.items():
+def write_npz(file: IO[bytes], arrays: Iterable[tuple[str, NDArray[Any]]]) -> None:
+    """Writes an .npz file of named arrays: the same ones give the same bytes, while numpy.savez stores the time of day.
+    """
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
+        for name, array in arrays:
             with archive.open(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), "w", force_zip64=True) as member:
                 np.save(member, np.asarray(array, order="C"), allow_pickle=False)
-    return buffer.getvalue()
 
 
 def json_bytes(value: dict[str, Any]) -> bytes:

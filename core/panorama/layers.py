@@ -130,15 +130,17 @@ class Fetched(LazyImage):
     @staticmethod
     def of(
         picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32], inside: NDArray[np.bool_],
-        by_root: bool,
+        by_root: bool, limits: tuple[float, float] | None = None,
     ) -> tuple[Fetched, NDArray[np.float32] | NDArray[np.bool_]]:  # fmt: skip
-        """A picture through a map, and its alpha (H, W); inside (H, W): where the map falls inside the picture."""
+        """A picture through a map, and its alpha (H, W); inside (H, W): where the map falls inside the picture; limits:
+        the picture's `range`, if it is known."""
         alpha: NDArray[Any] = inside
         if picture.alpha is not None:
             fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
             alpha = inside * np.where(fetched > LAYER.min_alpha, np.minimum(fetched, 1.0), np.float32(0))
         shows = inside if picture.alpha is None else alpha > 0
-        return Fetched(picture, map_x, map_y, shows, extent(picture.light), by_root), alpha
+        limits = extent(picture.light) if limits is None else limits
+        return Fetched(picture, map_x, map_y, shows, limits, by_root), alpha
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -11,7 +11,8 @@ from ...core.frames.frame import Frame
 from ...core.frames.reading import read_frame
 from ...core.options import StitchOptions
 from ...core.pictures.picture import Picture, load_picture
-from ...core.pipeline import StitchResult, Stopwatch, compose
+from ...core.pipeline import Stopwatch, compose
+from ...core.stitch_result import StitchResult
 from ...core.system.progress import STAGES_OF_MANY, Progress
 from ..scene_camera import SceneCamera
 from .rendered_set import RenderedSet
