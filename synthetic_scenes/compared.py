@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.cameras.sources import CameraRequest
-from ..core.stitch_result import StitchResult
+from ..core.pipeline import StitchResult
 from .measures import Truth, figures, hidden_quality, on_the_wide_canvas, truth_of, whole_picture
 from .rendered import RenderedPair
 from .rendered import _load as load_rendered  # a new name there would make every kept picture a stranger

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.measure.metrics import psnr
+from ..core.pipeline import StitchResult
 from ..core.raster.arrays import dilated
 from ..core.raster.colour import decode, encode
 from ..core.raster.sampling import fetch
-from ..core.stitch_result import StitchResult
 from .measures import Truth, common_part, on_the_wide_canvas
 from .rendered import RenderedPair
 

@@ -14,10 +14,10 @@ from ..core.compose.blend import averaged
 from ..core.compose.composition import composed
 from ..core.measure.metrics import appearance, coverage_samples, overlap_quality, psnr, ssim
 from ..core.panorama.layers import Layer
+from ..core.pipeline import StitchResult
 from ..core.raster.arrays import Array
 from ..core.raster.colour import encode
 from ..core.raster.sampling import fetch
-from ..core.stitch_result import StitchResult
 from .ground_truth import TrueGeometry, inverse_depth_at, pose_errors, seen_from, visible
 from .rendered import RenderedPair
 from .stitches import ON_REFERENCE

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.cameras.projective import homogeneous
+from ..core.pipeline import StitchResult
 from ..core.raster.arrays import Array
 from ..core.raster.colour import encode
-from ..core.stitch_result import StitchResult
 from .measures import Truth
 from .rendered import RenderedPair
 

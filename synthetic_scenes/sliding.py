@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.cameras.projective import homogeneous, project
+from ..core.pipeline import StitchResult
 from ..core.raster.arrays import Array
-from ..core.stitch_result import StitchResult
 from .ground_truth import inverse_depth_at, visible
 from .measures import Truth
 from .rendered import RenderedPair

@@ -25,8 +25,7 @@ from edf_stitch.core.field.field import FieldValues
 from edf_stitch.core.cameras.projective import fundamental_from_pose, infinite_homography, rotation_from_vector
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import picture_from_array
-from edf_stitch.core.pipeline import StitchOptions, stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.synthetic_scenes.two_planes import Pair, make_pair
 from hypothesis import HealthCheck, settings

@@ -17,7 +17,7 @@ ADDON = ROOT / "edf_addon"
 # Which rooms each may import, itself left out. Rooms stand in the order of the data.
 BELOW_POSE = ("system", "raster", "pictures", "cameras")
 BELOW_MEASURE = (*BELOW_POSE, "pose", "rig", "field", "dense", "continuation", "panorama", "compose")
-TOP = ("frames", "choices", "options", "fields", "mapping", "alignment", "stitch_result", "pipeline")
+TOP = ("frames", "choices", "options", "fields", "mapping", "alignment", "pipeline")
 MAY_IMPORT = {
     "system": (),
     "raster": ("system",),
@@ -32,7 +32,7 @@ MAY_IMPORT = {
     "panorama": (*BELOW_POSE, "field", "continuation", "choices"),
     "compose": (*BELOW_POSE, "field", "panorama", "choices", "options"),
     "measure": BELOW_MEASURE,
-    "output": (*BELOW_MEASURE, "measure", "stitch_result"),
+    "output": (*BELOW_MEASURE, "measure", "pipeline"),
     "batch": (*BELOW_MEASURE, "measure", "output", *TOP),
     "compare": (*BELOW_MEASURE, "measure", "output", *TOP),
     "commands": (*BELOW_MEASURE, "measure", "rivals", "output", "batch", "compare", *TOP),
@@ -42,9 +42,7 @@ MAY_IMPORT = {
     "fields": ("cameras", "field", "rivals"),
     "mapping": (*BELOW_MEASURE, "choices", "options"),
     "alignment": (*BELOW_MEASURE, "frames", "options", "fields", "mapping"),
-    "full_set": (*BELOW_MEASURE, "frames", "alignment"),
-    "stitch_result": (*BELOW_MEASURE, "frames"),
-    "pipeline": (*BELOW_MEASURE, "frames", "measure", "options", "alignment", "full_set", "stitch_result"),
+    "pipeline": (*BELOW_MEASURE, "frames", "measure", "options", "alignment"),
 }
 # The same for the add-on. What lies beside its rooms is known to all of them, or to those after it.
 BESIDE = ("idnames", "offered", "pair", "properties", "earlier", "engine_options", "status", "editor", "explain")

@@ -14,8 +14,8 @@ from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.reference_map import ReferenceMap
 from edf_stitch.core.panorama.warp import Warp
+from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.raster.picture_map import PictureMap
-from edf_stitch.core.stitch_result import StitchResult
 
 # The reference's own plane, whole, where what holds for single pixels of the reference can be asked; in words as well.
 ON_REFERENCE = StitchOptions(

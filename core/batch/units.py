@@ -36,7 +36,7 @@ from ..system.output_files import Made, OutputFiles
 from .list import BatchItem, same_name
 
 if TYPE_CHECKING:
-    from ..stitch_result import StitchResult
+    from ..pipeline import StitchResult
 
 STAMPS = ".edf"
 

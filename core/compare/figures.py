@@ -6,8 +6,8 @@ from ..cameras.edge import Edge
 from ..measure.held_out import held_out
 from ..measure.metrics import canvas_quality, coverage_samples, off_line_mean, overlap_quality
 from ..measure.projectivity import projectivity
+from ..pipeline import StitchResult
 from ..raster.arrays import Array
-from ..stitch_result import StitchResult
 
 # Name, unit, digits, and whether more is better (None: neither) of each figure, by its key.
 FIGURES: dict[str, tuple[str, str, int, bool | None]] = {

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..measure.metrics import overlap_views
+from ..pipeline import StitchResult
 from ..raster.colour import encode
-from ..stitch_result import StitchResult
 from .options import COMPARISON
 
 Rgb = NDArray[np.uint8]

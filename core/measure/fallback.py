@@ -11,7 +11,7 @@ from .verdict import NOT_USABLE
 
 if TYPE_CHECKING:
     from ..options import StitchOptions
-    from ..stitch_result import StitchResult
+    from ..pipeline import StitchResult
 
 SIMPLER: dict[str, dict[str, Any]] = {
     "the smooth field alone, without dense depth": {"dense": False},

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from ..stitch_result import StitchResult
+    from ..pipeline import StitchResult
 
 
 def camera_table(result: StitchResult) -> dict[str, Any]:

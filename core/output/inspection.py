@@ -30,7 +30,7 @@ from .match_table import match_file
 from .options import INSPECTION
 
 if TYPE_CHECKING:
-    from ..stitch_result import StitchResult
+    from ..pipeline import StitchResult
 
 # What the window is told of each match: the field stands on it, or it contradicts the others.
 USED, LEFT_OUT = "USED", "LEFT_OUT"

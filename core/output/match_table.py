@@ -11,7 +11,7 @@ from ..cameras.matches import Matches
 from ..pose.match_files import NOT_BY_FIELD, NOT_BY_GEOMETRY, USED, matches_csv
 
 if TYPE_CHECKING:
-    from ..stitch_result import StitchResult
+    from ..pipeline import StitchResult
 
 
 def match_file(result: StitchResult) -> bytes:

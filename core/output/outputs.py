@@ -31,7 +31,7 @@ from .match_table import match_file
 from .rig_page import rig_page
 
 if TYPE_CHECKING:
-    from ..stitch_result import StitchResult
+    from ..pipeline import StitchResult
 
 # Versions of the layers' folder and of the warp's file (docs/formats.md).
 LAYERS_FORMAT, WARP_FORMAT = 2, 2

@@ -14,7 +14,7 @@ from .page import STYLE, table
 from .rig_graph import rig_graph
 
 if TYPE_CHECKING:
-    from ..stitch_result import StitchResult
+    from ..pipeline import StitchResult
 
 _GRAPH_STYLE = """
 .graph { max-width: 100%; height: auto; background: var(--soft); border-radius: 6px; }

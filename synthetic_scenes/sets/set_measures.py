@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ...core.cameras.projective import rotation_angle
 from ...core.cameras.rig import Rig
 from ...core.measure.metrics import psnr, ssim
+from ...core.pipeline import StitchResult
 from ...core.raster.arrays import Array
 from ...core.raster.colour import encode
 from ...core.raster.sampling import fetch
-from ...core.stitch_result import StitchResult
 from ..finished import evened
 from ..ground_truth import SAME_PLACE, visible
 from ..scene_camera import SceneCamera

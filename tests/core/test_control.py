@@ -16,9 +16,8 @@ from edf_stitch.core.compose.crop import largest_rectangle
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.match_table import match_file
 from edf_stitch.core.output.outputs import warp_bytes
-from edf_stitch.core.pipeline import stitch
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.pose.match_files import matches_csv
-from edf_stitch.core.stitch_result import StitchResult
 from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at

@@ -16,10 +16,9 @@ from edf_stitch.core.measure.metrics import psnr
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.outputs import OutputRequest, check, write
 from edf_stitch.core.pictures.picture import picture_from_array
-from edf_stitch.core.pipeline import stitch
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.raster.colour import encode
 from edf_stitch.core.raster.lazy import whole
-from edf_stitch.core.stitch_result import StitchResult
 from edf_stitch.core.system.output_files import OutputFiles
 
 from ..sets import FOCAL, PictureSet, make_set

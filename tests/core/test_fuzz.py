@@ -21,9 +21,8 @@ from edf_stitch.core.choices import FADES
 from edf_stitch.core.commands.cli import main
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.masks import read_mask
-from edf_stitch.core.pipeline import stitch
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.pose.match_files import read_matches
-from edf_stitch.core.stitch_result import StitchResult
 from edf_stitch.core.system.errors import StitchError
 from edf_stitch.synthetic_scenes.two_planes import Pair
 from hypothesis import example, given, settings

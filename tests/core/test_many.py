@@ -19,8 +19,7 @@ from edf_stitch.core.output.match_table import match_file
 from edf_stitch.core.output.outputs import OutputRequest, check, warp_bytes, write
 from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.pictures.picture import picture_from_array
-from edf_stitch.core.pipeline import stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import Cancelled, NoOverlap
 from edf_stitch.core.system.output_files import OutputFiles
 

@@ -25,11 +25,10 @@ from edf_stitch.core.compose.multiband import bands_for
 from edf_stitch.core.field import folding, visibility
 from edf_stitch.core.panorama.warp import build_map
 from edf_stitch.core.pictures.encoding import encode_picture
-from edf_stitch.core.pipeline import StitchOptions, stitch
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.pose import features
 from edf_stitch.core.raster import arrays
 from edf_stitch.core.raster.colour import decode
-from edf_stitch.core.stitch_result import StitchResult
 from edf_stitch.core.system.errors import (
     BadRequest,
     Cancelled,

@@ -16,8 +16,7 @@ from edf_stitch.core.output.inspection import depth_grid, displacement_px, full_
 from edf_stitch.core.output.outputs import OutputRequest, warp_bytes, write
 from edf_stitch.core.panorama.levelling import angles_of, gravity, turned, upright
 from edf_stitch.core.pictures.picture import load_picture
-from edf_stitch.core.pipeline import stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.core.system.output_files import OutputFiles
 from edf_stitch.synthetic_scenes.two_planes import FLOOR_Y, WALL_Z, Pair, Textures

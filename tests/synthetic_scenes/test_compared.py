@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from edf_stitch.core.panorama.layers import Layer
-from edf_stitch.core.pipeline import stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.synthetic_scenes.compared import RenderedTruth, truth_beside
 from edf_stitch.synthetic_scenes.measures import figures, hidden_quality, truth_of
 from edf_stitch.synthetic_scenes.rendered import RenderedPair

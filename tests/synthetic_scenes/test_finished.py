@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.panorama.layers import Layer
+from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.raster.colour import decode
-from edf_stitch.core.stitch_result import StitchResult
 from edf_stitch.synthetic_scenes.finished import finished, things_half
 from edf_stitch.synthetic_scenes.measures import Truth, common_part, truth_of
 from edf_stitch.synthetic_scenes.rendered import RenderedPair

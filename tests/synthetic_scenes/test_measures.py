@@ -10,7 +10,7 @@ from edf_stitch.core.cameras.projective import infinite_homography, rotation_fro
 from edf_stitch.core.choices import RIVALS
 from edf_stitch.core.compose.blend import averaged
 from edf_stitch.core.panorama.layers import Layer
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.synthetic_scenes.measures import (
     Truth,
     composition,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.synthetic_scenes.measures import Truth, truth_of
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
 from edf_stitch.synthetic_scenes.sliding import pair_beside_rays

@@ -9,19 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...options import StitchOptions
-from ...panorama.warp import Warp
 from ...raster.arrays import bounds
 from ...raster.lazy import AnyImage
 from ...raster.log_encoding import log_encode
-from ..composition import Composition
 from ..options import BANDS
-from ..tone.exposure import Exposure
 from .options import DRAFT
+
+if TYPE_CHECKING:
+    from ...panorama.warp import Warp
+    from ..composition import Composition
+    from ..tone.exposure import Exposure
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ from .options import DRAFT
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
+class _Piece:
     """A picture in a part of the panorama: its number; share (h, w): how much of it is shown there, 0 where it shows
     nothing; alpha (h, w); and where it is seen."""
 
@@ -74,7 +74,7 @@ class EnlargedPanorama(LazyImage):
 
         def put(there: Part) -> None:
             here = (slice(a.start - b.start, a.stop - b.start) for a, b in zip(there, (rows, columns), strict=True))
-            out[tuple(here)] = self._light(there)
+            out[tuple(here)] = self._made(there)
 
         each(put, _tiles(rows, columns, DRAFT.tile_rows, DRAFT.tile_columns))
         return out
@@ -114,7 +114,7 @@ class EnlargedPanorama(LazyImage):
         each(put, _tiles(slice(0, height), slice(0, width), DRAFT.tile_rows, DRAFT.tile_columns))
         return out
 
-    def _light(self, part: Part) -> NDArray[np.float32]:
+    def _made(self, part: Part) -> NDArray[np.float32]:
         """The light (h, w, C) of one part."""
         ask()
         here, channels = self._enlargement(part), self.shape[2]
@@ -146,7 +146,7 @@ class EnlargedPanorama(LazyImage):
         alpha[self._drafted(here) & (total == 0)] = 1
         return alpha
 
-    def _shown(self, part: Part) -> Iterator[_Shown]:
+    def _shown(self, part: Part) -> Iterator[_Piece]:
         """What each picture shows of one part, of those that show anything."""
         here = self._enlargement(part)
         labels = self.draft.labels[here.cells]
@@ -157,7 +157,7 @@ class EnlargedPanorama(LazyImage):
             _, alpha = Fetched.of(picture, picture_map.x, picture_map.y, inside, True, self.limits[number])
             # to the fourth: the ramp between two px of the draft is then about two of four wide, and fine detail is not
             # seen twice
-            yield _Shown(number, np.square(np.square(share)) * inside, alpha.astype(np.float32), picture_map)
+            yield _Piece(number, np.square(np.square(share)) * inside, alpha.astype(np.float32), picture_map)
 
     def _map(self, number: int, here: Enlargement) -> PictureMap:
         """Where a picture is seen in a part."""
@@ -166,7 +166,7 @@ class EnlargedPanorama(LazyImage):
         height, width = self.pictures[number].light.shape[:2]
         return _enlarged(self.draft.warp.maps[number].within(box).arrays(), here, (width, height))
 
-    def _of_picture(self, one: _Shown, part: Part, box: Part) -> NDArray[np.float32]:
+    def _of_picture(self, one: _Piece, part: Part, box: Part) -> NDArray[np.float32]:
         """The light (h, w, C) of a picture in a box of a part, as it is shown there."""
         draft, number, places = self.draft, one.number, one.picture_map
         x, y = places.x[box], places.y[box]

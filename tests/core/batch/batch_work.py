@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 from edf_stitch.core.batch import run as batch
 from edf_stitch.core.commands.cli import main
-from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import picture_from_array
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchOptions, StitchResult
 
 from ...pairs import KNOWN_WORDS
 

@@ -16,8 +16,7 @@ from edf_stitch.core.batch.list import BatchItem, read_list
 from edf_stitch.core.batch.run import BatchSummary, Outcome, run_batch
 from edf_stitch.core.batch.units import BatchRequest
 from edf_stitch.core.pictures.encoding import encode_picture
-from edf_stitch.core.pipeline import StitchOptions, stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest, Cancelled, UnreadableImage, UnwritableOutput
 
 from ...pairs import KNOWN_WORDS, ON_REFERENCE

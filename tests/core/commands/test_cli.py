@@ -22,12 +22,11 @@ from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.commands import cli
 from edf_stitch.core.commands.cli import main
 from edf_stitch.core.commands.messages import shortened
-from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.camera_file import camera_table
 from edf_stitch.core.output.outputs import json_bytes
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import load_picture, picture_from_array
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchOptions, StitchResult
 from edf_stitch.core.system.errors import Cancelled
 from edf_stitch.core.system.progress import STAGES
 from edf_stitch.synthetic_scenes.two_planes import Pair

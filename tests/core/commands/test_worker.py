@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from edf_stitch.core.pictures.picture import load_picture
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 from ...pairs import ON_REFERENCE

@@ -14,7 +14,7 @@ from edf_stitch.core.compare.figures import FIGURES, figures_of
 from edf_stitch.core.compare.tables import shown
 from edf_stitch.core.measure.metrics import canvas_quality, overlap_quality, overlap_views, psnr, ssim
 from edf_stitch.core.output.outputs import warp_bytes
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult
 
 
 def test_canvas_values_are_of_both_pictures_black_outside_the_overlap(small_result: StitchResult) -> None:

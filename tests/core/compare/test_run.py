@@ -15,8 +15,7 @@ from edf_stitch.core.compare import run as run_module
 from edf_stitch.core.compare.pairs import PairFiles, find_pairs
 from edf_stitch.core.compare.run import FILES, ComparisonRequest, comparable, run_comparison
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.pipeline import stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest, Cancelled, DegenerateGeometry, UnwritableOutput
 
 from ...pairs import ON_REFERENCE

@@ -13,8 +13,7 @@ from edf_stitch.core.dense.matching import ComparedPicture
 from edf_stitch.core.dense.refine import _guide, _in_both, _overlap, _plain
 from edf_stitch.core.field.folding import folds, turning
 from edf_stitch.core.pictures.picture import Picture, load_picture, picture_from_array
-from edf_stitch.core.pipeline import stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult, stitch
 
 from ...pairs import ON_REFERENCE
 from ..line_scenes import Field

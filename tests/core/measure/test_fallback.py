@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from edf_stitch.core import pipeline
 from edf_stitch.core.measure.verdict import GOOD, NOT_USABLE, Verdict
-from edf_stitch.core.pipeline import StitchOptions, stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.system.errors import Cancelled
 from edf_stitch.synthetic_scenes.two_planes import Pair
 

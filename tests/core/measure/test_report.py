@@ -23,8 +23,7 @@ from edf_stitch.core.measure.report import make_report, plain
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.projection import round_projection
 from edf_stitch.core.panorama.warp import build_warp
-from edf_stitch.core.pipeline import StitchOptions, stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 from ...pairs import ON_REFERENCE, warp_of, with_map

@@ -11,9 +11,8 @@ import pytest
 from edf_stitch.core.compose.tone.exposure import unchanged
 from edf_stitch.core.measure.look import Look, look_at
 from edf_stitch.core.measure.verdict import Verdict, judge
-from edf_stitch.core.pipeline import StitchOptions, stitch
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.raster.picture_map import PictureMap
-from edf_stitch.core.stitch_result import StitchResult
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 RIGHT = {

@@ -12,7 +12,7 @@ from edf_stitch.core.cameras.sources import CameraRequest, cameras_for, read_cam
 from edf_stitch.core.output.camera_file import camera_table
 from edf_stitch.core.output.outputs import OutputRequest, check, json_bytes
 from edf_stitch.core.pictures.metadata import Exif
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.system.errors import BadRequest
 from edf_stitch.core.system.output_files import OutputFiles
 

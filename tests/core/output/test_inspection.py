@@ -14,8 +14,7 @@ from edf_stitch.core.panorama.projection import round_projection
 from edf_stitch.core.panorama.rig_viewpoint import rig_viewpoint
 from edf_stitch.core.panorama.rig_warp import RigSurface, build_rig_warp
 from edf_stitch.core.panorama.viewpoint import Viewpoint
-from edf_stitch.core.pipeline import stitch
-from edf_stitch.core.stitch_result import StitchResult
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 from ...pairs import ON_REFERENCE, with_map, with_two_view

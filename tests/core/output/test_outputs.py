@@ -16,10 +16,9 @@ from edf_stitch.core.output.outputs import OutputRequest, check, json_bytes, lay
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.pictures.masks import read_painted
 from edf_stitch.core.pictures.picture import load_picture
-from edf_stitch.core.pipeline import StitchOptions, stitch
+from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.pose.match_files import read_matches
 from edf_stitch.core.raster.colour import encode
-from edf_stitch.core.stitch_result import StitchResult
 from edf_stitch.core.system.errors import BadRequest, UnwritableOutput
 from edf_stitch.core.system.output_files import OutputFiles
 from edf_stitch.core.system.progress import STAGES

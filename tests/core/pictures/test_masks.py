@@ -14,8 +14,8 @@ from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.masks import painted_over, read_mask, read_painted, without
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
+from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.pose import features
-from edf_stitch.core.stitch_result import StitchResult
 from edf_stitch.core.system.errors import BadRequest, UnreadableImage
 
 SIZE = (36, 24)

@@ -20,10 +20,9 @@ from edf_stitch.core.choices import FIELDS
 from edf_stitch.core.commands.cli import main
 from edf_stitch.core.fields import fit_field
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.pipeline import stitch
+from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.pose import features
 from edf_stitch.core.raster.grid import Grid
-from edf_stitch.core.stitch_result import StitchResult
 from edf_stitch.core.system import cache as cache_module
 from edf_stitch.core.system.cache import Cache, default_folder
 from edf_stitch.synthetic_scenes.two_planes import Pair
