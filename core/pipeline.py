@@ -26,6 +26,7 @@ from .compose.decided import Decided
 from .compose.enlarging.draft import draft_times
 from .compose.enlarging.enlarged import EnlargedPanorama, enlarged_map
 from .compose.enlarging.full_set import FullSet
+from .compose.enlarging.memory_need import threads_that_fit
 from .field.field import Field
 from .field.sphere_field import SphereField
 from .frames.frame import Frame, size_of
@@ -47,8 +48,9 @@ from .raster.enlarging import enlarged_box, reduced_box
 from .raster.picture_map import CanvasMap
 from .raster.resizing import resized_points
 from .system.errors import BadRequest
+from .system.memory import give_back
 from .system.progress import Progress, Stopwatch, stages_of
-from .system.threads import ask, asking
+from .system.threads import ask, asking, at_most
 
 
 @dataclass(frozen=True)
@@ -264,7 +266,7 @@ def stitch(
     options = options or StitchOptions()
     stopwatch = Stopwatch(Progress(progress, cancelled, stages_of(len(pictures))))
 
-    with asking(cancelled):
+    with asking(cancelled), at_most(threads_that_fit(pictures, options)):
         stopwatch("read")
         frame = read_frame(pictures, options)
         geometry = estimate_geometry([frame], options, stopwatch)
@@ -278,12 +280,16 @@ def stitch(
 
 def _of_many(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:
     """The panorama of more than two pictures: of large ones by what is decided on small ones."""
+    give_back()  # what features took lies between what stays
     times = draft_times([size_of(picture) for picture in frame.pictures], options)
     small = frame.reduced(times)
     geometry_of_small = geometry.of_resized([size_of(picture) for picture in small.pictures])
     alignment = fit_and_warp(geometry_of_small, [small], options, progress)
     full = None if times == 1 or geometry.rig is None else FullSet(frame.pictures, geometry.rig, times)
-    return compose(small, alignment, options, progress, full=full)
+    give_back()
+    result = compose(small, alignment, options, progress, full=full)
+    give_back()
+    return result
 
 
 def compose(

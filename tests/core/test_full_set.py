@@ -79,8 +79,8 @@ def test_it_is_the_panorama_that_is_made_at_once(at_once: StitchResult, drafted:
     part = second[y : y + middle.shape[0], x : x + middle.shape[1]]
     smooth = [cv2.GaussianBlur(one, None, 2) for one in (middle, part)]
     assert psnr(*smooth, np.ones(part.shape[:2], bool)) > 29
-    sharpness = [cv2.Laplacian(one, cv2.CV_32F).std() for one in (middle, part)]
-    assert sharpness[1] > 0.95 * sharpness[0], "full pictures, not enlarged ones"
+    sharpness = [cv2.Laplacian(one[100:-100, 100:-100], cv2.CV_32F).std() for one in (first, shown(drafted))]
+    assert sharpness[1] > 0.9 * sharpness[0], "full pictures, not enlarged ones"
 
 
 def test_cuts_and_threads_change_no_bit(drafted: StitchResult) -> None:
