@@ -275,7 +275,8 @@ def _options_for(item: BatchItem, options: StitchOptions) -> StitchOptions:
 
 
 def _units(item: BatchItem, options: StitchOptions, request: BatchRequest, version: str) -> Iterator[Unit]:
-    decided = [version, asdict(replace(options, cache=None, memory_gb=None)), request.suffix.lower(), request.warp, request.layers]
+    outcome = asdict(replace(options, cache=None, memory_gb=None))
+    decided = [version, outcome, request.suffix.lower(), request.warp, request.layers]
     shared = [path for frame in item.aligned_on for path in item.files(frame)]
     known = [*decided, *(_identity(path) for path in (*options.files_read, *shared))]
     frames: Sequence[int | None] = (None,) if item.frames is None else (None, *item.frames)

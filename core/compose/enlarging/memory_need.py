@@ -31,8 +31,8 @@ class Need:
     ----------
     sizes : tuple of (int, int)
         (W, H) px of each as it is worked on.
-    full : int
-        Bytes of all as they are read.
+    read : int
+        Bytes of all while they are read, and shrunk if they are.
     held : int
         Bytes of all as they are worked on.
     times : int
@@ -40,7 +40,7 @@ class Need:
     """
 
     sizes: tuple[Size, ...]
-    full: int
+    read: int
     held: int
     times: int
 
@@ -51,9 +51,8 @@ class Need:
         features = min(threads, len(pixels)) * MEMORY.features_bytes * largest
         composed = MEMORY.decided_bytes * sum(pixels) / self.times**2
         enlarged = MEMORY.enlarged_bytes * sum(pixels) if self.times > 1 else 0.0
-        reading = self.full if self.full > self.held else 0
         working = self.held + max(features, composed + enlarged + threads * MEMORY.strip_bytes)
-        return int(MEMORY.program_bytes + max(self.held + reading, working))
+        return int(MEMORY.program_bytes + max(self.read, working))
 
 
 def threads_that_fit(sources: Sequence[Any], options: StitchOptions) -> int:
@@ -64,12 +63,13 @@ def threads_that_fit(sources: Sequence[Any], options: StitchOptions) -> int:
     NotEnoughMemory
         They take more than may be used with a single one. It says what would fit.
     """
-    free = free_bytes()
-    asked = options.memory_gb
-    if asked is None and (free is None or len(sources) == 2):
-        return count()
-    may_be_used = 1e9 * asked if asked is not None else free / 2 if free is not None else np.inf
-    at_most = may_be_used if asked is not None or free is None else free
+    if options.memory_gb is not None:
+        at_most = may_be_used = 1e9 * options.memory_gb
+    else:
+        free = free_bytes()
+        if free is None or len(sources) == 2:
+            return count()
+        at_most, may_be_used = float(free), free / 2
     facts = [_facts(one) for one in sources]
     need = _need(facts, options, options.scale)
     if need.bytes_with(1) > at_most:
@@ -83,7 +83,7 @@ def _need(facts: Sequence[tuple[Size, int]], options: StitchOptions, scale: floa
     full = sum(width * height * each for (width, height), each in facts)
     # shrunk pictures are of floats, and have a view beside
     held = full if scale == 1 else sum(width * height * MEMORY.float_bytes for width, height in sizes)
-    return Need(sizes, full, held, draft_times(sizes, options))
+    return Need(sizes, full if scale == 1 else full + held, held, draft_times(sizes, options))
 
 
 def _what_fits(facts: Sequence[tuple[Size, int]], options: StitchOptions, needed: int, at_most: float) -> str:

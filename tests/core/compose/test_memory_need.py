@@ -44,13 +44,17 @@ def test_what_is_refused_is_told_what_would_fit() -> None:
     assert threads_that_fit([PHONE] * fewer, asked(1.5)) >= 1
     with pytest.raises(NotEnoughMemory):
         threads_that_fit([PHONE] * (fewer + 1), asked(1.5))
-    scale = re.search(r"--scale ([\d.]+)", str(told.value))
-    assert scale and threads_that_fit([PHONE] * 30, asked(1.5, scale=float(scale[1]))) >= 1
+    with pytest.raises(NotEnoughMemory) as told:
+        threads_that_fit([PHONE] * 30, asked(2.0))
+    scale = float(re.search(r"--scale ([\d.]+)", str(told.value))[1])
+    assert threads_that_fit([PHONE] * 30, asked(2.0, scale=scale)) >= 1
+    with pytest.raises(NotEnoughMemory):
+        threads_that_fit([PHONE] * 30, asked(2.0, scale=scale + 0.05))
     with pytest.raises(NotEnoughMemory, match="use smaller pictures"):
         threads_that_fit([PHONE] * 30, asked(0.1))
 
 
-def test_without_a_limit_half_of_what_is_free_is_taken_and_all_of_it_if_need_be(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_limit_half_of_what_is_free_is_taken_or_all_if_need_be(monkeypatch: pytest.MonkeyPatch) -> None:
     def with_free(gb: float | None, count: int = 30) -> int:
         monkeypatch.setattr(memory_need, "free_bytes", lambda: None if gb is None else int(gb * 1e9))
         return threads_that_fit([PHONE] * count, asked(None))
