@@ -47,8 +47,8 @@ class Need:
     def bytes_with(self, threads: int) -> int:
         """Bytes at the peak of a stitch with so many threads."""
         pixels = [width * height for width, height in self.sizes]
-        largest = min(max(pixels, default=0), MEMORY.features_pixels)
-        features = min(threads, len(pixels)) * MEMORY.features_bytes * largest
+        one = MEMORY.features_bytes * min(max(pixels, default=0), MEMORY.features_pixels)
+        features = max(one, min(threads * one, MEMORY.features_at_once))
         composed = MEMORY.decided_bytes * sum(pixels) / self.times**2
         enlarged = MEMORY.enlarged_bytes * sum(pixels) if self.times > 1 else 0.0
         working = self.held + max(features, composed + enlarged + threads * MEMORY.strip_bytes)

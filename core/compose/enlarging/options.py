@@ -33,9 +33,11 @@ class MemoryOptions:
 
     # Bytes of the program and its libraries.
     program_bytes: int = 250_000_000
-    # Bytes a pixel, and pixels at most, of a picture whose features are looked for: a pyramid in floats.
+    # Bytes a pixel, and pixels at most, of a picture whose features are looked for, and bytes of all at once: see
+    # `pose.options.FEATURES`.
     features_bytes: int = 230
     features_pixels: int = 3_200_000
+    features_at_once: int = 1_200_000_000
     # Bytes for each pixel of all pictures, as decided about: maps, layers, overlaps and the panorama.
     decided_bytes: int = 45
     # The same for each of all pictures in full, of a large set: the panorama's outline, with all that they overlap.
