@@ -29,6 +29,7 @@ sys.exit(main(sys.argv[2:]))
 
 def write_ring(folder: Path, count: int, rings: int, turn: float, enlarged: int) -> float:
     """JPEGs of a painted sphere, taken from its middle, 1000 × 750 px times `enlarged`; their focal length."""
+    folder.mkdir()
     random, size, focal = np.random.default_rng(0), (1000, 750), 750.0
     sphere = np.zeros((2048, 4096, 3), np.float32)
     for side, share in ((16, 0.5), (128, 0.5), (512, 0.4), (2048, 0.25)):
@@ -56,29 +57,29 @@ def stitched(folder: Path, most_pixels: int, limit: float, *more: str) -> subpro
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (int(limit), int(limit)))
 
-    call = ["stitch", str(folder), "-o", str(folder / "out.png"), "--no-cache", "--overwrite", *more]
+    call = ["stitch", str(folder), "-o", str(folder.parent / "out.png"), "--no-cache", "--overwrite", *more]
     return subprocess.run(
         [sys.executable, "-c", RUN, str(most_pixels), *call], capture_output=True, text=True, preexec_fn=limited
     )
 
 
 def test_a_set_goes_through_within_a_hard_limit_or_says_what_would_fit(tmp_path: Path) -> None:
-    focal = write_ring(tmp_path, 6, 1, 0.5, 1)
+    focal = write_ring(tmp_path / "ring", 6, 1, 0.5, 1)
     given = ("--focal-px", str(focal), "--quiet")
-    done = stitched(tmp_path, 1_000_000, 700_000_000 + MAPPED, *given, "--memory", "0.7")
+    done = stitched(tmp_path / "ring", 1_000_000, 700_000_000 + MAPPED, *given, "--memory", "0.7")
     assert done.returncode == 0, done.stderr
     with_one = (tmp_path / "out.png").read_bytes()
-    again = stitched(tmp_path, 1_000_000, 64e9, *given)
+    again = stitched(tmp_path / "ring", 1_000_000, 64e9, *given)
     assert again.returncode == 0 and (tmp_path / "out.png").read_bytes() == with_one, "the limit changes no byte"
-    refused = stitched(tmp_path, 1_000_000, 64e9, *given, "--memory", "0.4")
+    refused = stitched(tmp_path / "ring", 1_000_000, 64e9, *given, "--memory", "0.4")
     assert refused.returncode == 3 and re.search(r"take about 0\.\d GB, and --memory allows 0\.4 GB", refused.stderr)
     assert "what would fit: --scale" in refused.stderr
 
 
 @pytest.mark.slow
 def test_thirty_pictures_of_12_megapixels_fit_in_three_and_a_half_gigabytes(tmp_path: Path) -> None:
-    focal = write_ring(tmp_path, 30, 2, 2 * np.pi / 15, 4)
-    done = stitched(tmp_path, 48_000_000, 3.5e9 + MAPPED, "--focal-px", str(focal), "--memory", "3.5")
+    focal = write_ring(tmp_path / "ring", 30, 2, 2 * np.pi / 15, 4)
+    done = stitched(tmp_path / "ring", 48_000_000, 3.5e9 + MAPPED, "--focal-px", str(focal), "--memory", "3.5")
     assert done.returncode == 0, done.stderr
     height, width = cv2.imread(str(tmp_path / "out.png")).shape[:2]
     assert width > 15_000 and height > 3000
