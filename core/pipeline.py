@@ -326,7 +326,8 @@ def compose(
     progress("warp", 0.5)
     # two pictures keep what earlier releases made of them
     by_root = len(pictures) > 2
-    layers = tuple(layer_of(picture, one, by_root) for picture, one in zip(pictures, whole.maps, strict=True))
+    hold = full is None  # of a large set, all together are no longer small
+    layers = tuple(layer_of(picture, one, by_root, hold) for picture, one in zip(pictures, whole.maps, strict=True))
 
     floats = [picture.bits == 32 for picture in pictures]
 
@@ -337,7 +338,7 @@ def compose(
         panorama = made.panorama if enlarged is None else Layer(enlarged, enlarged.alpha())
         own = whole.maps[0].inside()
         reference = enlarged_box(box_of(own), times) if own.any() else None
-        box = crop_box(options.kept, canvas.whole, panorama.alpha > 0, reference, len(pictures))
+        box = crop_box(options.kept, canvas.whole, panorama.shows, reference, len(pictures))
         return made, enlarged, panorama, box
 
     painted = frame.painted
@@ -362,7 +363,7 @@ def compose(
     progress("write", 0.0)
     hidden = np.logical_or.reduce([one.hidden for one in made.decided])
     told = (
-        options, pictures, alignment, canvas, made.decided, looks, panorama.alpha > 0, int(made.filled.sum()),
+        options, pictures, alignment, canvas, made.decided, looks, panorama.shows, int(made.filled.sum()),
         int((hidden & (made.panorama.alpha == 0)).sum()),
     )  # fmt: skip
     report, more = make_report(*told) if alignment.rig is None else make_rig_report(*told, labels, times)
