@@ -10,8 +10,8 @@ class DraftOptions:
     """Decisions about a large set at a fraction of its size (`draft`, `enlarged`)."""
 
     most_pixels: int = 48_000_000
-    """Pixels of all pictures together up to which a set is decided about at its own size: each takes about 40 bytes in
-    maps, layers and overlaps then, 2 GB in all."""
+    """Pixels of all pictures together up to which a set is decided about at its own size: each takes about 75 bytes in
+    maps, layers and overlaps then, 3.6 GB in all."""
 
     most_times: int = 16
     """How many px of the panorama lie along one of a draft's at most: of the largest sets that can be read."""
@@ -29,7 +29,7 @@ class DraftOptions:
 
 @dataclass(frozen=True)
 class MemoryOptions:
-    """What a stitch takes at its peak, measured on sets of 5 to 30 pictures of 0.3 to 12 MP (`memory_need`)."""
+    """What a stitch takes at its peak, measured on thirty pictures of 12 MP (`memory_need`)."""
 
     # Bytes of the program and its libraries.
     program_bytes: int = 250_000_000
@@ -39,9 +39,9 @@ class MemoryOptions:
     features_pixels: int = 3_200_000
     features_at_once: int = 1_200_000_000
     # Bytes for each pixel of all pictures, as decided about: maps, layers, overlaps and the panorama.
-    decided_bytes: int = 45
+    decided_bytes: int = 75
     # The same for each of all pictures in full, of a large set: the panorama's outline, with all that they overlap.
-    enlarged_bytes: float = 0.8
+    enlarged_bytes: float = 0.5
     # Bytes of each thread's strips while a panorama is composed and written.
     strip_bytes: int = 100_000_000
     # Bytes a pixel of a float picture and its view, and of one of 16 bits and its view.

@@ -30,20 +30,20 @@ def eight_threads(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_thirty_pictures_of_a_phone_fit_in_what_was_measured() -> None:
     pictures = [PHONE] * 30
-    fitting = [threads_that_fit(pictures, asked(gb)) for gb in (3.0, 3.5, 4.5, 64)]
+    fitting = [threads_that_fit(pictures, asked(gb)) for gb in (3.4, 3.6, 4.5, 64)]
     assert fitting == sorted(fitting) and 1 <= fitting[0] <= 4 and fitting[-1] == 8
     with pytest.raises(NotEnoughMemory):
         threads_that_fit(pictures, asked(2.0))
 
 
 def test_what_is_refused_is_told_what_would_fit() -> None:
-    with pytest.raises(NotEnoughMemory, match="30 pictures of 360 megapixels together take about 2.* --memory") as told:
-        threads_that_fit([PHONE] * 30, asked(1.5))
+    with pytest.raises(NotEnoughMemory, match="30 pictures of 360 megapixels together take about 3.* --memory") as told:
+        threads_that_fit([PHONE] * 30, asked(2.5))
     assert told.value.exit_code == 3
     fewer = int(re.search(r"the first (\d+) of them", str(told.value))[1])
-    assert threads_that_fit([PHONE] * fewer, asked(1.5)) >= 1
+    assert threads_that_fit([PHONE] * fewer, asked(2.5)) >= 1
     with pytest.raises(NotEnoughMemory):
-        threads_that_fit([PHONE] * (fewer + 1), asked(1.5))
+        threads_that_fit([PHONE] * (fewer + 1), asked(2.5))
     with pytest.raises(NotEnoughMemory) as told:
         threads_that_fit([PHONE] * 30, asked(2.0))
     scale = float(re.search(r"--scale ([\d.]+)", str(told.value))[1])
@@ -60,7 +60,7 @@ def test_without_a_limit_half_of_what_is_free_is_taken_or_all_if_need_be(monkeyp
         return threads_that_fit([PHONE] * count, asked(None))
 
     assert with_free(64) == 8 and with_free(None) == 8
-    assert with_free(9) == threads_that_fit([PHONE] * 30, asked(4.5)) > with_free(3.1) == 1
+    assert with_free(9) == threads_that_fit([PHONE] * 30, asked(4.5)) > with_free(3.4) == 1
     with pytest.raises(NotEnoughMemory, match="only this much is free: 1.0 GB"):
         with_free(1)
     assert with_free(1, count=2) == 8, "a pair goes as it always did"
