@@ -16,6 +16,7 @@ from .cameras.camera import Camera
 from .cameras.edge import Edge
 from .cameras.lens import undistort
 from .cameras.matches import Matches
+from .cameras.resized import resized_edge, resized_rig
 from .cameras.rig import Rig
 from .cameras.scale import Places, Scale, scale_for
 from .cameras.sources import cameras_for
@@ -137,6 +138,15 @@ class Geometry:
             return self.rig.centres
         pose = self.edges[0].two_view
         return np.stack([np.zeros(3), -pose.R.T @ pose.t])
+
+    def of_resized(self, sizes: Sequence[tuple[int, int]]) -> Geometry:
+        """The same of the pictures resized to (W, H) px."""
+        if [camera.size for camera in self.cameras] == list(sizes):
+            return self
+        edges = tuple(resized_edge(edge, self.cameras, sizes) for edge in self.edges)
+        cameras = tuple(camera.resized(size) for camera, size in zip(self.cameras, sizes, strict=True))
+        rig = None if self.rig is None else resized_rig(self.rig, sizes)
+        return replace(self, cameras=cameras, edges=edges, rig=rig)
 
 
 def align(frames: Sequence[Frame], options: StitchOptions, progress: ReportProgress) -> Alignment:

@@ -109,6 +109,10 @@ class StitchOptions:
     measure : bool, default True
         Whether the report also compares the pictures in the overlap, and holds matches back to see how far the field
         can be trusted.
+    memory_gb : float, optional
+        GB (of 10⁹ bytes) that a stitch may take: fewer threads work at once where they need more together, and pictures
+        that do not fit even so are refused. By default half of what is free; refused is what is more than all of it.
+        The outcome is the same.
     cache : Path, optional
         Folder where features, geometry and fields are kept for the next stitch of the same pictures; the outcome is the
         same. None: they are not kept.
@@ -139,6 +143,7 @@ class StitchOptions:
     preview: bool = False
     seed: int = 0
     measure: bool = True
+    memory_gb: float | None = dataclasses.field(default=None, compare=False)
     cache: Path | None = dataclasses.field(default=None, compare=False)
 
     def ignored(self, number: int) -> Path | NDArray[Any] | None:
@@ -223,6 +228,8 @@ class StitchOptions:
         self._check_exposure()
         if not LEAST_SCALE <= self.scale <= 1.0:  # NaN too
             raise BadRequest(f"a scale of {self.scale:g}: it must lie between {LEAST_SCALE:g} and 1 (the full size)")
+        if self.memory_gb is not None and not self.memory_gb > 0:  # NaN too
+            raise BadRequest(f"{self.memory_gb:g} GB of memory: it must be more than 0")
         if not 0 <= self.seed < 2**31:
             raise BadRequest("the seed must be a whole number from 0 to 2147483647")
         if isinstance(self.viewpoint, int) and self.viewpoint < 1:

@@ -10,8 +10,8 @@ from ..core.choices import RIVALS, Slide
 from ..core.frames.frame import Frame
 from ..core.frames.reading import read_frame
 from ..core.options import StitchOptions
-from ..core.pipeline import StitchResult, Stopwatch, compose
-from ..core.system.progress import Progress
+from ..core.pipeline import StitchResult, compose
+from ..core.system.progress import Progress, Stopwatch
 from .rendered import RenderedPair
 
 # What is known of the cameras / the field.

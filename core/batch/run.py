@@ -20,9 +20,9 @@ from ..frames.reading import read_frame
 from ..options import StitchOptions
 from ..output.outputs import json_bytes
 from ..pictures.picture import Picture
-from ..pipeline import StitchResult, Stopwatch, compose, stitch
+from ..pipeline import StitchResult, compose, stitch
 from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage
-from ..system.progress import Progress, stages_of
+from ..system.progress import Progress, Stopwatch, stages_of
 from ..system.threads import asking
 from .list import BatchItem
 from .options import CLIP

@@ -11,11 +11,12 @@ import hashlib
 import json
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,12 +28,12 @@ from ..output.outputs import (
     add_report,
     json_bytes,
     layer_files,
-    warp_bytes,
     write,
 )
+from ..output.warp_file import write_warp
 from ..pictures.encoding import output_bits
 from ..system.errors import BadRequest, UnreadableImage, UnwritableOutput
-from ..system.output_files import OutputFiles
+from ..system.output_files import Made, OutputFiles
 from .list import BatchItem, same_name
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ class Unit:
                 warnings += add_depth(result, *self._depth, files)
                 add_report(result, warnings, self.report, matches, timing, files)
                 if self.request.warp:
-                    files.add(self._named(".warp.npz"), warp_bytes(result))
+                    files.add_by(self._named(".warp.npz"), partial(write_warp, result))
             made = files.prints[_real(self.panorama)] if self.panorama else None
             files.add(self.stamp, json_bytes({"made_from": self.made_from, "panorama": made}))
         return warnings
@@ -185,7 +186,7 @@ class Unit:
         """Whether a panorama that exists is the one that was written."""
         if self.panorama is None or not os.path.exists(self.panorama):
             return True
-        return fingerprint_of_bytes(self.panorama.read_bytes()) == stamp.get("panorama")
+        return fingerprint_of_file(self.panorama) == stamp.get("panorama")
 
 
 @dataclass(frozen=True)
@@ -205,14 +206,12 @@ class UnitFiles(OutputFiles):
         super().__init__(overwrite, inputs)
         self.prints: dict[Path, list[int | str]] = {}
 
-    def add(self, path: str | Path, data: bytes) -> None:
-        """Stages a file."""
-        path = Path(path)
-        if not path.parent.exists():
-            self.add_to_folder(path.parent, path.name, data)
-            return
-        super().add(path, data)
-        self.prints[_real(path)] = fingerprint_of_bytes(data)
+    def add_by(self, path: str | Path, make: Callable[[IO[bytes]], Made]) -> Made:
+        """See `OutputFiles.add_by`."""
+        self.make_folder(Path(path).parent)
+        made = super().add_by(path, make)
+        self.prints[_real(path)] = fingerprint_of_file(self.staged(path))
+        return made
 
 
 def plan(items: Sequence[BatchItem], options: StitchOptions, request: BatchRequest) -> list[Job]:
@@ -264,9 +263,11 @@ def plan(items: Sequence[BatchItem], options: StitchOptions, request: BatchReque
     return jobs
 
 
-def fingerprint_of_bytes(data: bytes) -> list[int | str]:
-    """The number of bytes and their SHA-256."""
-    return [len(data), hashlib.sha256(data).hexdigest()]
+def fingerprint_of_file(path: Path) -> list[int | str]:
+    """The number of its bytes and their SHA-256."""
+    with open(path, "rb") as file:
+        digest = hashlib.file_digest(file, "sha256")
+        return [file.tell(), digest.hexdigest()]
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -285,9 +286,9 @@ def _options_for(item: BatchItem, options: StitchOptions) -> StitchOptions:
 
 
 def _units(item: BatchItem, options: StitchOptions, request: BatchRequest, version: str) -> Iterator[Unit]:
+    outcome = asdict(replace(options, cache=None, memory_gb=None))
     decided = [
-        version, asdict(replace(options, cache=None)), request.suffix.lower(), request.warp, request.layers,
-        request.depth, request.mesh,
+        version, outcome, request.suffix.lower(), request.warp, request.layers, request.depth, request.mesh,
     ]  # fmt: skip
     shared = [path for frame in item.aligned_on for path in item.files(frame)]
     known = [*decided, *(_identity(path) for path in (*options.files_read, *shared))]

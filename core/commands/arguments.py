@@ -190,10 +190,16 @@ def _add_preview(how: argparse._ArgumentGroup) -> None:
 
 
 def _add_repetition(how: argparse._ArgumentGroup) -> None:
-    """What another stitch of the same pictures takes from this one: what was kept, and the random choices."""
+    """What another stitch of the same pictures takes from this one: what was kept, and the random choices; and what
+    memory any of them may take."""
     how.add_argument(
         "--cache", action=argparse.BooleanOptionalAction, default=True,
         help="keep features, geometry and field for the next stitch of the same pictures (default; EDF_CACHE: where)",
+    )  # fmt: skip
+    how.add_argument(
+        "--memory", type=float, metavar="GB",
+        help="GB that may be taken (default: half of what is free): with less, less is done at once; the outcome is "
+        "the same",
     )  # fmt: skip
     how.add_argument("--seed", type=int, default=0, metavar="N", help="seed of every random choice (default 0)")
 
@@ -234,6 +240,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         preview=getattr(args, "preview", False),
         seed=args.seed,
         measure=measure,
+        memory_gb=args.memory,
         cache=default_folder() if args.cache else None,
     )
 

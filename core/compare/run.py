@@ -16,10 +16,10 @@ from ..frames.reading import read_frame
 from ..measure.projectivity import independent_fundamental
 from ..options import StitchOptions
 from ..output.outputs import json_bytes
-from ..pipeline import StitchResult, Stopwatch, compose
+from ..pipeline import StitchResult, compose
 from ..system.errors import BadRequest, Cancelled, StitchError
 from ..system.output_files import OutputFiles
-from ..system.progress import Progress
+from ..system.progress import Progress, Stopwatch
 from ..system.threads import asking
 from .figures import figures_of
 from .page import comparison_page

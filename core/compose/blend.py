@@ -165,11 +165,16 @@ class Evened(Retouched):
 
     def anew(self, before: NDArray[np.float32], there: Part) -> NDArray[np.float32]:
         """See `Retouched`."""
-        tones = log_encode(before)
-        # bounded, so that bright neighbours' differences neither brighten the dark nor turn light negative
-        most = BANDS.max_relative_change * np.abs(tones) + BANDS.max_dark_change
-        after = log_decode(tones + np.clip(self.change[there][self.touched[there]], -most, most))
-        return np.maximum(after, np.minimum(before, 0))
+        return changed(before, self.change[there][self.touched[there]])
+
+
+def changed(light: NDArray[np.float32], change: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Light (…, C) with a change (…, C) of its tones."""
+    tones = log_encode(light)
+    # bounded, so that bright neighbours' differences neither brighten the dark nor turn light negative
+    most = BANDS.max_relative_change * np.abs(tones) + BANDS.max_dark_change
+    after = log_decode(tones + np.clip(change, -most, most))
+    return np.maximum(after, np.minimum(light, 0))
 
 
 def seam_region(

@@ -40,6 +40,11 @@ class Frame:
         """What the pictures are called."""
         return [picture.name for picture in self.pictures]
 
+    @property
+    def sizes(self) -> list[tuple[int, int]]:
+        """(W, H) px of the pictures as they are worked on."""
+        return [size_of(picture) for picture in self.pictures]
+
     def only(self, numbers: Sequence[int]) -> Frame:
         """The same with some of the pictures, in the order of these numbers."""
         if list(numbers) == list(range(len(self.pictures))):
@@ -49,7 +54,7 @@ class Frame:
 
     def resized(self, share: float) -> Frame:
         """The same with its pictures shrunk to a share of their sides."""
-        return replace(self, pictures=tuple(resized(picture, share) for picture in self.pictures))
+        return self if share == 1 else replace(self, pictures=tuple(resized(one, share) for one in self.pictures))
 
 
 def size_of(picture: Picture) -> tuple[int, int]:

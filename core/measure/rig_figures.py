@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
+from ..cameras.camera import Camera
 from ..cameras.edge import Edge
 from ..cameras.lens import distort
 from ..cameras.projective import project
@@ -16,6 +17,7 @@ from ..cameras.rig import Rig, RigEdge
 from ..panorama.warp import Warp
 from ..raster.arrays import Array
 from ..raster.picture_map import BoxedMap, CanvasMap, PictureMap
+from ..raster.resizing import resized_points
 from ..system.threads import ask
 from .metrics import shown_at
 from .options import RIG
@@ -67,17 +69,22 @@ def weak_links(rig: Rig) -> list[RigEdge]:
     return [edge for edge in rig.edges if edge.inliers < RIG.weak_inliers and (edge.i, edge.j) in kept]
 
 
-def map_errors(warp: Warp, edges: Sequence[Edge]) -> Array:
+def map_errors(warp: Warp, edges: Sequence[Edge], cameras: Sequence[Camera]) -> Array:
     """px (M,) by which the maps miss matches: of each pair, a match's point of the first picture is looked up where
-    the canvas shows it, and compared with its point of the second one; an even sample of each pair."""
+    the canvas shows it, and compared with its point of the second one; an even sample of each pair. cameras: of the
+    pictures that the edges lie in, of which the maps may know smaller copies."""
     found = []
     for edge in edges:
         ask()
         inliers = edge.matches.subset(edge.two_view.inliers).thinned(RIG.matches_looked_up)
         if len(inliers):
             (first, corner), (second, other) = (_known_part(warp.maps[number]) for number in (edge.i, edge.j))
-            at = shown_at(first, inliers.x) + corner - other
-            found.append(np.linalg.norm(second.between(at) - inliers.y, axis=1))
+            x, y = (
+                points if camera.size == one.size else resized_points(points, camera.size, one.size)
+                for points, camera, one in zip((inliers.x, inliers.y), edge.pair(cameras), (first, second), strict=True)
+            )
+            at = shown_at(first, x) + corner - other
+            found.append(np.linalg.norm(second.between(at) - y, axis=1))
     errors = np.concatenate([np.zeros(0), *found])
     finite: Array = errors[np.isfinite(errors)]
     return finite

@@ -13,6 +13,7 @@ from ..compose.inpaint import closed_holes
 from ..compose.window import goes_round
 from ..field.sphere_field import SphereField
 from ..panorama.canvas import Canvas
+from ..raster.enlarging import enlarged_box
 from .exposure_entry import exposure_entry, exposure_warnings
 from .options import RIG, WARNING
 from .report import (
@@ -52,7 +53,7 @@ _UNSURE_SCALE = {
 def make_rig_report(
     options: StitchOptions, pictures: Sequence[Picture], alignment: Alignment, canvas: Canvas,
     decided: Sequence[Decided], appearance: dict[str, float], shows: NDArray[np.bool_], inpainted: int,
-    labels: NDArray[np.int16] | None,
+    labels: NDArray[np.int16] | None, times: int = 1,
 ) -> tuple[dict[str, Any], list[str]]:  # fmt: skip
     """The report of a stitch of more than two pictures.
 
@@ -62,6 +63,9 @@ def make_rig_report(
         As for `make_report`; the alignment has a rig.
     labels : (H, W) int array, optional
         Which picture each pixel of the panorama comes from.
+    times : int
+        How many px of the panorama lie along one of the alignment's warp, of labels and of what was decided and
+        counted there.
 
     Returns
     -------
@@ -73,16 +77,17 @@ def make_rig_report(
     rig, field, warp = alignment.rig, alignment.field, alignment.warp
     assert rig is not None and isinstance(field, SphereField)
     names = [picture.name for picture in pictures]
+    area, looked_at = times**2, shows[times // 2 :: times, times // 2 :: times]
     folds, around = max(one.folds for one in decided), goes_round(canvas)
-    open_px = int(closed_holes(shows, None, around)[0].sum())
-    error = map_errors(warp, alignment.edges)
+    open_px, inpainted = area * int(closed_holes(looked_at, None, around)[0].sum()), area * inpainted
+    error = times * map_errors(warp, alignment.edges, rig.cameras)
     found, inliers = (sum(int(one) for one in counts) for counts in zip(
         *((len(edge.matches), edge.two_view.inliers.sum()) for edge in alignment.edges), strict=True
     ))  # fmt: skip
     contradicting = found - inliers if alignment.edges[0].matches.given else 0
     report = {
         "schema": SCHEMA,
-        "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum()))),
+        "pictures": _pictures(pictures, rig, decided, shares(labels, warp.maps, int(shows.sum())), area),
         "left_out": left_out_entry(alignment.left_out),
         "options": options_entry(options, alignment) | {"fade": options.fade, "viewpoint": options.viewpoint},
         "matches": {
@@ -91,7 +96,7 @@ def make_rig_report(
         "rig": _rig_entry(rig, names),
         "field": {
             "kind": options.field, "smoothing": field.depth.smoothing, "centres": len(field.depth.inner.centres),
-            "leave_one_out_px": field.leave_one_out_px,
+            "leave_one_out_px": times * field.leave_one_out_px,
             "negative_share": float((rig.inverse_ranges < 0).mean()) if len(rig.inverse_ranges) else 0.0,
             "dense": _dense_entry(alignment.dense_sphere),
         },
@@ -99,8 +104,10 @@ def make_rig_report(
         "canvas": canvas_entry(canvas, rig.cameras[0].K),
         "depth": depth_entry(alignment.scale),
         "composition": {
-            "light": exposure_entry(pictures, decided), "occluded_px": sum(int(one.hidden.sum()) for one in decided),
-            "hole_px": open_px + inpainted, "inpainted_px": inpainted, "holes": closed_holes(shows, False, around)[1],
+            "light": exposure_entry(pictures, decided),
+            "occluded_px": area * sum(int(one.hidden.sum()) for one in decided),
+            "hole_px": open_px + inpainted, "inpainted_px": inpainted,
+            "holes": [enlarged_box(box, times) for box in closed_holes(looked_at, False, around)[1]],
         },
         "measured": {
             "alignment_median_px": _percentile(error, 50), "alignment_p95_px": _percentile(error, 95),
@@ -123,9 +130,10 @@ def make_rig_report(
 
 
 def _pictures(
-    pictures: Sequence[Picture], rig: Rig, decided: Sequence[Decided], share: Sequence[float]
+    pictures: Sequence[Picture], rig: Rig, decided: Sequence[Decided], share: Sequence[float], area: int
 ) -> list[dict[str, Any]]:
-    """What is known of each picture, and what became of it; `place` in units of the longest baseline."""
+    """What is known of each picture, and what became of it; `place` in units of the longest baseline; area: px of the
+    panorama in each that was decided about."""
     seen, error = rig.observations, residuals(rig)
     entries = []
     for number, (picture, camera) in enumerate(zip(pictures, rig.cameras, strict=True)):
@@ -138,7 +146,7 @@ def _pictures(
         entries.append(entry | {
             "place": rig.centres[number], "place_deviation": place_deviation(rig, number),
             "inliers": int(own.sum()), "residual_px": float(np.median(error[own])) if own.any() else None,
-            "hidden_px": int(decided[number].hidden.sum()), "share": share[number],
+            "hidden_px": area * int(decided[number].hidden.sum()), "share": share[number],
         })  # fmt: skip
     return entries
 

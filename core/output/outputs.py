@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +15,10 @@ from numpy.typing import NDArray
 
 from ..measure.report import plain
 from ..panorama.layers import Layer
-from ..panorama.rig_viewpoint import RigViewpoint
-from ..pictures.encoding import encode_picture, output_bits
+from ..pictures.encoding import encode_into, encode_picture, output_bits
 from ..raster.arrays import cut
 from ..raster.colour import decode
-from ..raster.lazy import whole
-from ..raster.picture_map import BoxedMap, MapPart
+from ..raster.enlarging import repeated
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
 from .camera_file import camera_table
@@ -30,12 +26,13 @@ from .depth.mesh import mesh_bytes
 from .depth.range_image import range_bytes, range_image
 from .match_table import match_file
 from .rig_page import rig_page
+from .warp_file import write_warp
 
 if TYPE_CHECKING:
     from ..pipeline import StitchResult
 
-# Versions of the layers' folder and of the warp's file (docs/formats.md).
-LAYERS_FORMAT, WARP_FORMAT = 2, 2
+# Version of the layers' folder (docs/formats.md).
+LAYERS_FORMAT = 2
 # Files of a layers' folder. Which picture each pixel comes from, and the same in the form that --mask takes: only where
 # there is a seam.
 LABELS, SEAM = "labels", "seam"
@@ -217,15 +214,14 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     """
     reference = result.pictures[0]
     alpha = None if result.panorama.alpha.min() >= 1.0 else result.panorama.alpha
-    data, warned = encode_picture(
-        result.panorama.light, alpha, result.bits, request.panorama.suffix, reference.icc, reference.exif
-    )
-    files.add(request.panorama, data)
-    warnings = list(warned)
+    suffix = request.panorama.suffix
+    warnings = list(files.add_by(request.panorama, lambda file: encode_into(
+        file.write, result.panorama.light, alpha, result.bits, suffix, reference.icc, reference.exif
+    )))  # fmt: skip
     if request.layers is not None:
         _add_layers(result, request.layers, files)
     if request.warp is not None:
-        files.add(request.warp, warp_bytes(result))
+        files.add_by(request.warp, lambda file: write_warp(result, file))
     if request.cameras is not None:
         files.add(request.cameras, json_bytes(camera_table(result)))
     warnings += add_depth(result, request.depth, request.mesh, files)
@@ -264,21 +260,26 @@ def add_report(
 def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
     """Stages everything of a layers' folder."""
     place, names = result.spread, [picture.name for picture in result.pictures]
+
+    def in_full(values: NDArray[Any]) -> NDArray[Any]:
+        """What lies on the warp's canvas (h, w) in px of the panorama."""
+        return cut(repeated(values, result.times), place)
+
     if result.rig is not None:
         _refuse_other_files(folder, layer_files(names, (".png", ".exr")))
-    for number, (picture, layer) in enumerate(zip(result.pictures, result.layers, strict=True)):
-        _add_layer(files, folder, layer_stem(number, picture.name), layer.within(place), result)
+    for number, picture in enumerate(result.pictures):
+        _add_layer(files, folder, layer_stem(number, picture.name), result.full_layer(number).within(place), result)
     asked = result.report["options"]
     first = 0 if asked["slide"] else 1  # from its own place the reference sees all that it shows
     masks = {
-        _occluded(number): _mask_bytes(cut(mask, place)) for number, mask in enumerate(result.occluded)
+        _occluded(number): _mask_bytes(in_full(mask)) for number, mask in enumerate(result.occluded)
         if number >= first
     }  # fmt: skip
-    masks[CONFIDENCE] = _mask_bytes(cut(result.confidence, place))
+    masks[CONFIDENCE] = _mask_bytes(in_full(result.confidence))
     if asked["holes"] != "transparent":
-        masks[INPAINTED] = _mask_bytes(cut(result.inpainted, place))
-    if result.labels is not None:
-        labels = cut(result.labels, place, -1)
+        masks[INPAINTED] = _mask_bytes(in_full(result.inpainted))
+    labels = result.full_labels()
+    if labels is not None:
         masks[LABELS] = _label_bytes(labels, len(result.pictures))
         if result.rig is None:
             masks[SEAM] = _mask_bytes(labels > 0, result.panorama.alpha > 0)
@@ -314,73 +315,6 @@ def _mask_bytes(mask: NDArray[Any], shown: NDArray[np.bool_] | None = None) -> b
     levels = np.rint(255 * mask.astype(np.float32)).astype(np.uint8)
     alpha = None if shown is None else shown.astype(np.float32)
     return encode_picture(decode(levels[..., None]), alpha, 8, ".png")[0]
-
-
-def warp_bytes(result: StitchResult) -> bytes:
-    """The content of the warp's file: geometry and maps, from which each layer can be made again.
-
-    Canvas pixel p + offset is seen at x ~ H_inf p + inverse_depth e_prime. On other surfaces p = K r for the unit
-    ray r of the pixel instead; there is no offset, but `projection` (its name), `focal` (px per radian), `centre`
-    (canvas px of the direction ahead) and `rotation` (from its axes to the reference camera's). Where the viewpoint
-    slides, by `slide` s, which is `s1` at most, that ray starts at s c, c = −Rᵀ t of the target, and inverse_depth is
-    measured from there: x ~ K (R (r + inverse_depth s c) + inverse_depth t). Of more than two pictures `places` say
-    where it starts. docs/formats.md lists every key.
-
-    Parameters
-    ----------
-    result : StitchResult
-
-    Returns
-    -------
-    bytes
-        An .npz file; NaN stands for what a model does not know. The same result gives the same bytes.
-    """
-    views, warp = result.views, result.warp.within(result.spread)
-    canvas = warp.canvas
-    e_prime = np.stack([view.e_prime for view in views])
-    if not np.isfinite(warp.inverse_depth).any():
-        # inside, e' is 0 without depth; in a file that would say that all cameras stand in one place
-        e_prime[1:] = np.nan
-    arrays: dict[str, NDArray[Any]] = {
-        "format": np.array(WARP_FORMAT), "sizes": np.array([view.size for view in views]),
-        "canvas": np.array([canvas.width, canvas.height]),
-        "offset": np.array(canvas.offset, np.int64), "inverse_depth": warp.inverse_depth,
-        "K": np.stack([view.K for view in views]), "R": np.stack([view.R for view in views]),
-        "t": np.stack([view.t for view in views]), "dist": np.stack([view.camera.distortion for view in views]),
-        "H_inf": np.stack([view.H_inf for view in views]), "e_prime": e_prime,
-        "F": np.stack([edge.two_view.F for edge in result.edges]),
-        "edges": np.array([(edge.i, edge.j) for edge in result.edges]),
-    }  # fmt: skip
-    for number, one in enumerate(warp.maps):
-        if number or canvas.projection is not None:  # in a flat panorama the reference is only shifted, by `offset`
-            known = one.known() if isinstance(one, BoxedMap) else MapPart(one.arrays(), (0, 0))
-            arrays |= {
-                f"map_x_{number:02d}": known.inner.x, f"map_y_{number:02d}": known.inner.y,
-                f"box_{number:02d}": np.array(known.box),
-            }  # fmt: skip
-    projection = canvas.projection
-    if projection is not None:
-        arrays |= {
-            "offset": np.full(2, np.nan), "projection": np.array(projection.kind), "focal": np.array(projection.focal),
-            "distance": np.array(projection.distance),
-            "centre": np.array(projection.centre) + canvas.offset, "rotation": projection.rotation,
-        }  # fmt: skip
-    if warp.slide is not None and warp.viewpoint is not None:
-        arrays |= {"slide": whole(warp.slide), "s1": np.array(warp.viewpoint.s1)}
-    elif isinstance(warp.viewpoint, RigViewpoint):
-        places = warp.viewpoint.s1 * warp.viewpoint.places
-        arrays |= {"s1": np.array(warp.viewpoint.s1), "places": places, "upright": warp.viewpoint.rotation}
-    return npz_bytes(arrays)
-
-
-def npz_bytes(arrays: dict[str, NDArray[Any]]) -> bytes:
-    """An .npz file of arrays: the same arrays give the same bytes, while numpy.savez stores the time of day."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
-        for name, array in arrays.items():
-            with archive.open(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), "w", force_zip64=True) as member:
-                np.save(member, np.asarray(array, order="C"), allow_pickle=False)
-    return buffer.getvalue()
 
 
 def json_bytes(value: dict[str, Any]) -> bytes:

@@ -70,6 +70,13 @@ class Canvas:
         left, top, width, height = box
         return replace(self, width=width, height=height, offset=(self.offset[0] - left, self.offset[1] - top))
 
+    def enlarged(self, times: int, K: Array) -> Canvas:
+        """The same of a round panorama with so many times as many px a side; K (3, 3): of the reference, enlarged."""
+        if self.projection is None:
+            raise ValueError("the plane of a picture has the size of that picture")
+        width, height, x, y = (times * side for side in (self.width, self.height, *self.offset))
+        return replace(self, width=width, height=height, offset=(x, y), projection=self.projection.enlarged(times, K))
+
     def of_reference(self, points: Array, camera: Camera | None = None) -> Array:
         """Canvas px (…, 2) of raw pixels (…, 2) of the reference; camera: the reference's, if its lens matters."""
         if self.projection is not None:

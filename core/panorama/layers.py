@@ -39,6 +39,11 @@ class Layer:
         """All of its light as an array."""
         return whole(self.light)
 
+    @property
+    def shows(self) -> NDArray[np.bool_]:
+        """Where (H, W) it shows anything: its alpha itself if that is bool."""
+        return self.alpha.astype(bool, copy=False) if self.alpha.dtype == bool else self.alpha > 0
+
     def within(self, box: Box) -> Layer:
         """The part in a box (left, top, width, height) of the canvas; nothing where that reaches over its edges."""
         left, top, width, height = box
@@ -51,7 +56,7 @@ class Layer:
         return Layer(Held(self.light, (part[0].start, part[1].start), part_of(self.light, part)), self.alpha)
 
 
-def layer_of(picture: Picture, picture_map: CanvasMap, by_root: bool = False) -> Layer:
+def layer_of(picture: Picture, picture_map: CanvasMap, by_root: bool = False, hold: bool = True) -> Layer:
     """Put a picture on the canvas.
 
     Parameters
@@ -61,6 +66,8 @@ def layer_of(picture: Picture, picture_map: CanvasMap, by_root: bool = False) ->
         Where it is seen on the canvas.
     by_root : bool
         Whether to interpolate the square root of its light (see `Fetched`).
+    hold : bool
+        Whether what is small is fetched once and kept; else it is fetched wherever it is read: the same bits.
 
     Returns
     -------
@@ -71,7 +78,7 @@ def layer_of(picture: Picture, picture_map: CanvasMap, by_root: bool = False) ->
         return _pasted_layer(picture, picture_map)
     if isinstance(picture_map, BoxedMap):
         parts = [
-            _fetched_layer(picture, part.inner, by_root).within(part.canvas_box(picture_map.shape))
+            _fetched_layer(picture, part.inner, by_root, hold).within(part.canvas_box(picture_map.shape))
             for part in picture_map.parts
         ]
         if len(parts) == 1:
@@ -79,7 +86,7 @@ def layer_of(picture: Picture, picture_map: CanvasMap, by_root: bool = False) ->
         left, right = parts
         light = SideBySide(left.light, right.light, picture_map.parts[1].corner[0])
         return Layer(light, np.maximum(left.alpha, right.alpha))
-    return _fetched_layer(picture, picture_map.arrays(), by_root)
+    return _fetched_layer(picture, picture_map.arrays(), by_root, hold)
 
 
 def _pasted_layer(picture: Picture, picture_map: ReferenceMap) -> Layer:
@@ -92,7 +99,7 @@ def _pasted_layer(picture: Picture, picture_map: ReferenceMap) -> Layer:
     return Layer(Placed(picture.light, (y, x), (canvas.height, canvas.width)), alpha)
 
 
-def _fetched_layer(picture: Picture, picture_map: PictureMap, by_root: bool) -> Layer:
+def _fetched_layer(picture: Picture, picture_map: PictureMap, by_root: bool, hold: bool) -> Layer:
     """A picture resampled through a map (H, W) of its raw pixels."""
     map_x, map_y, inside = picture_map.x, picture_map.y, picture_map.inside()
     channels = picture.light.shape[2]
@@ -101,7 +108,7 @@ def _fetched_layer(picture: Picture, picture_map: PictureMap, by_root: bool) -> 
         return Layer(np.broadcast_to(np.float32(0), (*inside.shape, channels)), inside)
     fetched, alpha = Fetched.of(picture, map_x[box], map_y[box], inside[box], by_root)
     # exposure, seam, blending and the report all read it: what is small is fetched once
-    light = whole(fetched) if np.prod(fetched.shape) <= LAYER.held_values else fetched
+    light = whole(fetched) if hold and np.prod(fetched.shape) <= LAYER.held_values else fetched
     placed = Placed(light, (box[0].start, box[1].start), (inside.shape[0], inside.shape[1]))
     if picture.alpha is None:
         return Layer(placed, inside)
@@ -130,15 +137,17 @@ class Fetched(LazyImage):
     @staticmethod
     def of(
         picture: Picture, map_x: NDArray[np.float32], map_y: NDArray[np.float32], inside: NDArray[np.bool_],
-        by_root: bool,
+        by_root: bool, limits: tuple[float, float] | None = None,
     ) -> tuple[Fetched, NDArray[np.float32] | NDArray[np.bool_]]:  # fmt: skip
-        """A picture through a map, and its alpha (H, W); inside (H, W): where the map falls inside the picture."""
+        """A picture through a map, and its alpha (H, W); inside (H, W): where the map falls inside the picture; limits:
+        the picture's `range`, if it is known."""
         alpha: NDArray[Any] = inside
         if picture.alpha is not None:
             fetched = fetch(picture.alpha[..., None], map_x, map_y)[..., 0]
             alpha = inside * np.where(fetched > LAYER.min_alpha, np.minimum(fetched, 1.0), np.float32(0))
         shows = inside if picture.alpha is None else alpha > 0
-        return Fetched(picture, map_x, map_y, shows, extent(picture.light), by_root), alpha
+        limits = extent(picture.light) if limits is None else limits
+        return Fetched(picture, map_x, map_y, shows, limits, by_root), alpha
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -24,7 +24,7 @@ Sharpless, Postle and German, Pannini: A New Projection for Rendering Wide Angle
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -90,6 +90,15 @@ class Projection:
         window = np.array(self.window)
         inner: Array = np.concatenate([np.maximum(limits[:2], window[:2]), np.minimum(limits[2:], window[2:])])
         return inner
+
+    def enlarged(self, times: int, K: Array) -> Projection:
+        """The same with so many times as many px a side; K (3, 3): of the reference, enlarged."""
+        u, v = (times * (middle + 0.5) - 0.5 for middle in self.centre)
+        window = self.window
+        if window is not None:
+            left, top, right, bottom = (times * edge for edge in window)
+            window = left, top, right, bottom
+        return replace(self, focal=times * self.focal, centre=(u, v), K=K, window=window)
 
     def rays(self, points: Array) -> Array:
         """Unit rays (…, 3) in the reference camera's frame of points (…, 2) of the plane."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,11 +81,23 @@ def encode_picture(
     UnwritableOutput
         The picture does not fit into this kind of file.
     """
+    pieces: list[bytes] = []
+    warnings = encode_into(pieces.append, pixels, alpha, bits, suffix, icc, exif)
+    return pieces[0] if len(pieces) == 1 else b"".join(pieces), warnings
+
+
+def encode_into(
+    put: Callable[[bytes], object], pixels: AnyImage, alpha: NDArray[Any] | None, bits: int, suffix: str,
+    icc: bytes | None = None, exif: Exif | None = None,
+) -> tuple[str, ...]:  # fmt: skip
+    """Encode a picture as a file, and hand over each piece of it as soon as it is made: of a PNG no more than some rows
+    are held. Arguments, warnings returned and errors: see `encode_picture`."""
     kind, _ = _writable(suffix)
     depth = output_bits((bits,), suffix)
     exif = exif or Exif()
     if kind == "exr":
-        return write_exr(in_srgb(pixels, icc), alpha, exif), ()
+        put(write_exr(in_srgb(pixels, icc), alpha, exif))
+        return ()
     height, width = pixels.shape[:2]
     if kind == "jpeg" and max(width, height) > _JPEG_LONGEST_SIDE:
         raise UnwritableOutput(f"JPEG holds {_JPEG_LONGEST_SIDE} pixels a side, not {width} × {height}; use .png")
@@ -95,15 +107,14 @@ def encode_picture(
         icc = None
     levels = _Levels(pixels, alpha, depth, curves_for(icc, channels), kind == "jpeg")
     if kind == "png":
-        encoded, brighter = levels.as_png()
+        brighter = levels.into_png(put, lambda header: embed(header, kind, exif, icc))
     else:
         coded, brighter = levels.as_array()
-        encoded = _by_opencv(coded, suffix)
-    warnings: tuple[str, ...] = ()
-    if bits == 32:
-        lost = f", and {brighter:.2%} of its pixels, brighter than white, were clipped" if brighter else ""
-        warnings = (f"float input was written display-encoded with {depth} bits{lost}; .exr keeps it",)
-    return embed(encoded, kind, exif, icc, straight_alpha=levels.shape[2] == 4), warnings
+        put(embed(_by_opencv(coded, suffix), kind, exif, icc, straight_alpha=levels.shape[2] == 4))
+    if bits < 32:
+        return ()
+    lost = f", and {brighter:.2%} of its pixels, brighter than white, were clipped" if brighter else ""
+    return (f"float input was written display-encoded with {depth} bits{lost}; .exr keeps it",)
 
 
 def in_srgb(pixels: AnyImage, icc: bytes | None) -> AnyImage:
@@ -148,8 +159,9 @@ class _Levels:
         height, width, channels = self.light.shape
         return height, width, channels if self.alpha is None or self.flat else 4  # no gray with alpha
 
-    def as_png(self) -> tuple[bytes, float]:
-        """The file, and the share of pixels brighter than white."""
+    def into_png(self, put: Callable[[bytes], object], embedded: Callable[[bytes], bytes]) -> float:
+        """Hands over the pieces of a PNG file, the first with what is to be `embedded` in it; the share of pixels
+        brighter than white."""
         beyond: list[int] = []
 
         def levels(rows: slice) -> NDArray[Any]:
@@ -157,7 +169,9 @@ class _Levels:
             beyond.append(brighter)
             return out
 
-        return encode_png(self.shape, self.bits, levels), self._share(beyond)
+        for number, piece in enumerate(encode_png(self.shape, self.bits, levels)):
+            put(piece if number else embedded(piece))
+        return self._share(beyond)
 
     def as_array(self) -> tuple[NDArray[Any], float]:
         """All of them as OpenCV writes them, in B, G, R, A order, and the share of pixels brighter than white."""
@@ -200,6 +214,6 @@ def save_picture(
     """Writes a picture file, whole or not at all. Arguments, warnings returned and errors: see `encode_picture`."""
     with OutputFiles(overwrite) as files:
         files.check(path)
-        data, warnings = encode_picture(pixels, alpha, bits, Path(path).suffix, icc, exif)
-        files.add(path, data)
-    return warnings
+        return files.add_by(
+            path, lambda file: encode_into(file.write, pixels, alpha, bits, Path(path).suffix, icc, exif)
+        )

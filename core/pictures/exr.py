@@ -68,6 +68,18 @@ def read_exr(data: bytes, check: Callable[[list[tuple[int, int]], int], None]) -
     return ExrPixels(pixels, alpha, warning)
 
 
+def exr_size(data: bytes) -> tuple[int, int]:
+    """(W, H) px of the largest picture in an EXR file; (0, 0) where it cannot be told."""
+    import OpenEXR
+
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            parts = OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True).parts
+        return max((_window(part.header["displayWindow"])[1] for part in parts), key=lambda size: size[0] * size[1])
+    except Exception:  # OpenEXR raises whatever its C++ side threw
+        return 0, 0
+
+
 def _layers(parts: list[Any]) -> Iterator[_Layer]:
     for part in parts:
         # Channels of one layer share everything before the last dot; a part's name stands for a missing prefix.

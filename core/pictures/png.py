@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -33,9 +33,14 @@ def chunk(name: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(body, zlib.crc32(name)))
 
 
-def encode_png(shape: tuple[int, int, int], bits: int, levels_of: Callable[[slice], NDArray[Any]]) -> bytes:
-    """A PNG file of (H, W, C) pixels, C = 1, 3 (RGB) or 4 (RGBA); levels_of(rows): those of some rows, uint8 for 8 bits
-    and uint16 for 16. It is called by several threads, and each row is asked for once."""
+def encode_png(
+    shape: tuple[int, int, int], bits: int, levels_of: Callable[[slice], NDArray[Any]]
+) -> Iterator[bytes]:
+    """A PNG file of (H, W, C) pixels, C = 1, 3 (RGB) or 4 (RGBA), in pieces: its signature and header first.
+
+    levels_of(rows): the levels of some rows, uint8 for 8 bits and uint16 for 16. It is called by several threads, and
+    each row is asked for once.
+    """
     height, width, channels = shape
 
     def packed(rows: slice) -> tuple[bytes, int, int]:
@@ -44,13 +49,12 @@ def encode_png(shape: tuple[int, int, int], bits: int, levels_of: Callable[[slic
         body = packer.compress(lines) + packer.flush(zlib.Z_FINISH if rows.stop == height else zlib.Z_FULL_FLUSH)
         return (_ZLIB if rows.start == 0 else b"") + body, zlib.adler32(lines), lines.nbytes
 
-    out = [SIGNATURE, chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, _KINDS[channels], 0, 0, 0))]
+    yield SIGNATURE + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, _KINDS[channels], 0, 0, 0))
     total = zlib.adler32(b"")
     for body, check, length in in_order(packed, strips(shape)):
         total = adler_of_both(total, check, length)
-        out.append(chunk(b"IDAT", body))
-    out += [chunk(b"IDAT", struct.pack(">I", total)), chunk(b"IEND", b"")]
-    return b"".join(out)
+        yield chunk(b"IDAT", body)
+    yield chunk(b"IDAT", struct.pack(">I", total)) + chunk(b"IEND", b"")
 
 
 def adler_of_both(first: int, second: int, length: int) -> int:

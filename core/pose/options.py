@@ -48,6 +48,11 @@ class FeatureOptions:
     points_per_cell: int = 8
     # Descriptors compared at a time, so that memory stays bounded.
     rows_at_once: int = 1024
+    # Bytes that a pixel takes while points are looked for (six blurs and five differences of the doubled picture, in
+    # floats, with what octaves add), and that all pictures of a set take together: OpenCV works with several threads on
+    # each as well, so that many large ones at once gain little.
+    pixel_bytes: int = 230
+    bytes_at_once: int = 1_200_000_000
 
 
 @dataclass(frozen=True)

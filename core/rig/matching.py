@@ -15,7 +15,7 @@ from ..pose.features import Features
 from ..pose.options import FEATURES
 from ..raster.arrays import Array
 from ..system.cache import Cache
-from ..system.threads import in_order
+from ..system.threads import at_most, in_order
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +79,11 @@ def found_features(
         )  # fmt: skip
 
     found = []
-    for one in in_order(of_one, pictures):
-        found.append(one)
-        progress(len(found) / len(pictures))
+    largest = max((min(most[1], picture.view[..., 0].size) for picture in pictures), default=1)
+    with at_most(max(1, FEATURES.bytes_at_once // (FEATURES.pixel_bytes * largest))):
+        for one in in_order(of_one, pictures):
+            found.append(one)
+            progress(len(found) / len(pictures))
     return found
 
 

@@ -47,6 +47,10 @@ class OutputTooLarge(StitchError):
     """The panorama would be larger than what can be held or written."""
 
 
+class NotEnoughMemory(StitchError):
+    """The pictures take more memory than may be used."""
+
+
 class Cancelled(StitchError):
     """The caller asked to stop; nothing was written."""
 

@@ -1,4 +1,4 @@
-"""Settings of glibc's allocator, so that freed memory is reused instead of given back to the system.
+"""Memory: how much is free, and settings of glibc's allocator, so that what is freed is used again.
 
 By default glibc unmaps large arrays at once and keeps a heap for each thread; clearing the pages of the next array then
 took a fifth of a stitch's time. Other allocators are left alone.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from pathlib import Path
 
 from .options import SYSTEM
 
@@ -34,3 +35,37 @@ def give_back() -> None:
     libc = ctypes.CDLL(None)
     if hasattr(libc, "malloc_trim"):
         libc.malloc_trim(0)
+
+
+def free_bytes() -> int | None:
+    """How many bytes this process may take beside those it has: what the machine has free, within the limits of its
+    control group and of its address space; None where that cannot be told."""
+    if sys.platform != "linux":
+        return None
+    import resource
+
+    try:
+        lines = Path("/proc/meminfo").read_text("ascii").splitlines()
+        known = [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+    except (OSError, ValueError, IndexError):
+        known = []
+    known += [most - used for most, used in _group_limits()]
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if most != resource.RLIM_INFINITY:
+        pages = int(Path("/proc/self/statm").read_text("ascii").split()[0])
+        known.append(most - pages * resource.getpagesize())
+    return max(0, min(known)) if known else None
+
+
+def _group_limits() -> list[tuple[int, int]]:
+    """Bytes that the process's control group may hold and does hold (versions 2 and 1), where it is limited."""
+    found = []
+    for folder, most, used in (
+        ("/sys/fs/cgroup", "memory.max", "memory.current"),
+        ("/sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
+    ):
+        try:
+            found.append((int(Path(folder, most).read_text("ascii")), int(Path(folder, used).read_text("ascii"))))
+        except (OSError, ValueError):  # no such version, or "max"
+            continue
+    return found

@@ -16,10 +16,12 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
+from typing import IO, TypeVar
 
 from .errors import BadRequest, UnwritableOutput
 from .options import SYSTEM
 
+Made = TypeVar("Made")
 # .edf-HOST-PROCESS-RANDOM.tmp: whose it is can be told when its process was killed
 _TEMPORARY = re.compile(r"\.edf-([0-9a-f]{8})-(\d+)-[0-9a-f]{12}\.tmp")
 _HOST = f"{zlib.crc32(platform.node().encode()):08x}"
@@ -80,6 +82,11 @@ class OutputFiles:
 
     def add(self, path: str | Path, data: bytes) -> None:
         """Stages a file in a folder that exists."""
+        self.add_by(path, lambda file: file.write(data))
+
+    def add_by(self, path: str | Path, make: Callable[[IO[bytes]], Made]) -> Made:
+        """Stages a file in a folder that exists, which `make` writes into, so that it need not be held as a whole; what
+        that returns."""
         target = _real(path)
         if target in self._staged:
             raise BadRequest(f"{target}: named for two outputs; give each its own name")
@@ -88,12 +95,17 @@ class OutputFiles:
         self._staged[target] = temporary
         try:
             with open(temporary, "xb") as file:
-                file.write(data)
+                return make(file)
         except OSError as error:
             raise _unwritable(target, error) from error
 
     def add_to_folder(self, folder: str | Path, name: str, data: bytes) -> None:
         """Stages a file in a folder that is made where it is missing."""
+        self.make_folder(folder)
+        self.add(_real(folder) / name, data)
+
+    def make_folder(self, folder: str | Path) -> None:
+        """Makes a folder where it is missing, with those that it lies in."""
         root = _real(folder)
         missing = [parent for parent in (root, *root.parents) if not _exists(parent)]
         for one in reversed(missing):
@@ -104,7 +116,10 @@ class OutputFiles:
             except OSError as error:
                 raise _unwritable(one, error) from error
             self._made.append(one)
-        self.add(root / name, data)
+
+    def staged(self, path: str | Path) -> Path:
+        """The temporary file that is put in this place."""
+        return self._staged[_real(path)]
 
     def commit(self) -> None:
         """Puts all staged files in place, or none."""

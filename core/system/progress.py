@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -71,3 +72,19 @@ class Progress:
             stage = stage if stage in names else TOLD_AS.get(stage, stage)
             done = sum(self.stages[name] for name in names[: names.index(stage)])
             self.report(stage, min(1.0, round(done + self.stages[stage] * fraction, 6)))
+
+
+class Stopwatch:
+    """A progress callable that also keeps the seconds of each stage (`seconds`), and raises Cancelled where asked."""
+
+    def __init__(self, progress: Progress) -> None:
+        self.seconds: dict[str, float] = {}
+        self._progress = progress
+        self._stage, self._since = "", time.perf_counter()
+
+    def __call__(self, stage: str, fraction: float = 0.0) -> None:
+        now = time.perf_counter()
+        if self._stage:
+            self.seconds[self._stage] = self.seconds.get(self._stage, 0.0) + now - self._since
+        self._stage, self._since = stage, now
+        self._progress(stage, fraction)

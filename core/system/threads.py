@@ -24,6 +24,7 @@ Part = TypeVar("Part")
 Result = TypeVar("Result")
 _here = threading.local()
 _asking: ContextVar[Tick] = ContextVar("asking", default=unwatched)
+_most: ContextVar[int] = ContextVar("most", default=SYSTEM.max_threads)
 
 
 def ask() -> None:
@@ -47,9 +48,19 @@ def asking(cancelled: Callable[[], bool] | None) -> Iterator[None]:
         _asking.reset(before)
 
 
+@contextmanager
+def at_most(threads: int) -> Iterator[None]:
+    """Within this, no more than so many threads work at once, each of which holds a part of its own."""
+    before = _most.set(min(_most.get(), threads))
+    try:
+        yield
+    finally:
+        _most.reset(before)
+
+
 def count() -> int:
     """How many threads work at once: one inside the work of another call, or there would be too many."""
-    return 1 if getattr(_here, "working", False) else max(1, min(SYSTEM.max_threads, cv2.getNumThreads()))
+    return 1 if getattr(_here, "working", False) else max(1, min(_most.get(), cv2.getNumThreads()))
 
 
 def in_order(work: Callable[[Part], Result], parts: Iterable[Part]) -> Iterator[Result]:

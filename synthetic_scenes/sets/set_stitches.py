@@ -11,8 +11,8 @@ from ...core.frames.frame import Frame
 from ...core.frames.reading import read_frame
 from ...core.options import StitchOptions
 from ...core.pictures.picture import Picture, load_picture
-from ...core.pipeline import StitchResult, Stopwatch, compose
-from ...core.system.progress import STAGES_OF_MANY, Progress
+from ...core.pipeline import StitchResult, compose
+from ...core.system.progress import STAGES_OF_MANY, Progress, Stopwatch
 from ..scene_camera import SceneCamera
 from .rendered_set import RenderedSet
 from .set_thresholds import OURS, ROTATION_ONLY

@@ -13,11 +13,11 @@ from edf_stitch.core.frames.frame import Frame, size_of
 from edf_stitch.core.frames.reading import prepare
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.picture import picture_from_array, resized
-from edf_stitch.core.pipeline import Stopwatch, compose
+from edf_stitch.core.pipeline import compose
 from edf_stitch.core.pose import features
 from edf_stitch.core.pose.options import FEATURES
 from edf_stitch.core.system.errors import BadRequest, NoOverlap, TooFewMatches
-from edf_stitch.core.system.progress import Progress
+from edf_stitch.core.system.progress import Progress, Stopwatch
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at, make_pair
 

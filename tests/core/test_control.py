@@ -15,7 +15,7 @@ from edf_stitch.core.choices import FIELDS, Crop
 from edf_stitch.core.compose.crop import largest_rectangle
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.match_table import match_file
-from edf_stitch.core.output.outputs import warp_bytes
+from edf_stitch.core.output.warp_file import warp_bytes
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.pose.match_files import matches_csv
 from edf_stitch.core.system.errors import BadRequest

@@ -20,7 +20,8 @@ from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.camera_file import camera_table
 from edf_stitch.core.output.depth.range_image import range_image
 from edf_stitch.core.output.match_table import match_file
-from edf_stitch.core.output.outputs import OutputRequest, check, warp_bytes, write
+from edf_stitch.core.output.outputs import OutputRequest, check, write
+from edf_stitch.core.output.warp_file import warp_bytes
 from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchResult, stitch

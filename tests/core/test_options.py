@@ -34,7 +34,7 @@ def test_the_defaults_are_the_designs() -> None:
         "ignore_in": (), "viewpoint": None, "require_all": False, "scale_metres": None,
         "slide": "auto", "projection": "auto", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
         "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": "auto",
-        "holes": "auto", "preview": False, "seed": 0, "measure": True, "cache": None,
+        "holes": "auto", "preview": False, "seed": 0, "measure": True, "memory_gb": None, "cache": None,
     }  # fmt: skip
 
 

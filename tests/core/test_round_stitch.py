@@ -13,7 +13,8 @@ from edf_stitch.core.compose.crop import largest_rectangle
 from edf_stitch.core.measure.metrics import look_up
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.inspection import depth_grid, displacement_px, full_geometry, heat_map, match_rows
-from edf_stitch.core.output.outputs import OutputRequest, warp_bytes, write
+from edf_stitch.core.output.outputs import OutputRequest, write
+from edf_stitch.core.output.warp_file import warp_bytes
 from edf_stitch.core.panorama.levelling import angles_of, gravity, turned, upright
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchResult, stitch

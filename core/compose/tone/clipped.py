@@ -34,10 +34,16 @@ class ClippedLight:
         next channel's and the one after that's own light; None where too little is known. Below 1 counts as 1.
     white : (h, w, C) float32 array or None
         What is clipped in all channels, at the middles of cells of the canvas; None where it is white.
+    times : int
+        By how many times as many px a side it is asked for as it was learnt on.
+    corner : (int, int)
+        Row and column of the canvas, in those px, at which what is asked for begins.
     """
 
     factors: tuple[NDArray[np.float32] | None, ...]
     white: NDArray[np.float32] | None = None
+    times: int = 1
+    corner: tuple[int, int] = (0, 0)
 
     def restore(self, own: NDArray[np.float32], light: NDArray[np.float32]) -> None:
         """Raise the channels of light (h, w, C) that are clipped in a picture's own light (h, w, C), in place."""
@@ -62,7 +68,8 @@ class ClippedLight:
         if self.white is None:
             return own
         rows, columns = (
-            _between(np.arange(one.start, one.stop), side) for one, side in zip(part, self.white.shape[:2], strict=True)
+            _between(np.arange(first + one.start, first + one.stop), side, self.times * CLIPPED.cell_px)
+            for first, one, side in zip(self.corner, part, self.white.shape[:2], strict=True)
         )
         upper, lower, down = rows
         left, right, across = columns
@@ -196,8 +203,10 @@ def _known(counts: Array) -> Plane:
     return known
 
 
-def _between(pixels: NDArray[np.intp], cells: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Plane]:
+def _between(
+    pixels: NDArray[np.intp], cells: int, cell_px: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Plane]:
     """The cells (N,) on either side of pixels of one axis, and how near (N,) the pixels are to the second."""
-    place = np.clip((pixels + 0.5) / CLIPPED.cell_px - 0.5, 0, cells - 1)
+    place = np.clip((pixels + 0.5) / cell_px - 0.5, 0, cells - 1)
     first = np.minimum(place.astype(np.intp), max(cells - 2, 0))
     return first, np.minimum(first + 1, cells - 1), (place - first).astype(np.float32)

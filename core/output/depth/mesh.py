@@ -70,7 +70,7 @@ def depth_grid(result: StitchResult, ranges: RangeImage) -> DepthGrid:
     DepthGrid
         In the unit of the ranges.
     """
-    canvas, view = result.warp.canvas.within(result.spread), result.views[0]
+    canvas, view = result.canvas, result.views[0]
     width, height = canvas.width, canvas.height
     step = max(1.0, float(np.sqrt(np.isfinite(1 / ranges.range).sum() / MESH.most_nodes)))
     x, y = (np.linspace(-0.5, side - 0.5, max(1, int(side / step)) + 1) for side in (width, height))

@@ -12,6 +12,7 @@ from ...cameras.scale import Scale
 from ...pictures.exr import exr_of_channels
 from ...pictures.metadata import SOFTWARE
 from ...raster.arrays import Plane, strips
+from ...raster.lazy import whole
 from ...system.errors import DegenerateGeometry
 from ..inspection import has_depth
 
@@ -48,7 +49,8 @@ class RangeImage:
 
 
 def range_image(result: StitchResult) -> RangeImage:
-    """The ranges of what a panorama shows, of a whole sphere's every pixel.
+    """The ranges of what a panorama shows, of a whole sphere's every pixel. Of a large set inverse depth is known at
+    each px of its draft, and bilinear between.
 
     Parameters
     ----------
@@ -63,12 +65,17 @@ def range_image(result: StitchResult) -> RangeImage:
     DegenerateGeometry
         The panorama has no depth.
     """
-    warp, alpha = result.warp.within(result.spread), result.panorama.alpha
-    canvas, reference = warp.canvas, result.views[0]
+    warp, alpha = result.warp, result.panorama.alpha
+    canvas, reference = result.canvas, result.views[0]
+    depth, confidence, off_depth = (
+        None if values is None else result.in_full(values, beyond)
+        for values, beyond in ((warp.depth, np.nan), (warp.lazy_confidence, 0.0), (warp.deviation, 0.0))
+    )
+    assert depth is not None
     out = np.empty(alpha.shape, np.float32)
-    deviation = None if warp.deviation is None else np.empty(alpha.shape, np.float32)
+    deviation = None if off_depth is None else np.empty(alpha.shape, np.float32)
     for rows in strips(alpha.shape):
-        d = np.asarray(warp.depth[rows, 0 : canvas.width], np.float64)
+        d = np.asarray(depth[rows, 0 : canvas.width], np.float64)
         length: Any = 1.0
         if canvas.projection is None:
             length = canvas.rays_at(reference.K, canvas.xs, canvas.ys[rows], reference.camera)[1]
@@ -76,16 +83,15 @@ def range_image(result: StitchResult) -> RangeImage:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             ranges = np.where(d > 0, result.scale.factor * length / d, np.inf)
             out[rows] = np.where(shown, ranges, np.nan)
-            if deviation is not None and warp.deviation is not None:
-                off = np.asarray(warp.deviation[rows, 0 : canvas.width], np.float64)
+            if deviation is not None and off_depth is not None:
+                off = np.asarray(off_depth[rows, 0 : canvas.width], np.float64)
                 deviation[rows] = np.where(shown, np.where(d > 0, ranges * off / d, np.inf), np.nan)
     if not has_depth(result) or not np.isfinite(out).any():
         raise DegenerateGeometry(
             "the panorama has no depth: its pictures were taken from one place, show one plane, or are shown without "
             "depth; leave out --depth and --mesh, or take pictures from different places"
         )
-    confidence = None if warp.lazy_confidence is None else warp.confidence
-    return RangeImage(out, deviation, confidence, result.scale)
+    return RangeImage(out, deviation, None if confidence is None else whole(confidence), result.scale)
 
 
 def range_bytes(image: RangeImage) -> bytes:

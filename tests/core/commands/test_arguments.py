@@ -84,6 +84,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--projection", "perspective", "--centre=-5,2", "--fov", "80"],
      {"projection": "perspective", "centre": (-5.0, 2.0), "fov": 80.0}),
     (["--crop", "auto", "--holes", "auto"], {"crop": "auto", "holes": "auto"}),
+    (["--memory", "2.5"], {"memory_gb": 2.5}),
     (["--seed", "7"], {"seed": 7}), (["--seed", "2147483647"], {"seed": 2147483647}),
 ])  # fmt: skip
 def test_how_it_is_done(words: list[str], expected: dict) -> None:
@@ -92,6 +93,7 @@ def test_how_it_is_done(words: list[str], expected: dict) -> None:
 
 @pytest.mark.parametrize("words", [
     ["--field", "nonsense"], ["--field", ""], ["--fade", "slowly"], ["--blend", ""], ["--seam", "x"], ["--seed", "x"],
+    ["--memory", "x"],
     ["--seed", "1.5"], ["--scale", "x"], ["--focal-px", "abc"], ["--focal-px", ""], ["--focal-px", "1,,2"],
     ["--focal-px"], ["--projection", "flat"], ["--sensor-mm", "1;2"],
     ["--slide", "x"], ["--slide", ""], ["--centre", "x"], ["--fov", "wide"],
@@ -106,6 +108,7 @@ def test_what_makes_no_sense_is_refused_by_the_parser(words: list[str], capsys: 
     *(["--focal-px", text] for text in ("0", "-5", "nan", "inf", "1,2,3")), ["--focal-mm", "35"], ["--sensor-mm", "36"],
     ["--sensor-mm", "0", "--focal-mm", "1"], ["--principal", "1"], ["--principal", "1,2,3"], ["--principal", "inf,1"],
     ["--focal-px", "9", "--focal35", "28"], ["--focal35", "28", "--cameras", "c.json"], ["--seed=-1"],
+    ["--memory", "0"], ["--memory=-1"], ["--memory", "nan"],
     ["--seed", "2147483648"], *(["--scale", text] for text in ("0", "1.5", "nan", "inf")), ["--scale=-0.5"],
     *(["--projection", text] for text in ("pannini:x", "pannini:", "pannini:1.1", "pannini:nan", "perspective:0.5")),
     *(["--slide", text, "--projection", "auto"] for text in ("1.1", "nan", "inf")), ["--slide", "2"],

@@ -13,7 +13,7 @@ import pytest
 from edf_stitch.core.compare.figures import FIGURES, figures_of
 from edf_stitch.core.compare.tables import shown
 from edf_stitch.core.measure.metrics import canvas_quality, overlap_quality, overlap_views, psnr, ssim
-from edf_stitch.core.output.outputs import warp_bytes
+from edf_stitch.core.output.warp_file import warp_bytes
 from edf_stitch.core.pipeline import StitchResult
 
 

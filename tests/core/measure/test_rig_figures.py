@@ -104,4 +104,4 @@ def test_maps_are_asked_where_pictures_show_what_matches() -> None:
     for off in (0.0, 3.0):
         matches = Matches(points, points - (10, 0) + (off, 0))
         edge = Edge(0, 1, matches, matches, replace(view, inliers=np.ones(50, bool)))
-        np.testing.assert_allclose(map_errors(warp, [edge]), off, atol=1e-3)
+        np.testing.assert_allclose(map_errors(warp, [edge], (camera, camera)), off, atol=1e-3)

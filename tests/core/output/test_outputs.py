@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.output import outputs
-from edf_stitch.core.output.outputs import OutputRequest, check, json_bytes, layer_stem, npz_bytes, warp_bytes, write
+from edf_stitch.core.output.outputs import OutputRequest, check, json_bytes, layer_stem, write
+from edf_stitch.core.output.warp_file import warp_bytes, write_npz
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.pictures.masks import read_painted
 from edf_stitch.core.pictures.picture import load_picture
@@ -174,8 +175,14 @@ def test_what_a_model_lacks_is_nan_in_the_warp_file(small_result: StitchResult) 
 
 def test_an_npz_depends_on_its_arrays_only() -> None:
     arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.asfortranarray(np.eye(3)), "c": np.array([3])}
-    data = npz_bytes(arrays)
-    assert data == npz_bytes({**arrays, "b": np.eye(3)})
+
+    def written_npz(arrays: dict[str, np.ndarray]) -> bytes:
+        buffer = io.BytesIO()
+        write_npz(buffer, arrays.items())
+        return buffer.getvalue()
+
+    data = written_npz(arrays)
+    assert data == written_npz({**arrays, "b": np.eye(3)})
     with np.load(io.BytesIO(data), allow_pickle=False) as file:
         assert list(file) == ["a", "b", "c"] and all(np.array_equal(file[name], arrays[name]) for name in arrays)
 
@@ -360,8 +367,8 @@ def stop_after(calls: int, original: Callable, trouble: type[BaseException]) -> 
 
 
 @pytest.mark.parametrize("trouble", [MemoryError, KeyboardInterrupt, UnwritableOutput])
-@pytest.mark.parametrize(("where", "calls"), [("encode_picture", 0), ("encode_picture", 1), ("encode_picture", 2),
-                                              ("warp_bytes", 0), ("json_bytes", 0), ("json_bytes", 1)])  # fmt: skip
+@pytest.mark.parametrize(("where", "calls"), [("encode_into", 0), ("encode_picture", 0), ("encode_picture", 1),
+                                              ("write_warp", 0), ("json_bytes", 0), ("json_bytes", 1)])  # fmt: skip
 def test_trouble_half_way_leaves_nothing(
     small_result: StitchResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, calls: int,
     trouble: type[BaseException],

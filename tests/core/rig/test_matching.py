@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
 from edf_stitch.core.pose import features
+from edf_stitch.core.pose.features import Features
 from edf_stitch.core.rig.matching import Matched, content_key, found_features, found_matches
 from edf_stitch.core.system.cache import Cache
 
@@ -74,3 +78,31 @@ def test_a_picture_is_known_by_what_it_shows(pictures: list[Picture]) -> None:
     upside_down = picture_from_array(np.ascontiguousarray(pictures[0].view[::-1]))
     masked = picture_from_array(np.dstack([pictures[0].view, np.full((120, 160), 9, np.uint8)]))
     assert len({content_key(one) for one in (pictures[0], upside_down, masked)}) == 3
+
+
+@pytest.mark.parametrize(("side", "together"), [(400, 4), (2000, 1)])
+def test_features_of_large_pictures_are_not_looked_for_all_at_once(
+    monkeypatch: pytest.MonkeyPatch, side: int, together: int
+) -> None:
+    """Each takes hundreds of megabytes meanwhile, and OpenCV has threads of its own."""
+    at_once, most, lock = 0, 0, threading.Lock()
+
+    def detect(*_: object) -> Features:
+        nonlocal at_once, most
+        with lock:
+            at_once += 1
+            most = max(most, at_once)
+        time.sleep(0.05)
+        with lock:
+            at_once -= 1
+        return Features(np.empty((0, 2)), np.empty((0, 128), np.float32), 1.0)
+
+    monkeypatch.setattr(features, "detect", detect)
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(4)
+    try:
+        pictures = [picture_from_array(np.full((side, side), number, np.uint8)) for number in range(6)]
+        assert len(found_features(pictures, False, Cache(None), lambda share: None)) == 6
+    finally:
+        cv2.setNumThreads(before)
+    assert most <= together and (together == 1 or most > 1)

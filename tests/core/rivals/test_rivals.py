@@ -16,7 +16,7 @@ from edf_stitch.core.field.field import Field
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.fields import fit_field
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.output.outputs import warp_bytes
+from edf_stitch.core.output.warp_file import warp_bytes
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.warp import build_map
 from edf_stitch.core.pipeline import stitch

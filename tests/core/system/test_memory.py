@@ -74,3 +74,28 @@ def test_nothing_happens_where_there_is_no_glibc(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(memory.ctypes, "CDLL", no_library)
     memory.use_again()
     memory.give_back()
+
+
+def test_what_is_free_is_bounded_by_the_address_space() -> None:
+    """Of the machine, its control group and `ulimit -v` the least counts."""
+    resource = pytest.importorskip("resource")
+    if memory.free_bytes() is None:
+        pytest.skip("cannot be told here")
+    asked = "from edf_stitch.core.system.memory import free_bytes; print(free_bytes())"
+    limit = 600_000_000
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True, preexec_fn=limited)
+    assert 0 < int(done.stdout) < limit
+
+
+def test_limits_of_control_groups_are_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "memory.max").write_text("5000000\n")
+    (tmp_path / "memory.current").write_text("2000000\n")
+    monkeypatch.setattr(memory, "Path", lambda first, *more: tmp_path.joinpath(*more) if more else Path(first))
+    if sys.platform == "linux":
+        assert memory._group_limits()[0] == (5_000_000, 2_000_000) and memory.free_bytes() == 3_000_000
+        (tmp_path / "memory.max").write_text("max\n")
+        assert memory._group_limits() == []

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.system import threads
 from edf_stitch.core.system.errors import Cancelled
-from edf_stitch.core.system.threads import asking, count, each, in_order
+from edf_stitch.core.system.threads import asking, at_most, count, each, in_order
 
 
 @pytest.fixture(autouse=True, params=[1, 3])
@@ -97,3 +97,18 @@ def test_what_is_written_by_parts_is_whole() -> None:
 
     each(put, range(0, 1000, 100))
     assert (out == np.arange(1000)).all()
+
+
+def test_no_more_threads_work_than_may() -> None:
+    with at_most(1):
+        assert count() == 1
+        with at_most(5):
+            assert count() == 1, "the least counts"
+    before = cv2.getNumThreads()
+    try:
+        cv2.setNumThreads(3)
+        with at_most(2):
+            assert count() == 2
+        assert count() == 3
+    finally:
+        cv2.setNumThreads(before)

@@ -1,0 +1,92 @@
+"""What a stitch takes is told beforehand: it goes within the limit, by fewer threads, or is refused with what fits."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.compose.enlarging import memory_need
+from edf_stitch.core.compose.enlarging.memory_need import threads_that_fit
+from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.pictures.encoding import save_picture
+from edf_stitch.core.pictures.picture import picture_from_array
+from edf_stitch.core.system.errors import BadRequest, NotEnoughMemory
+
+PHONE = np.broadcast_to(np.uint8(0), (3000, 4000, 3))
+
+
+def asked(gb: float | None, **options: object) -> StitchOptions:
+    return StitchOptions(memory_gb=gb, **options)  # type: ignore[arg-type]
+
+
+@pytest.fixture(autouse=True)
+def eight_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory_need, "count", lambda: 8)
+    monkeypatch.setattr(memory_need, "free_bytes", lambda: 64_000_000_000)
+
+
+def test_thirty_pictures_of_a_phone_fit_in_what_was_measured() -> None:
+    pictures = [PHONE] * 30
+    fitting = [threads_that_fit(pictures, asked(gb)) for gb in (3.4, 3.6, 4.5, 64)]
+    assert fitting == sorted(fitting) and 1 <= fitting[0] <= 4 and fitting[-1] == 8
+    with pytest.raises(NotEnoughMemory):
+        threads_that_fit(pictures, asked(2.0))
+
+
+def test_what_is_refused_is_told_what_would_fit() -> None:
+    with pytest.raises(NotEnoughMemory, match="30 pictures of 360 megapixels together take about 3.* --memory") as told:
+        threads_that_fit([PHONE] * 30, asked(2.5))
+    assert told.value.exit_code == 3
+    fewer = int(re.search(r"the first (\d+) of them", str(told.value))[1])
+    assert threads_that_fit([PHONE] * fewer, asked(2.5)) >= 1
+    with pytest.raises(NotEnoughMemory):
+        threads_that_fit([PHONE] * (fewer + 1), asked(2.5))
+    with pytest.raises(NotEnoughMemory) as told:
+        threads_that_fit([PHONE] * 30, asked(2.0))
+    scale = float(re.search(r"--scale ([\d.]+)", str(told.value))[1])
+    assert threads_that_fit([PHONE] * 30, asked(2.0, scale=scale)) >= 1
+    with pytest.raises(NotEnoughMemory):
+        threads_that_fit([PHONE] * 30, asked(2.0, scale=scale + 0.05))
+    with pytest.raises(NotEnoughMemory, match="use smaller pictures"):
+        threads_that_fit([PHONE] * 30, asked(0.1))
+
+
+def test_without_a_limit_half_of_what_is_free_is_taken_or_all_if_need_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    def with_free(gb: float | None, count: int = 30) -> int:
+        monkeypatch.setattr(memory_need, "free_bytes", lambda: None if gb is None else int(gb * 1e9))
+        return threads_that_fit([PHONE] * count, asked(None))
+
+    assert with_free(64) == 8 and with_free(None) == 8
+    assert with_free(9) == threads_that_fit([PHONE] * 30, asked(4.5)) > with_free(3.4) == 1
+    with pytest.raises(NotEnoughMemory, match="only this much is free: 1.0 GB"):
+        with_free(1)
+    assert with_free(1, count=2) == 8, "a pair goes as it always did"
+
+
+def test_files_are_counted_by_their_headers(tmp_path: Path) -> None:
+    picture = np.zeros((300, 400, 3), np.float32)
+    kinds = {".jpg": (8, 3), ".png": (8, 3), "16.png": (16, 9), ".exr": (32, 15), "16.tif": (16, 9)}
+    for suffix, (bits, each) in kinds.items():
+        path = tmp_path / f"a{suffix}"
+        save_picture(path, picture, None, bits)
+        assert memory_need._facts(path) == ((400, 300), each), suffix
+    assert memory_need._facts(picture_from_array(picture))[1] == 15
+    assert memory_need._facts(np.zeros((300, 400), np.uint16)) == ((400, 300), 6)
+    (tmp_path / "text.png").write_text("no picture")
+    for lacking in ("text.png", "none.png"):
+        assert memory_need._facts(tmp_path / lacking) == ((0, 0), 0), "reading says what is wrong with it"
+
+
+@pytest.mark.parametrize("gb", [0, -1, float("nan")])
+def test_no_memory_is_no_limit(gb: float) -> None:
+    with pytest.raises(BadRequest, match="GB of memory"):
+        asked(gb)
+
+
+def test_a_jpegs_header_is_enough(tmp_path: Path) -> None:
+    encoded = cv2.imencode(".jpg", np.zeros((30, 40, 3), np.uint8))[1].tobytes()
+    (tmp_path / "cut.jpg").write_bytes(encoded[:-40])
+    assert memory_need._facts(tmp_path / "cut.jpg")[0] == (40, 30)
