@@ -14,6 +14,8 @@ from edf_stitch.core.compose.enlarging import draft
 from edf_stitch.core.compose.enlarging.draft import draft_times
 from edf_stitch.core.measure.metrics import psnr
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.output.depth.mesh import mesh_bytes
+from edf_stitch.core.output.depth.range_image import range_image
 from edf_stitch.core.output.outputs import OutputRequest, check, write
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchResult, stitch
@@ -145,6 +147,30 @@ def test_the_report_counts_in_px_of_the_panorama(at_once: StitchResult, drafted:
     for name in ("alignment_median_px", "alignment_p95_px"):
         assert second["measured"][name] == pytest.approx(first["measured"][name], rel=0.5, abs=0.1)
     assert second["field"]["leave_one_out_px"] == pytest.approx(first["field"]["leave_one_out_px"], rel=0.3)
+
+
+def test_a_preview_is_made_at_once(large: PictureSet, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(draft, "DRAFT", replace(draft.DRAFT, most_pixels=1))
+    assert stitch(large.pictures, replace(OPTIONS, preview=True, measure=False)).enlarged is None
+
+
+def test_depth_has_the_panoramas_size_and_lies_where_the_drafts_does(drafted: StitchResult) -> None:
+    image = range_image(drafted)
+    assert image.range.shape == drafted.panorama.alpha.shape and image.deviation.shape == image.range.shape
+    left, top = drafted.spread[:2]
+    height, width = (side // 2 * 2 - 2 for side in image.range.shape)
+    inverse = 1 / image.range[top % 2 :, left % 2 :][:height, :width]
+    blocks = inverse.reshape(height // 2, 2, width // 2, 2).mean(axis=(1, 3))
+    row, column = (top + top % 2) // 2, (left + left % 2) // 2
+    depth = drafted.warp.inverse_depth
+
+    def off(down: int, right: int) -> float:
+        part = depth[row + down :, column + right :][: height // 2 - 1, : width // 2 - 1]
+        return float(np.nanmedian(np.abs(part - blocks[: part.shape[0], : part.shape[1]])))
+
+    assert off(0, 0) < 0.3 * min(off(0, 1), off(1, 0)), "in px of the panorama, none beside its place"
+    glb, _ = mesh_bytes(drafted, image)
+    assert glb[:4] == b"glTF"
 
 
 def test_layers_and_warp_have_the_panoramas_size(drafted: StitchResult, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.panorama.projection import Projection
 from edf_stitch.core.panorama.warp import Warp
+from edf_stitch.core.pipeline import StitchResult
 
 WIDTH, HEIGHT = 360, 180
 FOCAL = WIDTH / (2 * np.pi)
@@ -37,7 +38,14 @@ def rays_of(canvas: Canvas) -> np.ndarray:
     return canvas.rays_at(K, canvas.xs, canvas.ys, CAMERA)[0]
 
 
-def finished(canvas: Canvas, ranges: np.ndarray, shows: np.ndarray | None = None, **more: Any) -> SimpleNamespace:
+class Finished(SimpleNamespace):
+    """Of a set that is made at once."""
+
+    times = 1
+    in_full = StitchResult.in_full
+
+
+def finished(canvas: Canvas, ranges: np.ndarray, shows: np.ndarray | None = None, **more: Any) -> Finished:
     """The panorama of a canvas with ranges (H, W), gray noise; more: `scale`, and what its Warp has."""
     length = 1.0
     if canvas.projection is None:
@@ -49,7 +57,7 @@ def finished(canvas: Canvas, ranges: np.ndarray, shows: np.ndarray | None = None
     alpha = np.ones(ranges.shape, bool) if shows is None else shows
     other = View(CAMERA, K, np.eye(3), np.array([1.0, 0, 0]), np.eye(3), K[:, 0])
     first = View(CAMERA, K, np.eye(3), np.zeros(3), np.eye(3), np.zeros(3))
-    return SimpleNamespace(
+    return Finished(
         panorama=Layer(light, alpha), canvas=canvas, warp=Warp(canvas, (), d, **more), views=(first, other),
         spread=(0, 0, canvas.width, canvas.height), scale=scale, pictures=(SimpleNamespace(icc=None),),
     )  # fmt: skip

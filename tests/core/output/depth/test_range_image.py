@@ -66,7 +66,8 @@ def test_the_part_of_a_sphere_that_is_mapped_lies_in_its_place() -> None:
     part = canvas.within((100, 40, 120, 60))
     inner = finished(part, np.full((60, 120), 2.0))
     whole = finished(canvas, np.full((canvas.height, canvas.width), 2.0))
-    inner.spread, inner.panorama = (-100, -40, canvas.width, canvas.height), whole.panorama
+    inner.spread = (-100, -40, canvas.width, canvas.height)
+    inner.canvas, inner.panorama = canvas, whole.panorama
     image = range_image(inner)
     known = np.isfinite(image.range)
     assert image.range.shape == (canvas.height, canvas.width)
