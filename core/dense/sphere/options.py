@@ -163,7 +163,7 @@ class SweepOptions:
     """px that they may lie away from it there, unless a surface from further inside goes on, or the pictures speak for
     it."""
 
-    rim_gain: float = 4.0
+    rim_gain: float = 8.0
     """Levels, in the mean, by which such nodes have to make the pictures more alike than the field does."""
 
     rim_cost: float = 2.0
