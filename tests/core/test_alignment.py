@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core import alignment
 from edf_stitch.core.alignment import Alignment, align
 from edf_stitch.core.cameras.projective import rotation_angle
 from edf_stitch.core.frames.frame import Frame, size_of
@@ -14,7 +13,7 @@ from edf_stitch.core.frames.reading import prepare
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.picture import picture_from_array, resized
 from edf_stitch.core.pipeline import compose
-from edf_stitch.core.pose import features
+from edf_stitch.core.pose import features, pair_matches
 from edf_stitch.core.pose.options import FEATURES
 from edf_stitch.core.system.errors import BadRequest, NoOverlap, TooFewMatches
 from edf_stitch.core.system.progress import Progress, Stopwatch
@@ -239,7 +238,7 @@ def test_each_stage_is_told_and_features_climb(clip: list[Pair], quick: StitchOp
 def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
     small_pair: Pair, quick: StitchOptions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(alignment, "FEATURES", replace(FEATURES, preview_budget=500))
+    monkeypatch.setattr(pair_matches, "FEATURES", replace(FEATURES, preview_budget=500))
     frame = frame_of(small_pair, quick)
     real = features.detect
     asked: list[tuple[int, ...]] = []

@@ -135,6 +135,9 @@ class SweepOptions:
     usual_factor: float = 1.5
     """The largest difference of a found node, in usual ones: what is hidden is not found."""
 
+    noise_px: float = 0.3
+    """px, σ, of what is found: what rendered sets have."""
+
     speckle: float = 0.012
     """Side of the largest patch that is taken for an error, as a share of the side of what is searched."""
 
@@ -157,7 +160,14 @@ class SweepOptions:
     """Radians from where only one picture goes on, within which nodes have to lie near the field."""
 
     rim_px: float = 3.0
-    """px that they may lie away from it there."""
+    """px that they may lie away from it there, unless a surface from further inside goes on, or the pictures speak for
+    it."""
+
+    rim_gain: float = 8.0
+    """Levels, in the mean, by which such nodes have to make the pictures more alike than the field does."""
+
+    rim_cost: float = 2.0
+    """The largest mean difference of theirs, in medians of all that was found."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from ...system.threads import in_order
 from ..edge_aware_smoothing import Smoother, cut_edges, edge_weights, strengthen
 from ..options import REFINE
 from .choice import Compared, compared_on
-from .options import CHART
+from .options import CHART, SWEEP
 from .patch import Patch, SweptPicture
 from .search import Hints, found_on
 from .sphere_outlines import with_outlines
@@ -156,7 +156,8 @@ def _refined(compared: Compared, hints: Hints) -> _Refined:
     along = with_outlines(compared, found, along, edges)
     confidence: Plane = cv2.blur(found.where.astype(np.float32), (CONFIDENCE_NODES,) * 2)
     d = np.where(compared.owner >= 0, compared.at(along), compared.field)
-    return _Refined(d, confidence, compared.per_px, int(compared.several.sum()), int(found.where.sum()))
+    noise = compared.per_px * np.float32(SWEEP.noise_px)
+    return _Refined(d, confidence, noise, int(compared.several.sum()), int(found.where.sum()))
 
 
 def _plain(guide: NDArray[np.uint8]) -> Plane:

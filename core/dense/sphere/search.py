@@ -40,12 +40,14 @@ def found_on(compared: Compared, hints: Hints) -> Found:
     least, most = _range(compared, hints) if hints.coarse is not None else SWEEP.coarse_range_px
     best = swept(compared, least, most)
     where = best.unique & compared.several & _agreed(compared, best)
-    where &= ~(_rim(compared) & (np.abs(best.along - compared.field_px) > SWEEP.rim_px))
     if where.any():
         usual = SWEEP.usual_factor * float(np.percentile(best.cost[where], SWEEP.usual_percent))
         where &= best.cost <= max(SWEEP.least_cost, usual)
     where &= ~_small(best.along, where, SWEEP.speckle)
-    where &= ~_wrong_islands(best, where)
+    where &= ~_wrong(best, where, _small(best.along, where, SWEEP.island), SWEEP.island_gain, SWEEP.island_cost)
+    doubtful = where & _rim(compared) & (np.abs(best.along - compared.field_px) > SWEEP.rim_px)
+    doubtful &= ~_going_on(best.along, where & ~doubtful, doubtful)
+    where &= ~_wrong(best, where, doubtful, SWEEP.rim_gain, SWEEP.rim_cost)
     return Found(best.along, where)
 
 
@@ -115,9 +117,27 @@ def _small(along: Plane, where: NDArray[np.bool_], share: float) -> NDArray[np.b
     return small
 
 
-def _wrong_islands(best: Swept, where: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The nodes (h, w) of islands in which the pictures are not much more alike than where the field lies."""
-    island = _small(best.along, where, SWEEP.island)
+def _going_on(along: Plane, sure: NDArray[np.bool_], doubtful: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The doubtful nodes (h, w) on which the surface of sure ones goes on, node by node without a jump."""
+    reached = sure.copy()
+    steps = [(axis, np.abs(np.diff(along, axis=axis)) <= SWEEP.speckle_px) for axis in (0, 1)]
+    while True:
+        before = reached.copy()
+        for axis, smooth in steps:
+            first, second = (np.moveaxis(reached, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
+            may = np.moveaxis(doubtful, axis, 0)
+            close = np.moveaxis(smooth, axis, 0)
+            second |= first & close & may[1:]
+            first |= second & close & may[:-1]
+        if np.array_equal(before, reached):
+            return reached & doubtful
+
+
+def _wrong(
+    best: Swept, where: NDArray[np.bool_], island: NDArray[np.bool_], least_gain: float, most_cost: float
+) -> NDArray[np.bool_]:
+    """The nodes (h, w) of islands in which the pictures are not more alike by some levels than where the field lies, or
+    differ by more than so many medians of all that was found."""
     if not island.any():
         return island
     count, numbers = cv2.connectedComponents(island.astype(np.uint8), connectivity=4)
@@ -127,7 +147,7 @@ def _wrong_islands(best: Swept, where: NDArray[np.bool_]) -> NDArray[np.bool_]:
         np.bincount(flat, values.ravel().astype(np.float64), count) / size for values in (best.cost, best.field_cost)
     )
     usual = max(float(np.median(best.cost[where])), SWEEP.island_floor)
-    wrong = (at_field - cost <= SWEEP.island_gain) | (cost >= SWEEP.island_cost * usual)
+    wrong = (at_field - cost <= least_gain) | (cost >= most_cost * usual)
     wrong[0] = False
     found: NDArray[np.bool_] = wrong[numbers]
     return found

@@ -168,7 +168,8 @@ def test_warnings_are_told_even_when_quiet(
 
 @pytest.mark.parametrize("rating, last, code", [
     ("good", None, 0),
-    ("look", "edf: verdict: look at these places: a seam (3,4 5×6, 7,8 9×10); a fold (1,2 3×4); mend it", 0),
+    ("look", "edf: verdict: look at these places: a seam (3,4 5×6, 7,8 9×10); a fold (1,2 3×4); it is mirrored; "
+             "mend it", 0),
     ("not usable", "edf: verdict: not usable: it is mirrored; mend it", 1),
 ])  # fmt: skip
 def test_the_verdict_is_the_last_line_and_may_be_the_exit_code(
@@ -331,15 +332,14 @@ def test_what_only_two_pictures_know_is_refused_of_more(pictures: list[str], tmp
         assert told in said()[1]
 
 
-def test_dense_is_said_to_be_for_two_pictures_where_it_is_asked_for(
+def test_dense_is_for_two_pictures_and_for_more(
     pictures: list[str], tmp_path: Path, said: Callable, quick: list
 ) -> None:
-    for number, (given, words, told) in enumerate((
-        ([*pictures, pictures[0]], ["--dense"], True), ([*pictures, pictures[0]], [], False),
-        (pictures, ["--dense"], False),
-    )):  # fmt: skip
-        assert main(["stitch", *given, "-o", str(tmp_path / f"{number}.png"), "--quiet", *words]) == 0
-        assert ("--dense has no effect" in said()[1]) == told and quick[-1][-1].dense
+    for number, given in enumerate((pictures, [*pictures, pictures[0]])):
+        for words, dense in (([], True), (["--dense"], True), (["--no-dense"], False)):
+            out = str(tmp_path / f"{number}{len(words)}{dense}.png")
+            assert main(["stitch", *given, "-o", out, "--quiet", *words]) == 0
+            assert said()[1] == "" and quick[-1][-1].dense == dense
 
 
 def test_what_cannot_be_stitched_gives_3(pictures: list[str], tmp_path: Path, said: Callable) -> None:
