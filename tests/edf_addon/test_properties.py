@@ -110,8 +110,8 @@ def test_what_goes_on_is_neither_saved_nor_undone(blender, tmp_path):
 
 
 def test_every_option_of_the_engine_is_offered(blender):
-    """Those that come as files or images are added to a job by hand; three are nobody's wish, some are for more than the
-    two pictures that the panel has, and two are the command's: a panel shows its picture, and a scene has its unit."""
+    """Those that come as files or images are added to a job by hand; three are nobody's wish, some are for more than
+    the two pictures that the panel has, and two are the command's: a panel shows its picture, a scene has its unit."""
     by_hand = {"matches", "ignore", "mask"}
     of_many = {"viewpoint", "require_all", "ignore_in"}
     options = {field.name for field in dataclasses.fields(StitchOptions)}
