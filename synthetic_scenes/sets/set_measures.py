@@ -233,7 +233,7 @@ def range_figures(found: Found) -> dict[str, float]:
     x, y = found.on_maps()[where].astype(np.float32).T[:, None]
     layers = np.dstack([warp.inverse_depth, warp.deviation[:, :]]).astype(np.float32)
     d, deviation = fetch(layers, x, y, cv2.INTER_LINEAR)[0].T
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         off = np.where(d > 0, np.abs(np.log(scale / np.where(d > 0, d, 1) / true[where])), np.inf)
     sure = deviation <= np.median(deviation)
     return {

@@ -149,7 +149,7 @@ class SeenPatch:
     def coarse_pixels(self, d: Array) -> Array:
         """px (m, n, 2) of the picture itself, before the lens, at inverse ranges (m, n); NaN behind it."""
         seen = self.infinite + d[..., None] * self.towards
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             pixels: Array = np.where(seen[..., 2:] > 0, seen[..., :2] / seen[..., 2:], np.nan)
         return pixels if self.slack is None else pixels + self.slack
 
@@ -170,7 +170,7 @@ class SeenPatch:
         depth = infinite[2] + d * towards[2]
         slopes = []
         for k, scale in enumerate(self.picture.scale):
-            with np.errstate(divide="ignore", invalid="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 at = (infinite[k] + d * towards[k]) / depth
                 slopes.append(np.nan_to_num((towards[k] - at * towards[2]) / depth * np.float32(scale)))
         return slopes[0], slopes[1]
@@ -178,7 +178,7 @@ class SeenPatch:
     def _ahead(self, d: Plane) -> tuple[Plane, Plane, Plane]:
         """px x, y (h, w) before the lens, NaN behind the picture, and depths (h, w)."""
         x, y, depth = (part + d * np.float32(along) for part, along in zip(self._infinite, self.towards, strict=True))
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             depth = np.where(depth > 0, depth, np.float32(np.nan))
             x, y = x / depth, y / depth
         for beside, part in zip(self._slack, (x, y), strict=False):
