@@ -48,6 +48,9 @@ class RefineOptions:
     """Share by which what was found there counts less, unless both pictures look alike there: noise does not, a soft
     surface does."""
 
+    confidence_nodes: int = 9
+    """Nodes of the side of the window in which confidence is the share that was found."""
+
     overlap_nodes: int = 64
     """Nodes along the longer side of the reference that say where the overlap lies."""
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..raster.arrays import Plane
 from .edge_aware_smoothing import Smoother
 from .epipolar_lines import EpipolarLines, Places
+from .jumps import Jumps
 from .matching import ComparedPicture, comparable_levels
 from .options import OUTLINES
 from .tones import tone_curves
@@ -48,26 +49,21 @@ def at_outlines(
     -------
     (h, w) float32 array
     """
-    rough = cv2.medianBlur(along, OUTLINES.median_nodes)
-    near_jump = _near_jump(rough)
-    if not near_jump.any():
+    jumps = Jumps.of(along, found >= OUTLINES.example, OUTLINES.reach)
+    if jumps is None:
         return along
-    near, far = _beside(rough, along, found)
     compared = _Compared.of(lines, along, across, found, views)
-    places = _in_rows(*np.nonzero(near_jump))
+    places = _in_rows(*np.nonzero(jumps.near))
     own = compared.costs(along, across, places)
     # a guess is no better than the surface behind
     guessed = found[places] < OUTLINES.example
     own[guessed] = np.maximum(own[guessed], compared.behind) + 2 * OUTLINES.least_gain
-    better = []
-    for other in (near, far):
+    gains = []
+    for other in (jumps.nearest, jumps.farthest):
         gain = np.zeros_like(along)
         gain[places] = own - compared.costs(other, across, places)
-        better.append(gain)
-    gains = Smoother.of(edges, OUTLINES.smoothness, passes=1).averaged(better)
-    chosen = np.where(gains[0] > gains[1], near, far)
-    clearly = near_jump & (np.maximum(*gains) > OUTLINES.least_gain) & (np.abs(chosen - along) > OUTLINES.least_px)
-    return np.where(clearly, chosen, along)
+        gains.append(gain)
+    return jumps.settled(along, gains, Smoother.of(edges, OUTLINES.smoothness, passes=1))
 
 
 def _in_rows(row: Places, column: Places) -> Indices:
@@ -75,24 +71,6 @@ def _in_rows(row: Places, column: Places) -> Indices:
     short = -row.size % OUTLINES.row
     row, column = (np.append(at, np.repeat(at[:1], short)).reshape(-1, OUTLINES.row) for at in (row, column))
     return row, column
-
-
-def _near_jump(rough: Plane) -> NDArray[np.bool_]:
-    """The nodes (h, w) within reach of a jump of moves (h, w) px."""
-    few, around = (np.ones((side,) * 2, np.uint8) for side in (OUTLINES.jump_nodes, 2 * OUTLINES.reach + 1))
-    jumps = cv2.dilate(rough, few) - cv2.erode(rough, few) > OUTLINES.jump_px
-    near: NDArray[np.bool_] = cv2.dilate(jumps.view(np.uint8), around) > 0
-    return near
-
-
-def _beside(rough: Plane, along: Plane, found: Plane) -> tuple[Plane, Plane]:
-    """The nearest and the farthest (h, w) of the moves (h, w) px that were found within reach; rough: the same
-    without specks. Where none was found the moves themselves."""
-    window = np.ones((2 * OUTLINES.reach + 1,) * 2, np.uint8)
-    example, none = found >= OUTLINES.example, np.finfo(np.float32).max
-    nearest = cv2.dilate(np.where(example, rough, -none), window)
-    farthest = cv2.erode(np.where(example, rough, none), window)
-    return np.where(nearest > -none, nearest, along), np.where(farthest < none, farthest, along)
 
 
 @dataclass(frozen=True)

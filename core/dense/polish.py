@@ -17,6 +17,7 @@ from ..raster.arrays import Plane, beside
 from ..system.threads import each
 from .edge_aware_smoothing import Smoother
 from .epipolar_lines import EpipolarLines
+from .local_means import local_gain, mean, mean_there, without_means
 from .matching import ComparedPicture
 from .options import POLISH
 
@@ -80,9 +81,9 @@ def polish(
                 near, own = beside(rows, POLISH.window_px // 2, len(along))
                 weight = compared.trust(near)
                 weight *= compared.slope[near]
-                step = _mean(weight * compared.residual[near], POLISH.window_px)[own]
+                step = mean(weight * compared.residual[near], POLISH.window_px)[own]
                 weight *= compared.slope[near]
-                curvature = _mean(weight, POLISH.window_px)[own]
+                curvature = mean(weight, POLISH.window_px)[own]
                 step += np.float32(POLISH.start_evidence) * (start[rows] - along[rows])
                 step /= curvature + np.float32(POLISH.start_evidence + POLISH.damping)
                 np.add(along[rows], np.clip(step, -POLISH.max_step_px, POLISH.max_step_px, out=step), out=moved[rows])
@@ -124,8 +125,8 @@ def likeness(
         near, here = beside(rows, POLISH.surroundings_px, len(along))
         fetched, valid = target.sample(target.gray, *lines.target(along, across, near))
         valid &= shown[near]
-        a, b, share = _without_means(first[near], fetched, valid)
-        both, own, other = (_mean_there(u * v, share) for u, v in ((a, b), (a, a), (b, b)))
+        a, b, share = without_means(first[near], fetched, valid)
+        both, own, other = (mean_there(u * v, share) for u, v in ((a, b), (a, a), (b, b)))
         both /= np.sqrt((own + 1) * (other + 1))
         both *= valid
         out[rows] = both[here]
@@ -168,11 +169,8 @@ def _compared(
         fetched, both_shown = target.sample(second, *lines.target(along, across, near))
         both_shown &= shown[near]
         gray, gx, gy = cv2.split(fetched)
-        a, b, share = _without_means(first[near], gray, both_shown)
-        gain = _mean_there(a * b, share)[own]
-        gain += POLISH.gain_noise
-        gain /= _mean_there(b * b, share)[own] + POLISH.gain_noise
-        np.clip(gain, np.float32(1 / POLISH.max_gain), np.float32(POLISH.max_gain), out=gain)
+        a, b, share = without_means(first[near], gray, both_shown)
+        gain = local_gain(a, b, share)[own]
         valid[rows] = both_shown[own]
         np.multiply(gain, b[own], out=residual[rows])
         np.subtract(a[own], residual[rows], out=residual[rows])
@@ -192,29 +190,6 @@ def _compared(
 def _strips(rows: int) -> list[slice]:
     """Rows that a thread works on at once."""
     return [slice(top, min(top + POLISH.strip_rows, rows)) for top in range(0, rows, POLISH.strip_rows)]
-
-
-def _mean(values: Plane, side: int) -> Plane:
-    """Means over a square window."""
-    mean: Plane = cv2.blur(values, (side, side), borderType=cv2.BORDER_REFLECT_101)
-    return mean
-
-
-def _mean_there(values: Plane, share: Plane | None) -> Plane:
-    """Means over the surroundings, of which a share is valid (None: all), of values that are 0 where they are not."""
-    mean = _mean(values, POLISH.surroundings_px)
-    return mean if share is None else np.divide(mean, share, out=mean)
-
-
-def _without_means(a: Plane, b: Plane, valid: NDArray[np.bool_]) -> tuple[Plane, Plane, Plane | None]:
-    """Both minus their local means, 0 where not valid, and the valid share of the surroundings, None if all is valid.
-    """
-    if valid.all():
-        return a - _mean(a, POLISH.surroundings_px), b - _mean(b, POLISH.surroundings_px), None
-    weight = valid.astype(np.float32)
-    share = np.maximum(_mean(weight, POLISH.surroundings_px), np.float32(1e-3))
-    a, b = ((values - _mean_there(values * weight, share)) * weight for values in (a, b))
-    return a, b, share
 
 
 def _smooth_step(gradient: Plane, curvature: Plane) -> Plane:

@@ -25,8 +25,8 @@ from ..raster.arrays import Box, Plane
 from ..raster.options import PARTS
 from ..raster.sampling import fetch
 from ..system.threads import in_order
-from .edge_aware_smoothing import Smoother, cut_edges, edge_weights, strengthen
 from .epipolar_lines import EpipolarLines, SparseMap
+from .filling import filled
 from .matching import ComparedPicture, search, search_base
 from .moved_depth import build_refinement
 from .options import REFINE
@@ -113,14 +113,11 @@ def refine(
     similar = found * np.square(np.maximum(likeness(lines, views[0], views[1], along), 0))
     plain = _plain(lines, sparse, views[0]) * (1 - similar)
     guide = _guide(pictures[0].view, lines)
-    edges = edge_weights(guide, REFINE.edge_levels)
-    weights = strengthen(cut_edges(edges, along, found > 0, REFINE.depth_edge_px), plain, REFINE.plain_strength)
-    weight = np.maximum(found * (1 - np.float32(REFINE.plain_doubt) * plain), np.float32(REFINE.field_confidence))
-    along = Smoother.of(weights, REFINE.smoothness).smoothed(along, weight)
-    known = np.maximum(found, np.float32(REFINE.field_confidence))
-    polished = polish(lines, views[0], views[1], along, known, weights, slack)
-    along = at_outlines(lines, polished.along, polished.across, known, edges, views)
-    confidence = np.clip(likeness(lines, *views, along, polished.across), 0, 1) * cv2.blur(found, (9, 9))
+    whole = filled(guide, along, found, plain)
+    polished = polish(lines, views[0], views[1], whole.along, whole.known, whole.weights, slack)
+    along = at_outlines(lines, polished.along, polished.across, whole.known, whole.edges, views)
+    confidence = np.clip(likeness(lines, *views, along, polished.across), 0, 1)
+    confidence *= cv2.blur(found, (REFINE.confidence_nodes,) * 2)
     overlap = _in_both(lines, along, polished.across, pictures)
     if not overlap.any():
         return Dense(None, "the overlap is too small")

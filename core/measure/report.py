@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ..cameras.scale import Scale
     from ..compose.decided import Decided
     from ..dense.refine import Dense
+    from ..dense.sphere.refine_sphere import DenseSphere
     from ..options import StitchOptions
     from ..panorama.choosing_slide import SlideChoice
     from ..pictures.picture import Picture
@@ -96,7 +97,7 @@ def make_report(
             "fade_px": field.fit.fade_px, "residual_px": field.fit.residual_px, "held_out_px": field.fit.held_out_px,
             "negative_share": field.fit.negative_share,
             "slack_px": field.slack_px if isinstance(field, SlackField) else 0.0,
-            "dense": _dense_entry(alignment.dense),
+            "dense": dense_entry(alignment.dense, ("reach_px", "found", "moved_px", "across_px")),
         },
         "slide": slide_entry(alignment.slide),
         "canvas": canvas_entry(canvas, two_view.K),
@@ -263,13 +264,11 @@ def _fade(options: StitchOptions, alignment: Alignment) -> str:
     return "plane" if options.fade == "continue" and alignment.continuation is None else options.fade
 
 
-def _dense_entry(dense: Dense | None) -> dict[str, Any]:
+def dense_entry(dense: Dense | DenseSphere | None, told: Sequence[str]) -> dict[str, Any]:
+    """What is said of dense refinement, and those of its figures."""
     if dense is None or dense.refined is None:
         return {"used": False, "why": "not asked for" if dense is None else dense.why}
-    return {
-        "used": True, "reach_px": dense.reach_px, "found": dense.found, "moved_px": dense.moved_px,
-        "across_px": dense.across_px,
-    }  # fmt: skip
+    return {"used": True} | {name: getattr(dense, name) for name in told}
 
 
 def _median(values: Array) -> float:

@@ -19,6 +19,7 @@ from .options import RIG, WARNING
 from .report import (
     SCHEMA,
     canvas_entry,
+    dense_entry,
     depth_entry,
     how_holes_are_shown,
     left_out_entry,
@@ -32,7 +33,6 @@ from .rig_figures import focal_spread, map_errors, residuals, scale_kind, shares
 if TYPE_CHECKING:
     from ..alignment import Alignment
     from ..compose.decided import Decided
-    from ..dense.sphere.refine_sphere import DenseSphere
     from ..options import StitchOptions
     from ..pictures.picture import Picture
 
@@ -98,7 +98,7 @@ def make_rig_report(
             "kind": options.field, "smoothing": field.depth.smoothing, "centres": len(field.depth.inner.centres),
             "leave_one_out_px": times * field.leave_one_out_px,
             "negative_share": float((rig.inverse_ranges < 0).mean()) if len(rig.inverse_ranges) else 0.0,
-            "dense": _dense_entry(alignment.dense_sphere),
+            "dense": dense_entry(alignment.dense_sphere, ("found",)),
         },
         "slide": slide_entry(alignment.slide),
         "canvas": canvas_entry(canvas, rig.cameras[0].K),
@@ -199,12 +199,6 @@ def rig_warnings(rig: Rig, names: Sequence[str]) -> list[str]:
             f"({rig.cameras[0].focal:.0f} px) are doubtful, and with them depth"
         )
     return out
-
-
-def _dense_entry(dense: DenseSphere | None) -> dict[str, Any]:
-    if dense is None or dense.refined is None:
-        return {"used": False, "why": "not asked for" if dense is None else dense.why}
-    return {"used": True, "found": dense.found}
 
 
 def _about_given(contradicting: int, found: int) -> list[str]:

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...raster.arrays import Array, Plane
+from ...raster.enlarging import repeated
+from ...raster.picture_map import falls_inside
 from ..tones import tone_curves
 from .options import CHART, CHOICE
 from .patch import Patch, SeenPatch, SweptPicture, sampled
@@ -119,11 +121,8 @@ def compared_on(
         return None
     per_px = 1 / (patch.chart.per_radian * np.maximum(parallax, CHOICE.least_parallax * parallax.max()))
     at_field = [one.sampled_at(coarse_field, one.picture.levels) for one in seen]
-    wide = cv2.resize(
-        owner.astype(np.float32), None, fx=CHART.coarse_step, fy=CHART.coarse_step, interpolation=cv2.INTER_NEAREST
-    )
     height, width = patch.shape
-    own = wide[CHART.coarse_step :, CHART.coarse_step :][:height, :width].astype(np.int8)
+    own = repeated(owner, CHART.coarse_step)[CHART.coarse_step :, CHART.coarse_step :][:height, :width]
     count = np.sum([levels[..., 3] == 255 for levels in at_field], axis=0)
     toned = _in_one_tone(first, at_field, [one.picture.levels for one in seen])
     return Compared(
@@ -137,8 +136,7 @@ def _shown(seen: SeenPatch, d: Array) -> NDArray[np.bool_]:
     x, y = (seen.picture.placed(k, pixels[..., k]) for k in (0, 1))
     height, width = seen.picture.levels.shape[:2]
     border = CHOICE.border_px
-    shown: NDArray[np.bool_] = (x >= border) & (y >= border) & (x <= width - 1 - border) & (y <= height - 1 - border)
-    return shown
+    return falls_inside(x - border, y - border, (width - 2 * border, height - 2 * border))
 
 
 def _across(one: SeenPatch, other: SeenPatch | None = None) -> Array:

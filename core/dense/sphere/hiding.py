@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...raster.arrays import Plane
+from ...raster.picture_map import falls_inside
 from ..options import OUTLINES
 from .choice import Compared
 from .options import SPHERE_OUTLINES
@@ -19,7 +20,7 @@ def nearest_on(compared: Compared, d: Plane) -> list[Plane]:
         height, width = seen.picture.levels.shape[:2]
         cell = SPHERE_OUTLINES.cell_px
         nearest = np.full((int(height / cell) + 1, int(width / cell) + 1), -np.inf, np.float32)
-        inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
+        inside = falls_inside(x, y, (width, height))
         np.maximum.at(nearest, _cells(x[inside], y[inside], nearest.shape), d[inside])
         found.append(nearest)
     return found

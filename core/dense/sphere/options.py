@@ -42,6 +42,12 @@ class ChartOptions:
     least_share: float = 0.005
     """Share of a patch that several pictures have to show for it to be worth looking at."""
 
+    lens_points: int = 17
+    """Points along each side of a picture that tell how far its lens moves its border."""
+
+    coarse_share: float = 0.25
+    """Share of the time that the search at half the size takes."""
+
 
 @dataclass(frozen=True)
 class ChoiceOptions:
@@ -53,7 +59,7 @@ class ChoiceOptions:
     least_share: float = 0.02
     """Share of a patch that a picture has to show."""
 
-    border_px: float = 2.0
+    border_px: int = 2
     """px, of the picture, from its border within which it is not looked at."""
 
     base_sigma: float = 0.05
@@ -183,9 +189,6 @@ class SphereOutlinesOptions:
 
     cell_px: float = 3.0
     """px of the side of the cells of a picture in which the nearest is looked for."""
-
-    behind: float = 2.6
-    """What a node costs that lies behind something nearer in all pictures, in usual differences."""
 
 
 CHART = ChartOptions()

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 # px of what lies nowhere: far beyond any picture, and small enough to be interpolated.
 NOWHERE = -1e4
-# Points along each side of a picture that tell how far its lens moves its border.
-LENS_POINTS = 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +44,12 @@ class Patch:
         """k planes (h, w) of values (m, n, k) at the same places."""
         return in_between(self.shape, coarse, CHART.coarse_step)
 
-    def of_chart(self, values: NDArray[Any], margin: int = 0) -> NDArray[Any]:
-        """Values (H, W) of all nodes of the chart at those of the patch and a margin around it."""
+    def of_chart(self, values: NDArray[Any], margin: int = 0, times: int = 1) -> NDArray[Any]:
+        """Values (H, W) of all nodes of the chart, or of one with so many times fewer a side, at those of the patch and
+        a margin around it."""
         height, width = self.shape
-        rows = np.clip(np.arange(self.top - margin, self.top + height + margin), 0, len(values) - 1)
-        columns = np.arange(self.left - margin, self.left + width + margin)
+        rows = np.clip(np.arange(self.top - margin, self.top + height + margin) // times, 0, len(values) - 1)
+        columns = np.arange(self.left - margin, self.left + width + margin) // times
         columns = columns % values.shape[1] if self.chart.closed else np.clip(columns, 0, values.shape[1] - 1)
         here: NDArray[Any] = values[rows[:, None], columns]
         return here
@@ -110,7 +109,7 @@ def _without_lens(levels: NDArray[np.uint8], view: View) -> tuple[NDArray[np.uin
     """A picture (H, W, 4) as a camera without distortion would see it, and the corner of its first pixel, px of the
     picture's plane."""
     size = np.array(view.size)
-    some = np.meshgrid(*(np.linspace(0, side - 1, LENS_POINTS) for side in view.size))
+    some = np.meshgrid(*(np.linspace(0, side - 1, CHART.lens_points) for side in view.size))
     ideal = undistort(np.stack(some, axis=-1), view.camera).reshape(-1, 2)
     low = np.maximum(np.floor(ideal.min(axis=0)), -size / 2).astype(int)
     high = np.minimum(np.ceil(ideal.max(axis=0)), 1.5 * size).astype(int) + 1
@@ -161,29 +160,28 @@ class SeenPatch:
 
     def places(self, d: Plane) -> tuple[Plane, Plane]:
         """px x, y (h, w) of the shrunk picture at any inverse ranges (h, w)."""
-        x, y, _ = self._ahead(d)
-        return self.picture.placed(0, x), self.picture.placed(1, y)
+        pixels, _ = self._seen_at(d)
+        for beside, part in zip(self._slack, pixels, strict=False):
+            part += beside
+        return self.picture.placed(0, pixels[0]), self.picture.placed(1, pixels[1])
 
     def slopes(self, d: Plane) -> tuple[Plane, Plane]:
         """px (h, w), across and down, of the shrunk picture for each unit of inverse range."""
-        infinite, towards = self._infinite, self.towards.astype(np.float32)
-        depth = infinite[2] + d * towards[2]
-        slopes = []
-        for k, scale in enumerate(self.picture.scale):
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                at = (infinite[k] + d * towards[k]) / depth
-                slopes.append(np.nan_to_num((towards[k] - at * towards[2]) / depth * np.float32(scale)))
-        return slopes[0], slopes[1]
+        pixels, depth = self._seen_at(d)
+        towards = self.towards.astype(np.float32)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            across, down = (
+                np.nan_to_num((towards[k] - pixels[k] * towards[2]) / depth * np.float32(self.picture.scale[k]))
+                for k in (0, 1)
+            )
+        return across, down
 
-    def _ahead(self, d: Plane) -> tuple[Plane, Plane, Plane]:
-        """px x, y (h, w) before the lens, NaN behind the picture, and depths (h, w)."""
+    def _seen_at(self, d: Plane) -> tuple[list[Plane], Plane]:
+        """px x and y (h, w) of the picture's plane without slack, and depths (h, w) before it; NaN behind it."""
         x, y, depth = (part + d * np.float32(along) for part, along in zip(self._infinite, self.towards, strict=True))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             depth = np.where(depth > 0, depth, np.float32(np.nan))
-            x, y = x / depth, y / depth
-        for beside, part in zip(self._slack, (x, y), strict=False):
-            part += beside
-        return x, y, depth
+            return [x / depth, y / depth], depth
 
 
 def sampled(levels: NDArray[Any], x: Plane, y: Plane) -> NDArray[Any]:

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...cameras.lens import distort
 from ...field.refined_sphere import RefinedSphere
 from ...field.sphere_chart import SphereChart
+from ...field.sphere_points import seen_at
 from ...raster.arrays import Plane
+from ...raster.enlarging import repeated
 from ...raster.grid import Grid
+from ...raster.picture_map import falls_inside
 from ...system.threads import in_order
-from ..edge_aware_smoothing import Smoother, cut_edges, edge_weights, strengthen
+from ..filling import filled
 from ..options import REFINE
 from .choice import Compared, compared_on
 from .options import CHART, SWEEP
 from .patch import Patch, SweptPicture
-from .search import Hints, found_on
+from .search import Hints, found_on, span_of
 from .sphere_outlines import with_outlines
 from .sphere_polish import polished
 from .sweep import MEAN_OF_COLOURS
@@ -31,6 +33,12 @@ if TYPE_CHECKING:
     from ...cameras.view import View
     from ...field.sphere_field import SphereField
     from ...pictures.picture import Picture
+
+Covered = tuple[SphereChart, NDArray[np.intp]]
+"""A chart, and how many pictures show each of its cells (see `ChartOptions.cell`)."""
+Part = tuple[Patch, Patch]
+"""A patch with its margins, and what of the chart it is for."""
+Outcome = TypeVar("Outcome")
 
 
 @dataclass(frozen=True)
@@ -50,12 +58,6 @@ class DenseSphere:
     refined: RefinedSphere | None
     why: str
     found: float = 0.0
-
-
-# Share of the time that the search at half the size takes.
-COARSE_SHARE = 0.25
-# Of both sides of the window in which confidence is the share of nodes that were found.
-CONFIDENCE_NODES = 9
 
 
 def refine_sphere(
@@ -80,53 +82,71 @@ def refine_sphere(
     """
     if not rig.t.any():
         return DenseSphere(None, "pictures that were taken from one place tell no distances")
-    chart, count = _chart(field, rig.views)
-    small = chart.smaller(2)
-    smooth = _of_field(field, small)
-    swept = [SweptPicture.of(k, view, picture, small.per_radian)
-             for k, (view, picture) in enumerate(zip(rig.views, pictures, strict=True))]  # fmt: skip
+    covered = _chart(field, rig.views)
+    hints = _at_half_size(field, rig, pictures, covered, tick)
+    return _at_full_size(field, rig, pictures, covered, hints, tick)
+
+
+def _at_half_size(
+    field: SphereField, rig: Rig, pictures: Sequence[Picture], covered: Covered, tick: Callable[[float], None]
+) -> Hints:
+    """What is found with half as many nodes a side, and the rig's points, as hints of where to search."""
+    full, count = covered
+    chart = full.smaller(2)
+    smooth, swept = _of_field(field, chart), _swept(rig, pictures, chart)
     d, where = smooth.copy(), np.zeros(smooth.shape, bool)
-    hints = _hints(rig, small)
-    parts = _patches(small, count)
-    for number, (patch, inner) in enumerate(parts):
-        tick(COARSE_SHARE * number / len(parts))
-        compared = compared_on(patch, swept, field, smooth)
-        if compared is not None:
-            found = found_on(compared, hints)
-            _put(patch, inner, d, compared.at(found.along))
-            _put(patch, inner, where, found.where)
-    hints = replace(_hints(rig, chart), coarse=(d, where))
-    return _at_full_size(field, rig, pictures, (chart, count), hints, tick)
+
+    def found(part: Part) -> tuple[Plane, NDArray[np.bool_]] | None:
+        compared = compared_on(part[0], swept, field, smooth)
+        if compared is None:
+            return None
+        best = found_on(compared, SWEEP.coarse_range_px)
+        return compared.at(best.along), best.where
+
+    for (patch, inner), (near, known) in _each(found, _patches(chart, count), tick, (0.0, CHART.coarse_share)):
+        _put(patch, inner, d, near)
+        _put(patch, inner, where, known)
+    columns, rows = full.places(rig.rays)
+    return Hints(np.rint(columns), np.rint(rows), np.maximum(rig.inverse_ranges, 0), d, where)
 
 
 def _at_full_size(
-    field: SphereField, rig: Rig, pictures: Sequence[Picture], covered: tuple[SphereChart, NDArray[np.intp]],
-    hints: Hints, tick: Callable[[float], None],
+    field: SphereField, rig: Rig, pictures: Sequence[Picture], covered: Covered, hints: Hints,
+    tick: Callable[[float], None],
 ) -> DenseSphere:  # fmt: skip
-    """The refinement on a chart; covered: the chart, and how many pictures show its parts."""
+    """The refinement on the chart."""
     chart, count = covered
-    smooth = _of_field(field, chart)
-    swept = [SweptPicture.of(k, view, picture, chart.per_radian)
-             for k, (view, picture) in enumerate(zip(rig.views, pictures, strict=True))]  # fmt: skip
+    smooth, swept = _of_field(field, chart), _swept(rig, pictures, chart)
     d, confidence, deviation = smooth.copy(), np.zeros_like(smooth), _deviation(field, chart)
-    shown = cv2.resize((count > 0).astype(np.uint8), chart.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+    shown = repeated(count > 0, CHART.cell)
 
-    def refined(part: tuple[Patch, Patch]) -> _Refined | None:
+    def refined(part: Part) -> _Refined | None:
         compared = compared_on(part[0], swept, field, smooth)
         return None if compared is None else _refined(compared, hints)
 
-    parts, several, found = _patches(chart, count), 0, 0
-    for number, ((patch, inner), one) in enumerate(zip(parts, in_order(refined, parts), strict=True)):
-        tick(COARSE_SHARE + (1 - COARSE_SHARE) * number / len(parts))
-        if one is not None:
-            several, found = several + one.several, found + one.found
-            _put(patch, inner, d, one.d)
-            _put(patch, inner, confidence, one.confidence)
-            spread = np.hypot(one.confidence * one.noise, (1 - one.confidence) * patch.of_chart(deviation))
-            _put(patch, inner, deviation, spread.astype(np.float32))
+    several = found = 0
+    for (patch, inner), one in _each(refined, _patches(chart, count), tick, (CHART.coarse_share, 1.0)):
+        several, found = several + one.several, found + one.found
+        _put(patch, inner, d, one.d)
+        _put(patch, inner, confidence, one.confidence)
+        spread = np.hypot(one.confidence * one.noise, (1 - one.confidence) * patch.of_chart(deviation))
+        _put(patch, inner, deviation, spread.astype(np.float32))
     if not several:
         return DenseSphere(None, "no two pictures from different places show the same")
     return DenseSphere(RefinedSphere(chart, d, confidence, deviation, shown), "", found / several)
+
+
+def _each(
+    work: Callable[[Part], Outcome | None], parts: Sequence[Part], tick: Callable[[float], None],
+    share: tuple[float, float],
+) -> Iterator[tuple[Part, Outcome]]:  # fmt: skip
+    """Patches and what comes of each, of those of which anything does; share: of all work, where this begins and ends.
+    """
+    begin, end = share
+    for number, (part, outcome) in enumerate(zip(parts, in_order(work, parts), strict=True)):
+        tick(begin + (end - begin) * number / len(parts))
+        if outcome is not None:
+            yield part, outcome
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,18 +163,14 @@ class _Refined:
 
 def _refined(compared: Compared, hints: Hints) -> _Refined:
     """A patch, searched, filled, polished, and with its outlines in place."""
-    found = found_on(compared, hints)
+    found = found_on(compared, span_of(compared, hints))
+    where = found.where.astype(np.float32)
     guide = compared.best(compared.sampled(compared.at(found.along)))[..., :3]
-    edges = edge_weights(cv2.GaussianBlur(guide, (0, 0), 1.0).astype(np.float32), REFINE.edge_levels)
-    plain = _plain(guide)
     along = np.where(found.where, found.along, compared.field_px).astype(np.float32)
-    weights = strengthen(cut_edges(edges, along, found.where, REFINE.depth_edge_px), plain, REFINE.plain_strength)
-    known = np.maximum(found.where.astype(np.float32), np.float32(REFINE.field_confidence))
-    weight = np.maximum(found.where * (1 - np.float32(REFINE.plain_doubt) * plain), np.float32(REFINE.field_confidence))
-    along = Smoother.of(weights, REFINE.smoothness).smoothed(along, weight)
-    along = polished(compared, along, known, weights)
-    along = with_outlines(compared, found, along, edges)
-    confidence: Plane = cv2.blur(found.where.astype(np.float32), (CONFIDENCE_NODES,) * 2)
+    whole = filled(cv2.GaussianBlur(guide, (0, 0), 1.0).astype(np.float32), along, where, _plain(guide))
+    along = polished(compared, whole.along, whole.known, whole.weights)
+    along = with_outlines(compared, found, along, whole.edges)
+    confidence: Plane = cv2.blur(where, (REFINE.confidence_nodes,) * 2)
     d = np.where(compared.owner >= 0, compared.at(along), compared.field)
     noise = compared.per_px * np.float32(SWEEP.noise_px)
     return _Refined(d, confidence, noise, int(compared.several.sum()), int(found.where.sum()))
@@ -171,7 +187,7 @@ def _plain(guide: NDArray[np.uint8]) -> Plane:
     return plain
 
 
-def _chart(field: SphereField, views: Sequence[View]) -> tuple[SphereChart, NDArray[np.intp]]:
+def _chart(field: SphereField, views: Sequence[View]) -> Covered:
     """A chart of what pictures show, with as many nodes per radian as they have px, within bounds; and how many of them
     show each of its cells of `cell` nodes a side."""
     focal = float(np.median([view.camera.focal for view in views]))
@@ -200,15 +216,22 @@ def _chart(field: SphereField, views: Sequence[View]) -> tuple[SphereChart, NDAr
 
 def _count(field: SphereField, views: Sequence[View], chart: SphereChart) -> NDArray[np.intp]:
     """How many pictures show each node (h, w) of a chart."""
-    rays = chart.all_rays
+    rays = chart.all_rays.reshape(-1, 3)
     d = np.maximum(field.at(rays), 0)
-    count = np.zeros(chart.shape, np.intp)
+    count = np.zeros(len(rays), np.intp)
     for view in views:
-        seen = rays @ (view.K @ view.R).T + d[..., None] * (view.K @ view.t)
         with np.errstate(divide="ignore", invalid="ignore"):
-            pixels = distort(np.where(seen[..., 2:] > 0, seen[..., :2] / seen[..., 2:], np.nan), view.camera)
-            count += ((pixels >= 0) & (pixels <= np.array(view.size) - 1)).all(axis=-1)
-    return count
+            x, y = seen_at(view, rays, d).T
+        count += falls_inside(x, y, view.size)
+    return count.reshape(chart.shape)
+
+
+def _swept(rig: Rig, pictures: Sequence[Picture], chart: SphereChart) -> list[SweptPicture]:
+    """The pictures at the scale of a chart."""
+    return [
+        SweptPicture.of(number, view, picture, chart.per_radian)
+        for number, (view, picture) in enumerate(zip(rig.views, pictures, strict=True))
+    ]
 
 
 def _of_field(field: SphereField, chart: SphereChart) -> Plane:
@@ -223,14 +246,8 @@ def _deviation(field: SphereField, chart: SphereChart) -> Plane:
     return grid.to_pixels(field.deviation(chart.rays(grid.ys, grid.xs)), 0, 0, *chart.shape[::-1])
 
 
-def _hints(rig: Rig, chart: SphereChart) -> Hints:
-    """The rig's points on a chart."""
-    columns, rows = chart.places(rig.rays)
-    return Hints(np.rint(columns), np.rint(rows), np.maximum(rig.inverse_ranges, 0))
-
-
-def _patches(chart: SphereChart, count: NDArray[np.intp]) -> list[tuple[Patch, Patch]]:
-    """Patches with their margins, and what of the chart each of them is for, where several pictures show something."""
+def _patches(chart: SphereChart, count: NDArray[np.intp]) -> list[Part]:
+    """The patches where several pictures show something."""
     height, width = chart.shape
     found = []
     for top in range(0, height, CHART.side):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...raster.arrays import Array, Plane
 from ...raster.distance import distance_inside
+from ...raster.picture_map import falls_inside
 from .choice import Compared
 from .options import SWEEP
 from .sweep import Swept, swept
@@ -26,19 +26,19 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Hints:
-    """What is known before the search: inverse ranges (N,) of points at columns and rows (N,) of the chart; d and where
-    it was found at half the size, on the chart (H, W) of that size, None there itself."""
+    """What is known before the search: inverse ranges (N,) of points at columns and rows (N,) of the chart; d (H, W),
+    and where (H, W) it was found, on the chart of half the size."""
 
     columns: Array
     rows: Array
     inverse_ranges: Array
-    coarse: tuple[Plane, NDArray[np.bool_]] | None = None
+    d: Plane
+    where: NDArray[np.bool_]
 
 
-def found_on(compared: Compared, hints: Hints) -> Found:
-    """Search a patch, as far as hints ask for; without any from half the size, as far as is usual there."""
-    least, most = _range(compared, hints) if hints.coarse is not None else SWEEP.coarse_range_px
-    best = swept(compared, least, most)
+def found_on(compared: Compared, span: tuple[int, int]) -> Found:
+    """Search a patch from so many px from the base to so many."""
+    best = swept(compared, *span)
     where = best.unique & compared.several & _agreed(compared, best)
     if where.any():
         usual = SWEEP.usual_factor * float(np.percentile(best.cost[where], SWEEP.usual_percent))
@@ -51,8 +51,8 @@ def found_on(compared: Compared, hints: Hints) -> Found:
     return Found(best.along, where)
 
 
-def _range(compared: Compared, hints: Hints) -> tuple[int, int]:
-    """px from the base, to both sides, that are to be searched."""
+def span_of(compared: Compared, hints: Hints) -> tuple[int, int]:
+    """px from the base, to both sides, that hints ask to be searched."""
     patch, lows, highs = compared.patch, [0.0], [0.0]
     height, width = patch.shape
     row, column = hints.rows - patch.top, (hints.columns - patch.left) % patch.chart.circumference
@@ -63,25 +63,14 @@ def _range(compared: Compared, hints: Hints) -> tuple[int, int]:
         percent = SWEEP.points_percent
         lows.append(float(np.percentile(px, percent)))
         highs.append(float(np.percentile(px, 100 - percent)))
-    if hints.coarse is not None:
-        d, where = (_at_half(compared, values) for values in hints.coarse)
-        if where.sum() > SWEEP.least_found:
-            px = ((d - compared.base) / compared.per_px)[where]
-            lows.append(float(np.percentile(px, SWEEP.range_percent)))
-            highs.append(float(np.percentile(px, 100 - SWEEP.range_percent)))
+    d, where = (patch.of_chart(values, times=2) for values in (hints.d, hints.where))
+    if where.sum() > SWEEP.least_found:
+        px = ((d - compared.base) / compared.per_px)[where]
+        lows.append(float(np.percentile(px, SWEEP.range_percent)))
+        highs.append(float(np.percentile(px, 100 - SWEEP.range_percent)))
     margin, few, many = SWEEP.margin_px, SWEEP.least_range_px, SWEEP.most_range_px
     low, high = np.floor(min(lows) - margin), np.ceil(max(highs) + margin)
     return int(np.clip(low, -many, -few)), int(np.clip(high, few, many))
-
-
-def _at_half(compared: Compared, values: NDArray[Any]) -> NDArray[Any]:
-    """Values (H, W) of a chart of half the size at the nodes (h, w) of the patch."""
-    patch = compared.patch
-    rows = np.clip(np.arange(patch.top, patch.top + patch.shape[0]) // 2, 0, len(values) - 1)
-    columns = np.arange(patch.left, patch.left + patch.shape[1]) // 2
-    columns = columns % values.shape[1] if patch.chart.closed else np.clip(columns, 0, values.shape[1] - 1)
-    here: NDArray[Any] = values[rows[:, None], columns]
-    return here
 
 
 def _agreed(compared: Compared, best: Swept) -> NDArray[np.bool_]:
@@ -90,7 +79,7 @@ def _agreed(compared: Compared, best: Swept) -> NDArray[np.bool_]:
     for number, seen in enumerate(compared.seen):
         height, width = seen.picture.levels.shape[:2]
         x, y = seen.places(d)
-        here = np.nonzero((x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1) & (compared.owner != number))
+        here = np.nonzero(falls_inside(x, y, (width, height)) & (compared.owner != number))
         cell = np.rint(y[here]).astype(np.int64) * width + np.rint(x[here]).astype(np.int64)
         order = np.lexsort((best.summed[here], cell))
         begins = np.flatnonzero(np.diff(cell[order], prepend=-1))

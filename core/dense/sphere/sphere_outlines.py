@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ...raster.arrays import Plane
 from ..edge_aware_smoothing import Smoother, Weights
+from ..jumps import Jumps
 from ..options import OUTLINES
 from .choice import Compared
 from .hiding import hidden_from, nearest_on
@@ -26,35 +26,24 @@ def with_outlines(compared: Compared, found: Found, along: Plane, edges: Weights
     Near a jump each node may have what was found nearest or farthest around it, where the pictures are clearly more
     alike then; found: what is an example for others; edges: see `edge_weights`.
     """
-    around = np.ones((2 * SPHERE_OUTLINES.reach + 1,) * 2, np.uint8)
-    few = np.ones((OUTLINES.jump_nodes,) * 2, np.uint8)
     smoother = Smoother.of(edges, OUTLINES.smoothness, passes=1)
-    none = np.finfo(np.float32).max
     for _ in range(SPHERE_OUTLINES.rounds):
-        rough = cv2.medianBlur(along, OUTLINES.median_nodes)
-        jumps = cv2.dilate(rough, few) - cv2.erode(rough, few) > OUTLINES.jump_px
-        if not jumps.any():
+        jumps = Jumps.of(along, found.where, SPHERE_OUTLINES.reach)
+        if jumps is None:
             return along
-        band = cv2.dilate(jumps.astype(np.uint8), around) > 0
-        near = cv2.dilate(np.where(found.where, rough, -none), around)
-        far = cv2.erode(np.where(found.where, rough, none), around)
-        near, far = np.where(near > -none, near, along), np.where(far < none, far, along)
         nearest = nearest_on(compared, compared.at(along))
         own, seen = _costs(compared, along, nearest)
         sure = own[found.where & seen]
         usual = float(np.percentile(sure, OUTLINES.usual_percentile)) if sure.size else 0.0
-        behind = np.float32(max(OUTLINES.min_behind, SPHERE_OUTLINES.behind * usual))
+        behind = np.float32(max(OUTLINES.min_behind, OUTLINES.behind * usual))
         own = np.where(seen, own, behind)
         # a guess is no better than the surface behind
         own = np.where(found.where, own, np.maximum(own, behind) + 2 * np.float32(OUTLINES.least_gain))
         gains = []
-        for other in (near, far):
+        for other in (jumps.nearest, jumps.farthest):
             cost, seen = _costs(compared, other, nearest)
-            gains.append(np.where(band, own - np.where(seen, cost, behind), np.float32(0)))
-        gains = smoother.averaged(gains)
-        chosen = np.where(gains[0] > gains[1], near, far)
-        clearly = band & (np.maximum(*gains) > OUTLINES.least_gain) & (np.abs(chosen - along) > OUTLINES.least_px)
-        along = np.where(clearly, chosen, along)
+            gains.append(np.where(jumps.near, own - np.where(seen, cost, behind), np.float32(0)))
+        along = jumps.settled(along, gains, smoother)
     return along
 
 

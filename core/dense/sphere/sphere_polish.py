@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...raster.arrays import Plane
 from ..edge_aware_smoothing import Smoother, Weights
+from ..local_means import local_gain, mean, without_means
 from ..options import POLISH
 from .choice import Compared
 from .hiding import hidden_from
@@ -92,24 +93,13 @@ def _equations(fetched: _Fetched, compared: Compared, hidden: list[NDArray[np.bo
         both = (best_shown > 0) & fetched.shown[number] & ~hidden[number] & (mask == 0)
         if not both.any():
             continue
-        share = both.astype(np.float32)
-        around = np.maximum(_mean(share), np.float32(1e-3))
-        a, b = ((v - _mean(v * share) / around) * share for v in (best, fetched.gray[number]))
-        noise = np.float32(POLISH.gain_noise)
-        gain = (_mean(a * b) / around + noise) / (_mean(b * b) / around + noise)
-        gain = np.clip(gain, np.float32(1 / POLISH.max_gain), np.float32(POLISH.max_gain))
+        a, b, share = without_means(best, fetched.gray[number], both)
+        gain = local_gain(a, b, share)
         residual = a - gain * b
         slope = gain * fetched.slope[number] - best_slope
         typical = float(np.median(np.abs(residual[both][::16])))
         half = np.float32(max(POLISH.min_half_residual, POLISH.half_residual_factor * typical))
-        trust = share / (1 + np.square(residual / half))
+        trust = both / (1 + np.square(residual / half))
         gradient += trust * slope * residual
         curvature += trust * slope * slope
-    window = (POLISH.window_px,) * 2
-    return cv2.blur(gradient, window), cv2.blur(curvature, window)
-
-
-def _mean(values: Plane) -> Plane:
-    """Means over the surroundings."""
-    mean: Plane = cv2.blur(values, (POLISH.surroundings_px,) * 2, borderType=cv2.BORDER_REFLECT_101)
-    return mean
+    return mean(gradient, POLISH.window_px), mean(curvature, POLISH.window_px)

@@ -54,11 +54,6 @@ class DepthGrid:
             raise ValueError("the panorama has no depth: nothing of it lies nearer than infinity")
         return replace(self, inverse_depth=np.maximum(d, float(np.median(near)) / farthest))
 
-    def points(self, inverse_depth: Array, rays: Array, places: Array | None) -> Array:
-        """The points (…, 3) of rays (…, 3) at d (…)."""
-        points: Array = rays / inverse_depth[..., None]
-        return points if places is None else points + places
-
 
 @dataclass(frozen=True)
 class Surface:
@@ -242,11 +237,17 @@ def _joined(grid: DepthGrid, faces: NDArray[np.bool_], cells: NDArray[np.intp], 
     flat = [None if one is None else one.reshape(rows * columns, -1) for one in (grid.rays, grid.uvs, grid.places)]
     rays, uvs, places = flat
     assert rays is not None and uvs is not None
-    vertices = [grid.points(grid.inverse_depth.ravel()[used], rays[used], None if places is None else places[used])]
+    vertices = [_points(grid.inverse_depth.ravel()[used], rays[used], None if places is None else places[used])]
     own = _of_corners(at, cells).ravel()
-    vertices.append(grid.points(d.ravel(), rays[own], None if places is None else places[own]))
+    vertices.append(_points(d.ravel(), rays[own], None if places is None else places[own]))
     further = len(used) + np.arange(len(own)).reshape(-1, 4)
     return Surface(
         np.concatenate(vertices), np.concatenate([shared.reshape(-1, 4), further]).astype(np.int32),
         np.concatenate([uvs[used], uvs[own]]),
     )  # fmt: skip
+
+
+def _points(inverse_depth: Array, rays: Array, places: Array | None) -> Array:
+    """The points (N, 3) of rays (N, 3) at d (N,), seen from places (N, 3), None for the origin."""
+    points: Array = rays / inverse_depth[..., None]
+    return points if places is None else points + places
