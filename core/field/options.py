@@ -194,6 +194,47 @@ class FoldingOptions:
     """Pixels that a thread looks at at once. No result depends on it."""
 
 
+@dataclass(frozen=True)
+class CarryOptions:
+    """A surface seen from another place (`carried_surface`)."""
+
+    rounding: float = 1e-6
+    """Nodes by which a point may lie before a node that it lies on."""
+
+    same_surface_px: float = 1.5
+    """px of parallax within which what a ray shows lies on the surface that is known around it."""
+
+    jump_px: float = 6.0
+    """px of parallax between neighbours, with `jump_share` of the nearer one's, from which they lie on two surfaces."""
+
+    jump_share: float = 0.06
+    """See `jump_px`: what is near has steeper slopes."""
+
+    jump_side: int = 7
+    """px, side of the square in which depth differs hardly more at a jump than between neighbours."""
+
+    jump_growth: float = 2.0
+    """Times that it differs more there: on a steep surface it is three times."""
+
+    sharpenings: int = 2
+    """Rounds in which pixels between two surfaces are given to the nearer in depth; a jump is 2 to 4 px wide."""
+
+    speck_px: int = 5
+    """px, side of the median that takes single points out of the surface that they fall on."""
+
+    beside_nodes: int = 64
+    """Nodes beyond either end of a sphere that gaps are filled by: it goes on there."""
+
+    widest_gap_px: int = 256
+    """px of a gap between two surfaces at most that is filled from the farther one."""
+
+    rounds: int = 2
+    """px by which what is left open goes on from around at each size."""
+
+    halvings: int = 6
+    """Times that the canvas is halved for what is still open: up to 2 · 2⁶ px wide."""
+
+
 def decades(low: float, high: float) -> Array:
     """Powers of ten (n,) from 10**low to 10**high, two to each decade."""
     return np.asarray(10.0 ** np.arange(low, high + 0.01, 0.5))
@@ -207,3 +248,4 @@ PLANE = PlaneOptions()
 FADE = FadeOptions()
 VISIBILITY = VisibilityOptions()
 FOLDING = FoldingOptions()
+CARRY = CarryOptions()

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster.arrays import Plane
+from ..raster.arrays import Array, Plane
 from ..raster.sampling import fetch
+from .options import CARRY
 from .sphere_chart import SphereChart
 
 
@@ -41,6 +42,22 @@ class RefinedSphere:
             column = np.clip(column, np.float32(0), np.float32(width - 1))
         values = fetch(self._together, column, row, cv2.INTER_LINEAR)
         return values[..., 0], values[..., 1], values[..., 2]
+
+    def seen_from(self, places: Array, rays: Array, d: Plane) -> tuple[Plane, Plane, Plane]:
+        """Inverse range, confidence and deviation (…) along unit rays (…, 3) that begin at other places ((3,) or (…,
+        3), as seen from this one's); d (…): their inverse ranges to within a node, as points that are put on nodes
+        have them, and as they stay where this surface does not lie there."""
+        rough = d.astype(np.float64)
+        here = rays + rough[..., None] * places
+        length = np.linalg.norm(here, axis=-1)
+        own, confidence, deviation = self.at(here)
+        own = own.astype(np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            anew = own / ((here * rays).sum(axis=-1) / length - own * (rays * places).sum(axis=-1))
+        same = np.abs(anew - rough) < CARRY.same_surface_px / self.chart.per_radian
+        # what is off by an angle is off by less inverse range the farther away it is
+        share = np.square(length).astype(np.float32)
+        return np.where(same, anew, rough).astype(np.float32), confidence, deviation * share
 
     @cached_property
     def _together(self) -> Plane:

@@ -299,41 +299,11 @@ class SlideOptions:
 
 
 @dataclass(frozen=True)
-class CarryOptions:
-    """Inverse depth carried to the sliding viewpoint (`carried_depth`, `slid_warp`)."""
-
-    jump_px: float = 6.0
-    """px of parallax between neighbours, with `jump_share` of the nearer one's, from which they lie on two surfaces."""
-
-    jump_share: float = 0.06
-    """See `jump_px`: what is near has steeper slopes."""
-
-    jump_side: int = 7
-    """px, side of the square in which depth differs hardly more at a jump than between neighbours."""
-
-    jump_growth: float = 2.0
-    """Times that it differs more there: on a steep surface it is three times."""
-
-    sharpenings: int = 2
-    """Rounds in which pixels between two surfaces are given to the nearer in depth; a jump is 2 to 4 px wide."""
-
-    speck_px: int = 5
-    """px, side of the median that takes single points out of the surface that they fall on."""
+class UncoveredOptions:
+    """What a sliding viewpoint uncovers or hides (`slid_warp`)."""
 
     least_behind_px: int = 3
     """px, side of the square below which what the reference cannot see is rounding."""
-
-    beside_nodes: int = 64
-    """Nodes beyond either end of a sphere that gaps are filled by: it goes on there."""
-
-    widest_gap_px: int = 256
-    """px of a gap between two surfaces at most that is filled from the farther one."""
-
-    rounds: int = 2
-    """px by which what is left open goes on from around at each size."""
-
-    halvings: int = 6
-    """Times that the canvas is halved for what is still open: up to 2 · 2⁶ px wide."""
 
     same_share: float = 0.03
     """Share of d, with `same_px` px of parallax, by which a surface may differ from what was carried over."""
@@ -364,4 +334,4 @@ STRAIGHTNESS = StraightnessOptions()
 OWN_DEPTH = OwnDepthOptions()
 CHOICE = ChoiceOptions()
 SLIDE = SlideOptions()
-CARRY = CarryOptions()
+UNCOVERED = UncoveredOptions()

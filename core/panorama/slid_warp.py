@@ -26,7 +26,7 @@ from ..raster.picture_map import PictureMap
 from ..system.threads import each
 from .canvas import Canvas, border, bounding_canvas
 from .carried_depth import Lattice, Rays, Surface, carried_depth, looked_up, turned
-from .options import CANVAS, CARRY, SLIDE
+from .options import CANVAS, SLIDE, UNCOVERED
 from .projection import Projection, focal_of
 from .viewpoint import Viewpoint
 from .warp import Warp, trimmed
@@ -102,7 +102,7 @@ def _mapped(
         confidence[rows] = np.where(hidden, np.float32(0), more[..., 2])
 
     each(put, small_strips(shape))
-    unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((CARRY.least_behind_px,) * 2, np.uint8)) > 0
+    unseen = cv2.morphologyEx(behind, cv2.MORPH_OPEN, np.ones((UNCOVERED.least_behind_px,) * 2, np.uint8)) > 0
     return Warp(canvas, tuple(maps), depth, confidence, slide, unseen, viewpoint)
 
 
@@ -124,8 +124,8 @@ def _refined(
     )
     new = here / np.maximum(away, np.float32(SLIDE.least_range))
     focal = surface.projection.focal
-    same = np.abs(new - d) < CARRY.same_share * d + np.float32(CARRY.same_px / focal)
-    hidden = there & (new > d + CARRY.behind_share * new + np.float32(CARRY.behind_px / focal)) & (s > 0)
+    same = np.abs(new - d) < UNCOVERED.same_share * d + np.float32(UNCOVERED.same_px / focal)
+    hidden = there & (new > d + UNCOVERED.behind_share * new + np.float32(UNCOVERED.behind_px / focal)) & (s > 0)
     np.copyto(d, new, where=(there & same) | (s == 0))
     return x, y, hidden
 
@@ -182,7 +182,7 @@ def _reach(
     """left, top, right, bottom, px of the plane, of a rectangle that holds all pictures, with a margin; and whether
     more than some specks of them lie beyond the projection's limits."""
     height, width = surface.depth.shape
-    every = max(1, max(height, width) // CARRY.reach_nodes)
+    every = max(1, max(height, width) // UNCOVERED.reach_nodes)
     (x, y, z), depth = surface.points(viewpoint, slice(0, height, every), every)
     own = turned(viewpoint.rotation.T @ surface.projection.rotation, (x, y, z))
     moved, _ = viewpoint.shifted((own[0], own[1], own[2]), depth)
@@ -199,4 +199,4 @@ def _reach(
     margin = CANVAS.margin * max(views[0].size) * projection.focal / focal_of(projection.K)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     reach: Array = np.concatenate([np.maximum(low, limits[:2]), np.minimum(high, limits[2:])])
-    return reach, projection.cuts and float(beyond.any(axis=1).mean()) > CARRY.most_beyond
+    return reach, projection.cuts and float(beyond.any(axis=1).mean()) > UNCOVERED.most_beyond

@@ -17,6 +17,7 @@ from ...raster.picture_map import falls_inside
 from ..tones import tone_curves
 from .options import CHART, CHOICE
 from .patch import Patch, SeenPatch, SweptPicture, sampled
+from .place import Place
 
 if TYPE_CHECKING:
     from ...field.sphere_field import SphereField
@@ -60,6 +61,12 @@ class Compared:
         return px
 
     @cached_property
+    def infinity_px(self) -> Plane:
+        """px (h, w) from the base to what is infinitely far away."""
+        px: Plane = -self.base / self.per_px
+        return px
+
+    @cached_property
     def masks(self) -> list[NDArray[np.uint8]]:
         """1 (h, w) where each picture is the one that shows a node best."""
         return [(self.owner == number).astype(np.uint8) for number in range(len(self.seen))]
@@ -84,7 +91,7 @@ class Compared:
 
 
 def compared_on(
-    patch: Patch, pictures: Sequence[SweptPicture], field: SphereField, smooth: Plane
+    patch: Patch, pictures: Sequence[SweptPicture], place: Place, field: SphereField
 ) -> Compared | None:
     """Choose what is compared on a patch.
 
@@ -92,9 +99,10 @@ def compared_on(
     ----------
     patch : Patch
     pictures : sequence of SweptPicture
+        Their views as they are from the place.
+    place : Place
+        Where the patch is seen from.
     field : SphereField
-    smooth : (H, W) float32
-        The field's inverse range at all nodes of the chart.
 
     Returns
     -------
@@ -102,10 +110,12 @@ def compared_on(
         None where fewer than two pictures show the patch, or none of them stands apart.
     """
     margin = int(4 * CHOICE.base_sigma * patch.chart.per_radian) + 2 * CHART.coarse_step
-    around = patch.of_chart(smooth, margin)
+    around = patch.of_chart(place.d, margin)
     base = patch.at_coarse(cv2.GaussianBlur(around, (0, 0), CHOICE.base_sigma * patch.chart.per_radian), margin)
     coarse_field = patch.at_coarse(around, margin)
-    seen = [SeenPatch.of(patch, picture, field) for picture in pictures]
+    rays = place.from_viewpoint(patch.coarse_rays, coarse_field)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    seen = [SeenPatch.of(patch, picture, field.slack(picture.number, rays)) for picture in pictures]
     inside = [_shown(one, coarse_field) for one in seen]
     some = [number for number, shown in enumerate(inside) if shown.mean() > CHOICE.least_share]
     if len(some) < 2:
@@ -126,7 +136,7 @@ def compared_on(
     count = np.sum([levels[..., 3] == 255 for levels in at_field], axis=0)
     toned = _in_one_tone(first, at_field, [one.picture.levels for one in seen])
     return Compared(
-        patch, tuple(seen), tuple(toned), own, (own >= 0) & (count > 1), base, per_px, patch.of_chart(smooth)
+        patch, tuple(seen), tuple(toned), own, (own >= 0) & (count > 1), base, per_px, patch.of_chart(place.d)
     )
 
 

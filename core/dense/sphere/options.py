@@ -36,6 +36,22 @@ class ChartOptions:
     margin: int = 64
     """Nodes around a patch that are worked on with it: what is decided further away hardly reaches it."""
 
+    beyond_cells: int = 8
+    """Cells around what a picture shows best that are refined from its place as well: near things lie beside where the
+    field has them."""
+
+    sure: float = 0.5
+    """Confidence above which what was found from another place is taken before what was not from the best one."""
+
+    field_steps: int = 8
+    """Steps in which the field is carried to another place."""
+
+    field_damping: float = 0.5
+    """Share of each of them that is taken."""
+
+    least_along: float = 0.05
+    """The least range of a point of the field from another place, in that from the viewpoint."""
+
     coarse_step: int = 4
     """Nodes between places where what is smooth is worked out; between them it is interpolated."""
 
@@ -144,14 +160,14 @@ class SweepOptions:
     noise_px: float = 0.3
     """px, σ, of what is found: what rendered sets have."""
 
-    speckle: float = 0.012
-    """Side of the largest patch that is taken for an error, as a share of the side of what is searched."""
+    speckle: float = 7.5
+    """Nodes of the side of the largest piece that is taken for an error."""
 
     speckle_px: float = 2.0
-    """px between neighbours of one such patch at most."""
+    """px between neighbours of one such piece at most."""
 
-    island: float = 0.1
-    """The same for patches that have to speak for themselves: side as a share of what is searched."""
+    island: float = 64.0
+    """The same of pieces that have to speak for themselves."""
 
     island_gain: float = 1.0
     """Levels, in the mean, by which an island has to be more alike than the field is at its place."""

@@ -18,7 +18,6 @@ from ...raster.coarse import coarse_places, in_between
 from .options import CHART
 
 if TYPE_CHECKING:
-    from ...field.sphere_field import SphereField
     from ...pictures.picture import Picture
 
 # px of what lies nowhere: far beyond any picture, and small enough to be interpolated.
@@ -131,11 +130,10 @@ class SeenPatch:
     slack: Array | None
 
     @staticmethod
-    def of(patch: Patch, picture: SweptPicture, field: SphereField) -> SeenPatch:
-        """By the picture's camera, and the field's slack."""
-        view, rays = picture.view, patch.coarse_rays
-        slack = field.slack(picture.number, rays)
-        return SeenPatch(patch, picture, rays @ (view.K @ view.R).T, view.K @ view.t, slack)
+    def of(patch: Patch, picture: SweptPicture, slack: Array | None) -> SeenPatch:
+        """By the picture's camera."""
+        view = picture.view
+        return SeenPatch(patch, picture, patch.coarse_rays @ (view.K @ view.R).T, view.K @ view.t, slack)
 
     @cached_property
     def _infinite(self) -> list[Plane]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import cv2
@@ -12,17 +13,15 @@ from numpy.typing import NDArray
 
 from ...field.refined_sphere import RefinedSphere
 from ...field.sphere_chart import SphereChart
-from ...field.sphere_points import seen_at
 from ...raster.arrays import Plane
-from ...raster.enlarging import repeated
-from ...raster.grid import Grid
-from ...raster.picture_map import falls_inside
 from ...system.threads import in_order
 from ..filling import filled
 from ..options import REFINE
 from .choice import Compared, compared_on
+from .fusing import field_deviation, fused
 from .options import CHART, SWEEP
 from .patch import Patch, SweptPicture
+from .place import Place, Viewed
 from .search import Hints, found_on, span_of
 from .sphere_outlines import with_outlines
 from .sphere_polish import polished
@@ -30,15 +29,20 @@ from .sweep import MEAN_OF_COLOURS
 
 if TYPE_CHECKING:
     from ...cameras.rig import Rig
-    from ...cameras.view import View
     from ...field.sphere_field import SphereField
     from ...pictures.picture import Picture
 
-Covered = tuple[SphereChart, NDArray[np.intp]]
-"""A chart, and how many pictures show each of its cells (see `ChartOptions.cell`)."""
-Part = tuple[Patch, Patch]
-"""A patch with its margins, and what of the chart it is for."""
 Outcome = TypeVar("Outcome")
+APART = "no two pictures from different places show the same"
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A patch of what is refined from a place, with margins, and what of the place's chart it is for."""
+
+    place: int
+    patch: Patch
+    inner: Patch
 
 
 @dataclass(frozen=True)
@@ -82,66 +86,78 @@ def refine_sphere(
     """
     if not rig.t.any():
         return DenseSphere(None, "pictures that were taken from one place tell no distances")
-    covered = _chart(field, rig.views)
-    hints = _at_half_size(field, rig, pictures, covered, tick)
-    return _at_full_size(field, rig, pictures, covered, hints, tick)
+    viewed = Viewed.of(field, rig.views)
+    some = [Place.of(number, rig, viewed) for number in range(len(rig))]
+    places = [place for place in some if place is not None]
+    if not places:
+        return DenseSphere(None, APART)
+    hints = _at_half_size(field, rig, pictures, places, tick)
+    refined, found = _at_full_size(field, rig, pictures, places, hints, tick)
+    if found is None:
+        return DenseSphere(None, APART)
+    return DenseSphere(fused(viewed, places, refined, field_deviation(field, viewed.chart)), "", found)
 
 
 def _at_half_size(
-    field: SphereField, rig: Rig, pictures: Sequence[Picture], covered: Covered, tick: Callable[[float], None]
-) -> Hints:
+    field: SphereField, rig: Rig, pictures: Sequence[Picture], places: Sequence[Place], tick: Callable[[float], None]
+) -> list[Hints]:
     """What is found with half as many nodes a side, and the rig's points, as hints of where to search."""
-    full, count = covered
-    chart = full.smaller(2)
-    smooth, swept = _of_field(field, chart), _swept(rig, pictures, chart)
-    d, where = smooth.copy(), np.zeros(smooth.shape, bool)
+    small = [place.smaller(2) for place in places]
+    swept = _swept(rig, pictures, small[0].chart)
 
-    def found(part: Part) -> tuple[Plane, NDArray[np.bool_]] | None:
-        compared = compared_on(part[0], swept, field, smooth)
+    def found(part: _Part) -> tuple[Plane, NDArray[np.bool_]] | None:
+        compared = _compared(small[part.place], part, swept, field)
         if compared is None:
             return None
         best = found_on(compared, SWEEP.coarse_range_px)
         return compared.at(best.along), best.where
 
-    for (patch, inner), (near, known) in _each(found, _patches(chart, count), tick, (0.0, CHART.coarse_share)):
-        _put(patch, inner, d, near)
-        _put(patch, inner, where, known)
-    columns, rows = full.places(rig.rays)
-    return Hints(np.rint(columns), np.rint(rows), np.maximum(rig.inverse_ranges, 0), d, where)
+    hints = [
+        Hints(*place.points, one.d.copy(), np.zeros(one.d.shape, bool))
+        for place, one in zip(places, small, strict=True)
+    ]  # fmt: skip
+    for part, (near, known) in _each(found, _parts(small), tick, (0.0, CHART.coarse_share)):
+        _put(part, hints[part.place].d, near)
+        _put(part, hints[part.place].where, known)
+    return hints
 
 
 def _at_full_size(
-    field: SphereField, rig: Rig, pictures: Sequence[Picture], covered: Covered, hints: Hints,
+    field: SphereField, rig: Rig, pictures: Sequence[Picture], places: Sequence[Place], hints: Sequence[Hints],
     tick: Callable[[float], None],
-) -> DenseSphere:  # fmt: skip
-    """The refinement on the chart."""
-    chart, count = covered
-    smooth, swept = _of_field(field, chart), _swept(rig, pictures, chart)
-    d, confidence, deviation = smooth.copy(), np.zeros_like(smooth), _deviation(field, chart)
-    shown = repeated(count > 0, CHART.cell)
+) -> tuple[list[RefinedSphere], float | None]:  # fmt: skip
+    """The refinement from each place, and which share of what several pictures show was found, None of nothing."""
+    swept = _swept(rig, pictures, places[0].chart)
+    whole = [
+        RefinedSphere(place.chart, place.d.copy(), np.zeros_like(place.d), np.zeros_like(place.d), place.inside)
+        for place in places
+    ]  # fmt: skip
 
-    def refined(part: Part) -> _Refined | None:
-        compared = compared_on(part[0], swept, field, smooth)
-        return None if compared is None else _refined(compared, hints)
+    def refined(part: _Part) -> _Refined | None:
+        compared = _compared(places[part.place], part, swept, field)
+        return None if compared is None else _refined(compared, hints[part.place])
 
     several = found = 0
-    for (patch, inner), one in _each(refined, _patches(chart, count), tick, (CHART.coarse_share, 1.0)):
+    for part, one in _each(refined, _parts(places), tick, (CHART.coarse_share, 1.0)):
         several, found = several + one.several, found + one.found
-        _put(patch, inner, d, one.d)
-        _put(patch, inner, confidence, one.confidence)
-        spread = np.hypot(one.confidence * one.noise, (1 - one.confidence) * patch.of_chart(deviation))
-        _put(patch, inner, deviation, spread.astype(np.float32))
-    if not several:
-        return DenseSphere(None, "no two pictures from different places show the same")
-    return DenseSphere(RefinedSphere(chart, d, confidence, deviation, shown), "", found / several)
+        of_place = whole[part.place]
+        _put(part, of_place.inverse_range, one.d)
+        _put(part, of_place.confidence, one.confidence)
+        _put(part, of_place.deviation, one.noise)
+    return whole, found / several if several else None
+
+
+def _compared(place: Place, part: _Part, swept: Sequence[SweptPicture], field: SphereField) -> Compared | None:
+    """What is compared on a part of what is refined from a place."""
+    moved = [replace(picture, view=place.moved(picture.view)) for picture in swept]
+    return compared_on(part.patch, moved, place, field)
 
 
 def _each(
-    work: Callable[[Part], Outcome | None], parts: Sequence[Part], tick: Callable[[float], None],
+    work: Callable[[_Part], Outcome | None], parts: Sequence[_Part], tick: Callable[[float], None],
     share: tuple[float, float],
-) -> Iterator[tuple[Part, Outcome]]:  # fmt: skip
-    """Patches and what comes of each, of those of which anything does; share: of all work, where this begins and ends.
-    """
+) -> Iterator[tuple[_Part, Outcome]]:  # fmt: skip
+    """Parts and what comes of each, of those of which anything does; share: of all work, where this begins and ends."""
     begin, end = share
     for number, (part, outcome) in enumerate(zip(parts, in_order(work, parts), strict=True)):
         tick(begin + (end - begin) * number / len(parts))
@@ -187,45 +203,6 @@ def _plain(guide: NDArray[np.uint8]) -> Plane:
     return plain
 
 
-def _chart(field: SphereField, views: Sequence[View]) -> Covered:
-    """A chart of what pictures show, with as many nodes per radian as they have px, within bounds; and how many of them
-    show each of its cells of `cell` nodes a side."""
-    focal = float(np.median([view.camera.focal for view in views]))
-    rough = SphereChart.whole(np.eye(3), CHART.rough_height)
-    count = _count(field, views, rough)
-    height = focal * np.pi
-    nodes = float((count > 1).sum()) * (height / rough.height) ** 2
-    height *= min(1.0, np.sqrt(CHART.max_nodes / max(nodes, 1.0)))
-    cell = CHART.cell
-    height = cell * max(1, round(height / cell))
-    # the widest gap between columns that show something lies behind
-    columns, rows = (np.flatnonzero((count > 0).any(axis=axis)) for axis in (0, 1))
-    if not columns.size:
-        columns, rows = np.arange(count.shape[1]), np.arange(count.shape[0])
-    ends = np.append(columns, columns[0] + rough.circumference)
-    last = int(np.argmax(np.diff(ends)))
-    first, wide = ends[last + 1], rough.circumference - int(np.diff(ends)[last]) + 1
-    margin, scale = CHART.margin_cells, height / rough.height
-    low, high = (int(edge * scale) // cell for edge in (rows[0], rows[-1] + 1))
-    low, high = max(0, low - margin), min(height // cell, high + 1 + margin)
-    across = min(2 * height // cell, int((wide + 1) * scale) // cell + 2 * margin)
-    left = int(first % rough.circumference * scale) // cell - margin if across < 2 * height // cell else 0
-    chart = SphereChart(np.eye(3), height, low * cell, left * cell, ((high - low) * cell, across * cell))
-    return chart, _count(field, views, chart.smaller(cell))
-
-
-def _count(field: SphereField, views: Sequence[View], chart: SphereChart) -> NDArray[np.intp]:
-    """How many pictures show each node (h, w) of a chart."""
-    rays = chart.all_rays.reshape(-1, 3)
-    d = np.maximum(field.at(rays), 0)
-    count = np.zeros(len(rays), np.intp)
-    for view in views:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x, y = seen_at(view, rays, d).T
-        count += falls_inside(x, y, view.size)
-    return count.reshape(chart.shape)
-
-
 def _swept(rig: Rig, pictures: Sequence[Picture], chart: SphereChart) -> list[SweptPicture]:
     """The pictures at the scale of a chart."""
     return [
@@ -234,44 +211,37 @@ def _swept(rig: Rig, pictures: Sequence[Picture], chart: SphereChart) -> list[Sw
     ]
 
 
-def _of_field(field: SphereField, chart: SphereChart) -> Plane:
-    """The field's inverse range (H, W), not below 0, at all nodes of a chart."""
-    grid = Grid.over(0, 0, *chart.shape[::-1], CHART.field_nodes)
-    return grid.to_pixels(np.maximum(field.at(chart.rays(grid.ys, grid.xs)), 0), 0, 0, *chart.shape[::-1])
-
-
-def _deviation(field: SphereField, chart: SphereChart) -> Plane:
-    """The field's standard deviation (H, W) of inverse range."""
-    grid = Grid.over(0, 0, *chart.shape[::-1], CHART.deviation_nodes)
-    return grid.to_pixels(field.deviation(chart.rays(grid.ys, grid.xs)), 0, 0, *chart.shape[::-1])
-
-
-def _patches(chart: SphereChart, count: NDArray[np.intp]) -> list[Part]:
-    """The patches where several pictures show something."""
-    height, width = chart.shape
+def _parts(places: Sequence[Place]) -> list[_Part]:
+    """The patches of all places that hold something wanted."""
     found = []
-    for top in range(0, height, CHART.side):
-        for left in range(0, width, CHART.side):
-            inner = Patch(chart, top, left, (min(CHART.side, height - top), min(CHART.side, width - left)))
-            rows, columns = (
-                slice(first * n // side, -(-(first + length) * n // side))
-                for first, length, n, side in zip((top, left), inner.shape, count.shape, chart.shape, strict=True)
-            )
-            if (count[rows, columns] > 1).mean() < CHART.least_share:
-                continue
-            above, below = min(top, CHART.margin), min(height - top - inner.shape[0], CHART.margin)
-            before, after = min(left, CHART.margin), min(width - left - inner.shape[1], CHART.margin)
-            if chart.closed:
-                before = after = CHART.margin
-            shape = inner.shape[0] + above + below, inner.shape[1] + before + after
-            found.append((Patch(chart, top - above, left - before, shape), inner))
+    for number, place in enumerate(places):
+        chart, inside = place.chart, place.inside
+        height, width = chart.shape
+        for rows in _shares(height):
+            for columns in _shares(width):
+                if inside[rows, columns].mean() < CHART.least_share:
+                    continue
+                shape = rows.stop - rows.start, columns.stop - columns.start
+                inner = Patch(chart, rows.start, columns.start, shape)
+                above, below = (min(room, CHART.margin) for room in (rows.start, height - rows.stop))
+                before, after = (min(room, CHART.margin) for room in (columns.start, width - columns.stop))
+                if chart.closed:
+                    before = after = CHART.margin
+                shape = shape[0] + above + below, shape[1] + before + after
+                found.append(_Part(number, Patch(chart, rows.start - above, columns.start - before, shape), inner))
     return found
 
 
-def _put(patch: Patch, inner: Patch, chart: NDArray[Any], values: NDArray[Any]) -> None:
-    """Writes what a patch is for, of its values (h, w), into those of the chart."""
-    top, left = inner.top - patch.top, inner.left - patch.left
+def _shares(length: int) -> list[slice]:
+    """A length in as few equal shares as are no longer than a patch."""
+    ends = np.linspace(0, length, -(-length // CHART.side) + 1).round().astype(int).tolist()
+    return [slice(*two) for two in pairwise(ends)]
+
+
+def _put(part: _Part, whole: NDArray[Any], values: NDArray[Any]) -> None:
+    """Writes what a part is for, of its values (h, w), into those of the chart of its place."""
+    inner, top, left = part.inner, part.inner.top - part.patch.top, part.inner.left - part.patch.left
     height, width = inner.shape
-    chart[inner.top : inner.top + height, inner.left : inner.left + width] = values[
+    whole[inner.top : inner.top + height, inner.left : inner.left + width] = values[
         top : top + height, left : left + width
     ]

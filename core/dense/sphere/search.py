@@ -68,6 +68,8 @@ def span_of(compared: Compared, hints: Hints) -> tuple[int, int]:
         px = ((d - compared.base) / compared.per_px)[where]
         lows.append(float(np.percentile(px, SWEEP.range_percent)))
         highs.append(float(np.percentile(px, 100 - SWEEP.range_percent)))
+    # nothing lies beyond infinity
+    lows = [max(min(lows), float(compared.infinity_px.min()) - SWEEP.margin_px)]
     margin, few, many = SWEEP.margin_px, SWEEP.least_range_px, SWEEP.most_range_px
     low, high = np.floor(min(lows) - margin), np.ceil(max(highs) + margin)
     return int(np.clip(low, -many, -few)), int(np.clip(high, few, many))
@@ -98,10 +100,10 @@ def _rim(compared: Compared) -> NDArray[np.bool_]:
     return near
 
 
-def _small(along: Plane, where: NDArray[np.bool_], share: float) -> NDArray[np.bool_]:
-    """The found nodes (h, w) of patches that are small; share: the side of such a patch in sides of all."""
+def _small(along: Plane, where: NDArray[np.bool_], side: float) -> NDArray[np.bool_]:
+    """The found nodes (h, w) of pieces that are smaller than a square of so many nodes a side."""
     sixteenths = np.where(where, np.rint(along * 16), np.iinfo(np.int16).min).astype(np.int16)
-    cv2.filterSpeckles(sixteenths, np.iinfo(np.int16).min, int(share**2 * along.size), SWEEP.speckle_px * 16)
+    cv2.filterSpeckles(sixteenths, np.iinfo(np.int16).min, int(side**2), SWEEP.speckle_px * 16)
     small: NDArray[np.bool_] = where & (sixteenths == np.iinfo(np.int16).min)
     return small
 

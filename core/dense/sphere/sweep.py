@@ -46,8 +46,9 @@ def swept(compared: Compared, least: int, most: int) -> Swept:
     best = sums.argmin(axis=0)
     lowest = np.take_along_axis(sums, best[None], 0)[0]
     second = np.full(best.shape, np.iinfo(np.uint16).max, np.uint16)
+    beyond = compared.infinity_px - least  # levels below it all lie at infinity
     for level, values in enumerate(sums):
-        np.minimum(second, values, out=second, where=np.abs(best - level) > SWEEP.beside)
+        np.minimum(second, values, out=second, where=(np.abs(best - level) > SWEEP.beside) & (level >= beyond))
     middle = np.clip(best, 1, max(1, len(sums) - 2))
     before, at, after = (np.take_along_axis(sums, middle[None] + k, 0)[0].astype(np.float32) for k in (-1, 0, 1))
     # the vertex of a parabola through three costs

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.panorama.carried_depth import filled_surface
-from edf_stitch.core.panorama.options import CARRY
+from edf_stitch.core.field.carried_surface import filled_surface
+from edf_stitch.core.field.options import CARRY
 
 NEAR, FAR = np.float32(0.07), np.float32(0.03)
 

@@ -22,7 +22,7 @@ def seen(request: pytest.FixtureRequest) -> tuple[list[SeenPatch], SphereField]:
     pictures = pictures_of(rig)
     swept = [SweptPicture.of(k, view, picture, 280.0)
              for k, (view, picture) in enumerate(zip(rig.views, pictures, strict=True))]  # fmt: skip
-    return [SeenPatch.of(patch, one, field) for one in swept], field
+    return [SeenPatch.of(patch, one, None) for one in swept], field
 
 
 def rays_of(patch: Patch) -> np.ndarray:

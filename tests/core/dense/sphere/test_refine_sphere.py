@@ -10,6 +10,7 @@ import pytest
 from edf_stitch.core.cameras.rig import Rig
 from edf_stitch.core.dense.sphere.choice import Compared, compared_on
 from edf_stitch.core.dense.sphere.patch import Patch, SweptPicture
+from edf_stitch.core.dense.sphere.place import Place
 from edf_stitch.core.dense.sphere.refine_sphere import DenseSphere, refine_sphere
 from edf_stitch.core.dense.sphere.sweep import swept
 from edf_stitch.core.field.refined_sphere import RefinedSphere
@@ -138,8 +139,14 @@ def comparison(rig: Rig, field: SphereField, gains: tuple[float, ...] = ()) -> C
     pictures = [SweptPicture.of(k, view, picture, 280.0)
                 for k, (view, picture) in enumerate(zip(rig.views, pictures_of(rig, gains), strict=True))]  # fmt: skip
     chart = SphereChart.whole(np.eye(3), 880)
+    return compared_on(Patch(chart, 380, 790, (120, 150)), pictures, before_a_wall(chart), field)
+
+
+def before_a_wall(chart: SphereChart) -> Place:
+    """The first picture's place, 16 from all around."""
+    nothing = np.zeros(0)
     smooth = np.full(chart.shape, 1 / 16, np.float32)
-    return compared_on(Patch(chart, 380, 790, (120, 150)), pictures, field, smooth)
+    return Place(0, np.zeros(3), chart, np.ones((1, 2), bool), smooth, (nothing, nothing, nothing))
 
 
 def test_the_picture_at_the_viewpoint_shows_a_node_best(rig: Rig, field: SphereField) -> None:
@@ -158,7 +165,7 @@ def test_a_darker_picture_gets_the_tones_of_the_first(rig: Rig, field: SphereFie
 def test_one_picture_alone_is_not_compared(rig: Rig, field: SphereField) -> None:
     chart = SphereChart.whole(np.eye(3), 880)
     one = SweptPicture.of(0, rig.views[0], pictures_of(rig)[0], 280.0)
-    assert compared_on(Patch(chart, 380, 790, (60, 60)), [one], field, np.full(chart.shape, 1 / 16, np.float32)) is None
+    assert compared_on(Patch(chart, 380, 790, (60, 60)), [one], before_a_wall(chart), field) is None
 
 
 def test_the_sweep_finds_the_card_and_doubts_what_has_no_texture(rig: Rig, field: SphereField) -> None:
