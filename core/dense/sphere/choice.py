@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...raster.arrays import Array, Plane
+from ...raster.distance import distance_inside
 from ...raster.enlarging import repeated
 from ...raster.picture_map import falls_inside
 from ..tones import tone_curves
-from .options import CHART, CHOICE
+from .options import CHART, CHOICE, SWEEP
 from .patch import Patch, SeenPatch, SweptPicture, sampled
 from .place import Place
 
@@ -65,6 +66,13 @@ class Compared:
         """px (h, w) from the base to what is infinitely far away."""
         px: Plane = -self.base / self.per_px
         return px
+
+    @cached_property
+    def from_rim(self) -> Plane:
+        """How far (h, w) the nearest node lies that only one picture shows, in widths of the rim: its border, and
+        another's, disturb the comparison there."""
+        far: Plane = distance_inside(self.several) / np.float32(SWEEP.rim * self.patch.chart.per_radian)
+        return far
 
     @cached_property
     def masks(self) -> list[NDArray[np.uint8]]:

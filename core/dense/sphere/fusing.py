@@ -36,18 +36,15 @@ def fused(viewed: Viewed, places: Sequence[Place], refined: Sequence[RefinedSphe
     -------
     RefinedSphere
         On the viewpoint's chart. Each ray shows what was refined from where the picture that shows it best was taken;
-        where that is not sure, or leaves a gap, what was from other places; where no two pictures show anything, the
-        field.
+        where that leaves a gap, what was from other places; where no two pictures show anything, the field.
     """
     chart = viewed.chart
     owner = repeated(viewed.owner, CHART.cell)
     shown = owner >= 0
-    layers = [np.full(chart.shape, -1, np.float32) for _ in range(4)]
+    own, others = (np.full(chart.shape, -1, np.float32) for _ in range(2))
     for place, of_place in zip(places, refined, strict=True):
-        _put_from(place, of_place, chart, owner, layers)
-    nearest = layers[0]
-    for layer in layers[1:]:
-        nearest = np.where(nearest < 0, layer, nearest)
+        _put_from(place, of_place, chart, owner, own, others)
+    nearest = np.where(own < 0, others, own)
     alone = repeated(viewed.count < 2, CHART.cell)
     nearest = np.where(alone & (nearest < 0), viewed.d, nearest)
     d = filled_chart(nearest, chart.closed)
@@ -64,10 +61,10 @@ def field_deviation(field: SphereField, chart: SphereChart) -> Plane:
 
 
 def _put_from(
-    place: Place, refined: RefinedSphere, chart: SphereChart, owner: Plane, layers: Sequence[Plane]
+    place: Place, refined: RefinedSphere, chart: SphereChart, owner: Plane, own: Plane, others: Plane
 ) -> None:
-    """Puts what was refined from a place where it is seen from the viewpoint, into one of four layers (H, W): what is
-    sure, of the picture that shows that best and of others, and the rest of both."""
+    """Puts what was refined from a place where it is seen from the viewpoint (H, W): what the picture of the place
+    shows best, and what others do."""
     here = refined.chart
     depth = sharpened(np.maximum(refined.inverse_range, np.float32(0)), here.per_radian)
     columns = np.arange(here.shape[1], dtype=np.float64)
@@ -78,10 +75,9 @@ def _put_from(
         seen = place.from_viewpoint(rays, d)
         d = (d / np.linalg.norm(seen, axis=-1)).astype(np.float32)
         cells, there = cells_of(chart, seen)
-        d, sure = d[there], refined.confidence[rows][inside][there] > CHART.sure
-        best = owner.ravel()[cells] == place.number
-        for layer, which in zip(layers, (best & sure, ~best & sure, best & ~sure, ~best & ~sure), strict=True):
-            put_nearest(layer, cells[which], d[which])
+        d, best = d[there], owner.ravel()[cells] == place.number
+        put_nearest(own, cells[best], d[best])
+        put_nearest(others, cells[~best], d[~best])
 
 
 def _put_values(

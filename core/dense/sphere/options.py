@@ -40,9 +40,6 @@ class ChartOptions:
     """Cells around what a picture shows best that are refined from its place as well: near things lie beside where the
     field has them."""
 
-    sure: float = 0.5
-    """Confidence above which what was found from another place is taken before what was not from the best one."""
-
     field_steps: int = 8
     """Steps in which the field is carried to another place."""
 
@@ -127,6 +124,9 @@ class SweepOptions:
     prior_levels: float = 2.0
     """What it costs to lie away from the field: little, it only decides where the pictures do not."""
 
+    rim_levels: float = 8.0
+    """What it costs more at the very rim of what several pictures show."""
+
     prior_px: float = 4.0
     """px from the field from which on this is so."""
 
@@ -169,7 +169,7 @@ class SweepOptions:
     island: float = 64.0
     """The same of pieces that have to speak for themselves."""
 
-    island_gain: float = 1.0
+    island_gain: float = 3.0
     """Levels, in the mean, by which an island has to be more alike than the field is at its place."""
 
     island_cost: float = 4.0
@@ -207,7 +207,25 @@ class SphereOutlinesOptions:
     """px of the side of the cells of a picture in which the nearest is looked for."""
 
 
+@dataclass(frozen=True)
+class ImprovedOptions:
+    """Going back to the field (`improved`). Levels are gray levels, in the mean around a node."""
+
+    smoothness: float = 30.0
+    """λ, of the gain, along the edges of the picture."""
+
+    most_levels: float = 8.0
+    """The largest gain or loss of a node: what is hidden counts for no more."""
+
+    doubt_levels: float = 0.25
+    """Levels of loss at which all goes back to the field; with less, a share of it."""
+
+    least_share: float = 1e-3
+    """Share, of what is around a node, that is added to what several pictures show: it is divided by."""
+
+
 CHART = ChartOptions()
 CHOICE = ChoiceOptions()
 SWEEP = SweepOptions()
 SPHERE_OUTLINES = SphereOutlinesOptions()
+IMPROVED = ImprovedOptions()

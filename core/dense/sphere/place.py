@@ -18,6 +18,7 @@ from ...cameras.view import View
 from ...field.sphere_chart import SphereChart
 from ...field.sphere_points import seen_at
 from ...raster.arrays import Array, Plane, dilated
+from ...raster.distance import outside
 from ...raster.enlarging import repeated
 from ...raster.grid import Grid
 from ...raster.picture_map import falls_inside
@@ -68,14 +69,16 @@ class Place:
     """What is refined from where one picture was taken.
 
     number: the picture's; centre (3,): where; chart: around it; wanted (h, w): which of its cells the picture shows
-    best of several, and those around; d (H, W): the field's inverse range from there; points: columns, rows and inverse ranges
-    (N,) of the rig's points there.
+    best of several, and those around; share (h, w): what is taken of refinement, ever less beyond what several pictures
+    show, for nothing holds it there; d (H, W): the field's inverse range from there; points: columns, rows and inverse
+    ranges (N,) of the rig's points there.
     """
 
     number: int
     centre: Array
     chart: SphereChart
     wanted: Cells
+    share: Plane
     d: Plane
     points: tuple[Array, Array, Array]
 
@@ -88,22 +91,20 @@ class Place:
         if not own.any():
             return None
         centre = rig.centres[number]
-        rays = cells.all_rays[own]
-        d = cv2.resize(viewed.d, cells.shape[::-1], interpolation=cv2.INTER_AREA)[own]
         whole = SphereChart.whole(np.eye(3), cells.height)
-        wanted = np.zeros(whole.shape, np.uint8)
-        columns, rows = whole.places(rays - d[:, None] * centre)
-        row = np.clip(np.rint(rows).astype(int), 0, whole.height - 1)
-        wanted[row, np.rint(columns).astype(int) % whole.circumference] = 1
+        d = cv2.resize(viewed.d, cells.shape[::-1], interpolation=cv2.INTER_AREA)
+        towards = cells.all_rays - d[..., None] * centre
         reach = CHART.beyond_cells
-        wanted = np.concatenate([wanted[:, -reach:], wanted, wanted[:, :reach]], axis=1)
-        wide = dilated(wanted > 0, reach)[:, reach:-reach]
+        wide = _wider(_put(whole, towards[own]), reach)
         window = _window(wide)
+        several = _wider(_put(whole, towards[viewed.count > 1]), 1)
         own_chart = _cells(chart.height, *window)
-        inside = wide[window[0]][:, np.arange(window[1].start, window[1].stop) % whole.circumference]
+        columns = np.arange(window[1].start, window[1].stop) % whole.circumference
+        wide, several = (one[window[0]][:, columns] for one in (wide, several))
+        share = np.clip(1 - outside(several) / reach, 0, 1).astype(np.float32)
         away = rig.rays - np.maximum(rig.inverse_ranges, 0)[:, None] * centre
         points = (*own_chart.places(away), np.maximum(rig.inverse_ranges, 0) / np.linalg.norm(away, axis=1))
-        return Place(number, centre, own_chart, inside, _seen_from(viewed, own_chart, centre), points)
+        return Place(number, centre, own_chart, wide, share, _seen_from(viewed, own_chart, centre), points)
 
     def smaller(self, times: int) -> Place:
         """The same on a chart with so many times fewer nodes a side."""
@@ -117,8 +118,14 @@ class Place:
         """The nodes (H, W) that lie in wanted cells."""
         return repeated(self.wanted, self.chart.shape[0] // self.wanted.shape[0])
 
-    def moved(self, view: View) -> View:
-        """A picture's view of what lies around this place."""
+    def joined(self, refined: Plane) -> Plane:
+        """Inverse range (H, W) that becomes the field's beyond what several pictures show."""
+        share = cv2.resize(self.share, self.chart.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        whole: Plane = self.d + share * (refined - self.d)
+        return whole
+
+    def view_from(self, view: View) -> View:
+        """The view that a picture has of what lies around this place."""
         return replace(view, t=view.t + view.R @ self.centre)
 
     def from_viewpoint(self, rays: Array, d: Array) -> Array:
@@ -162,6 +169,21 @@ def _shown(field: SphereField, views: Sequence[View], chart: SphereChart) -> Arr
         across = np.linalg.norm(place - rays * (rays @ place)[..., None], axis=-1)
         one[:] = np.where(falls_inside(x, y, view.size).reshape(chart.shape), across, -1)
     return off
+
+
+def _put(whole: SphereChart, rays: Array) -> Cells:
+    """The cells (h, 2 h) of a whole sphere on which rays (N, 3) of any length lie."""
+    marked = np.zeros(whole.shape, bool)
+    columns, rows = whole.places(rays)
+    row = np.clip(np.rint(rows).astype(int), 0, whole.height - 1)
+    marked[row, np.rint(columns).astype(int) % whole.circumference] = True
+    return marked
+
+
+def _wider(marked: Cells, reach: int) -> Cells:
+    """Cells (h, 2 h) of a whole sphere with so many more on every side."""
+    around = np.concatenate([marked[:, -reach:], marked, marked[:, :reach]], axis=1)
+    return dilated(around, reach)[:, reach:-reach]
 
 
 def _window(mask: Cells) -> tuple[slice, slice]:

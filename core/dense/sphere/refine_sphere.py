@@ -19,6 +19,7 @@ from ..filling import filled
 from ..options import REFINE
 from .choice import Compared, compared_on
 from .fusing import field_deviation, fused
+from .improved import where_improved
 from .options import CHART, SWEEP
 from .patch import Patch, SweptPicture
 from .place import Place, Viewed
@@ -144,12 +145,15 @@ def _at_full_size(
         _put(part, of_place.inverse_range, one.d)
         _put(part, of_place.confidence, one.confidence)
         _put(part, of_place.deviation, one.noise)
-    return whole, found / several if several else None
+    joined = [
+        replace(one, inverse_range=place.joined(one.inverse_range)) for place, one in zip(places, whole, strict=True)
+    ]  # fmt: skip
+    return joined, found / several if several else None
 
 
 def _compared(place: Place, part: _Part, swept: Sequence[SweptPicture], field: SphereField) -> Compared | None:
     """What is compared on a part of what is refined from a place."""
-    moved = [replace(picture, view=place.moved(picture.view)) for picture in swept]
+    moved = [replace(picture, view=place.view_from(picture.view)) for picture in swept]
     return compared_on(part.patch, moved, place, field)
 
 
@@ -185,7 +189,7 @@ def _refined(compared: Compared, hints: Hints) -> _Refined:
     along = np.where(found.where, found.along, compared.field_px).astype(np.float32)
     whole = filled(cv2.GaussianBlur(guide, (0, 0), 1.0).astype(np.float32), along, where, _plain(guide))
     along = polished(compared, whole.along, whole.known, whole.weights)
-    along = with_outlines(compared, found, along, whole.edges)
+    along = where_improved(compared, with_outlines(compared, found, along, whole.edges), whole.edges)
     confidence: Plane = cv2.blur(where, (REFINE.confidence_nodes,) * 2)
     d = np.where(compared.owner >= 0, compared.at(along), compared.field)
     noise = compared.per_px * np.float32(SWEEP.noise_px)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...raster.arrays import Array, Plane
-from ...raster.distance import distance_inside
 from ...raster.picture_map import falls_inside
 from .choice import Compared
 from .options import SWEEP
@@ -45,7 +44,7 @@ def found_on(compared: Compared, span: tuple[int, int]) -> Found:
         where &= best.cost <= max(SWEEP.least_cost, usual)
     where &= ~_small(best.along, where, SWEEP.speckle)
     where &= ~_wrong(best, where, _small(best.along, where, SWEEP.island), SWEEP.island_gain, SWEEP.island_cost)
-    doubtful = where & _rim(compared) & (np.abs(best.along - compared.field_px) > SWEEP.rim_px)
+    doubtful = where & (compared.from_rim < 1) & (np.abs(best.along - compared.field_px) > SWEEP.rim_px)
     doubtful &= ~_going_on(best.along, where & ~doubtful, doubtful)
     where &= ~_wrong(best, where, doubtful, SWEEP.rim_gain, SWEEP.rim_cost)
     return Found(best.along, where)
@@ -91,13 +90,6 @@ def _agreed(compared: Compared, best: Swept) -> NDArray[np.bool_]:
         agree[order] = np.abs(along - of_best) <= SWEEP.agreement_px
         agreed[here] |= agree
     return agreed
-
-
-def _rim(compared: Compared) -> NDArray[np.bool_]:
-    """Where (h, w) only one picture goes on nearby: its border, and another's, disturb the comparison there."""
-    width = SWEEP.rim * compared.patch.chart.per_radian
-    near: NDArray[np.bool_] = distance_inside(compared.several) < width
-    return near
 
 
 def _small(along: Plane, where: NDArray[np.bool_], side: float) -> NDArray[np.bool_]:

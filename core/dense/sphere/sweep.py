@@ -63,6 +63,7 @@ def swept(compared: Compared, least: int, most: int) -> Swept:
 def _costs(compared: Compared, moves: Sequence[int]) -> NDArray[np.uint8]:
     """Costs (K, h, w) at moves px from the base; where only one picture shows the field, those of the field's place."""
     out = np.empty((len(moves), *compared.owner.shape), np.uint8)
+    levels_of_prior = SWEEP.prior_levels + SWEEP.rim_levels * (1 - np.minimum(compared.from_rim, 1))
     for k, move in enumerate(moves):
         d = np.maximum(compared.coarse_base + move * compared.coarse_per_px, 0)
         taken = [
@@ -71,7 +72,7 @@ def _costs(compared: Compared, moves: Sequence[int]) -> NDArray[np.uint8]:
         cost = difference(compared, taken, SWEEP.window)[0]
         prior = np.abs(move - compared.field_px)
         prior *= np.float32(1 / SWEEP.prior_px)
-        prior = np.minimum(prior, np.float32(1)) * np.float32(SWEEP.prior_levels)
+        prior = np.minimum(prior, np.float32(1)) * levels_of_prior
         out[k] = np.where(compared.several, cost + prior, SWEEP.most_levels * (prior > 0))
     return out
 

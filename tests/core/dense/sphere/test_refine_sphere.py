@@ -146,7 +146,8 @@ def before_a_wall(chart: SphereChart) -> Place:
     """The first picture's place, 16 from all around."""
     nothing = np.zeros(0)
     smooth = np.full(chart.shape, 1 / 16, np.float32)
-    return Place(0, np.zeros(3), chart, np.ones((1, 2), bool), smooth, (nothing, nothing, nothing))
+    all_of_it = np.ones((1, 2), np.float32)
+    return Place(0, np.zeros(3), chart, all_of_it > 0, all_of_it, smooth, (nothing, nothing, nothing))
 
 
 def test_the_picture_at_the_viewpoint_shows_a_node_best(rig: Rig, field: SphereField) -> None:

@@ -12,7 +12,7 @@ NEAR, FAR = np.float32(0.07), np.float32(0.03)
 
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("width", [4, 9, 18, 60])
-def test_a_gap_beside_a_near_thing_isfilled_surface_from_behind_it(width: int, turned: bool) -> None:
+def test_a_gap_beside_a_near_thing_is_filled_from_behind_it(width: int, turned: bool) -> None:
     """However wide: a post, and beside it what it hid from the reference's place."""
     points = np.full((90, 140), FAR, np.float32)
     points[:, 20:40] = NEAR
