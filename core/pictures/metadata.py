@@ -71,6 +71,11 @@ class Exif:
         """The kept text of a tag number, "" where there is none."""
         return next((value for number, value in self.kept if number == tag and isinstance(value, str)), "")
 
+    def number(self, tag: int) -> float:
+        """The kept number of a tag number, 0 where there is none."""
+        value = next((value for number, value in self.kept if number == tag and not isinstance(value, str)), 0)
+        return value[0] / value[1] if isinstance(value, tuple) else float(value)
+
 
 def read_exif(block: bytes | None) -> Exif:
     """Reads a raw EXIF block (a TIFF structure or a whole TIFF file); an empty Exif where damaged. Raises nothing."""
