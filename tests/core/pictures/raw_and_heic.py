@@ -39,8 +39,8 @@ def dng(
         (254, LONG, [0]), (256, LONG, [width]), (257, LONG, [height]), (258, SHORT, [16]), (259, SHORT, [1]),
         (262, SHORT, [32803]), (271, 2, b"Maker\0"), (272, 2, b"Model\0"), (273, LONG, [0]),
         (274, SHORT, [orientation]), (277, SHORT, [1]), (278, LONG, [height]), (279, LONG, [len(pixels)]),
-        (33421, SHORT, [2, 2]), (33422, 1, b"\0\1\1\2"), (34665, LONG, [0]), (50706, 1, b"\1\4\0\0"), (50708, 2, b"Maker Model\0"),
-        (50714, LONG, [0]), (50717, LONG, [65535]),
+        (33421, SHORT, [2, 2]), (33422, 1, b"\0\1\1\2"), (34665, LONG, [0]), (50706, 1, b"\1\4\0\0"),
+        (50708, 2, b"Maker Model\0"), (50714, LONG, [0]), (50717, LONG, [65535]),
         (50721, SIGNED, [(round(value * 10_000), 10_000) for row in XYZ_TO_SRGB for value in row]),
         (50728, RATIONAL, [(round(value * 10_000), 10_000) for value in neutral]), (50778, SHORT, [21]),
     ]  # fmt: skip
