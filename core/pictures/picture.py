@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..raster.arrays import strips
 from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from ..raster.lazy import AnyImage, Coded, whole
 from ..system.errors import BadRequest, UnreadableImage
@@ -145,7 +146,7 @@ def _developed(data: bytes, exposure: RawExposure | None, name: str) -> Picture:
     """The picture of a camera RAW file, linear in sRGB's primaries."""
     raw = develop(data, exposure, partial(check_size, stored=len(data), pixels_per_byte=READING.raw_pixels_per_byte))
     light = Coded(turn(raw.levels, raw.exif.orientation), (raw.curve,))
-    view = _float_view(light, _exposure(whole(light), None))
+    view = _float_view(light, _exposure(light, None))
     exif = replace(raw.exif.upright(), orientation=1)  # as its decoder may well have turned it
     return Picture(light, None, view, 32, exif, None, name, raw.warnings, float(raw.curve.table[-1]))
 
@@ -243,13 +244,14 @@ def _finite(colour: NDArray[Any], alpha: NDArray[Any] | None) -> tuple[NDArray[A
     return np.where(good[..., None], colour, np.float32(0)), alpha, 1.0 - float(good.mean())
 
 
-def _exposure(pixels: NDArray[Any], alpha: NDArray[Any] | None) -> float:
+def _exposure(pixels: AnyImage, alpha: NDArray[Any] | None) -> float:
     """The factor that brings the light of a float picture into the range of a display.
 
     Half way (in stops) between the factor that puts the median on middle gray and the one that keeps the brightest
     hundredth from clipping: a bright sky then leaves features in the shade, and a shade leaves some in the sky.
     """
-    light = pixels.max(axis=2)
+    width = pixels.shape[1]
+    light = np.concatenate([pixels[rows, 0:width].max(axis=2) for rows in strips(pixels.shape)])
     light = light[light > 0] if alpha is None else light[(light > 0) & (alpha > 0)]
     if light.size == 0:
         return 1.0
@@ -258,8 +260,11 @@ def _exposure(pixels: NDArray[Any], alpha: NDArray[Any] | None) -> float:
 
 
 def _float_view(pixels: AnyImage, exposure: float) -> NDArray[Any]:
+    view = np.empty(pixels.shape, np.uint8)
     with np.errstate(over="ignore"):
-        return encode(whole(pixels) * np.float32(exposure), 8)
+        for rows in strips(pixels.shape):
+            view[rows] = encode(pixels[rows, 0 : pixels.shape[1]] * np.float32(exposure), 8)
+    return view
 
 
 def curves_for(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
@@ -328,11 +333,11 @@ def in_same_colour_space(pictures: Sequence[Picture]) -> tuple[Picture, ...]:
     if len({picture.light.shape[2] for picture in pictures}) > 1:
         pictures = [_three_channels(picture) for picture in pictures]
     if all(picture.bits == 32 for picture in pictures):
-        exposures = [_exposure(picture.pixels, picture.alpha) for picture in pictures]
+        exposures = [_exposure(picture.light, picture.alpha) for picture in pictures]
         # One factor keeps the same thing equally bright in all; over two stops apart, seeing anything comes first.
         if max(exposures) <= 4.0 * min(exposures):
             shared = float(np.prod(exposures) ** (1 / len(exposures)))
-            pictures = [replace(picture, view=_float_view(picture.pixels, shared)) for picture in pictures]
+            pictures = [replace(picture, view=_float_view(picture.light, shared)) for picture in pictures]
     return tuple(pictures)
 
 
