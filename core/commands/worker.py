@@ -119,6 +119,9 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
             import_module(name)
         (folder / "result.json").write_text("{}")
         return
+    if job.get("show"):
+        _show(folder, job["show"])
+        return
     exposure = exposure_of_first(folder / job[side]["path"] for side in SIDES if "path" in job[side])
     pictures, turns = zip(*(_picture(folder, job[side], exposure) for side in SIDES), strict=True)
     camera = {key: _tuples(value) for key, value in job["options"].pop("camera", {}).items()}
@@ -139,6 +142,22 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
         lambda: stop.asked,  # Python swallows a KeyboardInterrupt inside a finalizer
     )  # fmt: skip
     _write(folder, result.spread_out(), rows, job.get("take", []), turns)
+
+
+def _show(folder: Path, paths: list[str]) -> None:
+    """Pictures of photographs that Blender cannot open, upright; result.json names a file for each path."""
+    import cv2
+
+    from ..pictures.picture import load_picture
+
+    files = {}
+    for number, path in enumerate(paths):
+        view = load_picture(path).view
+        files[path] = f"{number}.jpg"
+        stored = cv2.cvtColor(view, cv2.COLOR_RGB2BGR) if view.shape[2] == 3 else view
+        (folder / files[path]).write_bytes(cv2.imencode(".jpg", stored)[1].tobytes())
+        _say({"stage": "read", "share": (number + 1) / len(paths)})
+    (folder / "result.json").write_text(json.dumps({"files": files}), "utf-8")
 
 
 def _await(job: Path, stop: _Stop) -> None:
@@ -181,7 +200,7 @@ def cameras_of(entries: dict[str, Any], pictures: tuple[Any, ...]) -> dict[str, 
     return table if names[0] == names[1] else dict(zip(names, table.values(), strict=True))
 
 
-def _picture(folder: Path, entry: dict[str, Any], exposure: Any) -> tuple[Any, int]:
+def _picture(folder: Path, entry: dict[str, Any], exposure: Any = None) -> tuple[Any, int]:
     """The upright picture of a job's entry, and the orientation that its arrays and masks are turned by; exposure: what
     camera RAW is developed with."""
     from ..pictures.containers import read_structure

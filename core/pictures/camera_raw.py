@@ -8,13 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from .containers import (
-    TiffEntry,
-    _tiff_integers,
-    container_brand,
-    read_structure,
-    tiff_directory,
-)
+from .containers import TiffEntry, _tiff_integers, container_brand, read_structure, tiff_directory
+from .heif import boxes
+from .metadata import joined_exif
 
 # How files begin that are no TIFF, or one under a number of its maker's: Olympus, Panasonic, Fujifilm, Minolta, Sigma.
 _STARTS = (b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"FUJIFILMCCD-RAW", b"\0MRM", b"FOVb")
@@ -26,6 +22,8 @@ RAW_SUFFIXES = frozenset(
 SUBDIRECTORIES, PHOTOMETRIC, DNG_VERSION = 330, 262, 50706
 # Values of PhotometricInterpretation: a colour filter array, and linear light of a sensor.
 _SENSOR = {32803, 34892}
+# Canon's own box in CR3 files.
+_CANON = bytes.fromhex("85c0b687820f11e08111f4ce462b6a48")
 # Directories of a file that are looked at, at most: cameras write fewer than ten.
 _MOST_DIRECTORIES = 32
 
@@ -88,12 +86,24 @@ def raw_damage(data: bytes) -> str:
 
 def raw_exif(data: bytes) -> bytes | None:
     """The file's EXIF as a TIFF structure; None where it keeps it in another way."""
+    if container_brand(data) == "RAW":
+        return _canon_exif(data)
     if data.startswith(b"FUJIFILMCCD-RAW"):
         start = int.from_bytes(data[84:88], "big")
         preview = read_structure(data[start : start + int.from_bytes(data[88:92], "big")])
         return preview.exif if preview is not None else None
     tiff = _as_tiff(data)
     return tiff if tiff.startswith(_TIFF) else None
+
+
+def _canon_exif(data: bytes) -> bytes | None:
+    """Of a CR3 file, which has its directories in boxes of their own, within one of Canon's within `moov`."""
+    parts: dict[bytes, bytes] = {}
+    for outer in boxes(data, 0, len(data)):
+        for own in boxes(data, outer.start, outer.end) if outer.kind == b"moov" else ():
+            if own.kind == b"uuid" and data[own.start : own.start + 16] == _CANON:
+                parts |= {box.kind: data[box.start : box.end] for box in boxes(data, own.start + 16, own.end)}
+    return joined_exif(parts.get(b"CMT1", b""), parts.get(b"CMT2", b""))
 
 
 def _as_tiff(data: bytes) -> bytes:

@@ -18,8 +18,10 @@ def heic(data: bytes, _asked: dict[str, Any]) -> tuple[dict[str, Any], Any]:
     import _pi_heif
 
     # threads, HDR to 8 bits, BGR, without stride, more than 8 bits as 16, decoder, without limits
-    found = [one for one in _pi_heif.load_file(data, 1, False, False, True, True, "", False) if one is not None]
-    image = next(one for one in found if one.primary)
+    found = _pi_heif.load_file(data, 1, False, False, True, True, "", False)
+    image = next((one for one in found if one is not None and one.primary), None)
+    if image is None:
+        raise ValueError("no main picture")
     (width, height), mode = image.size_mode
     facts = {"width": width, "height": height, "mode": mode, "bits": image.bit_depth}
     return facts, bytes(image.data)  # a view would outlive the image, whose memory it shows

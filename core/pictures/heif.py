@@ -37,9 +37,11 @@ class HeifFacts:
     transfer: int = 2
 
 
-class _Box(NamedTuple):
+class Box(NamedTuple):
+    """A box of the ISO base media format: its four letters, and where its content lies in the file."""
+
     kind: bytes
-    start: int  # of its content
+    start: int
     end: int
 
 
@@ -53,7 +55,7 @@ class _Item:
 
     coding: bytes = b""
     extents: list[tuple[int, int]] = field(default_factory=list)
-    properties: list[_Box] = field(default_factory=list)
+    properties: list[Box] = field(default_factory=list)
 
 
 def read_heif(data: bytes) -> HeifFacts:
@@ -66,24 +68,27 @@ def read_heif(data: bytes) -> HeifFacts:
         return HeifFacts(damage="its tables are broken")
 
 
-def _boxes(data: bytes, at: int, end: int) -> Iterator[_Box]:
+def boxes(data: bytes, at: int, end: int) -> Iterator[Box]:
+    """The boxes between two bytes of a file, one behind the other; what ends beyond `end` is cut there. Raises nothing.
+    """
+    end = min(end, len(data))
     while at + 8 <= end:
         size, kind = struct.unpack_from(">I4s", data, at)
         start = at + 8
         if size == 1:
-            (size,) = struct.unpack_from(">Q", data, start)
+            size = int.from_bytes(data[start : start + 8], "big")
             start += 8
         stop = end if size == 0 else at + size
         if stop < start:
             return  # what some phones append is no box
-        yield _Box(kind, start, min(stop, end))
+        yield Box(kind, start, min(stop, end))
         at = stop
 
 
 class _Reader:
     """Big-endian numbers one after the other."""
 
-    def __init__(self, data: bytes, box: _Box) -> None:
+    def __init__(self, data: bytes, box: Box) -> None:
         self._data, self.at, self.end = data, box.start, box.end
 
     def take(self, count: int) -> int:
@@ -110,11 +115,11 @@ class _File:
         self._items: dict[int, _Item] = {}
         self._taken = 0  # bytes of items that were looked at
         self._references: list[tuple[bytes, int, list[int]]] = []
-        top = list(_boxes(data, 0, len(data)))
+        top = list(boxes(data, 0, len(data)))
         meta = next((box for box in top if box.kind == b"meta"), None)
         if meta is None:
             raise _Damaged("it is cut off, or holds no still picture")
-        self._inner = {box.kind: box for box in _boxes(data, meta.start + 4, meta.end)}
+        self._inner = {box.kind: box for box in boxes(data, meta.start + 4, meta.end)}
         for kind in (b"pitm", b"iinf", b"iloc", b"iprp"):
             if kind not in self._inner:
                 raise _Damaged("it is cut off: its tables are missing")
@@ -135,7 +140,7 @@ class _File:
     def _read_infos(self) -> None:
         reader = self._reader(b"iinf")
         reader.take(4 if reader.version()[0] else 2)
-        for box in _boxes(self._data, reader.at, reader.end):
+        for box in boxes(self._data, reader.at, reader.end):
             entry = _Reader(self._data, box)
             version = entry.version()[0]
             if box.kind == b"infe" and version >= 2:
@@ -169,8 +174,8 @@ class _File:
                 self._item(number).extents.append((start, end))
 
     def _read_properties(self) -> None:
-        inner = list(_boxes(self._data, *self._inner[b"iprp"][1:]))
-        listed = [box for one in inner if one.kind == b"ipco" for box in _boxes(self._data, one.start, one.end)]
+        inner = list(boxes(self._data, *self._inner[b"iprp"][1:]))
+        listed = [box for one in inner if one.kind == b"ipco" for box in boxes(self._data, one.start, one.end)]
         for one in inner:
             if one.kind != b"ipma":
                 continue
@@ -188,7 +193,7 @@ class _File:
     def _read_references(self) -> None:
         reader = self._reader(b"iref")
         size = 4 if reader.version()[0] else 2
-        for box in _boxes(self._data, reader.at, reader.end):
+        for box in boxes(self._data, reader.at, reader.end):
             entry = _Reader(self._data, box)
             of = entry.take(size)
             self._references.append((box.kind, of, [entry.take(size) for _ in range(entry.take(2))]))
@@ -291,7 +296,7 @@ class _File:
         if not kinds & {16, 17, 18, 19, 20, 21} or 33 not in kinds:
             raise _Damaged("its picture data are missing")
 
-    def _configured_units(self, box: _Box) -> Iterator[bytes]:
+    def _configured_units(self, box: Box) -> Iterator[bytes]:
         reader = _Reader(self._data, box)
         reader.take(22)
         for _ in range(reader.take(1)):

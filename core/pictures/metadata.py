@@ -109,6 +109,18 @@ def read_exif(block: bytes | None) -> Exif:
     )
 
 
+def joined_exif(first: bytes, second: bytes) -> bytes | None:
+    """One EXIF block of two that hold a directory each, that of the picture and EXIF's own, both little-endian, as
+    Canon keeps them; None where one of them is damaged."""
+    fields: list[list[Field]] = []
+    for block in (first, second):
+        directory = tiff_directory(block) if block[:4] == b"II*\0" else None
+        if directory is None:
+            return None
+        fields.append([(entry.tag, entry.kind, entry.values, tiff_bytes(block, entry)) for entry in directory[0]])
+    return b"II*\0" + struct.pack("<I", 8) + _directories(fields[0], fields[1], 8)
+
+
 def _first_directory_only(block: bytes) -> bytes | None:
     """The block without its thumbnail and further pages: damaged ones lead ExifRead on long walks."""
     directory = tiff_directory(block) if block[:4] in (b"II*\0", b"MM\0*") else None

@@ -86,6 +86,30 @@ def test_exif_under_a_makers_own_number_and_inside_a_preview() -> None:
     assert raw_exif(b"\0MRM") is None
 
 
+def test_exif_of_canons_boxes() -> None:
+    """CR3 has one directory in each of two boxes."""
+    def box(kind: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", 8 + len(body)) + kind + body
+
+    def directory(*entries: tuple[int, int, int, bytes]) -> bytes:
+        behind, listed = b"", b""
+        for tag, kind, count, value in entries:
+            listed += struct.pack("<HHII", tag, kind, count, 8 + 2 + 12 * len(entries) + 4 + len(behind))
+            behind += value
+        return b"II*\0" + struct.pack("<IH", 8, len(entries)) + listed + bytes(4) + behind
+
+    blocks = [
+        directory((271, 2, 6, b"Canon\0"), (272, 2, 12, b"Canon EOS R\0")),
+        directory((33434, 5, 1, struct.pack("<II", 1, 250)), (37386, 5, 1, struct.pack("<II", 35, 1))),
+    ]
+    own = bytes.fromhex("85c0b687820f11e08111f4ce462b6a48") + box(b"CMT1", blocks[0]) + box(b"CMT2", blocks[1])
+    start = b"\0\0\0\x18ftypcrx \0\0\0\x01crx isom"
+    found = read_exif(raw_exif(start + box(b"moov", box(b"uuid", own)) + box(b"mdat", bytes(50))))
+    assert (found.make, found.model, found.focal_mm) == ("Canon", "Canon EOS R", 35) and found.number(33434) == 1 / 250
+    for damaged in (start, start + box(b"moov", box(b"uuid", own[:40])), start + box(b"moov", own)):
+        assert raw_exif(damaged) is None
+
+
 def test_no_more_of_a_file_is_read_than_tells(tmp_path: Path) -> None:
     assert raw_bytes(written(tmp_path, "a.tif", PICTURE)) == PICTURE
     assert raw_bytes(written(tmp_path, "a.nef", JPEG)) is None
