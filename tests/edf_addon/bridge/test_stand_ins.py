@@ -50,6 +50,17 @@ def test_a_picture_stands_in_upright_and_the_worker_gets_the_file(
     assert photo._exif(chosen[0]).focal_mm == 35, "what the panel says of the focal length is the file's"
 
 
+def test_the_same_photographs_again_are_the_same_images(
+    blender: SimpleNamespace, photographs: list[Path], tmp_path: Path, small_pair: Pair
+) -> None:
+    files = [{"name": path.name} for path in photographs]
+    bpy.ops.edf.open_pair(directory=str(tmp_path), files=files)
+    assert [image.name for image in bpy.data.images] == ["a.dng", "b.heic"]
+    photographs[1].write_bytes(heic(255 - small_pair.target))
+    bpy.ops.edf.open_pair(directory=str(tmp_path), files=files)
+    assert blender.settings.target.name == "b.heic.001", "a panorama may still hold the one before"
+
+
 def test_a_stitch_of_them_is_float(blender: SimpleNamespace, photographs: list[Path]) -> None:
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     assert blender.settings.result.is_float
