@@ -122,9 +122,11 @@ def test_sizes_are_checked_wherever_they_stand(tmp_path: Path, monkeypatch: pyte
         loaded(tmp_path, lie)
 
 
-def test_a_size_that_the_decoder_contradicts_is_damage(tmp_path: Path) -> None:
-    with pytest.raises(UnreadableImage, match="HEIC"):
-        loaded(tmp_path, patched(heic(COLOUR), struct.pack(">II", 96, 64), struct.pack(">II", 95, 64)))
+def test_a_size_that_the_decoder_contradicts_is_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = {"width": 95, "height": 64, "mode": "RGB", "bits": 8}
+    monkeypatch.setattr(heif_decoding, "decoded", lambda *_: (other, np.zeros(95 * 64 * 3, np.uint8)))
+    with pytest.raises(UnreadableImage, match="95 × 64 pixels came out of it, its header says 96 × 64"):
+        loaded(tmp_path, heic(COLOUR))
 
 
 # --- a grid of tiles, as phones write it -----------------------------------------------------------------------------
@@ -139,8 +141,11 @@ def full(kind: bytes, *parts: bytes, version: int = 0) -> bytes:
     return box(kind, bytes([version, 0, 0, 0]), *parts)
 
 
-def grid(rows: int = 1, columns: int = 2, size: tuple[int, int] = (180, 60), tiles: int = 2) -> bytes:
-    """Item 1: a grid in idat, turned by a quarter; items 2 …: the same coded tile of 96 × 64 px."""
+def grid(
+    rows: int = 1, columns: int = 2, size: tuple[int, int] = (180, 60), tiles: int = 2, copies: int = 2
+) -> bytes:
+    """Item 1: a grid in idat, turned by a quarter; items 2 …: the same coded tile of 96 × 64 px, of which the file holds
+    some copies."""
     single = heic(COLOUR)
     facts = single.index(b"hvcC") - 4
     configuration = single[facts : facts + struct.unpack_from(">I", single, facts)[0]]
@@ -164,7 +169,7 @@ def grid(rows: int = 1, columns: int = 2, size: tuple[int, int] = (180, 60), til
             full(b"iloc", b"\x44\0", struct.pack(">H", len(places)), *places, version=1),
             box(b"iprp", properties, full(b"ipma", struct.pack(">I", len(uses)), *uses)), box(b"idat", described),
         )  # fmt: skip
-        return box(b"ftyp", b"heic", bytes(4), b"mif1heic") + meta + box(b"mdat", coded * tiles)
+        return box(b"ftyp", b"heic", bytes(4), b"mif1heic") + meta + box(b"mdat", coded * copies)
 
     return file(file(0).index(b"mdat") + 4)
 
@@ -183,6 +188,13 @@ def test_a_grid_of_tiles_is_read(tmp_path: Path) -> None:
 ])  # fmt: skip
 def test_tiles_that_do_not_make_the_picture_are_damage(asked: dict[str, int]) -> None:
     assert "tiles" in read_heif(grid(**asked)).damage
+
+
+def test_one_tile_that_is_used_for_ever_is_no_picture() -> None:
+    """Tiles by the thousand could each be walked through, in a small file."""
+    endless = grid(rows=1, columns=20, size=(20 * 96, 64), tiles=20, copies=2)
+    assert read_heif(endless).damage == "its picture data overlap"
+    assert not read_heif(grid(rows=1, columns=20, size=(20 * 96, 64), tiles=20, copies=20)).damage
 
 
 def test_a_broken_alpha_is_damage_too() -> None:
