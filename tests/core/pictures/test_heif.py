@@ -144,8 +144,8 @@ def full(kind: bytes, *parts: bytes, version: int = 0) -> bytes:
 def grid(
     rows: int = 1, columns: int = 2, size: tuple[int, int] = (180, 60), tiles: int = 2, copies: int = 2
 ) -> bytes:
-    """Item 1: a grid in idat, turned by a quarter; items 2 …: the same coded tile of 96 × 64 px, of which the file holds
-    some copies."""
+    """Item 1: a grid in idat, turned by a quarter; items 2 …: the same coded tile of 96 × 64 px, which the file holds
+    some times."""
     single = heic(COLOUR)
     facts = single.index(b"hvcC") - 4
     configuration = single[facts : facts + struct.unpack_from(">I", single, facts)[0]]
