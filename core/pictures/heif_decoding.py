@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..raster.matrix_profile import matrix_profile
 from ..system.errors import UnreadableImage
 from .containers import Structure
 from .decoder_process import decoded
@@ -21,15 +22,22 @@ _CODINGS = {
 # from them by less than cameras do.
 _DISPLAY_TRANSFERS = {1, 2, 4, 5, 6, 7, 13, 14, 15}
 _TRANSFERS = {16: "HDR (PQ)", 18: "HDR (HLG)"}
-_PRIMARIES = {1: "", 2: "", 5: "", 6: "", 7: "", 9: "BT.2020", 11: "DCI-P3", 12: "Display P3"}
+_PRIMARIES_OF_SRGB = {1, 2, 5, 6, 7}
+# Those with the white of daylight, for which a profile is made: name, and chromaticities of red, green and blue.
+_WIDER = {
+    9: ("Rec. 2020", ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046))),
+    12: ("Display P3", ((0.680, 0.320), (0.265, 0.690), (0.150, 0.060))),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class HeifPixels:
-    """pixels: upright (H, W, 1 to 4) uint8 or uint16, in R, G, B, A order; associated: multiplied by alpha."""
+    """pixels: upright (H, W, 1 to 4) uint8 or uint16, in R, G, B, A order; associated: multiplied by alpha; icc: the
+    file's profile, or one of the primaries that it names."""
 
     pixels: NDArray[Any]
     associated: bool
+    icc: bytes | None
     warnings: tuple[str, ...]
 
 
@@ -56,9 +64,12 @@ def decode_heif(data: bytes, structure: Structure) -> HeifPixels:
     else:
         pixels = samples
     pixels = pixels.reshape(height, width, len(letters))
-    named = _PRIMARIES.get(heif.primaries, f"of number {heif.primaries}")
-    warnings = (f"it says that its primaries are {named}, without a colour profile; its colours are taken as sRGB",)
-    return HeifPixels(pixels, letters.endswith("a"), warnings if named else ())
+    icc, warnings = structure.icc, []
+    if icc is None and heif.primaries in _WIDER:
+        icc = matrix_profile(*_WIDER[heif.primaries])
+    elif icc is None and heif.primaries not in _PRIMARIES_OF_SRGB:
+        warnings = [f"its primaries are of the unknown kind {heif.primaries}; its colours are taken as sRGB"]
+    return HeifPixels(pixels, letters.endswith("a"), icc, tuple(warnings))
 
 
 def _whole_range(levels: NDArray[np.uint16], bits: int) -> NDArray[np.uint16]:

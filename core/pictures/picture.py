@@ -134,7 +134,7 @@ def _load(path: Path, pixels_per_byte: int, exposure: RawExposure | None) -> Pic
     exif = read_exif(structure.exif)
     if structure.heif is not None:  # its decoder has turned it
         heif, upright = decode_heif(data, structure), replace(exif.upright(), orientation=1)
-        return _picture(heif.pixels, heif.associated, upright, structure.icc, path.name, [*heif.warnings])
+        return _picture(heif.pixels, heif.associated, upright, heif.icc, path.name, [*heif.warnings])
     if structure.tiff is not None:  # the value that decoding set aside, in BigTIFF too, which ExifRead does not know
         exif = replace(exif, orientation=structure.tiff.orientation if 1 <= structure.tiff.orientation <= 8 else 1)
     raw, warnings = decode_file(data, structure)

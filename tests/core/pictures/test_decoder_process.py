@@ -45,7 +45,8 @@ def test_what_it_writes_comes_back(script: Script) -> None:
 
 
 @pytest.mark.parametrize("lines", [
-    "sys.stderr.write('words of a library'); os.abort()", "sys.stdin.buffer.read(); os.abort()", "sys.exit(3)", "out.write(b'no JSON\\n')", "",
+    "sys.stderr.write('words of a library'); os.abort()",
+    "sys.stdin.buffer.read(); os.abort()", "sys.exit(3)", "out.write(b'no JSON\\n')", "",
     "out.write(b'{\"bytes\": 100}\\n' + bytes(50))",
     "out.write(b'{\"bytes\": 10}\\n' + bytes(10)); out.flush(); os.abort()",
 ])  # fmt: skip

@@ -75,11 +75,12 @@ def test_a_colour_profile_is_kept(tmp_path: Path) -> None:
     assert loaded(tmp_path, heic(COLOUR, icc_profile=icc)).icc == icc
 
 
-def test_other_primaries_are_said_and_light_beyond_a_display_is_refused(tmp_path: Path) -> None:
+def test_wider_primaries_get_a_profile_and_light_beyond_a_display_is_refused(tmp_path: Path) -> None:
     data = heic(COLOUR)
     at = data.index(b"nclx") + 4
-    wide = data[:at] + struct.pack(">H", 12) + data[at + 2 :]
-    assert "Display P3" in loaded(tmp_path, wide).warnings[0]
+    made = {number: loaded(tmp_path, data[:at] + struct.pack(">H", number) + data[at + 2 :]) for number in (9, 12, 11)}
+    assert made[12].icc is not None and b"D\0i\0s\0p\0l\0a\0y\0 \0P\0003" in made[12].icc and not made[12].warnings
+    assert made[9].icc not in (None, made[12].icc) and made[11].icc is None and "kind 11" in made[11].warnings[0]
     for number, word in ((16, "PQ"), (18, "HLG"), (99, "number 99")):
         with pytest.raises(UnreadableImage, match=f"{word}.*export it as JPEG, or as EXR"):
             loaded(tmp_path, data[: at + 2] + struct.pack(">H", number) + data[at + 4 :])
