@@ -8,12 +8,15 @@ It imports nothing of this package, so that it runs under whichever name that is
 from __future__ import annotations
 
 import json
+import os
 import sys
+from pathlib import Path
 from typing import Any
 
 
 def heic(data: bytes, _asked: dict[str, Any]) -> tuple[dict[str, Any], Any]:
     """The main picture, upright; samples of more than 8 bits stand at the upper end of 16."""
+    find_libraries()
     # The C module alone: its Python face needs Pillow, 7 MB more for each Python in the extension.
     import _pi_heif
 
@@ -25,6 +28,14 @@ def heic(data: bytes, _asked: dict[str, Any]) -> tuple[dict[str, Any], Any]:
     (width, height), mode = image.size_mode
     facts = {"width": width, "height": height, "mode": mode, "bits": image.bit_depth}
     return facts, bytes(image.data)  # a view would outlive the image, whose memory it shows
+
+
+def find_libraries() -> None:
+    """On Windows: Blender 4.2 leaves a wheel's libraries in the folder that pip would have emptied."""
+    add: Any = getattr(os, "add_dll_directory", None)
+    for folder in sys.path if add is not None else ():
+        for libraries in Path(folder).glob("pi_heif-*.data/platlib"):
+            add(str(libraries))
 
 
 def raw(data: bytes, asked: dict[str, Any]) -> tuple[dict[str, Any], Any]:

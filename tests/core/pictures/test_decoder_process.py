@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -9,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from edf_stitch.core.pictures import decoder_process
+from edf_stitch.core.pictures import decoder_main, decoder_process
 from edf_stitch.core.pictures.decoder_process import decoded
 from edf_stitch.core.system.errors import UnreadableImage
 
@@ -76,6 +77,18 @@ def test_the_script_itself_says_what_is_missing_or_wrong(monkeypatch: pytest.Mon
     folders = [one for one in sys.path if "site-packages" not in one]
     monkeypatch.setattr(sys, "path", folders)
     assert "need the package rawpy, which cannot be loaded here (No module named" in refusal()
+
+
+def test_libraries_are_found_where_blender_leaves_them_on_windows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = tmp_path / "site" / "pi_heif-1.4.0.data" / "platlib"
+    kept.mkdir(parents=True)
+    found: list[str] = []
+    monkeypatch.setattr(os, "add_dll_directory", found.append, raising=False)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), str(tmp_path / "site"), str(tmp_path / "missing")])
+    decoder_main.find_libraries()
+    assert found == [str(kept)]
 
 
 def test_without_a_python_to_start_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
