@@ -29,11 +29,14 @@ WHEELS = ROOT / "wheels"
 
 # One set for every Blender from 4.2 on. SciPy 1.16 and later fail on the NumPy 1.24 of Blender 4.2; only Python 3.14,
 # which has no SciPy 1.15, takes a later one.
-PINS = ("opencv-python-headless==4.11.0.86", "OpenEXR==3.5.3", "ExifRead==3.5.1", "tqdm==4.70.1")
+PINS = ("opencv-python-headless==4.11.0.86", "OpenEXR==3.5.3", "ExifRead==3.5.1", "pi-heif==1.4.0", "tqdm==4.70.1")
 SCIPY = {"3.11": "scipy==1.15.3", "3.13": "scipy==1.15.3", "3.14": "scipy==1.17.1"}
 # PoseLib's wheels for Intel Macs ended with 2.0.4, and Blender for them with 4.5, which has Python 3.11.
 POSELIB = {"macos-x64": "poselib==2.0.4"}
 POSELIB_ELSEWHERE = "poselib==2.0.5"
+# rawpy's ended with 0.25.1.
+RAWPY = {"macos-x64": "rawpy==0.25.1"}
+RAWPY_ELSEWHERE = "rawpy==0.28.0"
 # Blender's own builds have 3.11 and 3.13; Linux distributions build Blender on their own Python.
 PYTHONS = {
     "linux-x64": ("3.11", "3.13", "3.14"),
@@ -104,8 +107,8 @@ def lock() -> None:
     wheels = set()
     for platform, pythons in PYTHONS.items():
         for python in pythons:
-            poselib = POSELIB.get(platform, POSELIB_ELSEWHERE)
-            for path in _download(platform, python, (*PINS, poselib, SCIPY[python]), WHEELS):
+            own = POSELIB.get(platform, POSELIB_ELSEWHERE), RAWPY.get(platform, RAWPY_ELSEWHERE), SCIPY[python]
+            for path in _download(platform, python, (*PINS, *own), WHEELS):
                 wheels.add(Wheel(path.name, _sha256(path)))
     head = "# Written by `.ci/wheels.py lock`. One line a wheel; `.ci/wheels.py fetch` picks a platform's own.\n"
     LOCK.write_text(head + "".join(f"{wheel.requirement}  # {wheel.filename}\n" for wheel in sorted(wheels)), "utf-8")

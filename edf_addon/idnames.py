@@ -14,6 +14,7 @@ class Operator(StrEnum):
     FOLLOW = "edf.follow"
     CANCEL = "edf.cancel"
     OPEN_PAIR = "edf.open_pair"
+    DEVELOP_PAIR = "edf.develop_pair"
     SWAP = "edf.swap"
     RESET = "edf.reset"
     REFERENCE_FRAME = "edf.reference_frame"

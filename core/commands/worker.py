@@ -104,6 +104,7 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
     with undisturbed():  # interrupted while it loads, NumPy prints a traceback
         from ..cameras.sources import CameraRequest
         from ..options import StitchOptions
+        from ..pictures.raw_development import exposure_of_first
         from ..pipeline import stitch
         from ..system.cache import default_folder
         from ..system.memory import use_again
@@ -118,7 +119,11 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
             import_module(name)
         (folder / "result.json").write_text("{}")
         return
-    pictures, turns = zip(*(_picture(folder, job[side]) for side in SIDES), strict=True)
+    if job.get("show"):
+        _show(folder, job["show"])
+        return
+    exposure = exposure_of_first(folder / job[side]["path"] for side in SIDES if "path" in job[side])
+    pictures, turns = zip(*(_picture(folder, job[side], exposure) for side in SIDES), strict=True)
     camera = {key: _tuples(value) for key, value in job["options"].pop("camera", {}).items()}
     if job.get("cameras"):
         camera = {"cameras": cameras_of(job["cameras"], pictures)}
@@ -137,6 +142,22 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
         lambda: stop.asked,  # Python swallows a KeyboardInterrupt inside a finalizer
     )  # fmt: skip
     _write(folder, result.spread_out(), rows, job.get("take", []), turns)
+
+
+def _show(folder: Path, paths: list[str]) -> None:
+    """Pictures of photographs that Blender cannot open, upright; result.json names a file for each path."""
+    import cv2
+
+    from ..pictures.picture import load_picture
+
+    files = {}
+    for number, path in enumerate(paths):
+        view = load_picture(path).view
+        files[path] = f"{number}.jpg"
+        stored = cv2.cvtColor(view, cv2.COLOR_RGB2BGR) if view.shape[2] == 3 else view
+        (folder / files[path]).write_bytes(cv2.imencode(".jpg", stored)[1].tobytes())
+        _say({"stage": "read", "share": (number + 1) / len(paths)})
+    (folder / "result.json").write_text(json.dumps({"files": files}), "utf-8")
 
 
 def _await(job: Path, stop: _Stop) -> None:
@@ -179,8 +200,9 @@ def cameras_of(entries: dict[str, Any], pictures: tuple[Any, ...]) -> dict[str, 
     return table if names[0] == names[1] else dict(zip(names, table.values(), strict=True))
 
 
-def _picture(folder: Path, entry: dict[str, Any]) -> tuple[Any, int]:
-    """The upright picture of a job's entry, and the orientation that its arrays and masks are turned by."""
+def _picture(folder: Path, entry: dict[str, Any], exposure: Any = None) -> tuple[Any, int]:
+    """The upright picture of a job's entry, and the orientation that its arrays and masks are turned by; exposure: what
+    camera RAW is developed with."""
     from ..pictures.containers import read_structure
     from ..pictures.decoding import read_file, turn
     from ..pictures.metadata import Exif, read_exif
@@ -188,7 +210,7 @@ def _picture(folder: Path, entry: dict[str, Any]) -> tuple[Any, int]:
 
     if "path" in entry:
         path = folder / entry["path"]  # an absolute path stays as it is
-        picture = load_picture(path)
+        picture = load_picture(path, exposure=exposure)
         return replace(picture, name=entry["name"]), picture.exif.orientation
     exif = Exif()
     if entry.get("exif_of"):

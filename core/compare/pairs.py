@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..pictures.listing import SUFFIXES
+from ..pictures.listing import SUFFIXES, each_once
 from ..system.errors import BadRequest
 
 # A folder with files of these names may hold other pictures as well: `edf validate` keeps its true panorama there.
@@ -78,7 +78,7 @@ def _in_folder(folder: Path) -> list[PairFiles]:
 
 def _pair_of(folder: Path) -> PairFiles | None:
     """The pair in a folder; None if it holds no pictures."""
-    pictures = sorted(one for one in folder.iterdir() if one.suffix.lower() in SUFFIXES and one.is_file())
+    pictures = each_once(sorted(one for one in folder.iterdir() if one.suffix.lower() in SUFFIXES and one.is_file()))
     if not pictures:
         return None
     name = folder.resolve().name

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_painted, without
 from ..pictures.naming import told_apart
 from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
+from ..pictures.raw_development import RawExposure, exposure_of_first
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
 from .frame import Frame, size_of
@@ -112,6 +114,12 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         else f"{names[number]} is the same picture as {names[first]}: it is used once"
         for number, first in copies.items()
     )
+    finished = [picture.name for picture in pictures if picture.bits < 32]
+    if finished and any(np.isfinite(picture.clips_at) for picture in pictures):
+        warnings += (
+            f"camera RAW stands beside {finished[0]}: how its camera changed tones and colours cannot be undone, so "
+            "they match only roughly; use RAW files of all pictures, or of none",
+        )
     painted = None if options.mask is None else read_painted(options.mask)
     return Frame(tuple(worked_on), tuple(sizes), painted, warnings, tuple(shown_by))
 
@@ -120,7 +128,8 @@ def _all_read(sources: Sequence[Source]) -> list[Picture]:
     """The pictures. Raises UnreadableImage about all that cannot be read at once."""
     pictures: list[Picture] = []
     troubles: list[UnreadableImage] = []
-    for one in in_order(_picture_or_trouble, sources):
+    exposure = exposure_of_first(sources)
+    for one in in_order(partial(_picture_or_trouble, exposure=exposure), sources):
         if isinstance(one, UnreadableImage):
             troubles.append(one)
         else:
@@ -144,18 +153,20 @@ def _named_apart(pictures: list[Picture], sources: Sequence[Source]) -> list[Pic
     return out
 
 
-def _picture_or_trouble(source: Source) -> Picture | UnreadableImage:
+def _picture_or_trouble(source: Source, exposure: RawExposure | None) -> Picture | UnreadableImage:
     try:
-        return _picture(source)
+        return _picture(source, exposure)
     except UnreadableImage as trouble:
         return trouble
 
 
-def _picture(source: Source) -> Picture:
-    """A picture, read where it is not one yet."""
+def _picture(source: Source, exposure: RawExposure | None) -> Picture:
+    """A picture, read where it is not one yet; exposure: what camera RAW is developed with."""
     if isinstance(source, Picture):
         return source
-    return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
+    if isinstance(source, np.ndarray):
+        return picture_from_array(source)
+    return load_picture(source, exposure=exposure)
 
 
 def _copies(pictures: Sequence[Picture]) -> Iterator[tuple[int, int]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..compose.options import EXPOSURE
-from ..raster.arrays import in_any_channel
+from ..raster.arrays import in_any_channel, strips
 from .options import WARNING
 
 if TYPE_CHECKING:
@@ -48,7 +48,10 @@ def exposure_warnings(pictures: Sequence[Picture], exposures: Sequence[Exposure]
 
 
 def _clipped_share(picture: Picture) -> float:
-    """Share of a picture that is clipped in any channel; a float picture does not clip."""
+    """Share of a picture that is clipped in any channel; float pictures do not clip, but for camera RAW."""
     if picture.bits == 32:
-        return 0.0
+        height, width = picture.light.shape[:2]
+        limit = np.float32(WARNING.raw_clipped * picture.clips_at)
+        rows = strips(picture.light.shape) if np.isfinite(limit) else ()
+        return sum(int(in_any_channel(picture.light[part, 0:width] >= limit).sum()) for part in rows) / (height * width)
     return float(in_any_channel(picture.view >= EXPOSURE.clipped_level).mean())

@@ -12,6 +12,7 @@ import zlib
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from .heif import HeifFacts, read_heif
 from .options import READING
 
 # The first marker after JPEG's entropy-coded data: FF not followed by a stuffed 00, a restart marker or filling FF.
@@ -35,7 +36,7 @@ class TiffFacts:
 
 @dataclass(frozen=True)
 class Structure:
-    """A picture file from outside. kind: png, jpeg, tiff, webp, bmp or exr; width, height in pixels, 0 where not found.
+    """A picture file from outside. kind: png, jpeg, tiff, webp, bmp, heic or exr; width, height px, 0 where not found.
 
     damage says in words what is broken, or is empty. exif: the raw block as a TIFF structure (for TIFF the file
     itself). gray: a PNG without colour, which decoders may widen to RGBA for the sake of its alpha.
@@ -49,6 +50,7 @@ class Structure:
     icc: bytes | None = None
     gray: bool = False
     tiff: TiffFacts | None = None
+    heif: HeifFacts | None = None
 
 
 class TiffEntry(NamedTuple):
@@ -72,44 +74,28 @@ def read_structure(data: bytes) -> Structure | None:
         return _tiff(data)
     if data[:4] == b"\x76\x2f\x31\x01":
         return Structure("exr")
+    if container_brand(data) == "HEIC":
+        facts = read_heif(data)
+        return Structure("heic", facts.width, facts.height, facts.damage, facts.exif, facts.icc, heif=facts)
     if data[:2] == b"BM" and len(data) >= 26:
         width, height = struct.unpack_from("<ii", data, 18)
         return Structure("bmp", abs(width), abs(height))
     return None
 
 
-# Brands of the ISO base media container (bytes 8-12 of the file)
-_BRANDS = {b"crx ": "raw"} | dict.fromkeys((b"avif", b"avis"), "AVIF") | dict.fromkeys(
-    (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"hevm", b"hevs", b"mif1", b"msf1"), "HEIC/HEIF")
-_HEIF_SUFFIXES = dict.fromkeys((".heic", ".heif", ".hif"), "HEIC/HEIF") | {".avif": "AVIF"}
-_RAW_STARTS = (b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"FUJIFILMCCD-RAW", b"FOVb")
-_RAW_SUFFIXES = frozenset(
-    ".3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .iiq .kdc .mef .mrw .nef .nrw .orf .pef .raf .raw .rw2 .sr2 .srf .srw .x3f"
-    .split())
+# Brands of the ISO base media container (bytes 8-12 of the file), and what they stand for.
+_BRANDS = {b"crx ": "RAW", b"avif": "AVIF", b"avis": "AVIF"} | dict.fromkeys(
+    (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"hevm", b"hevs", b"mif1", b"msf1"), "HEIC")
 
 
-def foreign_kind(data: bytes, suffix: str) -> str:
-    """Names a picture format that this program does not read ("camera RAW", "HEIC/HEIF", "AVIF"), "" for all others.
-
-    suffix: the file's, lower case with its dot. RAW files are TIFF inside, so the name counts where the bytes look like
-    TIFF or like nothing known; those of HEIF only in the latter.
-    """
-    if data[4:8] == b"ftyp":
-        # the general brands come first in some AVIF files, whose own brand then follows among the compatible ones
-        brands = [data[8:12], *(data[at : at + 4] for at in range(16, min(64, _u32(data, 0)), 4))]
-        kinds = [_BRANDS[brand] for brand in brands if brand in _BRANDS]
-        kind = "AVIF" if "AVIF" in kinds else kinds[0] if kinds else ""
-        if kind:
-            return "camera RAW" if kind == "raw" else kind
-    tiff = data[:4] in (b"II*\0", b"MM\0*")
-    known = read_structure(data[:64]) is not None and not tiff
-    if data.startswith(_RAW_STARTS) or (tiff and data[8:10] == b"CR") or (suffix in _RAW_SUFFIXES and not known):
-        return "camera RAW"
-    if tiff:
-        directory = tiff_directory(data)
-        if directory is not None and any(entry.tag == 50706 for entry in directory[0]):  # DNGVersion
-            return "camera RAW"
-    return "" if known or tiff else _HEIF_SUFFIXES.get(suffix, "")
+def container_brand(data: bytes) -> str:
+    """"HEIC", "AVIF" or "RAW" (Canon's CR3) where the file is an ISO base media container of one of these, else ""."""
+    if data[4:8] != b"ftyp":
+        return ""
+    # the general brands come first in some AVIF files, whose own brand then follows among the compatible ones
+    brands = [data[8:12], *(data[at : at + 4] for at in range(16, min(64, _u32(data, 0)), 4))]
+    kinds = [_BRANDS[brand] for brand in brands if brand in _BRANDS]
+    return "AVIF" if "AVIF" in kinds else kinds[0] if kinds else ""
 
 
 def _u32(data: bytes, at: int) -> int:

@@ -8,9 +8,12 @@ from glob import glob
 from pathlib import Path
 
 from ..system.errors import BadRequest, UnreadableImage
+from .camera_raw import RAW_SUFFIXES
 
+# Endings of what cameras write beside a RAW file, as the same picture once more.
+_BESIDE_RAW = frozenset((".jpg", ".jpeg", ".heic", ".heif", ".hif"))
 # Endings of the files that are taken for pictures without being named.
-SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".webp", ".bmp"))
+SUFFIXES = frozenset((".png", ".tif", ".tiff", ".exr", ".webp", ".bmp")) | _BESIDE_RAW | RAW_SUFFIXES
 
 
 def listed(paths: Sequence[Path]) -> list[Path]:
@@ -21,7 +24,7 @@ def listed(paths: Sequence[Path]) -> list[Path]:
     paths : sequence of Path
         Files, which are taken as they are; folders, for the pictures in them; and patterns like IMG_*.jpg, for those
         that match. What is not named itself counts as a picture by its ending, and hidden files do not; it is sorted as
-        people count: 2 before 10.
+        people count: 2 before 10. Of a picture that a camera wrote as RAW and as JPEG or HEIC the RAW file is meant.
 
     Returns
     -------
@@ -48,6 +51,12 @@ def natural(path: Path) -> tuple[list[tuple[int, str]], str]:
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], path.name
 
 
+def each_once(files: Sequence[Path]) -> list[Path]:
+    """The same without what a camera wrote beside a RAW file."""
+    raw = {one.with_suffix("") for one in files if one.suffix.lower() in RAW_SUFFIXES}
+    return [one for one in files if one.suffix.lower() not in _BESIDE_RAW or one.with_suffix("") not in raw]
+
+
 def _meant_by(path: Path) -> Iterator[Path]:
     if path.is_dir():
         try:
@@ -61,6 +70,7 @@ def _meant_by(path: Path) -> Iterator[Path]:
     else:
         found, what = [Path(one) for one in glob(str(path))], "of that name"
     pictures = sorted(filter(_is_picture, found), key=lambda one: (one.parent, natural(one)))
+    pictures = each_once(pictures)
     if not pictures:
         raise BadRequest(f"{path}: no pictures {what} (files that end in {', '.join(sorted(SUFFIXES))})")
     yield from pictures

@@ -71,6 +71,11 @@ class Exif:
         """The kept text of a tag number, "" where there is none."""
         return next((value for number, value in self.kept if number == tag and isinstance(value, str)), "")
 
+    def number(self, tag: int) -> float:
+        """The kept number of a tag number, 0 where there is none."""
+        value = next((value for number, value in self.kept if number == tag and not isinstance(value, str)), 0)
+        return value[0] / value[1] if isinstance(value, tuple) else float(value)
+
 
 def read_exif(block: bytes | None) -> Exif:
     """Reads a raw EXIF block (a TIFF structure or a whole TIFF file); an empty Exif where damaged. Raises nothing."""
@@ -102,6 +107,18 @@ def read_exif(block: bytes | None) -> Exif:
         width=None if size[0] is None else int(size[0]), height=None if size[1] is None else int(size[1]),
         kept=tuple((number, value) for number, value in kept if value is not None),
     )
+
+
+def joined_exif(first: bytes, second: bytes) -> bytes | None:
+    """One EXIF block of two that hold a directory each, that of the picture and EXIF's own, both little-endian, as
+    Canon keeps them; None where one of them is damaged."""
+    fields: list[list[Field]] = []
+    for block in (first, second):
+        directory = tiff_directory(block) if block[:4] == b"II*\0" else None
+        if directory is None:
+            return None
+        fields.append([(entry.tag, entry.kind, entry.values, tiff_bytes(block, entry)) for entry in directory[0]])
+    return b"II*\0" + struct.pack("<I", 8) + _directories(fields[0], fields[1], 8)
 
 
 def _first_directory_only(block: bytes) -> bytes | None:

@@ -22,6 +22,8 @@ class ReadingOptions:
     photograph_pixels_per_byte: int = 400
     # The same for a mask, which may have one colour: deflate packs one bit a pixel a thousand times.
     drawing_pixels_per_byte: int = 10_000
+    # The same of a camera RAW file: the strongest lossy compression leaves a seventh of a byte for each.
+    raw_pixels_per_byte: int = 16
     # Bytes of an unpacked ICC profile; real ones have up to 2 MB, and a PNG's is compressed.
     max_icc_bytes: int = 8 << 20
     # Share of pixels that are not finite up to which a float picture is used; beyond, something else went wrong.
@@ -55,6 +57,21 @@ class MaskOptions:
     same_aspect: float = 1.05
 
 
+@dataclass(frozen=True)
+class DecodingOptions:
+    """Decoding HEIC and camera RAW (`decoder_process`, `raw_development`)."""
+
+    # Seconds after which a decoder counts as hung: the largest pictures take some ten, slow machines ten times that.
+    most_seconds: float = 300.0
+    # Stops by which exposures of one panorama may differ: beyond, what the files say of them is nonsense.
+    most_stops: float = 30.0
+    # Stops by which a picture is exposed more than another one if that is to be said, and share of it that is clipped:
+    # less is hardly seen.
+    longer_stops: float = 0.2
+    much_clipped: float = 0.01
+
+
 READING = ReadingOptions()
+DECODING = DecodingOptions()
 WRITING = WritingOptions()
 MASKS = MaskOptions()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +16,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..raster.arrays import strips
 from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from ..raster.lazy import AnyImage, Coded, whole
 from ..system.errors import BadRequest, UnreadableImage
-from .containers import foreign_kind, read_structure
+from .camera_raw import is_raw
+from .containers import container_brand, read_structure
 from .decoding import check_size, decode_exr, decode_file, read_file, turn
+from .heif_decoding import decode_heif
 from .metadata import Exif, read_exif
 from .options import READING
+from .raw_development import RawExposure, develop
 
-_READABLE = "PNG, JPEG, TIFF, EXR, WebP or BMP"
-_ADVICE = {
-    "camera RAW": "develop it in a RAW converter and export a 16-bit TIFF",
-    "HEIC/HEIF": "export it as JPEG or TIFF", "AVIF": "export it as PNG or JPEG",
-}
+_READABLE = "PNG, JPEG, TIFF, EXR, HEIC, WebP or BMP"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +54,8 @@ class Picture:
         File name, or "array".
     warnings : tuple of str
         For the user.
+    clips_at : float
+        Light from which a float picture is clipped: camera RAW has such, others have infinity.
     """
 
     light: AnyImage
@@ -63,6 +66,7 @@ class Picture:
     icc: bytes | None
     name: str
     warnings: tuple[str, ...] = ()
+    clips_at: float = float("inf")
 
     @property
     def pixels(self) -> NDArray[Any]:
@@ -79,8 +83,11 @@ class Picture:
         return opaque
 
 
-def load_picture(path: str | Path, pixels_per_byte: int = READING.photograph_pixels_per_byte) -> Picture:
-    """Read a PNG, JPEG, TIFF, EXR, WebP or BMP file of 8, 16 or 32 bits (float), gray or colour, with or without alpha.
+def load_picture(
+    path: str | Path, pixels_per_byte: int = READING.photograph_pixels_per_byte, exposure: RawExposure | None = None
+) -> Picture:
+    """Read a PNG, JPEG, TIFF, EXR, HEIC, WebP or BMP file of 8, 16 or 32 bits (float), gray or colour, with or without
+    alpha, or a camera RAW file, which becomes a float picture.
 
     Parameters
     ----------
@@ -88,6 +95,8 @@ def load_picture(path: str | Path, pixels_per_byte: int = READING.photograph_pix
         The file.
     pixels_per_byte : int
         Of a larger picture that the file may hold, at most; see `ReadingOptions`.
+    exposure : RawExposure, optional
+        What camera RAW of one panorama is developed with; by default each file's own.
 
     Returns
     -------
@@ -96,20 +105,22 @@ def load_picture(path: str | Path, pixels_per_byte: int = READING.photograph_pix
     Raises
     ------
     UnreadableImage
-        Missing, damaged, cut off, too large for memory or for its own length, HEIC or camera RAW, with what to do.
+        Missing, damaged, cut off, too large for memory or for its own length, or of a kind that is not read, with what
+        to do.
     """
     path = Path(path)
     try:
-        return _load(path, pixels_per_byte)
+        return _load(path, pixels_per_byte, exposure)
     except UnreadableImage as error:
         raise UnreadableImage(f"{path}: {error}") from error
 
 
-def _load(path: Path, pixels_per_byte: int) -> Picture:
+def _load(path: Path, pixels_per_byte: int, exposure: RawExposure | None) -> Picture:
     data = read_file(path)
-    foreign = foreign_kind(data, path.suffix.lower())
-    if foreign:
-        raise UnreadableImage(f"{foreign} pictures cannot be read; {_ADVICE[foreign]}")
+    if is_raw(data, path.suffix.lower()):
+        return _developed(data, exposure, path.name)
+    if container_brand(data) == "AVIF":
+        raise UnreadableImage("AVIF pictures cannot be read; export it as PNG or JPEG")
     structure = read_structure(data)
     if structure is None:
         raise UnreadableImage(f"not a picture of a known kind; export it as {_READABLE}")
@@ -121,11 +132,23 @@ def _load(path: Path, pixels_per_byte: int) -> Picture:
         raise UnreadableImage(f"the {kind} file is damaged: {structure.damage}; copy or export it again")
     check_size(structure.width, structure.height, len(data), pixels_per_byte)
     exif = read_exif(structure.exif)
+    if structure.heif is not None:  # its decoder has turned it
+        heif, upright = decode_heif(data, structure), replace(exif.upright(), orientation=1)
+        return _picture(heif.pixels, heif.associated, upright, heif.icc, path.name, [*heif.warnings])
     if structure.tiff is not None:  # the value that decoding set aside, in BigTIFF too, which ExifRead does not know
         exif = replace(exif, orientation=structure.tiff.orientation if 1 <= structure.tiff.orientation <= 8 else 1)
     raw, warnings = decode_file(data, structure)
     associated = structure.tiff is not None and structure.tiff.extra == 1
     return _picture(turn(raw, exif.orientation), associated, exif.upright(), structure.icc, path.name, warnings)
+
+
+def _developed(data: bytes, exposure: RawExposure | None, name: str) -> Picture:
+    """The picture of a camera RAW file, linear in sRGB's primaries."""
+    raw = develop(data, exposure, partial(check_size, stored=len(data), pixels_per_byte=READING.raw_pixels_per_byte))
+    light = Coded(turn(raw.levels, raw.exif.orientation), (raw.curve,))
+    view = _float_view(light, _exposure(light, None))
+    exif = replace(raw.exif.upright(), orientation=1)  # as its decoder may well have turned it
+    return Picture(light, None, view, 32, exif, None, name, raw.warnings, float(raw.curve.table[-1]))
 
 
 def picture_from_array(array: NDArray[Any], name: str = "array") -> Picture:
@@ -221,13 +244,14 @@ def _finite(colour: NDArray[Any], alpha: NDArray[Any] | None) -> tuple[NDArray[A
     return np.where(good[..., None], colour, np.float32(0)), alpha, 1.0 - float(good.mean())
 
 
-def _exposure(pixels: NDArray[Any], alpha: NDArray[Any] | None) -> float:
+def _exposure(pixels: AnyImage, alpha: NDArray[Any] | None) -> float:
     """The factor that brings the light of a float picture into the range of a display.
 
     Half way (in stops) between the factor that puts the median on middle gray and the one that keeps the brightest
     hundredth from clipping: a bright sky then leaves features in the shade, and a shade leaves some in the sky.
     """
-    light = pixels.max(axis=2)
+    width = pixels.shape[1]
+    light = np.concatenate([pixels[rows, 0:width].max(axis=2) for rows in strips(pixels.shape)])
     light = light[light > 0] if alpha is None else light[(light > 0) & (alpha > 0)]
     if light.size == 0:
         return 1.0
@@ -235,9 +259,12 @@ def _exposure(pixels: NDArray[Any], alpha: NDArray[Any] | None) -> float:
     return float(np.clip(np.sqrt(0.18 / middle * 0.9 / bright), 1e-37, 1e37))
 
 
-def _float_view(pixels: NDArray[Any], exposure: float) -> NDArray[Any]:
+def _float_view(pixels: AnyImage, exposure: float) -> NDArray[Any]:
+    view = np.empty(pixels.shape, np.uint8)
     with np.errstate(over="ignore"):
-        return encode(pixels * np.float32(exposure), 8)
+        for rows in strips(pixels.shape):
+            view[rows] = encode(pixels[rows, 0 : pixels.shape[1]] * np.float32(exposure), 8)
+    return view
 
 
 def curves_for(icc: bytes | None, channels: int) -> tuple[Curve, ...]:
@@ -306,11 +333,11 @@ def in_same_colour_space(pictures: Sequence[Picture]) -> tuple[Picture, ...]:
     if len({picture.light.shape[2] for picture in pictures}) > 1:
         pictures = [_three_channels(picture) for picture in pictures]
     if all(picture.bits == 32 for picture in pictures):
-        exposures = [_exposure(picture.pixels, picture.alpha) for picture in pictures]
+        exposures = [_exposure(picture.light, picture.alpha) for picture in pictures]
         # One factor keeps the same thing equally bright in all; over two stops apart, seeing anything comes first.
         if max(exposures) <= 4.0 * min(exposures):
             shared = float(np.prod(exposures) ** (1 / len(exposures)))
-            pictures = [replace(picture, view=_float_view(picture.pixels, shared)) for picture in pictures]
+            pictures = [replace(picture, view=_float_view(picture.light, shared)) for picture in pictures]
     return tuple(pictures)
 
 

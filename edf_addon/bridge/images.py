@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from . import compat
+from . import compat, stand_ins
 
 if TYPE_CHECKING:
     import numpy as np
@@ -60,6 +60,10 @@ def describe(
     path = file_of(image, user)
     if _goes_as_file(image, path):
         return {"name": image.name, "path": str(path)}
+    if path is not None and stand_ins.photograph_of(image) is not None:
+        raise Unusable(f"“{image.name}”: its photograph {path} is not there; put it back, or open it again")
+    if path is not None and stand_ins.is_needed(path):
+        raise Unusable(f"“{image.name}”: Blender cannot show camera RAW and HEIC files; open it with Open Pair")
     packed = image.packed_file
     if packed is not None:
         kept = folder / f"{side}.packed"
@@ -126,6 +130,8 @@ def _digest(data: bytes | memoryview) -> str:
 
 def _goes_as_file(image: bpy.types.Image, path: Path | None) -> bool:
     """Whether the worker reads the picture's file itself."""
+    if stand_ins.photograph_of(image) is not None:
+        return path is not None and path.is_file()
     return path is not None and path.is_file() and is_files_own(image) and path.suffix.lower() in READABLE
 
 
@@ -135,7 +141,11 @@ def _goes_as_packed(image: bpy.types.Image) -> bool:
 
 
 def file_of(image: bpy.types.Image, user: bpy.types.ImageUser | None = None) -> Path | None:
-    """The absolute path of an image's file, there or not; None where it has none."""
+    """The absolute path of an image's file, or of the photograph that it stands in for, there or not; None where it has
+    none."""
+    photograph = stand_ins.photograph_of(image)
+    if photograph is not None:
+        return photograph
     if image.source not in ("FILE", "SEQUENCE") or not image.filepath_raw or image.packed_file is not None:
         return None
     if image.source == "SEQUENCE" and user is not None:

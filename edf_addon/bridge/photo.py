@@ -5,11 +5,14 @@ Blender shows the pixels as they are stored; the engine, and with it every match
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
+
+from . import stand_ins
 
 if TYPE_CHECKING:
     from ...core.pictures.metadata import Exif
@@ -50,13 +53,20 @@ def _focal(image: bpy.types.Image) -> str:
 
 def _exif(image: bpy.types.Image) -> Exif | None:
     """None where there is no file to read, or none that says anything."""
+    photograph = stand_ins.photograph_of(image)
+    if photograph is not None:  # what stands in for it is upright
+        exif = _of_path(photograph)
+        return None if exif is None else replace(exif.upright(), orientation=1)
     if image.source != "FILE" or image.is_dirty and not image.filepath:
         return None
     if image.packed_file is not None:
         return _of_packed(image.session_uid, image.packed_file.size)
     if not image.filepath:
         return None
-    path = Path(bpy.path.abspath(image.filepath, library=image.library))
+    return _of_path(Path(bpy.path.abspath(image.filepath, library=image.library)))
+
+
+def _of_path(path: Path) -> Exif | None:
     try:
         stamp = path.stat()
     except OSError:
@@ -80,9 +90,12 @@ def _of_packed(uid: int, _size: int) -> Exif | None:
 
 def _of_bytes(data: bytes) -> Exif | None:
     try:
+        from ...core.pictures.camera_raw import is_raw, raw_exif
         from ...core.pictures.containers import read_structure
         from ...core.pictures.metadata import read_exif
 
+        if is_raw(data, ""):
+            return read_exif(raw_exif(data))
         structure = read_structure(data)
     except (ImportError, ValueError):  # a broken library is the panel's first line; here it is no more than silence
         return None

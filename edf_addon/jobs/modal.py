@@ -85,6 +85,8 @@ class LongWork:
 
     # Of a picture that follows the frame: its progress is not shown.
     follows = False
+    # What is taken into the file in the end, in messages.
+    makes = "the panorama"
     _job: job.Job
     _timer: Any = None
 
@@ -190,7 +192,7 @@ class LongWork:
                 health.forget()
                 words = self.finish(context, self._job.folder, outcome.result)
         except Exception as error:
-            words, failed = job.sentence(f"the panorama cannot be taken over: {_in_words(error)}"), True
+            words, failed = job.sentence(f"{self.makes} cannot be taken over: {_in_words(error)}"), True
         finally:
             _end()
         if outcome.kind == health.BROKEN:

@@ -8,8 +8,8 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
 from .. import editor, idnames, pair, properties
-from ..bridge import images
-from ..jobs import stitching
+from ..bridge import images, stand_ins
+from ..jobs import modal, stitching
 
 
 class EDF_OT_open_pair(bpy.types.Operator):  # noqa: N801
@@ -23,8 +23,11 @@ class EDF_OT_open_pair(bpy.types.Operator):  # noqa: N801
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
     filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_glob: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    is_browsed = False
 
     def invoke(self, context: Any, _event: Any) -> set[str]:
+        self.filter_glob, self.is_browsed = stand_ins.endings(), True
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -34,18 +37,56 @@ class EDF_OT_open_pair(bpy.types.Operator):  # noqa: N801
             chosen = "1 was" if len(names) == 1 else f"{len(names)} were"
             self.report({"ERROR"}, f"Choose two pictures ({chosen} chosen): hold Ctrl, or Shift, for the second.")
             return {"CANCELLED"}
-        loaded = []
-        for name in sorted(names):
-            try:
-                loaded.append(bpy.data.images.load(str(Path(self.directory, name)), check_existing=True))
-            except RuntimeError as error:
-                self.report({"ERROR"}, f"{name} cannot be opened: {error}")
-                return {"CANCELLED"}
-        settings = properties.settings_of(context.scene)
-        with pair.choosing(settings):
-            settings.reference, settings.target = loaded
-        stitching.show(context, loaded[0])
+        paths = [Path(self.directory, name) for name in sorted(names)]
+        if any(map(stand_ins.is_needed, paths)):
+            how = "EXEC_DEFAULT" if bpy.app.background or not self.is_browsed else "INVOKE_DEFAULT"
+            done: set[str] = bpy.ops.edf.develop_pair(how, reference=str(paths[0]), target=str(paths[1]))
+            return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+        try:
+            _choose(context, [_loaded(path) for path in paths])
+        except images.Unusable as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
         return {"FINISHED"}
+
+
+class EDF_OT_develop_pair(modal.LongWork, bpy.types.Operator):  # noqa: N801
+    """Open two photographs that Blender cannot open itself (camera RAW, HEIC), as reference and target"""
+
+    bl_idname = idnames.Operator.DEVELOP_PAIR
+    bl_label = "Develop Pair"
+    bl_options = {"INTERNAL", "UNDO"}
+    makes = "the pictures"
+
+    reference: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    target: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+
+    def prepare(self, _context: Any, _folder: Path) -> dict[str, Any]:
+        return {"show": [path for path in (self.reference, self.target) if stand_ins.is_needed(Path(path))]}
+
+    def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
+        chosen = []
+        for path in (self.reference, self.target):
+            shown = found["files"].get(path)
+            chosen.append(_loaded(Path(path)) if shown is None else stand_ins.bring(folder / shown, Path(path)))
+        _choose(context, chosen)
+        return "Opened " + " and ".join(image.name for image in chosen)
+
+
+def _loaded(path: Path) -> bpy.types.Image:
+    """Raises Unusable."""
+    try:
+        return bpy.data.images.load(str(path), check_existing=True)
+    except RuntimeError as error:
+        raise images.Unusable(f"{path.name} cannot be opened: {error}") from error
+
+
+def _choose(context: Any, opened: list[bpy.types.Image]) -> None:
+    """Make two images reference and target, and show the first."""
+    settings = properties.settings_of(context.scene)
+    with pair.choosing(settings):
+        settings.reference, settings.target = opened
+    stitching.show(context, opened[0])
 
 
 class EDF_OT_swap(bpy.types.Operator):  # noqa: N801
@@ -115,7 +156,7 @@ class EDF_OT_save(bpy.types.Operator):  # noqa: N801
         return editor.panorama(context) or editor.shown(context)
 
 
-CLASSES = (EDF_OT_open_pair, EDF_OT_swap, EDF_OT_save)
+CLASSES = (EDF_OT_open_pair, EDF_OT_develop_pair, EDF_OT_swap, EDF_OT_save)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

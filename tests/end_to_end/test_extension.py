@@ -133,6 +133,16 @@ for kind in ("exr", "png"):
     assert bpy.ops.edf.save(filepath=str(folder / f"panorama.{{kind}}")) == {{"FINISHED"}}
 bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
 """
+DEVELOPED = """
+import bpy, sys
+from pathlib import Path
+left, right = map(Path, {paths!r})
+bpy.ops.edf.open_pair(directory=str(left.parent), files=[{{"name": left.name}}, {{"name": right.name}}])
+settings = bpy.context.scene.edf_stitch
+assert [tuple(one.size) for one in (settings.reference, settings.target)] == [(480, 360)] * 2
+assert bpy.ops.edf.stitch() == {{"FINISHED"}}
+assert settings.result.is_float and not {{"rawpy", "_pi_heif"}} & set(sys.modules)
+"""
 AGAIN = """
 import bpy
 panorama = bpy.context.scene.edf_stitch.result
@@ -140,6 +150,21 @@ assert panorama.size[0] > 480 and panorama.packed_file, panorama
 assert bpy.ops.edf.restitch() == {"FINISHED"}
 assert bpy.context.scene.edf_stitch.result != panorama
 """
+
+
+def test_camera_raw_and_heic_are_opened_and_stitched(home, pair, tmp_path):
+    from edf_stitch.core.pictures.picture import load_picture
+
+    from ..core.pictures.raw_and_heic import dng, heic, mosaic
+
+    pictures = [load_picture(path) for path in pair]
+    paths = [tmp_path / "a.dng", tmp_path / "b.heic"]
+    paths[0].write_bytes(dng(mosaic(pictures[0].pixels)))
+    paths[1].write_bytes(heic(pictures[1].view))
+    done = home.edf("stitch", *paths, "-o", tmp_path / "out.exr")
+    assert done.returncode == 0 and load_picture(tmp_path / "out.exr").pixels.shape[1] > 480, done.stderr
+    done = home.run("--python-exit-code", "9", "--python-expr", DEVELOPED.format(paths=[*map(str, paths)]))
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_an_artists_way_from_two_photographs_to_a_file_and_again_tomorrow(home, pair, tmp_path):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...options import StitchOptions
+from ...pictures.camera_raw import is_raw, raw_size
 from ...pictures.containers import read_structure
 from ...pictures.exr import exr_size
 from ...pictures.picture import Picture
@@ -115,13 +116,15 @@ def _facts(source: Any) -> tuple[Size, int]:
         data = Path(source).read_bytes()
     except (OSError, ValueError):
         return (0, 0), 0
+    if is_raw(data, Path(source).suffix.lower()):
+        return raw_size(data), MEMORY.raw_bytes
     structure = read_structure(data)
     if structure is None:
         return (0, 0), 0
     if structure.kind == "exr":
         return exr_size(data), MEMORY.float_bytes
-    deep = data[24] == 16 if structure.kind == "png" else structure.tiff is not None and structure.tiff.bits > 8
-    return (structure.width, structure.height), MEMORY.deep_bytes if deep else 3
+    bits = data[24] if structure.kind == "png" else getattr(structure.tiff or structure.heif, "bits", 8)
+    return (structure.width, structure.height), MEMORY.deep_bytes if bits > 8 else 3
 
 
 def _of_array(array: NDArray[Any]) -> tuple[Size, int]:

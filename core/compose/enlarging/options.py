@@ -47,6 +47,8 @@ class MemoryOptions:
     # Bytes a pixel of a float picture and its view, and of one of 16 bits and its view.
     float_bytes: int = 15
     deep_bytes: int = 9
+    # The same of camera RAW, which is developed in a process of its own: as much again, of as many as are read at once.
+    raw_bytes: int = 20
 
 
 DRAFT = DraftOptions()

@@ -124,8 +124,8 @@ BOMB = (HEADER + chunk(b"IHDR", struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 
 HEIC, AVIF, CR3 = (struct.pack(">I", 24) + b"ftyp" + brand + bytes(4) + b"mif1" + brand + bytes(99)
                    for brand in (b"heic", b"avif", b"crx "))  # fmt: skip
 CR2 = b"II*\0\x10\0\0\0CR\2\0" + bytes(99)
-RAW_WORDS = ("camera RAW pictures cannot be read", "export a 16-bit TIFF")
-HEIC_WORDS = ("HEIC/HEIF pictures cannot be read", "export it as JPEG or TIFF")
+RAW_WORDS = ("camera RAW file", "export a 16-bit TIFF")
+HEIC_WORDS = ("the HEIC file is damaged", "copy or export it again")
 UNKNOWN_WORDS = ("not a picture of a known kind", "export it as PNG")
 BAD_FILES: dict[str, tuple[bytes, tuple[str, ...]]] = {
     **{f"half{suffix}": (encoded(NOISE, suffix)[:3000], ("cut off", "copy or export it again"))
@@ -137,10 +137,10 @@ BAD_FILES: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "film.mp4": (b"\0\0\0\x18ftypisom\0\0\2\0isomiso2" + bytes(99), UNKNOWN_WORDS),
     "header.png": (HEADER, ("cut off",)), "cut off and named.png": (encoded(NOISE, ".jpg")[:999], ("JPEG", "cut off")),
     "bomb.png": (BOMB, ("100000 × 100000 pixels are too many", "400 megapixels", "scale the picture down")),
-    "a.heic": (HEIC, HEIC_WORDS), "magic.jpg": (HEIC, HEIC_WORDS), "suffix.HEIF": (b"something new", HEIC_WORDS),
-    "brand.heic": (HEIC.replace(b"heic", b"new1").replace(b"mif1", b"new2"), HEIC_WORDS),
+    "a.heic": (HEIC, HEIC_WORDS), "magic.jpg": (HEIC, HEIC_WORDS), "suffix.HEIF": (b"something new", UNKNOWN_WORDS),
+    "brand.heic": (HEIC.replace(b"heic", b"new1").replace(b"mif1", b"new2"), UNKNOWN_WORDS),
     "a.avif": (AVIF, ("AVIF pictures cannot be read", "export it as PNG or JPEG")),
-    "suffix.avif": (b"something new", ("AVIF pictures cannot be read",)),
+    "suffix.avif": (b"something new", UNKNOWN_WORDS),
     "a.cr2": (CR2, RAW_WORDS), "magic.tif": (CR2, RAW_WORDS), "a.cr3": (CR3, RAW_WORDS), "b.jpg": (CR3, RAW_WORDS),
     "suffix.NEF": (encoded(NOISE, ".tif"), RAW_WORDS), "suffix.dng": (b"something new", RAW_WORDS),
     "nan.exr": (exr(with_bad_rows(NOISE, 0.6, np.nan)), ("60% of the pixels are not finite", "export it again")),

@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 from edf_stitch.core.compose.enlarging import memory_need
 from edf_stitch.core.compose.enlarging.memory_need import threads_that_fit
+from edf_stitch.core.compose.enlarging.options import MEMORY
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.encoding import save_picture
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.system.errors import BadRequest, NotEnoughMemory
+
+from ..pictures.raw_and_heic import dng, heic
 
 PHONE = np.broadcast_to(np.uint8(0), (3000, 4000, 3))
 
@@ -90,3 +93,18 @@ def test_a_jpegs_header_is_enough(tmp_path: Path) -> None:
     encoded = cv2.imencode(".jpg", np.zeros((30, 40, 3), np.uint8))[1].tobytes()
     (tmp_path / "cut.jpg").write_bytes(encoded[:-40])
     assert memory_need._facts(tmp_path / "cut.jpg")[0] == (40, 30)
+
+
+def test_heic_and_camera_raw_count_with_what_their_decoders_take(tmp_path: Path) -> None:
+    def needed(data: bytes, name: str) -> float:
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(NotEnoughMemory) as told:
+            threads_that_fit([tmp_path / name] * 3, asked(0.1, scale=0.1))
+        assert "3 pictures of 36 megapixels together" in str(told.value)
+        return float(re.search(r"take about ([\d.]+) GB", str(told.value))[1])
+
+    raw = needed(dng(np.zeros(PHONE.shape[:2], np.uint16)), "a.dng")
+    shrunk = 3 * 400 * 300 * MEMORY.float_bytes
+    assert raw == pytest.approx((MEMORY.program_bytes + 36e6 * MEMORY.raw_bytes + shrunk) / 1e9, abs=0.06)
+    levels = np.zeros(PHONE.shape, np.uint16)
+    assert needed(heic(levels, "RGB;16"), "deep.heic") > needed(heic(PHONE), "a.heic") + 0.15

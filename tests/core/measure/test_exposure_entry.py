@@ -33,6 +33,14 @@ def test_all_that_was_done_is_told() -> None:
     }  # fmt: skip
 
 
+def test_camera_raw_is_the_only_float_picture_that_clips() -> None:
+    light = np.full((10, 20, 3), 0.2, np.float32)
+    light[:5, :, 1] = 0.5
+    raw = replace(picture_from_array(light, "a.nef"), clips_at=0.5)
+    exposures = [Decided(NOTHING, NOTHING, unchanged(3))] * 2
+    assert exposure_entry([raw, replace(raw, clips_at=float("inf"))], exposures)["clipped"] == [0.5, 0.0]
+
+
 def test_what_could_not_be_matched_and_what_is_over_exposed_is_warned_of() -> None:
     pictures = [picture_from_array(np.zeros((4, 4, 3), np.uint8), name) for name in ("a.jpg", "b.jpg")]
     fine = replace(unchanged(3), overexposed=WARNING.overexposed_share)

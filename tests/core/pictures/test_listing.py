@@ -32,6 +32,15 @@ def test_a_pattern_stands_for_the_pictures_it_matches(folder: Path) -> None:
     assert names(listed([folder / "[ac].*"])) == ["a.png", "c.exr"]
 
 
+def test_of_raw_and_jpeg_of_one_picture_raw_is_meant(tmp_path: Path) -> None:
+    for name in ("a.NEF", "a.JPG", "a.png", "b.jpg", "c.heic", "c.dng", "d.HEIC"):
+        (tmp_path / name).touch()
+    assert names(listed([tmp_path])) == ["a.NEF", "a.png", "b.jpg", "c.dng", "d.HEIC"]
+    assert names(listed([tmp_path / "a.*"])) == ["a.NEF", "a.png"]
+    assert names(listed([tmp_path / "*.JPG"])) == ["a.JPG"], "there is nothing beside it that is meant"
+    assert names(listed([tmp_path / "a.JPG", tmp_path / "a.NEF"])) == ["a.JPG", "a.NEF"], "named by themselves"
+
+
 def test_files_are_taken_as_they_are_named_and_in_that_order(folder: Path) -> None:
     odd = [folder / "notes.txt", folder / "c.exr", folder / "a.png"]
     assert listed(odd) == odd
