@@ -18,7 +18,8 @@ from ..system.errors import BadRequest, UnwritableOutput
 from ..system.output_files import OutputFiles
 from ..system.threads import in_order
 from .decoding import quiet_opencv
-from .exr import write_exr
+from .exr import DEFAULT_FORM, ExrForm, write_exr
+from .gpano import SpherePart, xmp_packet
 from .metadata import Exif, embed
 from .options import WRITING
 from .picture import curves_for
@@ -50,8 +51,8 @@ def _writable(suffix: str) -> tuple[str, int]:
 
 def encode_picture(
     pixels: AnyImage, alpha: NDArray[Any] | None, bits: int, suffix: str, icc: bytes | None = None,
-    exif: Exif | None = None,
-) -> tuple[bytes, tuple[str, ...]]:
+    exif: Exif | None = None, exr: ExrForm = DEFAULT_FORM, sphere: SpherePart | None = None,
+) -> tuple[bytes, tuple[str, ...]]:  # fmt: skip
     """Encode a picture as a file.
 
     Parameters
@@ -66,6 +67,10 @@ def encode_picture(
         .png, .jpg, .jpeg, .tif, .tiff or .exr. EXR holds linear sRGB, multiplied by alpha.
     icc, exif : optional
         As in Picture.
+    exr : ExrForm
+        How an EXR is written.
+    sphere : SpherePart, optional
+        The part of an equirectangular sphere that it is: viewers are told.
 
     Returns
     -------
@@ -82,13 +87,13 @@ def encode_picture(
         The picture does not fit into this kind of file.
     """
     pieces: list[bytes] = []
-    warnings = encode_into(pieces.append, pixels, alpha, bits, suffix, icc, exif)
+    warnings = encode_into(pieces.append, pixels, alpha, bits, suffix, icc, exif, exr, sphere)
     return pieces[0] if len(pieces) == 1 else b"".join(pieces), warnings
 
 
 def encode_into(
     put: Callable[[bytes], object], pixels: AnyImage, alpha: NDArray[Any] | None, bits: int, suffix: str,
-    icc: bytes | None = None, exif: Exif | None = None,
+    icc: bytes | None = None, exif: Exif | None = None, exr: ExrForm = DEFAULT_FORM, sphere: SpherePart | None = None,
 ) -> tuple[str, ...]:  # fmt: skip
     """Encode a picture as a file, and hand over each piece of it as soon as it is made: of a PNG no more than some rows
     are held. Arguments, warnings returned and errors: see `encode_picture`."""
@@ -96,8 +101,11 @@ def encode_into(
     depth = output_bits((bits,), suffix)
     exif = exif or Exif()
     if kind == "exr":
-        put(write_exr(in_srgb(pixels, icc), alpha, exif))
-        return ()
+        data, share = write_exr(in_srgb(pixels, icc), alpha, exif, exr, sphere is not None and sphere.is_whole)
+        put(data)
+        most = f"half floats hold ({WRITING.max_half:.0f})"
+        lost = f"{share:.2%} of the pixels are brighter than {most} and were clipped; --exr-depth float keeps them"
+        return (lost,) if share else ()
     height, width = pixels.shape[:2]
     if kind == "jpeg" and max(width, height) > _JPEG_LONGEST_SIDE:
         raise UnwritableOutput(f"JPEG holds {_JPEG_LONGEST_SIDE} pixels a side, not {width} × {height}; use .png")
@@ -105,12 +113,13 @@ def encode_into(
     channels = 3 if alpha is not None and kind != "jpeg" else pixels.shape[2]
     if icc is not None and icc_channels(icc) != channels:
         icc = None
+    xmp = None if sphere is None else xmp_packet(sphere)
     levels = _Levels(pixels, alpha, depth, curves_for(icc, channels), kind == "jpeg")
     if kind == "png":
-        brighter = levels.into_png(put, lambda header: embed(header, kind, exif, icc))
+        brighter = levels.into_png(put, lambda header: embed(header, kind, exif, icc, xmp=xmp))
     else:
         coded, brighter = levels.as_array()
-        put(embed(_by_opencv(coded, suffix), kind, exif, icc, straight_alpha=levels.shape[2] == 4))
+        put(embed(_by_opencv(coded, suffix), kind, exif, icc, levels.shape[2] == 4, xmp))
     if bits < 32:
         return ()
     lost = f", and {brighter:.2%} of its pixels, brighter than white, were clipped" if brighter else ""

@@ -36,6 +36,8 @@ class WritingOptions:
     jpeg_quality: int = 95
     # zlib's level, 1 to 9: the fastest; photographs hardly pack better on higher ones.
     png_level: int = 1
+    # The largest number that half a float (16 bits) holds.
+    max_half: float = 65504.0
     # Bytes of a text in EXIF: the whole block has to fit into one JPEG segment of 64 kB.
     max_text_bytes: int = 2000
 
