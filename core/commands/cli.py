@@ -172,7 +172,8 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
         "as people count; of two pictures the first is the reference",
     )  # fmt: skip
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="OUT", help=".png, .jpg, .tif (8 or 16 bit) or .exr (float)"
+        "-o", "--output", type=Path, required=True, metavar="OUT",
+        help=".png, .jpg, .tif (8 or 16 bit), .exr or .hdr (float)",
     )
     add_options(parser)
     add_files(parser)

@@ -42,7 +42,7 @@ def add_files(parser: argparse.ArgumentParser) -> None:
 def add_batch_files(parser: argparse.ArgumentParser) -> None:
     """Adds what a batch leaves of each item, and what it makes again."""
     files = parser.add_argument_group("files")
-    files.add_argument("--format", default=".png", metavar="SUFFIX", help=".png (default), .jpg, .tif or .exr")
+    files.add_argument("--format", default=".png", metavar="SUFFIX", help=".png (default), .jpg, .tif, .exr or .hdr")
     files.add_argument("--layers", action="store_true", help="NAME.layers: each picture on the canvas, with alpha")
     files.add_argument("--warp", action="store_true", help="NAME.warp.npz: maps, inverse depth and geometry")
     files.add_argument("--depth", action="store_true", help="NAME.depth.exr: ranges, their deviation and confidence")

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from .options import READING
+from .radiance_header import is_radiance, read_header
 
 # The first marker after JPEG's entropy-coded data: FF not followed by a stuffed 00, a restart marker or filling FF.
 _JPEG_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")
@@ -35,7 +36,7 @@ class TiffFacts:
 
 @dataclass(frozen=True)
 class Structure:
-    """A picture file from outside. kind: png, jpeg, tiff, webp, bmp or exr; width, height in pixels, 0 where not found.
+    """A picture file from outside. kind: png, jpeg, tiff, webp, bmp, hdr or exr; width, height: px, 0 where not found.
 
     damage says in words what is broken, or is empty. exif: the raw block as a TIFF structure (for TIFF the file
     itself). gray: a PNG without colour, which decoders may widen to RGBA for the sake of its alpha.
@@ -72,6 +73,9 @@ def read_structure(data: bytes) -> Structure | None:
         return _tiff(data)
     if data[:4] == b"\x76\x2f\x31\x01":
         return Structure("exr")
+    if is_radiance(data):
+        header = read_header(data)
+        return Structure("hdr", *header.size, header.damage)
     if data[:2] == b"BM" and len(data) >= 26:
         width, height = struct.unpack_from("<ii", data, 18)
         return Structure("bmp", abs(width), abs(height))

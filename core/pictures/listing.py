@@ -10,7 +10,7 @@ from pathlib import Path
 from ..system.errors import BadRequest, UnreadableImage
 
 # Endings of the files that are taken for pictures without being named.
-SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".webp", ".bmp"))
+SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".bmp"))
 
 
 def listed(paths: Sequence[Path]) -> list[Path]:

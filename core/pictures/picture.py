@@ -22,8 +22,9 @@ from .containers import foreign_kind, read_structure
 from .decoding import check_size, decode_exr, decode_file, read_file, turn
 from .metadata import Exif, read_exif
 from .options import READING
+from .radiance import decode_radiance
 
-_READABLE = "PNG, JPEG, TIFF, EXR, WebP or BMP"
+_READABLE = "PNG, JPEG, TIFF, EXR, HDR, WebP or BMP"
 _ADVICE = {
     "camera RAW": "develop it in a RAW converter and export a 16-bit TIFF",
     "HEIC/HEIF": "export it as JPEG or TIFF", "AVIF": "export it as PNG or JPEG",
@@ -80,7 +81,7 @@ class Picture:
 
 
 def load_picture(path: str | Path, pixels_per_byte: int = READING.photograph_pixels_per_byte) -> Picture:
-    """Read a PNG, JPEG, TIFF, EXR, WebP or BMP file of 8, 16 or 32 bits (float), gray or colour, with or without alpha.
+    """Read a PNG, JPEG, TIFF, EXR, HDR, WebP or BMP file of 8, 16 or 32 bits (float), gray or colour, any alpha.
 
     Parameters
     ----------
@@ -120,6 +121,9 @@ def _load(path: Path, pixels_per_byte: int) -> Picture:
         kind = structure.kind.upper()
         raise UnreadableImage(f"the {kind} file is damaged: {structure.damage}; copy or export it again")
     check_size(structure.width, structure.height, len(data), pixels_per_byte)
+    if structure.kind == "hdr":
+        raw, warnings = decode_radiance(data)
+        return _picture(raw, False, Exif(), None, path.name, warnings)
     exif = read_exif(structure.exif)
     if structure.tiff is not None:  # the value that decoding set aside, in BigTIFF too, which ExifRead does not know
         exif = replace(exif, orientation=structure.tiff.orientation if 1 <= structure.tiff.orientation <= 8 else 1)

@@ -120,6 +120,8 @@ def _facts(source: Any) -> tuple[Size, int]:
         return (0, 0), 0
     if structure.kind == "exr":
         return exr_size(data), MEMORY.float_bytes
+    if structure.kind == "hdr":
+        return (structure.width, structure.height), MEMORY.float_bytes
     deep = data[24] == 16 if structure.kind == "png" else structure.tiff is not None and structure.tiff.bits > 8
     return (structure.width, structure.height), MEMORY.deep_bytes if deep else 3
 
