@@ -115,7 +115,7 @@ def test_every_option_of_the_engine_is_offered(blender):
     """Those that come as files or images are added to a job by hand; three are nobody's wish, some are for more than
     the two pictures that the panel has, and two are the command's: a panel shows its picture, a scene has its unit."""
     by_hand = {"matches", "ignore", "mask"}
-    of_many = {"viewpoint", "require_all", "ignore_in"}
+    of_many = {"viewpoint", "require_all", "ignore_in", "brackets"}
     options = {field.name for field in dataclasses.fields(StitchOptions)}
     nobodys, of_command = {"measure", "cache", "memory_gb"}, {"preview", "scale_metres"}
     assert options - nobodys - of_many - of_command == set(engine_options.options_of(blender.settings)) | by_hand
