@@ -39,3 +39,10 @@ HOLES = ("auto", "transparent", "inpaint")
 # it is; or a number of stops by which all gets brighter than at the common exposure.
 EXPOSURES = ("auto", "reference", "none")
 Exposing = str | float
+# Exposures of one view: looked for and merged, or left as they are; or how many in a row are one bracket.
+BRACKETS = ("auto", "off")
+Brackets = str | int
+# How an EXR file of colours holds its numbers: 32 bits, or 16 with three digits and light up to 65504.
+EXR_DEPTHS = ("float", "half")
+# How it is packed: as it is, or smaller by a loss that is not seen.
+EXR_COMPRESSIONS = ("zip", "dwab")

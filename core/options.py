@@ -15,6 +15,7 @@ from .cameras.scale import ScaleMetres
 from .cameras.sources import CameraRequest
 from .choices import (
     BLENDS,
+    BRACKETS,
     CENTRE,
     CROPS,
     EXPOSURES,
@@ -25,6 +26,7 @@ from .choices import (
     PROJECTIONS,
     ROUND_FIELDS,
     SEAMS,
+    Brackets,
     Crop,
     Exposing,
     Level,
@@ -64,6 +66,9 @@ class StitchOptions:
         "centre" for the one that is best connected with all others. By default the first that connects with others.
     require_all : bool, default False
         Whether a picture that connects with no others is an error, and not left out.
+    brackets : str or int, default "auto"
+        Which pictures are exposures of one view, and become one of floats before everything else: one of BRACKETS, or
+        how many in a row.
     scale_metres : (int or str, int or str, float), optional
         Two pictures, each by its number, counted from 1, or its name, and how many metres apart they were taken: then
         ranges are in metres. Else they are if the cameras that are given are, and in baselines if nothing is known.
@@ -126,6 +131,7 @@ class StitchOptions:
     ignore_in: tuple[tuple[str, Path | NDArray[Any]], ...] = ()
     viewpoint: int | str | None = None
     require_all: bool = False
+    brackets: Brackets = "auto"
     scale_metres: ScaleMetres | None = None
     slide: Slide = "auto"
     projection: str = "auto"
@@ -241,6 +247,10 @@ class StitchOptions:
                     f"the scale {one}, {other}, {metres:g}: two different pictures, and their distance in metres above "
                     "0, are needed"
                 )
+        if self.brackets not in BRACKETS and not (isinstance(self.brackets, int) and self.brackets > 1):
+            raise BadRequest(
+                f"brackets {self.brackets!r} are not known; choose from: {', '.join(BRACKETS)}, or a number from 2"
+            )
         self._check_preview()
         self._check_projection()
         self._check_level()

@@ -7,7 +7,7 @@ them. A clip aligns many frames at once and composes each; a comparison composes
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -212,6 +212,8 @@ def compose(
     named = (line for picture in pictures for line in _named(picture))
     warnings = (*frame.warnings, *named, *alignment.warnings, *more)
     report["warnings"] = list(warnings)
+    if frame.brackets:
+        report["brackets"] = [asdict(bracket) for bracket in frame.brackets]
     warp, occluded = whole.within(box), tuple(cut(one.hidden, box) for one in made.decided)
     labels = None if labels is None else cut(labels, box, -1)
     look = look_at(frame.pictures, warp.maps, [one.exposure for one in made.decided], occluded, labels)

@@ -51,6 +51,11 @@ def frame_of(settings: Any, scale: float = 1.0) -> dict[str, Any]:
     return frame
 
 
+def exr_form_of(settings: Any) -> dict[str, str]:
+    """How a panorama of float pictures is written: the fields of ExrForm."""
+    return {"depth": settings.exr_depth.lower(), "compression": settings.exr_compression.lower()}
+
+
 def _exposure_of(settings: Any) -> str | float:
     """The exposure by name, or the stops that are added to it."""
     if settings.light == "AUTO" and settings.light_stops:

@@ -67,6 +67,14 @@ CROPS = (
     ("REFERENCE", "Reference", "Only the reference's own frame", 2),
     ("BOX", "Box", "A rectangle in pixels of the full panorama", 3),
 )
+EXR_DEPTHS = (
+    ("FLOAT", "Float", "32 bits a channel: every value as it is"),
+    ("HALF", "Half", "16 bits a channel: three digits, light up to 65504; half as large"),
+)
+EXR_COMPRESSIONS = (
+    ("ZIP", "ZIP", "Without loss"),
+    ("DWAB", "DWAB", "Much smaller, with a loss that is not seen"),
+)
 MATCH_STATES = (
     ("USED", "Used", "The field stands on it"),
     ("LEFT_OUT", "Left Out", "It contradicts the others and was not used"),

@@ -194,6 +194,14 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         name="Box", description="Left, top, width and height, in pixels of the full panorama, from its top left",
         size=4, default=(0, 0, 1000, 1000), min=0, update=reframe,
     )
+    exr_depth: EnumProperty(
+        name="Float Depth", description="How a panorama of float pictures is held in the Blender file, and saved as "
+        "EXR", items=offered.EXR_DEPTHS,
+    )
+    exr_compression: EnumProperty(
+        name="Compression", description="How a panorama of float pictures is packed in the Blender file, and saved as "
+        "EXR", items=offered.EXR_COMPRESSIONS,
+    )
     scale: FloatProperty(
         name="Scale", description="Both pictures are resized by this first", default=1.0, min=0.02, max=1.0,
         subtype="FACTOR",

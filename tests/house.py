@@ -21,7 +21,7 @@ TOP = ("frames", "choices", "options", "fields", "mapping", "alignment", "pipeli
 MAY_IMPORT = {
     "system": (),
     "raster": ("system",),
-    "pictures": ("system", "raster"),
+    "pictures": ("system", "raster", "choices"),
     "cameras": ("system", "raster", "pictures"),
     "pose": BELOW_POSE,
     "rig": (*BELOW_POSE, "pose", "choices"),

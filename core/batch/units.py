@@ -32,6 +32,7 @@ from ..output.outputs import (
 )
 from ..output.warp_file import write_warp
 from ..pictures.encoding import output_bits
+from ..pictures.exr import ExrForm
 from ..system.errors import BadRequest, UnreadableImage, UnwritableOutput
 from ..system.output_files import Made, OutputFiles
 from .list import BatchItem, same_name
@@ -48,7 +49,7 @@ class BatchRequest:
 
     folder: created if missing; suffix: of the panoramas; warp, layers, depth, mesh: whether these are written too;
     resume: skip what is up to date; overwrite: replace what exists; shard: (I, N), the I-th (from 1) of N runs that
-    share the work. Raises BadRequest.
+    share the work; exr: how panoramas and layers are written as .exr. Raises BadRequest.
     """
 
     folder: Path
@@ -60,6 +61,7 @@ class BatchRequest:
     shard: tuple[int, int] = (1, 1)
     depth: bool = False
     mesh: bool = False
+    exr: ExrForm = ExrForm()
 
     def __post_init__(self) -> None:
         output_bits((8,), self.suffix)
@@ -131,7 +133,8 @@ class Unit:
         files = UnitFiles(may_replace, (*self.pictures, *self.options.files_read))
         with files:
             if self.panorama:
-                warnings += write(result, OutputRequest(self.panorama, layers=self._layers), files)
+                outputs = OutputRequest(self.panorama, layers=self._layers, exr=self.request.exr)
+                warnings += write(result, outputs, files)
             if self.report:
                 matches, timing = self._named(".matches.csv"), self._named(".timing.json")
                 warnings += add_depth(result, *self._depth, files)
@@ -289,6 +292,7 @@ def _units(item: BatchItem, options: StitchOptions, request: BatchRequest, versi
     outcome = asdict(replace(options, cache=None, memory_gb=None))
     decided = [
         version, outcome, request.suffix.lower(), request.warp, request.layers, request.depth, request.mesh,
+        asdict(request.exr),
     ]  # fmt: skip
     shared = [path for frame in item.aligned_on for path in item.files(frame)]
     known = [*decided, *(_identity(path) for path in (*options.files_read, *shared))]

@@ -8,7 +8,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..choices import BLENDS, CENTRE, EXPOSURES, FADES, FIELDS, HOLES, PROJECTIONS, SEAMS, Exposing, Slide
+from ..choices import (
+    BLENDS,
+    BRACKETS,
+    CENTRE,
+    EXPOSURES,
+    FADES,
+    FIELDS,
+    HOLES,
+    PROJECTIONS,
+    SEAMS,
+    Brackets,
+    Exposing,
+    Slide,
+)
 
 if TYPE_CHECKING:
     from ..options import StitchOptions
@@ -84,6 +97,11 @@ def _add_many(parser: argparse.ArgumentParser) -> None:
     many.add_argument(
         "--require-all", action="store_true",
         help="exit with 3 where a picture connects with no others (by default it is left out, and named)",
+    )  # fmt: skip
+    many.add_argument(
+        "--brackets", default="auto", type=_brackets, metavar="auto|off|N",
+        help="exposures of one view become one picture of high dynamic range: auto (default: they are looked for), "
+        "off, or every N pictures in order",
     )  # fmt: skip
 
 
@@ -223,6 +241,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         ignore_in=tuple(args.ignore),
         viewpoint=args.viewpoint,
         require_all=args.require_all,
+        brackets=args.brackets,
         scale_metres=args.scale_metres,
         slide=args.slide,
         projection=args.projection,
@@ -290,6 +309,10 @@ def _viewpoint(text: str) -> int | str:
     if text.casefold() in (CENTRE, "center"):
         return CENTRE
     return int(text) if text.isdecimal() else text
+
+
+def _brackets(text: str) -> Brackets:
+    return int(text) if text.isdecimal() and int(text) > 1 else _choice(BRACKETS)(text)
 
 
 def _scale_metres(text: str) -> tuple[int | str, int | str, float]:

@@ -17,7 +17,7 @@ from typing import NoReturn
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
 from .arguments import add_options, numbered, options_from
-from .file_arguments import add_batch_files, add_files, shard
+from .file_arguments import add_batch_files, add_files, exr_form, shard
 from .messages import print_summary, progress_shown, say, shortened, verdict_line
 from .options import MESSAGES
 
@@ -172,7 +172,8 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
         "as people count; of two pictures the first is the reference",
     )  # fmt: skip
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="OUT", help=".png, .jpg, .tif (8 or 16 bit) or .exr (float)"
+        "-o", "--output", type=Path, required=True, metavar="OUT",
+        help=".png, .jpg, .tif (8 or 16 bit), .exr or .hdr (float)",
     )
     add_options(parser)
     add_files(parser)
@@ -262,7 +263,7 @@ def _stitch(args: argparse.Namespace) -> int:
     options = numbered(options_from(args, measure=bool(args.report or args.verbose)), pictures)
     check_count(len(pictures), options)
     outputs = OutputRequest(
-        args.output, args.report, args.layers, args.warp, args.cameras_out, args.depth, args.mesh
+        args.output, args.report, args.layers, args.warp, args.cameras_out, args.depth, args.mesh, exr_form(args)
     )  # fmt: skip
     with OutputFiles(args.overwrite, [*pictures, *options.files_read]) as files:
         names = [path.name for path in pictures]
@@ -297,7 +298,8 @@ def _batch(args: argparse.Namespace) -> int:
     use_again()
     suffix = args.format if args.format.startswith(".") else f".{args.format}"
     request = BatchRequest(
-        args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard, args.depth, args.mesh
+        args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard, args.depth, args.mesh,
+        exr_form(args),
     )  # fmt: skip
 
     def tell(outcome: Outcome, number: int, count: int) -> None:

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..choices import EXR_COMPRESSIONS, EXR_DEPTHS
+
+if TYPE_CHECKING:
+    from ..pictures.exr import ExrForm
 
 
 def add_files(parser: argparse.ArgumentParser) -> None:
@@ -29,20 +35,41 @@ def add_files(parser: argparse.ArgumentParser) -> None:
     files.add_argument(
         "--cameras-out", type=Path, metavar="FILE.json", help="the cameras that were found, as --cameras takes them"
     )
+    _add_exr(files)
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")
 
 
 def add_batch_files(parser: argparse.ArgumentParser) -> None:
     """Adds what a batch leaves of each item, and what it makes again."""
     files = parser.add_argument_group("files")
-    files.add_argument("--format", default=".png", metavar="SUFFIX", help=".png (default), .jpg, .tif or .exr")
+    files.add_argument("--format", default=".png", metavar="SUFFIX", help=".png (default), .jpg, .tif, .exr or .hdr")
     files.add_argument("--layers", action="store_true", help="NAME.layers: each picture on the canvas, with alpha")
     files.add_argument("--warp", action="store_true", help="NAME.warp.npz: maps, inverse depth and geometry")
     files.add_argument("--depth", action="store_true", help="NAME.depth.exr: ranges, their deviation and confidence")
     files.add_argument("--mesh", action="store_true", help="NAME.mesh.glb: the panorama as a surface with depth")
+    _add_exr(files)
     files.add_argument("--resume", action="store_true", help="make only what is missing, or was made otherwise")
     files.add_argument("--shard", type=shard, default=(1, 1), metavar="I/N", help="the I-th of N runs that share LIST")
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")
+
+
+def _add_exr(files: argparse._ArgumentGroup) -> None:
+    """How panoramas and layers are written as .exr."""
+    files.add_argument(
+        "--exr-depth", default="float", choices=EXR_DEPTHS, metavar="DEPTH",
+        help="of .exr: float (default: 32 bits) or half (16: three digits, light up to 65504)",
+    )  # fmt: skip
+    files.add_argument(
+        "--exr-compression", default="zip", choices=EXR_COMPRESSIONS, metavar="COMPRESSION",
+        help="of .exr: zip (default: without loss) or dwab (much smaller, with a loss that is not seen)",
+    )  # fmt: skip
+
+
+def exr_form(args: argparse.Namespace) -> ExrForm:
+    """What the parsed arguments ask for of EXR files."""
+    from ..pictures.exr import ExrForm
+
+    return ExrForm(args.exr_depth, args.exr_compression)
 
 
 def shard(text: str) -> tuple[int, int]:

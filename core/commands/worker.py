@@ -10,8 +10,8 @@ file whose EXIF (orientation included) belongs to the array. `options`: fields o
 CameraRequest. `cameras`: {"reference", "target"}: {"lens": fields of BlenderLens but the resolution, "matrix_world"}.
 `masks`: {"reference", "target"}: .npy of pictures, rows as shown; {"seam"}: over the whole panorama. `matches`: .npy
 (N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as result.json had it in matches.file. `take`:
-which of "layers", "masks", "depth" to leave as pictures. Relative paths start at FOLDER. Or `try` alone: load the
-libraries, and no more.
+which of "layers", "masks", "depth" to leave as pictures. `exr`: fields of ExrForm, for panorama and layers. Relative
+paths start at FOLDER. Or `try` alone: load the libraries, and no more.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
         pictures, options, lambda stage, share: _say({"stage": stage, "share": share * WORKER.stitch_share}),
         lambda: stop.asked,  # Python swallows a KeyboardInterrupt inside a finalizer
     )  # fmt: skip
-    _write(folder, result.spread_out(), rows, job.get("take", []), turns)
+    _write(folder, result.spread_out(), rows, job, turns)
 
 
 def _show(folder: Path, paths: list[str]) -> None:
@@ -233,12 +233,15 @@ def _array(path: Path) -> Any:
     return np.load(path, allow_pickle=False)
 
 
-def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[int, ...]) -> None:
+def _write(folder: Path, result: Any, rows: Any, job: dict[str, Any], turns: tuple[int, ...]) -> None:
     """Everything the window may ask for, with result.json as the index."""
     from ..output import inspection as seen
     from ..output.outputs import json_bytes
+    from ..output.sphere_part import sphere_part_of
     from ..pictures.encoding import encode_picture
+    from ..pictures.exr import ExrForm
 
+    take, exr = job.get("take", []), ExrForm(**job.get("exr", {}))
     kind = ".png" if result.bits == 8 else ".exr"
     files: dict[str, str] = {}
 
@@ -248,10 +251,12 @@ def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[i
         share = min(WORKER.max_share, WORKER.stitch_share + WORKER.file_share * len(files))
         _say({"stage": "write", "share": share})
 
-    def picture(pixels: Any, alpha: Any) -> bytes:
-        return encode_picture(pixels, alpha, result.bits, kind, result.pictures[0].icc, result.pictures[0].exif)[0]
+    def picture(pixels: Any, alpha: Any, sphere: Any = None) -> bytes:
+        icc, exif = result.pictures[0].icc, result.pictures[0].exif
+        return encode_picture(pixels, alpha, result.bits, kind, icc, exif, exr, sphere)[0]
 
-    add("panorama", picture(result.panorama.light, _unless_opaque(result.panorama.alpha)))
+    alpha = _unless_opaque(result.panorama.alpha)
+    add("panorama", picture(result.panorama.light, alpha, sphere_part_of(result)))
     for side, layer in zip(SIDES, result.layers, strict=True):
         if "layers" in take:
             add(f"{side} layer", picture(layer.light, layer.alpha))

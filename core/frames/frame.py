@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pictures.picture import Picture, resized
+from .merging import MergedBracket
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,10 @@ class Frame:
     warnings : tuple of str
         About what was given, in plain words.
     shown_by : tuple of int
-        Of each picture that was given the number of the one here that is used for it: copies are used once.
+        Of each picture that was given the number of the one here that is used for it: copies are used once, and
+        exposures of one view together.
+    brackets : tuple of MergedBracket
+        What became of exposures of one view.
     """
 
     pictures: tuple[Picture, ...]
@@ -34,6 +38,7 @@ class Frame:
     painted: NDArray[np.int8] | None = None
     warnings: tuple[str, ...] = ()
     shown_by: tuple[int, ...] = ()
+    brackets: tuple[MergedBracket, ...] = ()
 
     @property
     def names(self) -> list[str]:

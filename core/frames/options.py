@@ -25,4 +25,138 @@ class PreviewOptions:
     """Points along each side of a picture that its outline is guessed by."""
 
 
+@dataclass(frozen=True)
+class BracketOptions:
+    """Exposures of one view: how they are told from other pictures (`brackets`, `exposures`)."""
+
+    thumbnail_px: int = 32
+    """px along the longer side of the copies by which exposures of one view are looked for among all pictures."""
+
+    alike: float = 0.75
+    """Correlation of the logarithms of their light from which on they may show one view: a shift in the hand costs a
+    tenth."""
+
+    working_px: int = 1600
+    """px along the longer side at which exposures are aligned: points are found to a twentieth of a pixel there."""
+
+    least_stops: float = 0.6
+    """Stops by which two exposures of a bracket differ at least: cameras vary by a third by themselves."""
+
+    usable: tuple[float, float] = (10 / 255, 240 / 255)
+    """Share of white, display-encoded, between which a picture tells how bright something is."""
+
+    least_usable: float = 0.01
+    """Share of the pixels that both exposures must show so."""
+
+    least_points: int = 30
+    """Points that must be found in both for one view to be told by them."""
+
+    most_points: int = 1500
+    """Points that are looked for: as many as a homography can use."""
+
+    point_quality: float = 0.002
+    """Of the best corner's quality, that of the worst that is taken: dark corners of a room have weak ones only."""
+
+    point_distance_px: float = 8.0
+    """px between points at the working size at least, so that they cover the picture."""
+
+    window_px: int = 21
+    """px a side that a point is followed by; OpenCV's default."""
+
+    levels: int = 4
+    """Halvings at which points are followed first: 16 × 10 px of shift."""
+
+    back_px: float = 0.5
+    """px by which a point that is followed there and back may miss itself."""
+
+    mean_px: int = 9
+    """px a side of the means of light that are compared: more than what a hand or a resampling blurs."""
+
+    mean_share: float = 0.8
+    """Share of such a mean that both exposures must show well."""
+
+    same_stops: float = 0.02
+    """Stops by which a gain may be off for points to be followed by it: beyond, it is measured again where the
+    pictures were aligned by it, and they are aligned again."""
+
+    inlier_px: float = 0.7
+    """px within which the homography has to explain a point, at the working size."""
+
+    least_inliers: float = 0.85
+    """Share of the points that it explains in one view: the rest may have moved. Parallax of a step to the side leaves
+    less."""
+
+    least_inliers_given: float = 0.65
+    """The same where the user says which pictures are one view."""
+
+    most_shift: float = 0.02
+    """Share of the diagonal by which a corner may move between two exposures from the hand, which follow each other
+    within a second."""
+
+    most_shift_given: float = 0.1
+    """The same where the user says so."""
+
+    still_px: float = 0.15
+    """px at the working size by which half of the points move less on a tripod: then nothing is resampled."""
+
+    blank_levels: tuple[float, float] = (3.0, 10.0)
+    """Levels of 255, median and 90th percentile, by which pictures without points, brought to one exposure, may differ
+    and still show one view: noise."""
+
+    exif_agrees: float = 0.26
+    """Stops by which the gain that is seen may differ from the one that EXIF tells: its numbers are rounded by up to a
+    tenth; beyond, the camera's curve is at work, and EXIF is believed."""
+
+
+@dataclass(frozen=True)
+class MergeOptions:
+    """How exposures of one view become one picture (`merging`)."""
+
+    clipping: tuple[float, float] = (217 / 255, 250 / 255)
+    """Share of white, display-encoded, from which on an exposure counts less, and from which on it does not count: a
+    sensor clips, and curves bend, a little below white."""
+
+    darkness: tuple[float, float] = (5 / 255, 25 / 255)
+    """The same from which on it counts at all, and counts fully: a level of 5 may be 10 % off by rounding."""
+
+    clipped: float = 254.5 / 255
+    """Share of white that is clipped."""
+
+    last_resort: float = 1e-4
+    """Weight of the middle exposure where no other counts: what is beyond another's border is still shown."""
+
+    moved_stops: float = 0.4
+    """Stops by which an exposure may differ from all around the same place in the next one: noise of 2 levels at the
+    darkest that is compared is 0.25."""
+
+    compared_levels: int = 32
+    """Steps of the display-encoded range for each of which the usual difference of two exposures is found: cameras'
+    curves differ from sRGB's, and that is no movement."""
+
+    least_compared: int = 50
+    """px of such a step, at least, for a median."""
+
+    curve_stops: float = 0.3
+    """Stops by which the medians of steps may lie off the parabola through them before they count by half: one is
+    another where something moved over all that has its brightness."""
+
+    curve_rounds: int = 10
+    """Rounds of weighted least squares, at which the parabola no longer moves."""
+
+    least_moved: float = 1e-4
+    """Share of the pixels that something which moved has at least: below, it is noise."""
+
+    moved_margin_px: int = 7
+    """px around it, at the working size, that are taken from the same exposure: its soft edge."""
+
+    moved_edge_px: float = 2.0
+    """Width (σ) of the change from that exposure to the others, px at the working size."""
+
+    well_exposed: float = 0.9
+    """Share of what moved that the middle exposure has to show well to be the one that is taken; else the one that
+    shows most of it."""
+
+
 PREVIEW = PreviewOptions()
+BRACKETS = BracketOptions()
+MERGE = MergeOptions()

@@ -20,16 +20,34 @@ from ..pictures.picture import Picture, in_same_colour_space, load_picture, pict
 from ..pictures.raw_development import RawExposure, exposure_of_first
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
+from .brackets import brackets_in
 from .frame import Frame, size_of
+from .merging import MergedBracket, merged
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
 Source = str | Path | NDArray[Any] | Picture
 # Beyond this, pairs and memory were never tried.
 MOST_PICTURES = 60
+# Exposures of one view that a camera takes in a row, at most.
+MOST_EXPOSURES = 9
 
 
 def check_count(count: int, options: StitchOptions) -> None:
-    """Refuses (BadRequest) as many pictures as cannot be stitched, and options that do not go with so many."""
+    """Refuses (BadRequest) as many files as cannot be stitched, and options that do not go with so many."""
+    if isinstance(options.brackets, int):
+        if count % options.brackets:
+            raise BadRequest(
+                f"{count} pictures are given, which are no brackets of {options.brackets}: leave out what is extra"
+            )
+        _check_views(count // options.brackets, options)
+    elif options.brackets == "off" or count <= MOST_PICTURES:
+        _check_views(count, options)
+    elif count > MOST_PICTURES * MOST_EXPOSURES:
+        _check_views(count, options)
+
+
+def _check_views(count: int, options: StitchOptions) -> None:
+    """The same of pictures of different views."""
     if count < 2:
         raise BadRequest("one picture alone makes no panorama: give two that were taken from different places")
     if count > MOST_PICTURES:
@@ -47,31 +65,77 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
     sources : sequence of (str, Path, ndarray or Picture)
         Of two the reference first.
     options : StitchOptions
-        Their scale and masks.
+        Their scale and masks, and what is a bracket.
 
     Returns
     -------
     Frame
-        Of several copies of a picture the first.
+        Of several copies of a picture the first, and one of the exposures of one view.
 
     Raises
     ------
     UnreadableImage
         Files are no pictures, or damaged; all of them are named.
     BadRequest
-        A wrong number of pictures, or a mask that does not fit.
+        A wrong number of pictures, a mask that does not fit, or brackets that are none.
     NoOverlap
         The same picture twice, and no other.
     """
     check_count(len(sources), options)
-    pictures = in_same_colour_space(_named_apart(_all_read(sources), sources))
+    given = _named_apart(_all_read(sources), sources)
+    views, members, brackets = _views_of(given, options)
+    if brackets:
+        _check_views(len(views), options)
+    pictures = in_same_colour_space(views)
     copies = dict(_copies(pictures))
     if len(pictures) - len(copies) == 1:
         which = "the two pictures are" if len(pictures) == 2 else "all pictures are"
         raise NoOverlap(f"{which} the same picture: choose two photographs taken from different places")
     if copies:
-        check_count(len(pictures) - len(copies), options)
-    return prepare(pictures, options, copies)
+        _check_views(len(pictures) - len(copies), options)
+    if not brackets:
+        return prepare(pictures, options, copies)
+    masks = options.ignored_in([picture.name for picture in given])
+    of_views = tuple(next((masks[number] for number in one if masks[number] is not None), None) for one in members)
+    frame = prepare(pictures, replace(options, ignore=of_views, ignore_in=()), copies)
+    view_of = {number: view for view, numbers in enumerate(members) for number in numbers}
+    return replace(
+        frame, shown_by=tuple(frame.shown_by[view_of[number]] for number in range(len(given))),
+        warnings=(_said_of(brackets), *frame.warnings), brackets=tuple(brackets),
+    )  # fmt: skip
+
+
+def _views_of(
+    given: list[Picture], options: StitchOptions
+) -> tuple[list[Picture], list[tuple[int, ...]], list[MergedBracket]]:
+    """Pictures of different views, exposures of one merged: of each the numbers of the pictures it was made of, in
+    order of the first; and what was merged."""
+    found = brackets_in(given, options.brackets)
+    of_first = {min(bracket.numbers): bracket for bracket in found}
+    joined = {number for bracket in found for number in bracket.numbers}
+    views: list[Picture] = []
+    members: list[tuple[int, ...]] = []
+    brackets: list[MergedBracket] = []
+    for number, picture in enumerate(given):
+        if number in of_first:
+            picture, bracket = merged(given, of_first[number])
+            brackets.append(bracket)
+            members.append(of_first[number].numbers)
+        elif number in joined:
+            continue
+        else:
+            members.append((number,))
+        views.append(picture)
+    return views, members, brackets
+
+
+def _said_of(brackets: Sequence[MergedBracket]) -> str:
+    """What was merged, in words."""
+    count = sum(len(bracket.names) for bracket in brackets)
+    of_each = sorted({len(bracket.names) for bracket in brackets})
+    many = f"{len(brackets)} brackets" if len(brackets) > 1 else "a bracket"
+    exposures = " or ".join(map(str, of_each))
+    return f"{count} pictures are {many} of {exposures} exposures and were merged; --brackets off keeps them apart"
 
 
 def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[int, int] | None = None) -> Frame:

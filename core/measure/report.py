@@ -199,7 +199,7 @@ def options_entry(options: StitchOptions, alignment: Alignment) -> dict[str, Any
         "slide": options.slide if options.may_slide else 0, "level": options.level, "centre": options.centre,
         "fov": options.fov, "scale": options.scale, "crop": options.crop, "blend": options.blend,
         "seam": options.seam, "exposure": options.exposure, "holes": options.holes, "seed": options.seed,
-        "scale_metres": options.scale_metres, "preview": options.preview,
+        "scale_metres": options.scale_metres, "preview": options.preview, "brackets": options.brackets,
     }  # fmt: skip
 
 

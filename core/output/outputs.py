@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..measure.report import plain
 from ..panorama.layers import Layer
 from ..pictures.encoding import encode_into, encode_picture, output_bits
+from ..pictures.exr import ExrForm
 from ..raster.arrays import cut
 from ..raster.colour import decode
 from ..raster.enlarging import repeated
@@ -26,6 +27,7 @@ from .depth.mesh import mesh_bytes
 from .depth.range_image import range_bytes, range_image
 from .match_table import match_file
 from .rig_page import rig_page
+from .sphere_part import sphere_part_of
 from .warp_file import write_warp
 
 if TYPE_CHECKING:
@@ -64,6 +66,8 @@ class OutputRequest:
         .exr.
     mesh : Path, optional
         .glb.
+    exr : ExrForm
+        How panorama and layers are written as .exr.
     """
 
     panorama: Path
@@ -73,6 +77,7 @@ class OutputRequest:
     cameras: Path | None = None
     depth: Path | None = None
     mesh: Path | None = None
+    exr: ExrForm = ExrForm()
 
     @property
     def timing(self) -> Path | None:
@@ -216,10 +221,11 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     alpha = None if result.panorama.alpha.min() >= 1.0 else result.panorama.alpha
     suffix = request.panorama.suffix
     warnings = list(files.add_by(request.panorama, lambda file: encode_into(
-        file.write, result.panorama.light, alpha, result.bits, suffix, reference.icc, reference.exif
+        file.write, result.panorama.light, alpha, result.bits, suffix, reference.icc, reference.exif, request.exr,
+        sphere_part_of(result),
     )))  # fmt: skip
     if request.layers is not None:
-        _add_layers(result, request.layers, files)
+        _add_layers(result, request.layers, request.exr, files)
     if request.warp is not None:
         files.add_by(request.warp, lambda file: write_warp(result, file))
     if request.cameras is not None:
@@ -257,7 +263,7 @@ def add_report(
         files.add(page_beside(report), rig_page(result).encode(errors="replace"))
 
 
-def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
+def _add_layers(result: StitchResult, folder: Path, exr: ExrForm, files: OutputFiles) -> None:
     """Stages everything of a layers' folder."""
     place, names = result.spread, [picture.name for picture in result.pictures]
 
@@ -268,7 +274,8 @@ def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
     if result.rig is not None:
         _refuse_other_files(folder, layer_files(names, (".png", ".exr")))
     for number, picture in enumerate(result.pictures):
-        _add_layer(files, folder, layer_stem(number, picture.name), result.full_layer(number).within(place), result)
+        layer = result.full_layer(number).within(place)
+        _add_layer(files, folder / layer_stem(number, picture.name), layer, result, exr)
     asked = result.report["options"]
     first = 0 if asked["slide"] else 1  # from its own place the reference sees all that it shows
     masks = {
@@ -292,13 +299,12 @@ def _add_layers(result: StitchResult, folder: Path, files: OutputFiles) -> None:
     files.add_to_folder(folder, CANVAS, json_bytes(about))
 
 
-def _add_layer(files: OutputFiles, folder: Path, name: str, layer: Layer, result: StitchResult) -> None:
+def _add_layer(files: OutputFiles, path: Path, layer: Layer, result: StitchResult, exr: ExrForm) -> None:
     """Stages one layer as .png, and as .exr too where a picture is of floats, which a PNG clips."""
     icc, exif = result.pictures[0].icc, result.pictures[0].exif
     for bits, suffix in ((result.bits, ".png"), (32, ".exr"))[: 2 if result.bits == 32 else 1]:
-        files.add_to_folder(
-            folder, name + suffix, encode_picture(layer.light, layer.alpha, bits, suffix, icc, exif)[0]
-        )
+        data, _ = encode_picture(layer.light, layer.alpha, bits, suffix, icc, exif, exr)
+        files.add_to_folder(path.parent, path.name + suffix, data)
 
 
 def _label_bytes(labels: NDArray[np.int16], count: int) -> bytes:

@@ -1,4 +1,4 @@
 """From a file or array to a Picture, and back to a file.
 
-May import system and raster.
+May import system, raster and the choices.
 """

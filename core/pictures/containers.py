@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from .heif import HeifFacts, read_heif
 from .options import READING
+from .radiance_header import is_radiance, read_header
 
 # The first marker after JPEG's entropy-coded data: FF not followed by a stuffed 00, a restart marker or filling FF.
 _JPEG_MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")
@@ -36,7 +37,7 @@ class TiffFacts:
 
 @dataclass(frozen=True)
 class Structure:
-    """A picture file from outside. kind: png, jpeg, tiff, webp, bmp, heic or exr; width, height px, 0 where not found.
+    """A picture file from outside. kind: png, jpeg, tiff, webp, bmp, heic, hdr or exr; width, height px, or 0.
 
     damage says in words what is broken, or is empty. exif: the raw block as a TIFF structure (for TIFF the file
     itself). gray: a PNG without colour, which decoders may widen to RGBA for the sake of its alpha.
@@ -77,6 +78,9 @@ def read_structure(data: bytes) -> Structure | None:
     if container_brand(data) == "HEIC":
         facts = read_heif(data)
         return Structure("heic", facts.width, facts.height, facts.damage, facts.exif, facts.icc, heif=facts)
+    if is_radiance(data):
+        header = read_header(data)
+        return Structure("hdr", *header.size, header.damage)
     if data[:2] == b"BM" and len(data) >= 26:
         width, height = struct.unpack_from("<ii", data, 18)
         return Structure("bmp", abs(width), abs(height))

@@ -18,27 +18,29 @@ from ..system.errors import BadRequest, UnwritableOutput
 from ..system.output_files import OutputFiles
 from ..system.threads import in_order
 from .decoding import quiet_opencv
-from .exr import write_exr
-from .metadata import Exif, embed
+from .exr import DEFAULT_FORM, ExrForm, write_exr
+from .gpano import SpherePart, xmp_packet
+from .metadata import SOFTWARE, Exif, embed
 from .options import WRITING
 from .picture import curves_for
 from .png import encode_png
+from .radiance import encode_radiance
 
 # suffix: container, bits it can hold
 _WRITABLE = {
     ".png": ("png", 16), ".jpg": ("jpeg", 8), ".jpeg": ("jpeg", 8), ".tif": ("tiff", 16), ".tiff": ("tiff", 16),
-    ".exr": ("exr", 32),
+    ".exr": ("exr", 32), ".hdr": ("hdr", 32),
 }
 _JPEG_LONGEST_SIDE = 65500  # libjpeg's limit
 
 
 def output_bits(bits: Iterable[int], suffix: str) -> int:
-    """Bits per channel of an output: the deepest input's, as far as the file kind goes; EXR is always 32.
+    """Bits per channel of an output: the deepest input's, as far as the file kind goes; EXR and HDR are always 32.
 
     suffix: with its dot, any case. Raises BadRequest for a kind that is not written.
     """
     kind, most = _writable(suffix)
-    return 32 if kind == "exr" else min(max(bits), most)
+    return most if kind in ("exr", "hdr") else min(max(bits), most)
 
 
 def _writable(suffix: str) -> tuple[str, int]:
@@ -50,8 +52,8 @@ def _writable(suffix: str) -> tuple[str, int]:
 
 def encode_picture(
     pixels: AnyImage, alpha: NDArray[Any] | None, bits: int, suffix: str, icc: bytes | None = None,
-    exif: Exif | None = None,
-) -> tuple[bytes, tuple[str, ...]]:
+    exif: Exif | None = None, exr: ExrForm = DEFAULT_FORM, sphere: SpherePart | None = None,
+) -> tuple[bytes, tuple[str, ...]]:  # fmt: skip
     """Encode a picture as a file.
 
     Parameters
@@ -59,13 +61,17 @@ def encode_picture(
     pixels : (H, W, C) array or LazyImage
         Light as in Picture.
     alpha : (H, W), optional
-        float32 in [0, 1], or bool. JPEG gets black where it is 0, the others keep it.
+        float32 in [0, 1], or bool. JPEG and HDR get black where it is 0, the others keep it.
     bits : int
         The deepest input's: 8, 16 or 32.
     suffix : str
-        .png, .jpg, .jpeg, .tif, .tiff or .exr. EXR holds linear sRGB, multiplied by alpha.
+        .png, .jpg, .jpeg, .tif, .tiff, .exr or .hdr. EXR and HDR hold linear sRGB, multiplied by alpha.
     icc, exif : optional
         As in Picture.
+    exr : ExrForm
+        How an EXR is written.
+    sphere : SpherePart, optional
+        The part of an equirectangular sphere that it is: viewers are told.
 
     Returns
     -------
@@ -82,13 +88,13 @@ def encode_picture(
         The picture does not fit into this kind of file.
     """
     pieces: list[bytes] = []
-    warnings = encode_into(pieces.append, pixels, alpha, bits, suffix, icc, exif)
+    warnings = encode_into(pieces.append, pixels, alpha, bits, suffix, icc, exif, exr, sphere)
     return pieces[0] if len(pieces) == 1 else b"".join(pieces), warnings
 
 
 def encode_into(
     put: Callable[[bytes], object], pixels: AnyImage, alpha: NDArray[Any] | None, bits: int, suffix: str,
-    icc: bytes | None = None, exif: Exif | None = None,
+    icc: bytes | None = None, exif: Exif | None = None, exr: ExrForm = DEFAULT_FORM, sphere: SpherePart | None = None,
 ) -> tuple[str, ...]:  # fmt: skip
     """Encode a picture as a file, and hand over each piece of it as soon as it is made: of a PNG no more than some rows
     are held. Arguments, warnings returned and errors: see `encode_picture`."""
@@ -96,7 +102,13 @@ def encode_into(
     depth = output_bits((bits,), suffix)
     exif = exif or Exif()
     if kind == "exr":
-        put(write_exr(in_srgb(pixels, icc), alpha, exif))
+        data, share = write_exr(in_srgb(pixels, icc), alpha, exif, exr, sphere is not None and sphere.is_whole)
+        put(data)
+        most = f"half floats hold ({WRITING.max_half:.0f})"
+        lost = f"{share:.2%} of the pixels are brighter than {most} and were clipped; --exr-depth float keeps them"
+        return (lost,) if share else ()
+    if kind == "hdr":
+        _put_radiance(put, in_srgb(pixels, icc), alpha, exif)
         return ()
     height, width = pixels.shape[:2]
     if kind == "jpeg" and max(width, height) > _JPEG_LONGEST_SIDE:
@@ -105,16 +117,29 @@ def encode_into(
     channels = 3 if alpha is not None and kind != "jpeg" else pixels.shape[2]
     if icc is not None and icc_channels(icc) != channels:
         icc = None
+    xmp = None if sphere is None else xmp_packet(sphere)
     levels = _Levels(pixels, alpha, depth, curves_for(icc, channels), kind == "jpeg")
     if kind == "png":
-        brighter = levels.into_png(put, lambda header: embed(header, kind, exif, icc))
+        brighter = levels.into_png(put, lambda header: embed(header, kind, exif, icc, xmp=xmp))
     else:
         coded, brighter = levels.as_array()
-        put(embed(_by_opencv(coded, suffix), kind, exif, icc, straight_alpha=levels.shape[2] == 4))
+        put(embed(_by_opencv(coded, suffix), kind, exif, icc, levels.shape[2] == 4, xmp))
     if bits < 32:
         return ()
     lost = f", and {brighter:.2%} of its pixels, brighter than white, were clipped" if brighter else ""
     return (f"float input was written display-encoded with {depth} bits{lost}; .exr keeps it",)
+
+
+def _put_radiance(put: Callable[[bytes], object], light: AnyImage, alpha: NDArray[Any] | None, exif: Exif) -> None:
+    """Hands over the pieces of a Radiance file of light in the primaries of sRGB."""
+
+    def shown(rows: slice) -> NDArray[Any]:
+        part = light[rows, 0 : light.shape[1]]
+        return part if alpha is None else part * alpha[rows][..., None]
+
+    lines = {"SOFTWARE": SOFTWARE, "CAPDATE": exif.text(36867) or exif.text(306)}
+    for piece in encode_radiance(light.shape, shown, {name: text for name, text in lines.items() if text}):
+        put(piece)
 
 
 def in_srgb(pixels: AnyImage, icc: bytes | None) -> AnyImage:

@@ -5,16 +5,22 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..choices import EXR_COMPRESSIONS, EXR_DEPTHS
 from ..raster.arrays import strips
 from ..raster.lazy import AnyImage
-from ..system.errors import UnreadableImage
-from ..system.threads import each
+from ..system.errors import BadRequest, UnreadableImage
+from ..system.threads import in_order
 from .metadata import SOFTWARE, Exif
+from .options import WRITING
+
+# x, y of red, green, blue and white of Rec. 709, as the attribute `chromaticities` holds them
+_REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 
 class ExrPixels(NamedTuple):
@@ -135,37 +141,77 @@ def _in_display_window(layer: _Layer) -> tuple[NDArray[Any], NDArray[Any] | None
     return whole, whole_alpha
 
 
-def write_exr(pixels: AnyImage, alpha: NDArray[Any] | None, exif: Exif) -> bytes:
-    """A 32-bit ZIP-compressed EXR file in memory.
+@dataclass(frozen=True)
+class ExrForm:
+    """How an EXR file of colours is written.
+
+    Attributes
+    ----------
+    depth : str, default "float"
+        One of EXR_DEPTHS: 32 bits a channel, or "half", which are 16: three digits, up to 65504.
+    compression : str, default "zip"
+        One of EXR_COMPRESSIONS: without loss, or "dwab", which is smaller and loses what is not seen.
+    """
+
+    depth: str = "float"
+    compression: str = "zip"
+
+    def __post_init__(self) -> None:
+        for what, value, known in (
+            ("depth", self.depth, EXR_DEPTHS), ("compression", self.compression, EXR_COMPRESSIONS),
+        ):  # fmt: skip
+            if value not in known:
+                raise BadRequest(f"the {what} {value!r} of EXR is not offered; choose from: {', '.join(known)}")
+
+
+DEFAULT_FORM = ExrForm()
+
+
+def write_exr(
+    pixels: AnyImage, alpha: NDArray[Any] | None, exif: Exif, form: ExrForm = DEFAULT_FORM, whole_sphere: bool = False
+) -> tuple[bytes, float]:
+    """An EXR file in memory, and the share of its pixels that are brighter than it can hold.
 
     pixels: float32 H×W×C (1 or 3), scene-linear in Rec. 709 primaries, straight; stored premultiplied. alpha: float32
-    H×W or None. Photographer, time and camera go into the standard attributes.
+    H×W or None. whole_sphere: it is a whole sphere, which the attribute `envmap` says. Photographer, time, camera and
+    primaries go into the standard attributes.
     """
-    names = "RGB" if pixels.shape[2] == 3 else "Y"
-    channels = {name: np.empty(pixels.shape[:2], np.float32) for name in names}
+    import OpenEXR
 
-    def put(rows: slice) -> None:
+    kind = np.float16 if form.depth == "half" else np.float32
+    most = WRITING.max_half if form.depth == "half" else np.inf
+    names = "RGB" if pixels.shape[2] == 3 else "Y"
+    channels: dict[str, NDArray[Any]] = {name: np.empty(pixels.shape[:2], kind) for name in names}
+
+    def put(rows: slice) -> int:
         part = pixels[rows, 0 : pixels.shape[1]]
         stored = part if alpha is None else part * alpha[rows][..., None]
         for index, name in enumerate(names):
-            channels[name][rows] = stored[..., index]
+            channels[name][rows] = np.clip(stored[..., index], -most, most)
+        return int(np.count_nonzero((stored > most).any(axis=2)))
 
-    each(put, strips(pixels.shape))
+    beyond = sum(in_order(put, strips(pixels.shape)))
     if alpha is not None:
-        channels["A"] = np.ascontiguousarray(alpha, np.float32)
-    texts = {
+        channels["A"] = np.ascontiguousarray(alpha, kind)
+    attributes: dict[str, Any] = {
         "owner": exif.text(33432) or exif.text(315), "capDate": exif.text(36867) or exif.text(306),
         "comments": " ".join(filter(None, (exif.make, exif.model, exif.lens))), "software": SOFTWARE,
     }
-    return exr_of_channels(channels, {name: text for name, text in texts.items() if text})
+    attributes = {name: text for name, text in attributes.items() if text}
+    if len(names) == 3:
+        attributes["chromaticities"] = _REC_709
+    if whole_sphere:
+        attributes["envmap"] = OpenEXR.ENVMAP_LATLONG
+    return exr_of_channels(channels, attributes, form.compression), beyond / max(1, pixels.shape[0] * pixels.shape[1])
 
 
-def exr_of_channels(channels: dict[str, NDArray[np.float32]], texts: dict[str, str]) -> bytes:
-    """A 32-bit ZIP-compressed EXR file in memory of channels (H, W) by their names, with attributes of text."""
+def exr_of_channels(channels: dict[str, NDArray[Any]], attributes: dict[str, Any], compression: str = "zip") -> bytes:
+    """An EXR file in memory of channels (H, W), float32 or float16, by their names, with attributes; compression: one
+    of EXR_COMPRESSIONS."""
     import OpenEXR
 
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header = {"compression": getattr(OpenEXR, f"{compression.upper()}_COMPRESSION"), "type": OpenEXR.scanlineimage}
     stream = io.BytesIO()
-    with OpenEXR.File(header | texts, channels) as file:
+    with OpenEXR.File(header | attributes, channels) as file:
         file.write(stream)
     return stream.getvalue()

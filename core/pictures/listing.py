@@ -13,7 +13,7 @@ from .camera_raw import RAW_SUFFIXES
 # Endings of what cameras write beside a RAW file, as the same picture once more.
 _BESIDE_RAW = frozenset((".jpg", ".jpeg", ".heic", ".heif", ".hif"))
 # Endings of the files that are taken for pictures without being named.
-SUFFIXES = frozenset((".png", ".tif", ".tiff", ".exr", ".webp", ".bmp")) | _BESIDE_RAW | RAW_SUFFIXES
+SUFFIXES = frozenset((".png", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".bmp")) | _BESIDE_RAW | RAW_SUFFIXES
 
 
 def listed(paths: Sequence[Path]) -> list[Path]:

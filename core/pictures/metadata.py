@@ -20,7 +20,7 @@ from .png import chunk
 
 SOFTWARE = "EDF Stitch"
 _JPEG_SEGMENT = 65533  # bytes a JPEG segment holds after its length
-_ASCII, _SHORT, _LONG, _RATIONAL, _UNDEFINED, _SIGNED_RATIONAL = 2, 3, 4, 5, 7, 10
+_BYTE, _ASCII, _SHORT, _LONG, _RATIONAL, _UNDEFINED, _SIGNED_RATIONAL = 1, 2, 3, 4, 5, 7, 10
 # ExifRead's name, tag number, type to write. The first group stands in the first directory, the second in the Exif one.
 _IMAGE_TAGS = (
     ("Image Make", 271, _ASCII), ("Image Model", 272, _ASCII), ("Image DateTime", 306, _ASCII),
@@ -42,8 +42,9 @@ class Exif:
     """What a picture's EXIF says; an empty text, None or orientation 1 where it says nothing (or nonsense).
 
     orientation: 1..8 as stored in the file. width, height (ExifImageWidth/Height) in pixels and focal_plane_*_per_mm in
-    sensor pixels per mm belong to the picture as the sensor held it, unless `upright` turned them. kept: (tag number,
-    value) of the tags that are written again; a value is a text, an integer, or (numerator, denominator).
+    sensor pixels per mm belong to the picture as the sensor held it, unless `upright` turned them. heading: degrees
+    from true north to the east at which the camera looked. kept: (tag number, value) of the tags that are written
+    again; a value is a text, an integer, or (numerator, denominator).
     """
 
     orientation: int = 1
@@ -56,6 +57,7 @@ class Exif:
     focal_plane_y_per_mm: float | None = None
     width: int | None = None
     height: int | None = None
+    heading: float | None = None
     kept: tuple[tuple[int, str | int | tuple[int, int]], ...] = ()
 
     def upright(self) -> Exif:
@@ -96,6 +98,7 @@ def read_exif(block: bytes | None) -> Exif:
     per_mm = {2: 1 / 25.4, 3: 0.1}.get(int(_number(tags.get("EXIF FocalPlaneResolutionUnit"), 1, 5) or 2))
     plane = [_number(tags.get(f"EXIF FocalPlane{axis}Resolution"), 1, 1e6) for axis in "XY"]
     plane_per_mm = [None if value is None or per_mm is None else value * per_mm for value in plane]
+    north = tags.get("GPS GPSImgDirectionRef")  # T is the true one; M, the magnetic, lies elsewhere
     size = [_number(tags.get(f"EXIF ExifImage{side}"), 1, 1e6) for side in ("Width", "Length")]
     return Exif(
         orientation=int(_number(tags.get("Image Orientation"), 1, 8) or 1),
@@ -105,6 +108,7 @@ def read_exif(block: bytes | None) -> Exif:
         focal35_mm=_number(tags.get("EXIF FocalLengthIn35mmFilm"), 1, 10000),
         focal_plane_x_per_mm=plane_per_mm[0], focal_plane_y_per_mm=plane_per_mm[1],
         width=None if size[0] is None else int(size[0]), height=None if size[1] is None else int(size[1]),
+        heading=_number(tags.get("GPS GPSImgDirection"), 0, 360) if _text(north) == "T" else None,
         kept=tuple((number, value) for number, value in kept if value is not None),
     )
 
@@ -212,24 +216,28 @@ def _directory(fields: list[Field], at: int) -> bytes:
     return entries + struct.pack("<I", 0) + values
 
 
-def embed(encoded: bytes, kind: str, exif: Exif, icc: bytes | None, straight_alpha: bool = False) -> bytes:
-    """The encoded picture with EXIF and, where given, an ICC profile put in.
+def embed(
+    encoded: bytes, kind: str, exif: Exif, icc: bytes | None, straight_alpha: bool = False, xmp: bytes | None = None
+) -> bytes:
+    """The encoded picture with EXIF and, where given, an ICC profile and an XMP packet put in.
 
     encoded: bytes as `png` and OpenCV write them; kind: jpeg, png or tiff (little-endian, classic). straight_alpha: say
     in a TIFF that the fourth sample is a straight alpha.
     """
     if kind == "jpeg":
-        return _embed_jpeg(encoded, exif, icc)
+        return _embed_jpeg(encoded, exif, icc, xmp)
     if kind == "png":
-        return _embed_png(encoded, exif, icc)
-    return _embed_tiff(encoded, exif, icc, straight_alpha)
+        return _embed_png(encoded, exif, icc, xmp)
+    return _embed_tiff(encoded, exif, icc, straight_alpha, xmp)
 
 
-def _embed_jpeg(encoded: bytes, exif: Exif, icc: bytes | None) -> bytes:
+def _embed_jpeg(encoded: bytes, exif: Exif, icc: bytes | None, xmp: bytes | None) -> bytes:
     def segment(marker: int, body: bytes) -> bytes:
         return struct.pack(">BBH", 0xFF, marker, len(body) + 2) + body
 
     parts = [encoded[:2], segment(0xE1, b"Exif\0\0" + exif_block(exif))]
+    if xmp:
+        parts.append(segment(0xE1, b"http://ns.adobe.com/xap/1.0/\0" + xmp))
     if icc:
         step = _JPEG_SEGMENT - 14
         pieces = [icc[at : at + step] for at in range(0, len(icc), step)]
@@ -239,18 +247,21 @@ def _embed_jpeg(encoded: bytes, exif: Exif, icc: bytes | None) -> bytes:
     return b"".join([*parts, encoded[2:]])
 
 
-def _embed_png(encoded: bytes, exif: Exif, icc: bytes | None) -> bytes:
+def _embed_png(encoded: bytes, exif: Exif, icc: bytes | None, xmp: bytes | None) -> bytes:
     header_end = 8 + 12 + 13
     profile = chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(icc)) if icc else b""
-    return encoded[:header_end] + profile + chunk(b"eXIf", exif_block(exif)) + encoded[header_end:]
+    packet = chunk(b"iTXt", b"XML:com.adobe.xmp\0\0\0\0\0" + xmp) if xmp else b""
+    return encoded[:header_end] + profile + chunk(b"eXIf", exif_block(exif)) + packet + encoded[header_end:]
 
 
-def _embed_tiff(encoded: bytes, exif: Exif, icc: bytes | None, straight_alpha: bool) -> bytes:
+def _embed_tiff(encoded: bytes, exif: Exif, icc: bytes | None, straight_alpha: bool, xmp: bytes | None) -> bytes:
     directory = tiff_directory(encoded)
     assert directory is not None and encoded[:4] == b"II*\0", "written by OpenCV a moment ago"
     first, second = _fields(exif)
     if icc:
         first.append((34675, _UNDEFINED, len(icc), icc))
+    if xmp:
+        first.append((700, _BYTE, len(xmp), xmp))
     if straight_alpha:
         first.append(_field(338, _SHORT, 2))
     new = {field[0] for field in first}

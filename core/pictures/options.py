@@ -26,6 +26,14 @@ class ReadingOptions:
     raw_pixels_per_byte: int = 16
     # Bytes of an unpacked ICC profile; real ones have up to 2 MB, and a PNG's is compressed.
     max_icc_bytes: int = 8 << 20
+    # Bytes up to which the header of a Radiance picture is looked for: programs put their whole command into it.
+    max_header_bytes: int = 1 << 16
+    # Share by which the sides of a pixel may differ and still be taken as square: rounding.
+    square_pixels: float = 0.005
+    # Least that light may be multiplied by according to a header, and most the other way: floats hold 38 digits.
+    least_scale: float = 1e-12
+    # x and y by which primaries may differ and still be the same: headers are rounded.
+    same_primaries: float = 0.002
     # Share of pixels that are not finite up to which a float picture is used; beyond, something else went wrong.
     max_not_finite: float = 0.5
 
@@ -38,6 +46,8 @@ class WritingOptions:
     jpeg_quality: int = 95
     # zlib's level, 1 to 9: the fastest; photographs hardly pack better on higher ones.
     png_level: int = 1
+    # The largest number that half a float (16 bits) holds.
+    max_half: float = 65504.0
     # Bytes of a text in EXIF: the whole block has to fit into one JPEG segment of 64 kB.
     max_text_bytes: int = 2000
 

@@ -26,9 +26,10 @@ from .decoding import check_size, decode_exr, decode_file, read_file, turn
 from .heif_decoding import decode_heif
 from .metadata import Exif, read_exif
 from .options import READING
+from .radiance import decode_radiance
 from .raw_development import RawExposure, develop
 
-_READABLE = "PNG, JPEG, TIFF, EXR, HEIC, WebP or BMP"
+_READABLE = "PNG, JPEG, TIFF, EXR, HDR, HEIC, WebP or BMP"
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +87,7 @@ class Picture:
 def load_picture(
     path: str | Path, pixels_per_byte: int = READING.photograph_pixels_per_byte, exposure: RawExposure | None = None
 ) -> Picture:
-    """Read a PNG, JPEG, TIFF, EXR, HEIC, WebP or BMP file of 8, 16 or 32 bits (float), gray or colour, with or without
+    """Read a PNG, JPEG, TIFF, EXR, HDR, HEIC, WebP or BMP file of 8, 16 or 32 bits (float), gray or colour, with any
     alpha, or a camera RAW file, which becomes a float picture.
 
     Parameters
@@ -131,6 +132,9 @@ def _load(path: Path, pixels_per_byte: int, exposure: RawExposure | None) -> Pic
         kind = structure.kind.upper()
         raise UnreadableImage(f"the {kind} file is damaged: {structure.damage}; copy or export it again")
     check_size(structure.width, structure.height, len(data), pixels_per_byte)
+    if structure.kind == "hdr":
+        raw, warnings = decode_radiance(data)
+        return _picture(raw, False, Exif(), None, path.name, warnings)
     exif = read_exif(structure.exif)
     if structure.heif is not None:  # its decoder has turned it
         heif, upright = decode_heif(data, structure), replace(exif.upright(), orientation=1)

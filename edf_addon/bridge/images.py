@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Kinds of files that the engine reads itself.
-READABLE = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".webp", ".bmp"})
+READABLE = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".bmp"})
 # How a fingerprint begins: of a file, or of pixels that are in no file.
 FILE, PIXELS = "file ", "pixels "
 # Bits per pixel, over all channels, of images without alpha.
@@ -164,12 +164,12 @@ def is_files_own(image: bpy.types.Image) -> bool:
 
 def _is_plain(image: bpy.types.Image) -> bool:
     """Whether colour space and alpha are those that the kind of file has anyway."""
-    suffix = Path(image.filepath_raw).suffix.lower()
-    usual_alpha = "PREMUL" if suffix == ".exr" else "STRAIGHT"
+    holds_light = Path(image.filepath_raw).suffix.lower() in (".exr", ".hdr")
+    usual_alpha = "PREMUL" if holds_light else "STRAIGHT"
     if image.depth not in OPAQUE_DEPTHS and image.alpha_mode != usual_alpha:
         return False
     # bytes stay bytes whatever they mean, and the panorama gets their colour space; floats were converted
-    usual_space = compat.LINEAR if suffix == ".exr" else compat.DISPLAY
+    usual_space = compat.LINEAR if holds_light else compat.DISPLAY
     return not image.is_float or image.colorspace_settings.name == usual_space
 
 

@@ -53,6 +53,7 @@ def make_job(
     job["options"] = engine_options.options_of(settings, scale)
     wanted = [name for name in ("layers", "masks", "depth") if getattr(settings, f"take_{name}")]
     job["take"] = wanted if scale is None else []
+    job["exr"] = engine_options.exr_form_of(settings)
     job["masks"] = {}
     for side in ownership.SIDES:
         mask = getattr(settings, f"ignore_{side}")

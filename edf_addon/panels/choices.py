@@ -68,6 +68,8 @@ OUTPUT = (
     Row("light"),
     Row("light_stops", shown=lambda settings: settings.light == "AUTO"),
     Row("holes", why_not=lambda settings: "An average has no holes" if settings.blend == "LINEAR" else ""),
+    Row("exr_depth"),
+    Row("exr_compression"),
     Row("scale"),
     Row("seed"),
 )

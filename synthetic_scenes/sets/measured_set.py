@@ -26,6 +26,7 @@ from .set_measures import (
     poses,
     range_figures,
 )
+from .set_radiance import radiance_figures
 from .set_seams import seam_figures
 from .set_sliding import beside_figures
 from .set_stitches import SLID, WAYS, Shared, stitched
@@ -81,6 +82,7 @@ def measured_set(rendered: RenderedSet) -> MeasuredSet:
         maps, by_picture = map_figures(found)
         by_picture = [line | pose for line, pose in zip(by_picture, poses(found), strict=True)]
         figures = pose_figures(found) | maps | range_figures(found) | line_figures(found) | thing_figures(found)
+        figures |= radiance_figures(found)
         left = [path.stem for number, path in enumerate(rendered.pictures) if number not in found.numbers]
         runs[way] = _run("", result.warnings, len(found.numbers), left, figures, by_picture)
         panoramas[way] = _Shown(*on_the_sphere(found), found)

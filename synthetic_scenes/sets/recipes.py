@@ -28,7 +28,7 @@ class SetRecipe:
     (standard deviation, m), and chance; noise: σ of the sensor's, levels of 8 bit; strays: how many pictures, the
     last ones, show another place; parallax: whether one place cannot explain all pictures; agx: whether pictures are 8
     bit by Blender's view AgX, which takes lights back as cameras do, not by Standard; exposures: how often and by how
-    much brighter, EV, each picture is taken, the one that is stitched first.
+    much brighter, EV, each picture is taken, the middle one first.
     """
 
     name: str
@@ -198,7 +198,7 @@ _SETS = (
     SetRecipe("room_sphere", "A furnished room all around, up and down, in three rings of pictures", "room",
               rings(24.0), 27, 0.15, seed=4, agx=True),
     SetRecipe("brackets", "Five pictures, each exposed three times, of a room with a window, a lamp and a glossy floor",
-              "bright_room", fan(32.0, 24.0), 5, 0.12, seed=14, agx=True, exposures=(0.0, -2.0, 2.0)),
+              "bright_room", fan(32.0, 24.0), 5, 0.12, seed=14, exposures=(0.0, -4.0, 2.0)),
     SetRecipe("mixed", "Six pictures from a tripod, four more from the hand", "room", on_a_tripod(24.0, 26.0, 4), 10,
               0.15, seed=8),
     SetRecipe("stray", "Nine pictures, two of them of another place", "two_rooms",

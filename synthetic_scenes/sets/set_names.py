@@ -20,6 +20,8 @@ SET_MEASURES = {
     "slid_beside_px": ("beside the truth's rays, viewpoint slides, median", "px", 2),
     "slid_beside_p95_px": ("beside the truth's rays, viewpoint slides, 95th", "px", 2),
     "s1": ("how far the viewpoint slides", "", 2),
+    "radiance_percent": ("merged exposures: radiance, over 12 stops, median", "%", 2),
+    "radiance_stops": ("merged exposures: stops that are right to within 10 %", "", 0),
     "psnr_db": ("panorama against the true sphere, PSNR", "dB", 2),
     "ssim": ("panorama against the true sphere, SSIM", "", 4),
     "common_psnr_db": ("the same over what all of these show, PSNR", "dB", 2),

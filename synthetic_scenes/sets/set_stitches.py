@@ -41,11 +41,13 @@ def told_lens(camera: SceneCamera) -> float:
 
 
 def told_pictures(rendered: RenderedSet) -> list[Picture]:
-    """Its pictures, which say what most cameras write: their 35 mm equivalent focal length in whole millimetres."""
+    """Its pictures, all exposures of each, which say what most cameras write: their 35 mm equivalent focal length in
+    whole millimetres."""
     pictures = []
-    for path, camera in zip(rendered.pictures, rendered.cameras, strict=True):
-        picture = load_picture(path)
-        pictures.append(replace(picture, exif=replace(picture.exif, focal35_mm=equivalent_mm(camera))))
+    exposures = rendered.brackets or tuple((path,) for path in rendered.pictures)
+    for paths, camera in zip(exposures, rendered.cameras, strict=True):
+        for picture in map(load_picture, paths):
+            pictures.append(replace(picture, exif=replace(picture.exif, focal35_mm=equivalent_mm(camera))))
     return pictures
 
 

@@ -31,7 +31,7 @@ def test_the_defaults_are_the_designs() -> None:
     options = StitchOptions()
     assert {one.name: getattr(options, one.name) for one in fields(options)} == {
         "field": "slack", "fade": "continue", "camera": CameraRequest(), "matches": None, "ignore": (),
-        "ignore_in": (), "viewpoint": None, "require_all": False, "scale_metres": None,
+        "ignore_in": (), "viewpoint": None, "require_all": False, "scale_metres": None, "brackets": "auto",
         "slide": "auto", "projection": "auto", "level": "auto", "centre": None, "fov": None, "scale": 1.0,
         "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": "auto",
         "holes": "auto", "preview": False, "seed": 0, "measure": True, "memory_gb": None, "cache": None,
@@ -76,6 +76,8 @@ def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
     *(({"exposure": name}, (repr(name), "choose from: auto, reference, none, or a number of stops"))
       for name in ("", "Auto", "1")),
     *(({"exposure": value}, ("stops", "between -10 and 10")) for value in (10.1, -11, math.nan, math.inf)),
+    *(({"brackets": value}, ("brackets", repr(value), "choose from: auto, off, or a number from 2"))
+      for value in ("", "on", 1, 0, -3)),
     *(({"holes": name}, ("holes", repr(name), "choose from: auto, transparent, inpaint")) for name in ("", "fill")),
     *(({"crop": name}, ("crop", repr(name), "choose from: auto, full, inscribed, reference, or X, Y, W, H"))
       for name in ("tight", "", "1,2,3,4", "Full")),

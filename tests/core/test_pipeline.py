@@ -23,8 +23,10 @@ from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.cameras.view import views_of
 from edf_stitch.core.compose.multiband import bands_for
 from edf_stitch.core.field import folding, visibility
+from edf_stitch.core.output.outputs import OutputRequest, write
 from edf_stitch.core.panorama.warp import build_map
 from edf_stitch.core.pictures.encoding import encode_picture
+from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.pose import features
 from edf_stitch.core.raster import arrays
@@ -38,8 +40,10 @@ from edf_stitch.core.system.errors import (
     TooFewMatches,
     UnreadableImage,
 )
+from edf_stitch.core.system.output_files import OutputFiles
 from edf_stitch.core.system.progress import STAGES
 from edf_stitch.synthetic_scenes.ground_truth import TrueGeometry, pose_errors
+from edf_stitch.synthetic_scenes.rendered import expose
 from edf_stitch.synthetic_scenes.scene_camera import SceneCamera
 from edf_stitch.synthetic_scenes.two_planes import Pair, depth_at, make_pair
 
@@ -297,6 +301,29 @@ def test_pictures_of_two_kinds_from_files(folder: Path, small_pair: Pair, known:
     (tmp_path / "target.exr").write_bytes(data)
     result = stitch((folder / "reference.png", tmp_path / "target.exr"), known)
     assert good(small_pair, result) and result.bits == 32
+
+
+def test_brackets_are_stitched_as_one_picture_each(small_pair: Pair, known: StitchOptions, tmp_path: Path) -> None:
+    pytest.importorskip("OpenEXR")
+    random = np.random.default_rng(8)
+    # lights that no single exposure holds
+    lights = [2 * decode(one) for one in (small_pair.reference, small_pair.target)]
+    taken = [expose(light, (2.0**stops,) * 3, 0.5, False, random) for light in lights for stops in (0, -2, 2)]
+    result = stitch(taken, known)
+    assert good(small_pair, result) and result.bits == 32 and len(result.pictures) == 2
+    about = result.report["brackets"]
+    assert [len(one["names"]) for one in about] == [3, 3] and np.allclose(about[0]["stops"], (-2, 0, 2), atol=0.05)
+    assert about[0]["clipped"] == 0 and result.report["options"]["brackets"] == "auto"
+    assert any("6 pictures are 2 brackets of 3 exposures" in warning for warning in result.warnings)
+    with OutputFiles() as files:
+        write(result, OutputRequest(tmp_path / "out.exr"), files)
+        write(result, OutputRequest(tmp_path / "out.hdr"), files)
+    seen = [load_picture(tmp_path / f"out.{kind}").pixels for kind in ("exr", "hdr")]
+    assert seen[0].max() > 1.5 and np.median(np.abs(seen[1] / np.maximum(seen[0], 1e-3) - 1)) < 0.01
+    height, width = small_pair.reference.shape[:2]
+    x, y = result.canvas.offset
+    shown = seen[0][y : y + height, x : x + width]
+    assert np.median(np.abs(shown / lights[0] - 1)) < 0.05
 
 
 def test_half_a_picture_of_nothing_is_transparent_and_said(small_pair: Pair, known: StitchOptions) -> None:

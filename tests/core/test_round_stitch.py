@@ -14,8 +14,11 @@ from edf_stitch.core.measure.metrics import look_up
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.inspection import depth_grid, displacement_px, full_geometry, heat_map, match_rows
 from edf_stitch.core.output.outputs import OutputRequest, write
+from edf_stitch.core.output.sphere_part import sphere_part_of
 from edf_stitch.core.output.warp_file import warp_bytes
 from edf_stitch.core.panorama.levelling import angles_of, gravity, turned, upright
+from edf_stitch.core.pictures.gpano import SpherePart
+from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest
@@ -215,6 +218,21 @@ def test_files_of_a_sphere_all_have_its_size(results: dict[str, StitchResult], t
         seen = np.isfinite(warp["map_x_01"]) & (np.pad(result.layers[1].alpha, _margins(result)) > 0)
         off = np.hypot(at[..., 0] / at[..., 2] - warp["map_x_01"], at[..., 1] / at[..., 2] - warp["map_y_01"])[seen]
         assert off.max() < 2.0 and np.median(off) < 0.5, "slack apart"
+
+
+def test_only_spheres_say_which_part_of_a_sphere_they_are(results: dict[str, StitchResult]) -> None:
+    sphere = results["equirectangular"]
+    height, width = sphere.alpha.shape
+    assert sphere_part_of(sphere) == SpherePart((width, height), (0, 0, width, height))
+    part = sphere_part_of(replace(sphere, canvas=sphere.canvas.within((30, 20, 60, 40))))
+    assert part == SpherePart((width, height), (30, 20, 60, 40))
+    assert all(sphere_part_of(one) is None for kind, one in results.items() if kind != "equirectangular")
+    # the reference looks 100° from north, and lies 12° right of the middle
+    first = replace(sphere.pictures[0], exif=Exif(heading=100.0))
+    level = {"projection": {"level": (12.0, 0.0, 0.0)}}
+    looking = replace(sphere, pictures=(first, sphere.pictures[1]), report={**sphere.report, "canvas": level})
+    found = sphere_part_of(looking)
+    assert found is not None and found.heading == 88.0
 
 
 def test_what_a_window_shows_of_a_round_panorama(results: dict[str, StitchResult]) -> None:

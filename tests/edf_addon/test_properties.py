@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
+from edf_stitch.core.choices import EXR_COMPRESSIONS, EXR_DEPTHS
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.pictures.exr import ExrForm
 
 bpy = pytest.importorskip("bpy")
 properties = pytest.importorskip("edf_stitch.edf_addon.properties")
@@ -113,7 +115,7 @@ def test_every_option_of_the_engine_is_offered(blender):
     """Those that come as files or images are added to a job by hand; three are nobody's wish, some are for more than
     the two pictures that the panel has, and two are the command's: a panel shows its picture, a scene has its unit."""
     by_hand = {"matches", "ignore", "mask"}
-    of_many = {"viewpoint", "require_all", "ignore_in"}
+    of_many = {"viewpoint", "require_all", "ignore_in", "brackets"}
     options = {field.name for field in dataclasses.fields(StitchOptions)}
     nobodys, of_command = {"measure", "cache", "memory_gb"}, {"preview", "scale_metres"}
     assert options - nobodys - of_many - of_command == set(engine_options.options_of(blender.settings)) | by_hand
@@ -244,3 +246,12 @@ def test_a_file_of_this_release_opens_with_what_nobody_set_as_it_is_now(blender,
 def test_an_appended_scene_of_an_earlier_release_means_the_same(blender):
     bpy.ops.wm.append(directory=f"{EARLIER}/Scene/", filename="untouched")
     assert engine_options.options_of(bpy.data.scenes["untouched"].edf_stitch)["projection"] == "reference"
+
+
+def test_every_form_of_exr_is_offered(blender):
+    settings = blender.settings
+    assert engine_options.exr_form_of(settings) == dataclasses.asdict(ExrForm())
+    for name, known in (("exr_depth", EXR_DEPTHS), ("exr_compression", EXR_COMPRESSIONS)):
+        assert tuple(item.identifier.lower() for item in settings.bl_rna.properties[name].enum_items) == known
+    settings.exr_depth, settings.exr_compression = "HALF", "DWAB"
+    assert engine_options.exr_form_of(settings) == {"depth": "half", "compression": "dwab"}

@@ -123,6 +123,8 @@ def _facts(source: Any) -> tuple[Size, int]:
         return (0, 0), 0
     if structure.kind == "exr":
         return exr_size(data), MEMORY.float_bytes
+    if structure.kind == "hdr":
+        return (structure.width, structure.height), MEMORY.float_bytes
     bits = data[24] if structure.kind == "png" else getattr(structure.tiff or structure.heif, "bits", 8)
     return (structure.width, structure.height), MEMORY.deep_bytes if bits > 8 else 3
 

@@ -57,6 +57,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--field", "strict", "--fade", "plane", "--projection", "reference", "--seam", "none"],
      {"field": "strict", "fade": "plane", "projection": "reference", "seam": "none"}),
     (["--field", "paper", "--fade", "infinity"], {"field": "paper", "fade": "infinity"}),
+    (["--brackets", "3"], {"brackets": 3}), (["--brackets", "off"], {"brackets": "off"}),
     (["--matches", "m.csv", "--ignore-ref", "a.png", "--ignore-target", "b.png"],
      {"matches": Path("m.csv"), "ignore": (Path("a.png"), Path("b.png"))}),
     (["--ignore-target", "b.png"], {"ignore": (None, Path("b.png"))}),
@@ -97,6 +98,7 @@ def test_how_it_is_done(words: list[str], expected: dict) -> None:
     ["--seed", "1.5"], ["--scale", "x"], ["--focal-px", "abc"], ["--focal-px", ""], ["--focal-px", "1,,2"],
     ["--focal-px"], ["--projection", "flat"], ["--sensor-mm", "1;2"],
     ["--slide", "x"], ["--slide", ""], ["--centre", "x"], ["--fov", "wide"],
+    ["--brackets", "1"], ["--brackets", "on"],
 ], ids=" ".join)  # fmt: skip
 def test_what_makes_no_sense_is_refused_by_the_parser(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as leaving:

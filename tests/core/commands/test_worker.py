@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchResult
+from edf_stitch.core.raster.colour import decode
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 from ...pairs import ON_REFERENCE
@@ -66,6 +67,17 @@ def test_a_job_gives_the_panorama_that_the_pipeline_gives(job, tmp_path, small_r
     depth = load_picture(tmp_path / "job" / index["files"]["inverse depth"]).pixels[..., 0]
     assert np.allclose(depth, small_result.warp.inverse_depth)
     assert index["report"] == json.loads(json.dumps(index["report"])) and index["report"]["two_view"]["model"]
+
+
+def test_float_panoramas_are_written_as_the_panel_asks(job, tmp_path, small_pair: Pair):
+    OpenEXR = pytest.importorskip("OpenEXR")
+    for side in ("reference", "target"):
+        np.save(tmp_path / f"{side}.npy", decode(getattr(small_pair, side)))
+    status, _, index = run(tmp_path / "job", {**job, "exr": {"depth": "half", "compression": "dwab"}})
+    assert status == 0
+    with OpenEXR.File(str(tmp_path / "job" / index["files"]["panorama"]), separate_channels=True) as file:
+        assert file.channels()["R"].pixels.dtype == np.float16
+        assert file.header()["compression"] == OpenEXR.DWAB_COMPRESSION
 
 
 def test_matches_that_are_left_out_are_measured_and_not_used(job, tmp_path, small_result: StitchResult):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
 from edf_stitch.core.system.errors import BadRequest, NoOverlap, UnreadableImage
+
+from .exposed_views import HEIGHT, WIDTH, bracket_of, painted_world, view_of
 
 PLAIN = StitchOptions()
 
@@ -26,7 +29,18 @@ def test_two_to_sixty_pictures_are_taken() -> None:
     with pytest.raises(BadRequest, match="one picture alone"):
         check_count(1, PLAIN)
     with pytest.raises(BadRequest, match="61 pictures given, at most 60"):
-        check_count(61, PLAIN)
+        check_count(61, StitchOptions(brackets="off"))
+
+
+def test_brackets_may_be_many_files_of_few_views() -> None:
+    check_count(MOST_PICTURES * 3, PLAIN)
+    check_count(MOST_PICTURES * 3, StitchOptions(brackets=3))
+    for count, brackets, said in (
+        (MOST_PICTURES * 3 + 3, 3, "61 pictures given"), (541, "auto", "541 pictures given"),
+        (7, 3, "no brackets of 3"), (3, 3, "one picture alone"),
+    ):  # fmt: skip
+        with pytest.raises(BadRequest, match=said):
+            check_count(count, StitchOptions(brackets=brackets))
 
 
 def test_options_that_only_a_pair_knows_are_refused_of_more() -> None:
@@ -105,3 +119,39 @@ def test_pictures_of_the_same_name_in_different_folders_are_told_apart(tmp_path:
     assert frame.names == ["east/1.png", "west/1.png", "2.png"]
     assert frame.warnings == ("west/1.png is given twice: it is used once",)
     assert read_frame(files[:2], StitchOptions()).names == ["1.png", "1.png"], "of two the role says which"
+
+
+def test_exposures_of_one_view_become_one_picture() -> None:
+    world = painted_world()
+    views = [view_of(world, x) for x in (20.0, 240.0, 460.0)]
+    left, middle, right = (bracket_of(light, name) for light, name in zip(views, "abc", strict=True))
+    mask = np.zeros((HEIGHT, WIDTH), bool)
+    mask[:, :50] = True
+    # the second by one exposure alone, the first masked by the name of its darkest
+    frame = read_frame([left[0], middle[0], left[1], *right, left[2]], StitchOptions(ignore_in=(("a-2.png", mask),)))
+    assert frame.names == ["a+0.png", "b+0.png", "c+0.png"]
+    assert [one.bits for one in frame.pictures] == [32, 8, 32]
+    assert frame.shown_by == (0, 1, 0, 2, 2, 2, 0)
+    assert frame.pictures[0].alpha is not None and (frame.pictures[0].alpha[:, :50] == 0).all()
+    assert frame.warnings[0] == (
+        "6 pictures are 2 brackets of 3 exposures and were merged; --brackets off keeps them apart"
+    )
+    assert [bracket.names for bracket in frame.brackets] == [
+        ("a-2.png", "a+0.png", "a+2.png"), ("c-2.png", "c+0.png", "c+2.png")
+    ]  # fmt: skip
+    assert np.median(np.abs(frame.pictures[2].pixels / views[2] - 1)) < 0.02
+    apart = read_frame([*left, *right], StitchOptions(brackets="off"))
+    assert len(apart.pictures) == 6 and apart.brackets == ()
+    with pytest.raises(BadRequest, match="one picture alone makes no panorama"):
+        read_frame(left, PLAIN)
+    with pytest.raises(BadRequest, match="no exposures of one view"):
+        read_frame([left[0], middle[0], left[1], middle[1]], StitchOptions(brackets=2))
+
+
+def test_copies_are_left_out_beside_brackets() -> None:
+    world = painted_world()
+    left, right = (bracket_of(view_of(world, x), name) for x, name in ((20.0, "a"), (240.0, "b")))
+    again = replace(right[0], name="again.png")
+    frame = read_frame([*left, right[0], again], PLAIN)
+    assert frame.names == ["a+0.png", "b+0.png"] and frame.shown_by == (0, 0, 0, 1, 1)
+    assert len(frame.warnings) == 2 and "again.png is the same picture as b+0.png" in frame.warnings[1]

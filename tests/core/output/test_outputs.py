@@ -15,6 +15,7 @@ from edf_stitch.core.output import outputs
 from edf_stitch.core.output.outputs import OutputRequest, check, json_bytes, layer_stem, write
 from edf_stitch.core.output.warp_file import warp_bytes, write_npz
 from edf_stitch.core.panorama.layers import Layer
+from edf_stitch.core.pictures.exr import ExrForm
 from edf_stitch.core.pictures.masks import read_painted
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
@@ -279,6 +280,17 @@ def test_layers_of_float_pictures_have_exr_beside_them(small_result: StitchResul
         assert np.array_equal(back.alpha, layer.alpha) and np.array_equal(back.pixels, layer.pixels)
     back = load_picture(tmp_path / "out.exr")
     assert np.allclose(back.pixels, bright.pixels, rtol=1e-5) and np.array_equal(back.alpha, bright.alpha)
+
+
+def test_exr_is_written_as_it_is_asked_for(small_result: StitchResult, tmp_path: Path) -> None:
+    OpenEXR = pytest.importorskip("OpenEXR")
+    request = OutputRequest(tmp_path / "out.exr", layers=tmp_path / "layers", exr=ExrForm("half", "dwab"))
+    with OutputFiles() as files:
+        assert write(named(as_float(small_result)), request, files) == []
+    for path in (request.panorama, tmp_path / "layers" / "00_reference.exr", tmp_path / "layers" / "01_target.exr"):
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            assert file.channels()["R"].pixels.dtype == np.float16, path
+            assert file.header()["compression"] == OpenEXR.DWAB_COMPRESSION
 
 
 def test_float_into_png_is_clipped_and_said_in_the_report_too(small_result: StitchResult, tmp_path: Path) -> None:

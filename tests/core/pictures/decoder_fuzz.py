@@ -46,7 +46,7 @@ def whole_files() -> dict[str, bytes]:
     made["progressive.jpg"] = _encoded(".jpg", noise[..., :3], cv2.IMWRITE_JPEG_PROGRESSIVE, 1)
     made["restarts.jpg"] = _encoded(".jpg", noise[..., :3], cv2.IMWRITE_JPEG_RST_INTERVAL, 2)
     made["lossy.webp"] = _encoded(".webp", noise[..., :3], cv2.IMWRITE_WEBP_QUALITY, 60)
-    made |= _by_pillow(noise) | _by_tifffile(noise) | _by_openexr(noise)
+    made |= _by_pillow(noise) | _by_tifffile(noise) | _by_openexr(noise) | _radiance(noise)
     return made
 
 
@@ -132,6 +132,22 @@ def _by_openexr(noise: np.ndarray) -> dict[str, bytes]:
         file.write(stream)
     made["parts.exr"] = stream.getvalue()
     return made
+
+
+def _radiance(noise: np.ndarray) -> dict[str, bytes]:
+    """Pixels in runs of either kind, and plain; rows and columns."""
+    light = np.float32(2.0) ** (noise[..., :3] / np.float32(16) - 8)
+    light[20:40] = light[20, 20]
+    lines = b"EXPOSURE=2\nCOLORCORR=1 2 1\nPRIMARIES=0.7 0.3 0.2 0.8 0.1 0.05 0.3127 0.329\nPIXASPECT=1\n"
+    packed = _encoded(".hdr", light, cv2.IMWRITE_HDR_COMPRESSION, cv2.IMWRITE_HDR_COMPRESSION_RLE)
+    plain = _encoded(".hdr", light, cv2.IMWRITE_HDR_COMPRESSION, cv2.IMWRITE_HDR_COMPRESSION_NONE)
+    repeated = plain[: -4 * (WIDTH * HEIGHT - 1)] + bytes([1, 1, 1, (WIDTH * HEIGHT - 1) % 256])
+    repeated += bytes([1, 1, 1, (WIDTH * HEIGHT - 1) // 256])
+    rows, columns = (f"-Y {HEIGHT} +X {WIDTH}".encode(), f"+X {HEIGHT} +Y {WIDTH}".encode())
+    return {
+        "packed.hdr": packed.replace(b"FORMAT", lines + b"FORMAT"), "plain.hdr": plain, "repeated.hdr": repeated,
+        "columns.hdr": packed.replace(rows, columns).replace(b"rgbe", b"xyze"),
+    }  # fmt: skip
 
 
 def case(number: int, files: dict[str, bytes]) -> tuple[str, bytes]:

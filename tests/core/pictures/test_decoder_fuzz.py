@@ -97,6 +97,7 @@ def png(width: int, height: int, data: bytes) -> bytes:
 
 def encoded(suffix: str, size: tuple[int, int] = (96, 64), *options: int) -> bytes:
     noise = np.random.default_rng(1).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
+    noise = noise.astype(np.float32) if suffix == ".hdr" else noise
     return cv2.imencode(suffix, noise, list(options))[1].tobytes()
 
 
@@ -128,6 +129,7 @@ BOMBS = {
         patched(encoded(".tif"), struct.pack("<HHIHH", 256, 3, 1, 96, 0), struct.pack("<HHII", 256, 4, 1, SIDE)),
         struct.pack("<HHIHH", 257, 3, 1, 64, 0), struct.pack("<HHII", 257, 4, 1, SIDE)),
     "bomb.exr": exr(SIDE),
+    "bomb.hdr": patched(encoded(".hdr"), b"-Y 64 +X 96", f"-Y {SIDE} +X {SIDE}".encode())[:5000],
 }  # fmt: skip
 
 

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from edf_stitch.core.pictures.containers import read_structure
 from edf_stitch.core.pictures.encoding import encode_picture, output_bits, save_picture
+from edf_stitch.core.pictures.exr import ExrForm
+from edf_stitch.core.pictures.gpano import SpherePart
 from edf_stitch.core.pictures.metadata import Exif, embed
 from edf_stitch.core.pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
 from edf_stitch.core.raster.colour import decode, parse_icc
@@ -221,3 +223,45 @@ def test_same_picture_same_bytes() -> None:
     for suffix in (".jpg", ".png", ".tif", ".exr"):
         one, two = (encode_picture(NOISE[..., :3], NOISE[..., 3], 16, suffix, icc(), EXIF)[0] for _ in range(2))
         assert one == two
+
+
+def test_half_floats_are_small_and_say_what_they_cannot_hold(tmp_path: Path) -> None:
+    bright = NOISE[..., :3] * 9
+    bright[0, :11, 1] = 1e6
+    data, warnings = encode_picture(bright, None, 32, ".exr", exr=ExrForm("half"))
+    back = written(tmp_path, data, ".exr").pixels
+    assert back[0, 0, 1] == 65504 and np.allclose(back[1:], bright[1:], rtol=6e-4, atol=1e-6)
+    assert len(warnings) == 1 and f"{11 / bright[..., 0].size:.2%}" in warnings[0] and "--exr-depth" in warnings[0]
+    with OpenEXR.File(io.BytesIO(data), separate_channels=True) as file:
+        assert file.channels()["G"].pixels.dtype == np.float16
+    whole = encode_picture(bright, None, 32, ".exr")
+    assert whole[1] == () and len(data) < 0.7 * len(whole[0])
+
+
+def test_dwab_loses_little(tmp_path: Path) -> None:
+    smooth = 4 * cv2.GaussianBlur(NOISE[..., :3], (0, 0), 5)
+    data, warnings = encode_picture(smooth, NOISE[..., 3], 32, ".exr", exr=ExrForm(compression="dwab"))
+    with OpenEXR.File(io.BytesIO(data), separate_channels=True) as file:
+        assert file.header()["compression"] == OpenEXR.DWAB_COMPRESSION
+    back = written(tmp_path, data, ".exr")
+    shown = NOISE[..., 3] > 0.9
+    assert warnings == () and np.allclose(back.alpha, NOISE[..., 3], atol=1e-3)
+    assert np.allclose(back.pixels[shown], smooth[shown], rtol=0.02)
+
+
+@pytest.mark.parametrize("form", [{"depth": "double"}, {"compression": "piz"}])
+def test_other_forms_of_exr_are_refused_by_name(form: dict) -> None:
+    with pytest.raises(BadRequest, match=next(iter(form.values()))):
+        ExrForm(**form)
+
+
+def test_exr_says_its_primaries_and_whether_it_is_a_whole_sphere() -> None:
+    def header(sphere: SpherePart | None, channels: int = 3) -> dict:
+        data, _ = encode_picture(NOISE[..., :channels], None, 32, ".exr", sphere=sphere)
+        with OpenEXR.File(io.BytesIO(data), separate_channels=True) as file:
+            return dict(file.header())
+
+    assert np.allclose(header(None)["chromaticities"], (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329))
+    assert "envmap" not in header(None) and "chromaticities" not in header(None, 1)
+    assert header(SpherePart((44, 30), (0, 0, 44, 30)))["envmap"] == OpenEXR.ENVMAP_LATLONG
+    assert "envmap" not in header(SpherePart((60, 30), (4, 0, 44, 30))), "a part of a sphere is no environment map"

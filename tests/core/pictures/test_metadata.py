@@ -105,6 +105,19 @@ def test_what_is_written_is_read_again_and_nothing_else() -> None:
     assert 274 in tags and again.orientation == 1, "the pixels are upright by then"
 
 
+@pytest.mark.parametrize(("north", "heading"), [("T", 87.5), ("M", None)])
+def test_where_the_camera_looked_is_known_from_true_north_alone(north: str, heading: float | None) -> None:
+    image = {34853: (4, 0)}
+    place = len(tiff(image))
+    gps = tiff({16: (2, north), 17: (5, [(175, 2)])}, following=0)[8:]
+    # the directory of GPS behind the first one, with its values moved there
+    count = struct.unpack_from("<H", gps)[0]
+    moved = bytearray(gps)
+    struct.pack_into("<I", moved, 2 + 12 * (count - 1) + 8, place + 6 + 12 * count)
+    exif = read_exif(tiff({34853: (4, place)}) + bytes(moved))
+    assert exif.heading == heading and read_exif(exif_block(exif)).heading is None
+
+
 @pytest.mark.parametrize("kind", ["jpeg", "png", "tiff"])
 def test_exif_and_profile_travel_in(kind: str) -> None:
     profile = bytes(np.random.default_rng(1).integers(0, 256, 150_001, dtype=np.uint8))  # three JPEG segments

@@ -70,6 +70,14 @@ def test_a_files_own_pixels_go_by_the_file(blender, tmp_path):
     assert entry(image, tmp_path) == {"name": "a.png", "path": str(tmp_path / "a.png")}
 
 
+def test_a_radiance_file_goes_by_itself_and_shows_the_same_light(blender, tmp_path):
+    image = bpy.data.images.load(write(tmp_path / "a.hdr", gradient().astype(np.float32) / 50))
+    assert entry(image, tmp_path) == {"name": "a.hdr", "path": str(tmp_path / "a.hdr")}
+    ours = picture_files.read(tmp_path / "a.hdr").pixels
+    step = ours.max(axis=2, keepdims=True) / 128  # Blender reads the lower end of a mantissa's step, we its middle
+    assert (np.abs(images.read(image)[..., :3] - ours) <= 0.51 * step).all()
+
+
 def test_painted_pixels_go_as_an_array_with_the_files_exif(blender, tmp_path):
     image = bpy.data.images.load(write(tmp_path / "a.png", gradient()))
     painted = np.dstack([gradient()[::-1] / 255, np.ones((HEIGHT, WIDTH))])

@@ -7,12 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from edf_stitch.core.frames.reading import read_frame
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.raster.colour import encode
 from edf_stitch.synthetic_scenes.ground_truth import visible
 from edf_stitch.synthetic_scenes.sets import rendered_set as module
 from edf_stitch.synthetic_scenes.sets.recipes import SETS
 from edf_stitch.synthetic_scenes.sets.rendered_set import RenderedSet, rendered_set
+from edf_stitch.synthetic_scenes.sets.set_radiance import radiance_error
+from edf_stitch.synthetic_scenes.sets.set_stitches import ON_SPHERE, told_pictures
 from edf_stitch.synthetic_scenes.sets.set_thresholds import PROOF
 from edf_stitch.synthetic_scenes.sets.sphere_truth import in_frame, seen_by
 
@@ -70,10 +73,13 @@ def brackets(rendered_folder: Path) -> RenderedSet:
     return rendered_set(replace(SETS["brackets"], count=3, noise=0.0), SIZE, rendered_folder)
 
 
-def test_pictures_show_their_light_as_their_view_does(room: RenderedSet, brackets: RenderedSet) -> None:
+def test_pictures_show_their_light_as_their_view_does(
+    room: RenderedSet, brackets: RenderedSet, rendered_folder: Path
+) -> None:
     taken, light = load_picture(room.pictures[0]).view, load_picture(room.pictures[0].with_suffix(".exr")).pixels
     assert np.abs(taken - encode(light, 8).astype(float)).max() <= 1
-    taken, light = load_picture(brackets.pictures[0]), load_picture(brackets.pictures[0].with_suffix(".exr")).pixels
+    by_agx = rendered_set(replace(RECIPE, count=1, agx=True), SIZE, rendered_folder)
+    taken, light = load_picture(by_agx.pictures[0]), load_picture(by_agx.pictures[0].with_suffix(".exr")).pixels
     standard = encode(light, 8).astype(float)
     apart = np.abs(taken.view - standard).mean()
     assert apart > 3, "not the view Standard"
@@ -86,8 +92,13 @@ def test_pictures_show_their_light_as_their_view_does(room: RenderedSet, bracket
     ].mean()
 
 
-def test_brackets_are_all_rendered_and_one_of_each_is_stitched(brackets: RenderedSet) -> None:
-    assert [[path.name for path in files] for files in brackets.brackets][1] == ["01.png", "01_-2ev.png", "01_+2ev.png"]
+def test_brackets_are_all_rendered_and_merged_to_their_light(brackets: RenderedSet) -> None:
+    assert [[path.name for path in files] for files in brackets.brackets][1] == ["01.png", "01_-4ev.png", "01_+2ev.png"]
+    frame = read_frame(told_pictures(brackets), ON_SPHERE)
+    assert frame.names == ["00.png", "01.png", "02.png"]
+    for path, merged in zip(brackets.pictures, frame.pictures, strict=True):
+        figures = radiance_error(merged.pixels, load_picture(path.with_suffix(".exr")).pixels)
+        assert figures["radiance_percent"] < 1 and figures["radiance_stops"] >= 4, "without grain"
     assert brackets.pictures == tuple(files[0] for files in brackets.brackets)
     middle, darker, brighter = (load_picture(path).view.astype(int) for path in brackets.brackets[0])
     assert (darker <= middle).all() and (middle <= brighter).all()
