@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..system.errors import BadRequest, UnreadableImage
 from .camera import Camera, Knowledge
+from .lens_entries import lens_of
 from .options import INTRINSICS
 from .plausible import check_plausible, fold_warning
 from .sensors import sensor_diagonal
@@ -226,9 +227,10 @@ def read_camera_file(
     Parameters
     ----------
     source : str, path or dict
-        {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "R": 3×3?, "t": [3]?}}, "unit": UNIT?} with
-        NAME the picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes, integer pixel centres;
-        UNIT is "metres" if t is in metres, "baselines" if in none that is known.
+        {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "lens": {…}?, "R": 3×3?, "t": [3]?}},
+        "unit": UNIT?} with NAME the picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes,
+        integer pixel centres; `lens`, in place of a distortion, as for `lens_of`; UNIT is "metres" if t is in metres,
+        "baselines" if in none that is known.
     names : sequence of str
         The pictures' file names.
     sizes : sequence of (int, int)
@@ -318,6 +320,9 @@ def _camera_from_entry(entry: dict[str, Any], name: str, size: tuple[int, int]) 
         if len(values) > 5 or not np.isfinite(values).all():
             raise BadRequest(f"the camera of {name}: distortion is at most k1, k2, p1, p2, k3")
         distortion[: len(values)] = values
+    lens = None if entry.get("lens") is None else lens_of(entry["lens"], K, size, name)
+    if lens is not None and distortion.any():
+        raise BadRequest(f"the camera of {name}: it has a distortion and a lens; give one of them")
     pose = None
     if entry.get("R") is not None or entry.get("t") is not None:
         R, t = _matrix(entry, "R", (3, 3), name), _matrix(entry, "t", (3,), name)
@@ -325,7 +330,7 @@ def _camera_from_entry(entry: dict[str, Any], name: str, size: tuple[int, int]) 
         if np.abs(S - 1).max() > 1e-3 or np.linalg.det(R) < 0:
             raise BadRequest(f"the camera of {name}: R is not a rotation matrix")
         pose = (U @ Vt, t)  # files carry six digits: the nearest true rotation
-    return Camera(K, size, "camera file", 0.0, distortion, pose)
+    return Camera(K, size, "camera file", 0.0, distortion, pose, lens=lens)
 
 
 def _matrix(entry: dict[str, Any], key: str, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:

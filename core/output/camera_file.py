@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..cameras.lens_entries import lens_entry
+
 if TYPE_CHECKING:
     from ..pipeline import StitchResult
 
@@ -21,13 +23,15 @@ def camera_table(result: StitchResult) -> dict[str, Any]:
     Returns
     -------
     dict
-        Of each picture that was used, by its name: K in px of the full picture, `distortion`, and `R`, `t` in the frame
-        of the first one, unless the geometry knows no pose; and the `unit` of t.
+        Of each picture that was used, by its name: K in px of the full picture, `distortion`, `lens` where it
+        has another one, and `R`, `t` in the frame of the first one, unless the geometry knows no pose; and the `unit`
+        of t.
     """
     posed = all(np.isfinite(view.R).all() and np.isfinite(view.t).all() for view in result.views)
     table = {}
     for picture, view, size in zip(result.pictures, result.views, result.full_sizes, strict=True):
         full = replace(view.camera, K=view.K).resized(size)
         pose = {"R": view.R, "t": view.t * result.scale.factor} if posed else {}
-        table[picture.name] = {"K": full.K, "distortion": full.distortion, **pose}
+        lens = {} if full.lens is None else {"lens": lens_entry(full)}
+        table[picture.name] = {"K": full.K, "distortion": full.distortion, **lens, **pose}
     return {"cameras": table, "unit": result.scale.unit}

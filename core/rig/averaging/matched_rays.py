@@ -29,11 +29,8 @@ class SharedLens:
         """The camera with this lens; a given distortion still moves the same pixels."""
         if camera.fixed:
             return camera
-        if camera.distortion.any():
-            distortion = camera.distortion * self.factor ** np.array([2.0, 4, 1, 1, 6])
-        else:
-            distortion = np.array([self.k1, 0.0, 0, 0, 0])
-        return replace(camera, K=camera.scaled(self.factor), distortion=distortion)
+        zoomed = camera.zoomed(self.factor)
+        return zoomed if camera.lens_known else replace(zoomed, distortion=np.array([self.k1, 0.0, 0, 0, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +167,7 @@ def matched_rays(
     for camera, raw in zip(cameras, points, strict=True):
         ideal = homogeneous(undistort(raw, camera)) @ inverse_intrinsics(camera.K).T
         normalised.append(ideal[:, :2])
-        flags.append((camera.focal, float(not camera.fixed), float(not (camera.fixed or camera.distortion.any()))))
+        flags.append((camera.focal, float(not camera.fixed), float(not (camera.fixed or camera.lens_known))))
     ends, sides = [], []
     for pair in verified.pairs:
         columns = first_is(points, pair)
