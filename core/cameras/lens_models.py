@@ -148,8 +148,8 @@ def _projected(lens: Lens, angle: Array) -> tuple[Array, Array]:
         return np.tan(angle), 1 / np.cos(angle) ** 2
     k1, k2, k3, k4 = lens.angular
     t = angle * angle
-    bent = angle * ((((k4 * t + k3) * t + k2) * t + k1) * t + 1)
-    slope = (((9 * k4 * t + 7 * k3) * t + 5 * k2) * t + 3 * k1) * t + 1
+    bent = angle * (1.0 + t * (k1 + t * (k2 + t * (k3 + t * k4))))
+    slope = 1.0 + t * (3 * k1 + t * (5 * k2 + t * (7 * k3 + t * 9 * k4)))
     return bent, slope
 
 
