@@ -49,6 +49,8 @@ class Camera:
         Whether the pose is in metres, and not in a unit of its own.
     lens : Lens, optional
         A lens of another kind, which then is known; None where `distortion` says all.
+    start : (3, 3), optional
+        A rotation, world to camera, to begin with: nothing is held by it.
     """
 
     K: NDArray[np.float64]
@@ -62,6 +64,7 @@ class Camera:
     lens_of: str = ""
     in_metres: bool = False
     lens: Lens | None = None
+    start: NDArray[np.float64] | None = None
 
     @property
     def focal(self) -> float:
