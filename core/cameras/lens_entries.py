@@ -48,7 +48,8 @@ def lens_of(entry: Any, K: np.ndarray[Any, Any], size: tuple[int, int], name: st
     half = _numbers({"radius_px": [entry.get("radius_px", min(size) / 2)]}, "radius_px", 1, place)[0]
     if not half > 0:
         raise BadRequest(f"{place}: radius_px is {half:g}; it is where the polynomial is 1, and above 0")
-    lens = Lens(LensProjection(projection), angular, _numbers(entry, "ptlens", 3, place), half / float(K[0, 0]))
+    ptlens = _numbers(entry, "ptlens", 3, place)
+    lens = Lens(LensProjection(projection), angular, ptlens, half / float(K[0, 0]) if any(ptlens) else 1.0)
     if not lens.limit > 0:
         raise BadRequest(f"{place}: it folds on its axis, so that no ray can be told from another; check its numbers")
     return lens
@@ -59,10 +60,9 @@ def lens_entry(camera: Camera) -> dict[str, Any] | None:
     lens = camera.lens
     if lens is None:
         return None
-    return {
-        "projection": str(lens.projection), "angular": list(lens.angular), "ptlens": list(lens.ptlens),
-        "radius_px": lens.radius * camera.focal,
-    }  # fmt: skip
+    angular = {"angular": list(lens.angular)} if any(lens.angular) else {}
+    ptlens = {"ptlens": list(lens.ptlens), "radius_px": lens.radius * camera.focal} if any(lens.ptlens) else {}
+    return {"projection": str(lens.projection), **angular, **ptlens}
 
 
 def _numbers(entry: dict[str, Any], key: str, count: int, place: str) -> tuple[float, ...]:

@@ -214,7 +214,7 @@ def _array(path: Path) -> Any:
 def _write(folder: Path, result: Any, rows: Any, take: list[str], turns: tuple[int, ...]) -> None:
     """Everything the window may ask for, with result.json as the index."""
     from ..output import inspection as seen
-    from ..output.outputs import json_bytes
+    from ..output.json_file import json_bytes
     from ..pictures.encoding import encode_picture
 
     kind = ".png" if result.bits == 8 else ".exr"

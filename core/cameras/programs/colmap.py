@@ -22,7 +22,10 @@ MODELS = (
     "SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV", "FOV",
     "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE",
 )  # fmt: skip
-PARAMETERS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8, "OPENCV_FISHEYE": 8}
+PARAMETERS = {
+    "SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8, "OPENCV_FISHEYE": 8,
+    "FULL_OPENCV": 12,
+}  # fmt: skip
 _FILES = ("cameras.txt", "images.txt", "cameras.bin", "images.bin")
 _POSE = ("QW", "QX", "QY", "QZ", "TX", "TY", "TZ")
 # Models of one focal length.
@@ -98,7 +101,9 @@ def _entry(model: str, size: tuple[int, int], values: list[float], place: str) -
     entry: dict[str, Any] = {"K": [[fx, 0, cx - 0.5], [0, fy, cy - 0.5], [0, 0, 1]], "size": list(size)}
     if model == "OPENCV_FISHEYE":
         return entry | {"lens": {"projection": "equidistant", "angular": more}}
-    return entry | {"distortion": more}
+    if any(more[5:]):
+        raise BadRequest(f"{place}: k4 to k6 of {model} are not read, and not all are 0: let COLMAP estimate OPENCV")
+    return entry | {"distortion": more[:5]}
 
 
 def _checked_model(model: str, place: str) -> int:

@@ -28,8 +28,8 @@ def test_the_polynomial_is_one_at_half_the_shorter_side() -> None:
 
 def test_what_is_written_is_read_back() -> None:
     for lens in (
-        {"projection": "equisolid", "angular": [0.0] * 4, "ptlens": [0.0, 0.01, 0.0], "radius_px": 280.0},
-        {"projection": "equidistant", "angular": [0.01, -0.002, 0.0, 0.0], "ptlens": [0.0] * 3, "radius_px": 300.0},
+        {"projection": "equisolid", "ptlens": [0.0, 0.01, 0.0], "radius_px": 280.0},
+        {"projection": "equidistant", "angular": [0.01, -0.002, 0.0, 0.0]},
     ):
         table = {name: {"K": K, "lens": lens} for name in NAMES}
         camera = read_camera_file({"cameras": table}, NAMES, SIZES)[0]
