@@ -15,6 +15,7 @@ from .camera import Camera, Knowledge
 from .lens_entries import lens_of
 from .options import INTRINSICS
 from .plausible import check_plausible, fold_warning
+from .programs.lensfun import LensProfile
 from .programs.recognised import read_any
 from .sensors import sensor_diagonal
 
@@ -113,10 +114,13 @@ def cameras_for(
         The camera file cannot be read.
     """
     warnings: list[str] = []
+    profiles: dict[str, LensProfile] = {}
     held: Sequence[Camera | None] = [None] * len(names)
     if request.cameras is not None:
-        table, unit = camera_table(request.cameras, names)
-        held = read_camera_file({"cameras": table, "unit": unit}, names, sizes)
+        table, unit = camera_table(request.cameras, names, exifs)
+        profiles = {name: entry for name, entry in table.items() if isinstance(entry, LensProfile)}
+        if not profiles:
+            held = read_camera_file({"cameras": table, "unit": unit}, names, sizes)
         if len(names) > 2 and set(table) - set(names):
             warnings.append(f"the camera file names what is none of the pictures: {_strangers(table, names)}")
     cameras = [
@@ -128,6 +132,8 @@ def cameras_for(
         if lender is not None:  # one lens took all pictures more often than not
             known, name = cameras[lender], "the other picture" if len(names) == 2 else names[lender]
             cameras = [_with_lens_of(known, camera, name) if camera.assumed else camera for camera in cameras]
+    if profiles:
+        cameras = [profiles[name].on(camera) for name, camera in zip(names, cameras, strict=True)]
     if request.principal:
         values = [request.principal[i : i + 2] for i in range(0, len(request.principal), 2)]
         cameras = [
@@ -282,10 +288,12 @@ def read_camera_file(
     return out
 
 
-def camera_table(source: str | Path | dict[str, Any], names: Sequence[str]) -> tuple[dict[str, Any], str]:
+def camera_table(
+    source: str | Path | dict[str, Any], names: Sequence[str], exifs: Sequence[Exif] = ()
+) -> tuple[dict[str, Any], str]:
     """What a camera file of any program (`programs.recognised`), or a camera file's content, holds by the names of
     pictures, and its unit. Raises as `read_camera_file` does."""
-    content: Any = source if isinstance(source, dict) else read_any(Path(source), names)
+    content: Any = source if isinstance(source, dict) else read_any(Path(source), names, exifs)
     table = content.get("cameras", content) if isinstance(content, dict) else None
     if not isinstance(table, dict):
         raise BadRequest('a camera file holds {"cameras": {"NAME": {"K": [[…]], "R": [[…]], "t": […]}}}')

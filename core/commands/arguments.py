@@ -63,7 +63,7 @@ def _add_cameras(parser: argparse.ArgumentParser) -> None:
     camera.add_argument(
         "--cameras", type=Path, metavar="FILE",
         help="per picture K, optionally distortion or lens, R and t; of more than two, those that are in it are held; "
-        "or a COLMAP model's folder, transforms.json, a Hugin project (.pto)",
+        "or a COLMAP model's folder, transforms.json, a Hugin project (.pto), a calibration, a lensfun database",
     )  # fmt: skip
 
 

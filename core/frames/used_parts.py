@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.lens import unused, used_angle
-from ..cameras.sources import CameraRequest, camera_table, read_camera_file
+from ..cameras.sources import CameraRequest, camera_table, cameras_for
 from ..pictures.masks import without
 from ..pictures.picture import Picture
 from ..system.errors import BadRequest
@@ -39,8 +39,9 @@ def within_lenses(frame: Frame, request: CameraRequest) -> Frame:
     """
     if request.cameras is None:
         return frame
-    table, unit = camera_table(request.cameras, frame.names)
-    cameras = read_camera_file({"cameras": table, "unit": unit}, frame.names, frame.full_sizes)
+    exifs = [picture.exif for picture in frame.pictures]
+    table, _ = camera_table(request.cameras, frame.names, exifs)
+    cameras, _ = cameras_for(request, frame.names, frame.full_sizes, exifs)
     pictures: list[Picture] = []
     warnings: list[str] = []
     lost: dict[float, list[str]] = {}
@@ -48,9 +49,9 @@ def within_lenses(frame: Frame, request: CameraRequest) -> Frame:
         entry = table.get(picture.name)
         if isinstance(entry, dict) and entry.get("ignore"):
             picture = without(picture, _masked(entry, picture, full))
-        beyond = None if camera is None else unused(camera.resized(size_of(picture)))
+        beyond = unused(camera.resized(size_of(picture)))
         pictures.append(picture if beyond is None else without(picture, beyond))
-        if camera is not None and camera.lens is not None and beyond is not None:
+        if camera.lens is not None and beyond is not None:
             lost.setdefault(float(np.degrees(used_angle(camera.lens))), []).append(picture.name)
     for degrees, names in lost.items():
         listed = ", ".join(names[:5]) + (", …" if len(names) > 5 else "")

@@ -16,6 +16,7 @@ COLMAP_MODELS = {
     "SIMPLE_PINHOLE": (0, (700, 401, 299)), "PINHOLE": (1, (700, 710, 401, 299)),
     "SIMPLE_RADIAL": (2, (700, 401, 299, -0.1)), "RADIAL": (3, (700, 401, 299, -0.1, 0.02)),
     "OPENCV": (4, (700, 710, 401, 299, -0.1, 0.02, 0.001, -0.002)),
+    "FULL_OPENCV": (6, (700, 710, 401, 299, -0.1, 0.02, 0.001, -0.002, 0.003, 0, 0, 0)),
     "OPENCV_FISHEYE": (5, (700, 710, 401, 299, 0.01, -0.002, 0.0003, -0.0001)),
 }  # fmt: skip
 # Turned by 90° to the right about the vertical, w x y z, and a place.

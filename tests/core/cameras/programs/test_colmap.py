@@ -29,7 +29,8 @@ def test_each_model_is_what_opencv_projects_by(write: Write, model: str, tmp_pat
     if model == "OPENCV_FISHEYE":
         seen = cv2.fisheye.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), camera.K, more)[0]
     else:
-        seen = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.K, np.pad(more, (0, 5 - len(more))))[0]
+        five = np.resize(np.append(more, np.zeros(5)), 5)
+        seen = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.K, five)[0]
     assert np.abs(distort((rays @ camera.K.T)[:, :2], camera) - seen.reshape(-1, 2)).max() < 1e-9
 
 
@@ -58,7 +59,7 @@ def test_a_folder_without_a_model_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("file", "old", "new", "said"), [
-    ("cameras.txt", "PINHOLE", "FULL_OPENCV", r"cameras.txt, line 2: .* 'FULL_OPENCV' is not read; SIMPLE_"),
+    ("cameras.txt", "PINHOLE", "FOV", r"cameras.txt, line 2: .* 'FOV' is not read; SIMPLE_"),
     ("cameras.txt", " 299", "", "line 2: 3 parameters; PINHOLE has 4"),
     ("cameras.txt", "701", "x", "line 2: a parameter is 'x'; a number"),
     ("cameras.txt", "701", "nan", "line 2: a parameter is 'nan'; a number"),
@@ -66,6 +67,7 @@ def test_a_folder_without_a_model_is_refused(tmp_path: Path) -> None:
     ("cameras.txt", "800", "800.5", "line 2: the width is '800.5'; a whole number"),
     ("cameras.txt", "800", "0", "line 2: a picture of 0 × 600 px"),
     ("cameras.txt", "3 P", "4 P", "images.txt, line 2: it was taken by camera 3, which cameras.txt lacks"),
+    ("cameras.txt", "PINHOLE 800 600 701", "FULL_OPENCV 800 600 5 5 5 5 0 0 0 1 701", "k4 to k6 of FULL_OPENCV"),
     ("images.txt", "3 images/a.png", "3", "line 2: 9 values; an image has a number, QW"),
     ("images.txt", "1 0 0 0 0", "0 0 0 0 0", "line 2: QW QX QY QZ are no rotation"),
     ("images.txt", "images/a.png", "images/b.png", "line 4: images/b.png has a camera already"),
