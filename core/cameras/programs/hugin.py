@@ -18,7 +18,7 @@ from ...raster.arrays import Array
 from ...system.errors import BadRequest
 from ..lens_models import Lens, LensProjection
 from ..options import INTRINSICS
-from ..projective import rotation_from_vector
+from ..projective import rotation_from_angles
 from .values import number, shortened, size_of, whole
 
 # Numbers of lenses (f of an image) that are read, and of those that are not.
@@ -117,13 +117,6 @@ def read_cameras(text: str, place: str) -> dict[str, Any]:
     return dict(zip(project.names, project.entries, strict=True))
 
 
-def rotation_of(yaw: float, pitch: float, roll: float) -> Array:
-    """From a camera's axes to the panorama's (3, 3), of angles in degrees."""
-    turns = (np.radians(angle) * np.eye(3)[axis] for angle, axis in ((yaw, 1), (pitch, 0), (roll, 2)))
-    first, second, third = (rotation_from_vector(turn) for turn in turns)
-    return first @ second @ third
-
-
 def _parameters(line: str) -> dict[str, str]:
     """The parameters of a line by their names, the first of each."""
     found: dict[str, str] = {}
@@ -178,7 +171,7 @@ def _entry(images: Sequence[dict[str, str]], k: int, place: str) -> dict[str, An
     abc, shift = [of(key) for key in "abc"], (of("d"), of("e"))
     K = [[focal, 0, (width - 1) / 2 + shift[0]], [0, focal, (height - 1) / 2 + shift[1]], [0, 0, 1]]
     angles = [number(images[k].get(key, 0), key, place) for key in "ypr"]
-    entry: dict[str, Any] = {"K": K, "size": [width, height], "start": rotation_of(*angles).T}
+    entry: dict[str, Any] = {"K": K, "size": [width, height], "start": rotation_from_angles(*angles).T}
     if projection != LensProjection.RECTILINEAR or any(abc):
         entry["lens"] = {"projection": str(projection), "ptlens": abc}
     if projection == LensProjection.RECTILINEAR:

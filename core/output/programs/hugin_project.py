@@ -15,9 +15,10 @@ from scipy.optimize import brentq
 from ...cameras.camera import Camera
 from ...cameras.lens import undistort
 from ...cameras.lens_models import Lens, LensProjection
-from ...cameras.programs.hugin import PROJECTIONS, rotation_of
+from ...cameras.programs.hugin import PROJECTIONS
 from ...cameras.projective import homogeneous, project
 from ...panorama.canvas import border
+from ...panorama.levelling import angles_of
 from ...raster.arrays import Array
 from ...system.errors import UnwritableOutput
 from ..camera_file import FoundCamera
@@ -129,7 +130,7 @@ def hugin_project(
             warnings.append(f"{one.name}: Hugin's lens a, b, c is up to {lens.off:.1f} px off the one that was used")
         values = {
             "f": lens.f, "v": lens.v, "Ra": 0, "Rb": 0, "Rc": 0, "Rd": 0, "Re": 0, "Eev": 0, "Er": 1, "Eb": 1,
-            **dict(zip("rpy", reversed(angles(one.R @ frame.rotation)), strict=True)),
+            **dict(zip("rpy", reversed(angles_of(one.R @ frame.rotation)), strict=True)),
             "TrX": 0, "TrY": 0, "TrZ": 0, "j": 0, **dict(zip("abc", lens.abc, strict=True)),
             **dict(zip("de", lens.shift, strict=True)), "g": 0, "t": 0,
             "Va": 1, "Vb": 0, "Vc": 0, "Vd": 0, "Vx": 0, "Vy": 0, "Vm": 5,
@@ -143,16 +144,6 @@ def hugin_project(
             for row in rows
         ]
     return ("\n".join(lines) + "\n").encode(errors="replace"), warnings
-
-
-def angles(R: Array) -> tuple[float, float, float]:
-    """Yaw, pitch and roll in degrees of a camera that sees the panorama's axes turned by R (3, 3)."""
-    turned = R.T
-    pitch = float(np.arcsin(np.clip(-turned[1, 2], -1, 1)))
-    yaw, roll = float(np.arctan2(turned[0, 2], turned[2, 2])), float(np.arctan2(turned[1, 0], turned[1, 1]))
-    if np.abs(rotation_of(*np.degrees((yaw, pitch, roll))) - turned).max() > 1e-6:  # straight up or down
-        roll, yaw = 0.0, float(np.arctan2(-turned[2, 0], turned[0, 0]))
-    return tuple(np.degrees((yaw, pitch, roll)).tolist())
 
 
 def _number(value: float) -> str:

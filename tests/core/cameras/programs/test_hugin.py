@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.lens import undistort
 from edf_stitch.core.cameras.options import INTRINSICS
+from edf_stitch.core.cameras.programs.hugin import read_cameras
 from edf_stitch.core.cameras.projective import homogeneous
 from edf_stitch.core.pose.match_files import read_matches, read_matches_of_pairs
 from edf_stitch.core.system.errors import BadRequest
@@ -66,6 +67,18 @@ def test_lenses_are_shared_and_rotations_hold_nothing(tmp_path: Path) -> None:
 
 def test_the_field_of_view_of_a_fisheye_holds(tmp_path: Path) -> None:
     assert cameras(with_lens(tmp_path, "f3 v120"))[0].fixed
+
+
+@pytest.mark.parametrize(("kinds", "hidden"), [
+    ("01", (1, 0)), ("11", (0, 0)), ("21", (1, 0)), ("41", (1, 1)), ("00", (1, 1)), ("44", (2, 2)),
+])  # fmt: skip
+def test_masks_that_exclude_are_left_out(kinds: str, hidden: tuple[int, int], tmp_path: Path) -> None:
+    """Of the image, of its stack, or of its lens, which both share; those that include are only wishes."""
+    text = PROJECT.replace("k i0 t0", f"k i0 t{kinds[0]}").replace("k i1 t1", f"k i1 t{kinds[1]}")
+    entries = read_cameras(text, "ab.pto")
+    assert tuple(len(entry.get("ignore", [])) for entry in entries.values()) == hidden
+    if hidden[0]:
+        assert next(iter(entries.values()))["ignore"][0] == [[0, 0], [99, 0], [99, 49], [0, 49]]
 
 
 def test_control_points_are_matches(tmp_path: Path) -> None:

@@ -51,6 +51,8 @@ def camera(folder: Path, exif: Exif = EXIF, text: str = DATABASE) -> Camera:
 
 
 def test_the_lens_is_exifs_between_its_calibrations(tmp_path: Path) -> None:
+    found = camera(tmp_path, Exif(focal_mm=22.0, focal35_mm=22.0, lens=EXIF.lens))
+    assert found.lens is not None and np.allclose(found.lens.ptlens, (0.015, -0.035, 0.015))
     found = camera(tmp_path)
     assert found.lens is not None and np.allclose(found.lens.ptlens, (0.02, -0.03, 0.01))
     # half the shorter side of full frame is 12 mm: half of 24 mm
