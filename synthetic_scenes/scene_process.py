@@ -14,7 +14,7 @@ from typing import Any
 
 from ..core.choices import RIVALS
 from ..core.measure.report import plain
-from ..core.output.outputs import json_bytes
+from ..core.output.json_file import json_bytes
 from ..core.system.errors import StitchError
 from ..core.system.output_files import OutputFiles
 from .finished import finished, target_only

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.batch.units import read_json
-from ..core.output.outputs import json_bytes
+from ..core.output.json_file import json_bytes
 from ..core.system.errors import BadRequest, UnwritableOutput
 from ..core.system.output_files import OutputFiles
 from .blender_process import LAST_LINES, find_blender

@@ -18,7 +18,7 @@ from ..compose.pooling import pooled_decision
 from ..frames.frame import Frame
 from ..frames.reading import read_frame
 from ..options import StitchOptions
-from ..output.outputs import json_bytes
+from ..output.json_file import json_bytes
 from ..pictures.picture import Picture
 from ..pipeline import StitchResult, compose, stitch
 from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage

@@ -21,12 +21,12 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from ..options import StitchOptions
+from ..output.json_file import json_bytes
 from ..output.outputs import (
     CANVAS,
     OutputRequest,
     add_depth,
     add_report,
-    json_bytes,
     layer_files,
     write,
 )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.resizing import size_change
+from .lens_models import Lens
 
 
 class Knowledge(StrEnum):
@@ -35,7 +36,7 @@ class Camera:
     log_sigma : float
         Standard deviation of log f; 0 for a fixed focal length.
     distortion : (5,)
-        k1, k2, p1, p2, k3 as in OpenCV.
+        k1, k2, p1, p2, k3 as in OpenCV; all 0 where there is a `lens`.
     pose : (R, t), optional
         World to camera: x ~ K (R X + t).
     principal_sigma : float
@@ -46,6 +47,10 @@ class Camera:
         Name of the picture whose focal length was taken, this one's own not being known; empty where it is.
     in_metres : bool
         Whether the pose is in metres, and not in a unit of its own.
+    lens : Lens, optional
+        A lens of another kind, which then is known; None where `distortion` says all.
+    start : (3, 3), optional
+        A rotation, world to camera, to begin with: nothing is held by it.
     """
 
     K: NDArray[np.float64]
@@ -58,6 +63,8 @@ class Camera:
     knowledge: Knowledge = Knowledge.GIVEN
     lens_of: str = ""
     in_metres: bool = False
+    lens: Lens | None = None
+    start: NDArray[np.float64] | None = None
 
     @property
     def focal(self) -> float:
@@ -73,6 +80,26 @@ class Camera:
     def assumed(self) -> bool:
         """Whether nothing was known of the focal length."""
         return self.knowledge == Knowledge.ASSUMED
+
+    @property
+    def bent(self) -> bool:
+        """Whether its picture shows anything else than a pinhole would."""
+        return bool(self.distortion.any()) or (self.lens is not None and self.lens.bends)
+
+    @property
+    def lens_known(self) -> bool:
+        """Whether its distortion is known, or that it has none, and not to be sought."""
+        return self.lens is not None or bool(self.distortion.any())
+
+    def without_lens(self) -> Camera:
+        """The camera of the same points free of distortion; where that was known, it is known that none is left."""
+        return replace(self, distortion=np.zeros(5), lens=Lens() if self.lens_known else None)
+
+    def zoomed(self, factor: float) -> Camera:
+        """The camera with its focal length called so many times as long; a known lens moves the same pixels."""
+        lens = None if self.lens is None else self.lens.zoomed(factor)
+        distortion = self.distortion * factor ** np.array([2.0, 4, 1, 1, 6])
+        return replace(self, K=self.scaled(factor), distortion=distortion, lens=lens)
 
     def scaled(self, factor: float) -> NDArray[np.float64]:
         """K with its focal length times `factor`."""

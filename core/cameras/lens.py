@@ -1,16 +1,19 @@
-"""Lens distortion in OpenCV's five-parameter form, made safe outside the picture.
+"""What lenses do to pictures: between px of a pinhole camera's plane and px of the picture, safe outside of it.
 
-x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + tangential terms (Brown 1971). A polynomial says nothing beyond the radius it was
-fitted on and may fold back into the picture there; past the trusted radius its displacement is carried on in proportion
-to the radius.
+Distortion is OpenCV's, in five parameters: x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + tangential terms (Brown 1971). A
+polynomial says nothing beyond the radius it was fitted on and may fold back into the picture there; past the trusted
+radius its displacement is carried on in proportion to the radius. So are other lenses (`lens_models`) beyond the angle
+up to which they are used.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..raster.arrays import Array
 from .camera import Camera
+from .lens_models import Lens
 from .options import LENS
 
 
@@ -33,14 +36,16 @@ def distort(points: Array, camera: Camera) -> Array:
     ----------
     D. Brown, Close-Range Camera Calibration, Photogrammetric Engineering 37, 1971.
     """
-    if not camera.distortion.any():
+    if not camera.bent:
         return points
     ideal = _normalised(points, camera)
+    if camera.lens is not None:
+        return _pixels(_shown(ideal, camera.lens), camera)
     return _pixels(_distorted(ideal, camera.distortion, _trusted_radius(camera)), camera)
 
 
 def undistort(points: Array, camera: Camera) -> Array:
-    """Remove lens distortion: the inverse of `distort`, by a damped fixed-point iteration.
+    """Remove lens distortion: the inverse of `distort`, by a damped fixed-point iteration, of a `Lens` by Newton's.
 
     Parameters
     ----------
@@ -54,9 +59,11 @@ def undistort(points: Array, camera: Camera) -> Array:
     (…, 2)
         Ideal px.
     """
-    if not camera.distortion.any():
+    if not camera.bent:
         return points
     raw = _normalised(points, camera)
+    if camera.lens is not None:
+        return _pixels(_flattened(raw, camera.lens), camera)
     limit = _trusted_radius(camera)
     ideal = raw.copy()
     for _ in range(LENS.iterations):
@@ -68,9 +75,48 @@ def undistort(points: Array, camera: Camera) -> Array:
     return _pixels(ideal, camera)
 
 
+def unused(camera: Camera) -> NDArray[np.bool_] | None:
+    """Where a picture (H, W) shows what lies beyond the angle up to which its lens is used; None where it does not."""
+    if camera.lens is None or not camera.lens.bends:
+        return None
+    limit = float(camera.lens.shown_at(np.array(used_angle(camera.lens))))
+    if _corner_radius(camera) <= limit:
+        return None
+    width, height = camera.size
+    rows = np.arange(height, dtype=np.float64)[:, None]
+    y = (rows - camera.K[1, 2]) / camera.K[1, 1]
+    x = (np.arange(width, dtype=np.float64) - camera.K[0, 2] - camera.K[0, 1] * y) / camera.K[0, 0]
+    beyond: NDArray[np.bool_] = x * x + y * y > limit * limit
+    return beyond if beyond.any() else None
+
+
+def used_angle(lens: Lens) -> float:
+    """The angle from the axis, rad, up to which a lens is used."""
+    return min(lens.limit, float(np.radians(LENS.widest_used)))
+
+
+def _shown(ideal: Array, lens: Lens) -> Array:
+    """Where a lens shows points (…, 2) of the plane at distance 1."""
+    radius = np.sqrt((ideal**2).sum(axis=-1, keepdims=True))
+    inner = np.clip(radius, 1e-12, np.tan(used_angle(lens)))
+    raw: Array = ideal * (lens.shown_at(np.arctan(inner)) / inner)
+    return raw
+
+
+def _flattened(raw: Array, lens: Lens) -> Array:
+    """The inverse of `_shown`."""
+    limit = used_angle(lens)
+    radius = np.sqrt((raw**2).sum(axis=-1, keepdims=True))
+    inner = np.clip(radius, 1e-12, float(lens.shown_at(np.array(limit))))
+    ideal: Array = raw * (np.tan(np.minimum(lens.angle_at(inner), limit)) / inner)
+    return ideal
+
+
 def fold_radius(camera: Camera) -> tuple[float, float] | None:
     """The raw normalised radius at which the radial polynomial folds back, and that of the farthest corner, if the
     first is the smaller one: no ray is seen beyond it; else None."""
+    if camera.lens is not None:
+        return None
     r, slope, raw = _radial(camera)
     farthest = _corner_radius(camera)
     folded = np.flatnonzero((slope <= 0) & (np.maximum.accumulate(raw) < farthest))

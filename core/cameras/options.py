@@ -41,6 +41,16 @@ class LensOptions:
     # Iterations of undistortion, at most, and the step in normalised units that ends them.
     iterations: int = 60
     tolerance: float = 1e-12
+    # Step of an angle, rad, that ends its search: what is left then is its square.
+    angle_tolerance: float = 1e-9
+    # Angles from the axis, degrees, up to which models are looked at: tangents and sines end at 90, the others at 180.
+    widest_flat: float = 89.9
+    widest_round: float = 179.0
+    # Focal lengths per rad below which a lens shows too little to be inverted; 0 is where it folds.
+    least_angular_slope: float = 0.05
+    # Degrees from the axis up to which a picture is used: the engine holds pictures on their planes, where what is
+    # shown at 80 is stretched 6 × across and 33 × outwards.
+    widest_used: float = 80.0
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,16 @@ def rotation_from_vector(omega: Array) -> Array:
     return R
 
 
+def rotation_from_angles(yaw: float, pitch: float, roll: float) -> Array:
+    """The rotation (3, 3) from the axes of a camera at these angles (degrees) to those of the panorama."""
+    (sy, sp, sr), (cy, cp, cr) = (f(np.radians([yaw, pitch, roll])) for f in (np.sin, np.cos))
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_x = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
+    about_z = np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]])
+    rotation: Array = about_y @ about_x @ about_z
+    return rotation
+
+
 def rotation_angle(R1: Array, R2: Array) -> float:
     """Angle between two rotations in degrees; 2·asin form, exact to rounding for small angles."""
     return float(np.degrees(2 * np.arcsin(min(1.0, np.linalg.norm(R1 - R2) / (2 * np.sqrt(2))))))

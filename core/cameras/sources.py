@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,10 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..system.errors import BadRequest, UnreadableImage
+from ..system.errors import BadRequest
 from .camera import Camera, Knowledge
+from .lens_entries import lens_of
 from .options import INTRINSICS
 from .plausible import check_plausible, fold_warning
+from .programs.lensfun import LensProfile
+from .programs.recognised import read_any
 from .sensors import sensor_diagonal
 
 if TYPE_CHECKING:
@@ -112,10 +114,13 @@ def cameras_for(
         The camera file cannot be read.
     """
     warnings: list[str] = []
+    profiles: dict[str, LensProfile] = {}
     held: Sequence[Camera | None] = [None] * len(names)
     if request.cameras is not None:
-        table, unit = _camera_table(request.cameras)
-        held = read_camera_file({"cameras": table, "unit": unit}, names, sizes)
+        table, unit = camera_table(request.cameras, names, exifs)
+        profiles = {name: entry for name, entry in table.items() if isinstance(entry, LensProfile)}
+        if not profiles:
+            held = read_camera_file({"cameras": table, "unit": unit}, names, sizes)
         if len(names) > 2 and set(table) - set(names):
             warnings.append(f"the camera file names what is none of the pictures: {_strangers(table, names)}")
     cameras = [
@@ -127,6 +132,8 @@ def cameras_for(
         if lender is not None:  # one lens took all pictures more often than not
             known, name = cameras[lender], "the other picture" if len(names) == 2 else names[lender]
             cameras = [_with_lens_of(known, camera, name) if camera.assumed else camera for camera in cameras]
+    if profiles:
+        cameras = [profiles[name].on(camera) for name, camera in zip(names, cameras, strict=True)]
     if request.principal:
         values = [request.principal[i : i + 2] for i in range(0, len(request.principal), 2)]
         cameras = [
@@ -226,9 +233,11 @@ def read_camera_file(
     Parameters
     ----------
     source : str, path or dict
-        {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "R": 3×3?, "t": [3]?}}, "unit": UNIT?} with
-        NAME the picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes, integer pixel centres;
-        UNIT is "metres" if t is in metres, "baselines" if in none that is known.
+        {"cameras": {NAME: {"K": 3×3, "distortion": [k1, k2, p1, p2, k3]?, "lens": {…}?, "R": 3×3?, "t": [3]?}},
+        "unit": UNIT?} with NAME the picture's file name, or "reference" and "target"; x ~ K (R X + t), OpenCV axes,
+        integer pixel centres; `lens`, in place of a distortion, as for `lens_of`; UNIT is "metres" if t is in metres,
+        "baselines" if in none that is known (docs/formats.md says what more an entry may hold). Or a file of another
+        program (`programs.recognised`).
     names : sequence of str
         The pictures' file names.
     sizes : sequence of (int, int)
@@ -246,7 +255,7 @@ def read_camera_file(
     UnreadableImage
         For the file.
     """
-    table, unit = _camera_table(source)
+    table, unit = camera_table(source, names)
     out: list[Camera | None] = []
     several = len(names) > 2
     for number, (name, size) in enumerate(zip(names, sizes, strict=True)):
@@ -279,17 +288,12 @@ def read_camera_file(
     return out
 
 
-def _camera_table(source: str | Path | dict[str, Any]) -> tuple[dict[str, Any], str]:
-    """What a camera file, or its content, holds by the names of pictures, and its unit. Raises as `read_camera_file`
-    does."""
-    content: Any = source
-    if not isinstance(source, dict):
-        try:
-            content = json.loads(Path(source).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise UnreadableImage(f"the camera file cannot be read: {error}") from error
-        except (ValueError, RecursionError) as error:
-            raise BadRequest(f"the camera file is not JSON: {error}") from error
+def camera_table(
+    source: str | Path | dict[str, Any], names: Sequence[str], exifs: Sequence[Exif] = ()
+) -> tuple[dict[str, Any], str]:
+    """What a camera file of any program (`programs.recognised`), or a camera file's content, holds by the names of
+    pictures, and its unit. Raises as `read_camera_file` does."""
+    content: Any = source if isinstance(source, dict) else read_any(Path(source), names, exifs)
     table = content.get("cameras", content) if isinstance(content, dict) else None
     if not isinstance(table, dict):
         raise BadRequest('a camera file holds {"cameras": {"NAME": {"K": [[…]], "R": [[…]], "t": […]}}}')
@@ -318,14 +322,46 @@ def _camera_from_entry(entry: dict[str, Any], name: str, size: tuple[int, int]) 
         if len(values) > 5 or not np.isfinite(values).all():
             raise BadRequest(f"the camera of {name}: distortion is at most k1, k2, p1, p2, k3")
         distortion[: len(values)] = values
+    own = _size_of(entry, name, size)
+    lens = None if entry.get("lens") is None else lens_of(entry["lens"], K, own, name)
+    if lens is not None and distortion.any():
+        raise BadRequest(f"the camera of {name}: it has a distortion and a lens; give one of them")
     pose = None
     if entry.get("R") is not None or entry.get("t") is not None:
-        R, t = _matrix(entry, "R", (3, 3), name), _matrix(entry, "t", (3,), name)
-        U, S, Vt = np.linalg.svd(R)
-        if np.abs(S - 1).max() > 1e-3 or np.linalg.det(R) < 0:
-            raise BadRequest(f"the camera of {name}: R is not a rotation matrix")
-        pose = (U @ Vt, t)  # files carry six digits: the nearest true rotation
-    return Camera(K, size, "camera file", 0.0, distortion, pose)
+        pose = (_rotation(entry, "R", name), _matrix(entry, "t", (3,), name))
+    start = None if entry.get("start") is None else _rotation(entry, "start", name)
+    sigma = entry.get("focal_sigma", 0.0)
+    if not isinstance(sigma, (int, float)) or not 0 <= sigma < 10:
+        raise BadRequest(f"the camera of {name}: focal_sigma is the deviation of the log of its focal length, 0 to 10")
+    camera = Camera(K, own, "camera file", float(sigma), distortion, pose, lens=lens, start=start)
+    if sigma:
+        camera = replace(camera, principal_sigma=INTRINSICS.principal_sigma, knowledge=Knowledge.EXIF)
+    return camera if own == size else camera.resized(size)
+
+
+def _size_of(entry: dict[str, Any], name: str, size: tuple[int, int]) -> tuple[int, int]:
+    """The size (W, H) px that a camera is about: the picture's own (`size`), or another one of the same shape."""
+    told = entry.get("size")
+    if told is None:
+        return size
+    if not (isinstance(told, list) and len(told) == 2 and all(isinstance(one, int) and one > 0 for one in told)):
+        raise BadRequest(f"the camera of {name}: size must be [width, height], px")
+    if abs(told[0] * size[1] - told[1] * size[0]) > max(*told, *size):
+        turned = "; it is about the picture as it is stored, and EXIF turns it" if told[::-1] == list(size) else ""
+        raise BadRequest(
+            f"the camera of {name} is one of {told[0]} × {told[1]} px, the picture has {size[0]} × {size[1]}{turned}: "
+            "give the picture that it is about"
+        )
+    return told[0], told[1]
+
+
+def _rotation(entry: dict[str, Any], key: str, name: str) -> NDArray[np.float64]:
+    """The rotation nearest to the matrix of an entry: files carry six digits."""
+    U, S, Vt = np.linalg.svd(_matrix(entry, key, (3, 3), name))
+    if np.abs(S - 1).max() > 1e-3 or np.linalg.det(U @ Vt) < 0:
+        raise BadRequest(f"the camera of {name}: {key} is not a rotation matrix")
+    rotation: NDArray[np.float64] = U @ Vt
+    return rotation
 
 
 def _matrix(entry: dict[str, Any], key: str, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:

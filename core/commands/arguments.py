@@ -74,9 +74,10 @@ def _add_cameras(parser: argparse.ArgumentParser) -> None:
         help="principal point in pixels (default: the middle)",
     )  # fmt: skip
     camera.add_argument(
-        "--cameras", type=Path, metavar="FILE.json",
-        help="per picture K, optionally distortion, R and t; of more than two, those that are in it are held",
-    )
+        "--cameras", type=Path, metavar="FILE",
+        help="per picture K, optionally distortion or lens, R and t; of more than two, those that are in it are held; "
+        "or a COLMAP model's folder, transforms.json, a Hugin project (.pto), a calibration, a lensfun database",
+    )  # fmt: skip
 
 
     camera.add_argument(
@@ -111,7 +112,7 @@ def _add_control(parser: argparse.ArgumentParser) -> None:
     control.add_argument(
         "--matches", type=Path, metavar="FILE.csv",
         help="x,y,x2,y2[,weight] in px of REF and TARGET; of more than two pictures the columns picture and picture2 "
-        "name whose: used as given, nothing is searched; a report's own: as they were found",
+        "name whose: used as given, nothing is searched; a report's own: as they were found; or a Hugin project",
     )  # fmt: skip
     control.add_argument(
         "--ignore-ref", type=Path, metavar="MASK",

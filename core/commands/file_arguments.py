@@ -33,8 +33,10 @@ def add_files(parser: argparse.ArgumentParser) -> None:
         help="the panorama as a surface that stands as far away as it was found to be (glTF, which Blender imports)",
     )
     files.add_argument(
-        "--cameras-out", type=Path, metavar="FILE.json", help="the cameras that were found, as --cameras takes them"
-    )
+        "--cameras-out", type=Path, metavar="NAME",
+        help="the cameras that were found: .json as --cameras takes them, transforms.json, .pto (Hugin), .chan (Nuke), "
+        "or a folder (a COLMAP model)",
+    )  # fmt: skip
     _add_exr(files)
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")
 

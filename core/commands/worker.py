@@ -236,7 +236,7 @@ def _array(path: Path) -> Any:
 def _write(folder: Path, result: Any, rows: Any, job: dict[str, Any], turns: tuple[int, ...]) -> None:
     """Everything the window may ask for, with result.json as the index."""
     from ..output import inspection as seen
-    from ..output.outputs import json_bytes
+    from ..output.json_file import json_bytes
     from ..output.sphere_part import sphere_part_of
     from ..pictures.encoding import encode_picture
     from ..pictures.exr import ExrForm

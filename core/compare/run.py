@@ -15,7 +15,7 @@ from ..frames.frame import Frame
 from ..frames.reading import read_frame
 from ..measure.projectivity import independent_fundamental
 from ..options import StitchOptions
-from ..output.outputs import json_bytes
+from ..output.json_file import json_bytes
 from ..pipeline import StitchResult, compose
 from ..system.errors import BadRequest, Cancelled, StitchError
 from ..system.output_files import OutputFiles

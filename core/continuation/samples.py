@@ -51,7 +51,7 @@ def samples_of(field: Field, reference: View, target: View, refined: RefinedDept
     camera = reference.camera
     width, height = camera.size
     grid = Grid.over(0, 0, width, height, GRID.field_nodes)
-    bent = camera.distortion.any()
+    bent = camera.bent
     values = field.on_grid(grid, undistort(grid.points, camera) if bent else None)
     every = max(1, int(np.sqrt(width * height / GRID.samples)))
     xs, ys = np.arange(0, width, every, dtype=np.float64), np.arange(0, height, every, dtype=np.float64)
@@ -73,7 +73,7 @@ def samples_of(field: Field, reference: View, target: View, refined: RefinedDept
     at_border = ((raw < every) | (raw > np.array([width, height]) - 1 - every)).any(axis=-1)
     ray, shift, d, trust, at_border = (one[ahead] for one in (ray, shift, d, trust, at_border))
     points = ray[:, :2] / ray[:, 2:] + shift
-    seen = distort(points, target.camera) if target.camera.distortion.any() else points
+    seen = distort(points, target.camera) if target.camera.bent else points
     inside = falls_inside(seen[:, 0], seen[:, 1], target.size)
     return Samples(points[inside], (d / ray[:, 2])[inside], trust[inside], at_border[inside])
 

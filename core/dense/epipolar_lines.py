@@ -51,7 +51,7 @@ class SparseMap:
         width, height = camera.size
         box = (-margin, -margin, width + 2 * margin, height + 2 * margin)
         grid = Grid.over(*box)
-        values = field.on_grid(grid, undistort(grid.points, camera) if camera.distortion.any() else None)
+        values = field.on_grid(grid, undistort(grid.points, camera) if camera.bent else None)
         inverse_depth = np.ascontiguousarray(grid.to_pixels(values.inverse_depth, *box, step))
         shift = None
         if values.shift is not None:
@@ -205,7 +205,7 @@ class EpipolarLines:
         if across is not None:
             x -= across[part] * direction[..., 1]
             y += across[part] * direction[..., 0]
-        if self.camera_prime.distortion.any():
+        if self.camera_prime.bent:
             raw = distort(np.stack([x, y], axis=-1).astype(np.float64), self.camera_prime).astype(np.float32)
             x, y = raw[..., 0], raw[..., 1]
         return x, y

@@ -23,6 +23,7 @@ from ..system.threads import in_order
 from .brackets import brackets_in
 from .frame import Frame, size_of
 from .merging import MergedBracket, merged
+from .used_parts import within_lenses
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
 Source = str | Path | NDArray[Any] | Picture
@@ -145,7 +146,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     ----------
     pictures : sequence of Picture
     options : StitchOptions
-        Their scale and masks.
+        Their scale, masks and given cameras.
     copies : dict, optional
         Numbers of pictures that are left out since they are the same as another one: its number.
 
@@ -156,7 +157,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     Raises
     ------
     BadRequest, UnreadableImage
-        About a mask.
+        About a mask or the camera file.
     """
     copies, names = copies or {}, [picture.name for picture in pictures]
     masks = options.ignored_in(names)
@@ -185,7 +186,8 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
             "they match only roughly; use RAW files of all pictures, or of none",
         )
     painted = None if options.mask is None else read_painted(options.mask)
-    return Frame(tuple(worked_on), tuple(sizes), painted, warnings, tuple(shown_by))
+    frame = Frame(tuple(worked_on), tuple(sizes), painted, warnings, tuple(shown_by))
+    return within_lenses(frame, options.camera)
 
 
 def _all_read(sources: Sequence[Source]) -> list[Picture]:

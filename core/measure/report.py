@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.lens_entries import lens_entry
 from ..compose.inpaint import closed_holes
 from ..compose.window import goes_round
 from ..field.slack import SlackField
@@ -255,7 +256,7 @@ def picture_entry(picture: Picture, camera: Camera) -> dict[str, Any]:
         "alpha": picture.alpha is not None, "icc": picture.icc is not None,
         "camera": {
             "focal_px": camera.focal, "source": camera.source, "fixed": camera.fixed, "distortion": camera.distortion,
-        },
+        } | ({} if camera.lens is None else {"lens_model": lens_entry(camera)}),
     }  # fmt: skip
 
 

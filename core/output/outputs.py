@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +12,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..measure.report import plain
 from ..panorama.layers import Layer
 from ..pictures.encoding import encode_into, encode_picture, output_bits
 from ..pictures.exr import ExrForm
@@ -22,10 +20,11 @@ from ..raster.colour import decode
 from ..raster.enlarging import repeated
 from ..system.errors import BadRequest
 from ..system.output_files import OutputFiles
-from .camera_file import camera_table
 from .depth.mesh import mesh_bytes
 from .depth.range_image import range_bytes, range_image
+from .json_file import json_bytes
 from .match_table import match_file
+from .programs.written import check_cameras, write_cameras
 from .rig_page import rig_page
 from .sphere_part import sphere_part_of
 from .warp_file import write_warp
@@ -61,7 +60,7 @@ class OutputRequest:
     warp : Path, optional
         .npz.
     cameras : Path, optional
-        .json.
+        Its name says the form (see `form_of`).
     depth : Path, optional
         .exr.
     mesh : Path, optional
@@ -132,9 +131,10 @@ def check(
     if request.cameras is not None and len(set(pictures)) < len(pictures):
         twice = next(name for number, name in enumerate(pictures) if name in pictures[:number])
         raise BadRequest(f"cameras are written by name, and two pictures are called {twice}: rename one of them")
+    cameras = [] if request.cameras is None else check_cameras(request.cameras, files)
     named = (
-        request.panorama, request.report, request.timing, request.matches, request.warp, request.cameras,
-        request.depth, request.mesh,
+        request.panorama, request.report, request.timing, request.matches, request.warp, *cameras, request.depth,
+        request.mesh,
     )  # fmt: skip
     page = request.page if len(pictures) > 2 else None
     single = [path for path in (*named, page) if path is not None]
@@ -215,7 +215,7 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     UnwritableOutput
         A panorama that its format cannot hold, or a file that cannot be written.
     DegenerateGeometry
-        Depth is asked for, and there is none.
+        Depth or cameras of another program are asked for, and there are none.
     """
     reference = result.pictures[0]
     alpha = None if result.panorama.alpha.min() >= 1.0 else result.panorama.alpha
@@ -229,7 +229,7 @@ def write(result: StitchResult, request: OutputRequest, files: OutputFiles) -> l
     if request.warp is not None:
         files.add_by(request.warp, lambda file: write_warp(result, file))
     if request.cameras is not None:
-        files.add(request.cameras, json_bytes(camera_table(result)))
+        warnings += write_cameras(result, request.cameras, files)
     warnings += add_depth(result, request.depth, request.mesh, files)
     if request.report is not None and request.timing is not None and request.matches is not None:
         add_report(result, [*result.warnings, *warnings], request.report, request.matches, request.timing, files)
@@ -321,9 +321,3 @@ def _mask_bytes(mask: NDArray[Any], shown: NDArray[np.bool_] | None = None) -> b
     levels = np.rint(255 * mask.astype(np.float32)).astype(np.uint8)
     alpha = None if shown is None else shown.astype(np.float32)
     return encode_picture(decode(levels[..., None]), alpha, 8, ".png")[0]
-
-
-def json_bytes(value: dict[str, Any]) -> bytes:
-    """JSON as people read it; NaN and infinity become null."""
-    # the name of a file need not be UTF-8
-    return (json.dumps(plain(value), indent=1, ensure_ascii=False) + "\n").encode(errors="replace")

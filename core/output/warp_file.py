@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import io
+import json
 import zipfile
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.lens_entries import lens_entry
 from ..panorama.rig_viewpoint import RigViewpoint
 from ..raster.lazy import whole
 from ..raster.picture_map import BoxedMap, MapPart
@@ -68,6 +71,8 @@ def _warp_arrays(result: StitchResult) -> Iterator[tuple[str, NDArray[Any]]]:
         "F": np.stack([edge.two_view.F for edge in result.edges]),
         "edges": np.array([(edge.i, edge.j) for edge in result.edges]),
     }.items()  # fmt: skip
+    if any(view.camera.lens for view in views):
+        yield "lenses", np.array([json.dumps(lens_entry(replace(view.camera, K=view.K))) for view in views])
     del inverse_depth
     for number in range(len(views)):
         if number or projection is not None:  # in a flat panorama the reference is only shifted, by `offset`

@@ -103,7 +103,7 @@ class Canvas:
         """
         if self.projection is not None:
             return self.projection.project_rows(rows, xs, ys)
-        if camera is not None and camera.distortion.any():
+        if camera is not None and camera.bent:
             raw = np.stack(np.broadcast_arrays(xs[None, :], ys[:, None]), axis=-1)
             return list(np.moveaxis(homogeneous(undistort(raw, camera)) @ rows.T, -1, 0))
         return [(row[0] * xs)[None, :] + (row[1] * ys[:, None] + row[2]) for row in rows]

@@ -75,7 +75,7 @@ class Surface:
         camera = self.reference.camera
         with np.errstate(divide="ignore", invalid="ignore"):
             ideal = np.stack([x / ahead, y / ahead], axis=-1)
-        raw = distort(ideal, camera) if camera.distortion.any() else ideal
+        raw = distort(ideal, camera) if camera.bent else ideal
         shown = (ahead_of_camera(x, y, ahead) & falls_inside(raw[:, 0], raw[:, 1], camera.size))
         shown |= self.seen[rows, ::every][slides]
         return [part[shown] for part in own], self.depth[rows, ::every][slides][shown]

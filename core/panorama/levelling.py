@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..cameras.projective import down_at
+from ..cameras.projective import down_at, rotation_from_angles
 from ..choices import LEVELS, Level
 from ..raster.arrays import Array
 from ..system.errors import BadRequest
@@ -135,12 +135,7 @@ def upright(down: Array) -> Array:
 
 def turned(yaw: float, pitch: float, roll: float) -> Array:
     """The rotation (3, 3) from the panorama's axes to those of a camera at these angles (degrees)."""
-    (sy, sp, sr), (cy, cp, cr) = (f(np.radians([yaw, pitch, roll])) for f in (np.sin, np.cos))
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_x = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
-    about_z = np.array([[cr, -sr, 0], [sr, cr, 0], [0, 0, 1]])
-    rotation: Array = (about_y @ about_x @ about_z).T
-    return rotation
+    return rotation_from_angles(yaw, pitch, roll).T
 
 
 def angles_of(rotation: Array) -> tuple[float, float, float]:

@@ -108,7 +108,7 @@ def seen_at(
         moved = d * np.asarray(warp.slide[box], np.float64)
         seen = [part + moved * k for part, k in zip(seen, view.H_inf @ reference.K @ warp.viewpoint.c, strict=True)]
     x, y = transfer(view, seen, d)
-    if not view.camera.distortion.any():
+    if not view.camera.bent:
         return x, y
     raw = distort(np.stack([x, y], axis=-1), view.camera)
     return raw[..., 0], raw[..., 1]

@@ -142,7 +142,7 @@ def _seen_at(
 
 def _raw(view: View, x: Array, y: Array) -> tuple[Array, Array]:
     """Raw pixels x, y (…) of ideal ones."""
-    if not view.camera.distortion.any():
+    if not view.camera.bent:
         return x, y
     raw = distort(np.stack([x, y], axis=-1), view.camera)
     return raw[..., 0], raw[..., 1]

@@ -281,7 +281,7 @@ def raw_pixels(
     for across, down in beside:
         x += across
         y += down
-    if view.camera.distortion.any():
+    if view.camera.bent:
         x, y = np.moveaxis(distort(np.stack([x, y], axis=-1), view.camera), -1, 0)
     return x, y
 
@@ -293,7 +293,7 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     interpolated there and scaled by p_3; where the reference camera does not look, that plane alone is left.
     """
     if canvas.projection is None:
-        return field.on_grid(grid, undistort(grid.points, camera) if camera.distortion.any() else None)
+        return field.on_grid(grid, undistort(grid.points, camera) if camera.bent else None)
     width, height = camera.size
     margin = int(np.ceil(min(field.fit.fade_px, WARP.max_fade * max(camera.size))))
     across, down = width + 2 * margin, height + 2 * margin
@@ -303,7 +303,7 @@ def _node_values(field: Field, grid: Grid, canvas: Canvas, camera: Camera) -> Fi
     step = 2.0 ** np.floor(np.log2(step))
     flat = Grid.over(-margin, -margin, across, down, int(min(share * GRID.nodes, across * down / step**2)))
     ideal = undistort(flat.points, camera)
-    values = field.on_grid(flat, ideal if camera.distortion.any() else None)
+    values = field.on_grid(flat, ideal if camera.bent else None)
     if values.far is None:
         raise BadRequest(
             f"the field {field.name!r} knows the reference's plane only: use slack or strict, or --projection reference"

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.matches import Matches
+from ..cameras.programs.hugin import Project, project_in
 from ..pictures.naming import number_of
 from ..raster.resizing import resized_points
 from ..system.errors import BadRequest
@@ -131,7 +132,7 @@ def read_matches(
         A CSV file in UTF-8: x, y in the reference and x2, y2 in the target, px of the upright pictures with integer
         pixel centres, and optionally a weight (default 1; 0 leaves the match out). Separated by commas, semicolons or
         white space; a header may name the columns in any order, among others; lines that start with # are skipped. Or
-        an array of the same columns.
+        an array of the same columns, or a Hugin project with control points.
     size, size_prime : (int, int)
         (W, H) px of the reference and of the target.
     worked : ((int, int), (int, int)), optional
@@ -254,7 +255,22 @@ def _from_array(array: NDArray[Any]) -> _Table:
     return _Table(rows[:, :4], rows[:, 4], None, np.ones(len(array)), np.full((len(array), 4), np.nan), places)
 
 
+def _from_project(project: Project, path: Path) -> _Table:
+    """The control points of a Hugin project."""
+    if not len(project.points):
+        raise BadRequest(f"{path}: no control points in this project; let Hugin find some, or give none")
+    ends = [name.replace("\\", "/").rpartition("/")[2] for name in project.names]
+    names = np.array(ends if len(set(ends)) == len(ends) else project.names)
+    count = len(project.points)
+    places = [f"{path}, line {line}" for line in project.lines]
+    worked = np.full((count, 4), np.nan)
+    return _Table(project.points, np.ones(count), None, np.ones(count), worked, places, names[project.pairs])
+
+
 def _from_file(path: Path) -> _Table:
+    project = project_in(path)
+    if project is not None:
+        return _from_project(project, path)
     rows: list[list[float]] = []
     places: list[str] = []
     states: list[str] = []

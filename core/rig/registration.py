@@ -95,7 +95,7 @@ def _registered(
 ) -> Registration:  # fmt: skip
     """The same of pictures of which none shows just what another one does."""
     ideal = [undistort(p, camera) for p, camera in zip(points, cameras, strict=True)]
-    plain = [replace(camera, distortion=np.zeros(5)) for camera in cameras]
+    plain = [camera.without_lens() for camera in cameras]
     verified = verify(ideal, _watched(matches, progress), scale, seed)
     check_given_poses(plain, ideal, verified, names)
     averages = hypotheses(plain, ideal, verified, partial(progress, "geometry", _VERIFIED))

@@ -107,7 +107,8 @@ def lenses_of(cameras: Sequence[Camera]) -> list[int]:
     """The number of each camera's lens: those of one size and the same intrinsics share one."""
     numbers: dict[tuple[object, ...], int] = {}
     return [
-        numbers.setdefault((one.size, one.K.tobytes(), one.distortion.tobytes()), len(numbers)) for one in cameras
+        numbers.setdefault((one.size, one.K.tobytes(), one.distortion.tobytes(), one.lens), len(numbers))
+        for one in cameras
     ]
 
 

@@ -81,7 +81,7 @@ class SweptPicture:
         if picture.alpha is not None:
             shown[picture.alpha <= 0] = 0
         levels, corner = np.dstack([colours, shown]), (0.0, 0.0)
-        if view.camera.distortion.any():
+        if view.camera.bent:
             levels, corner = _without_lens(levels, view)
         height, width = levels.shape[:2]
         shrink = min(1.0, per_radian / view.camera.focal)

@@ -55,7 +55,8 @@ def candidates(
     """Poses of all pairs, the best first.
 
     Starts are RANSAC's pose and, where matches are few, those of other seeds and the best pure rotation with directions
-    of the baseline all around. All are refined and judged by a Cauchy cost, and by parallax of the wrong sign.
+    of the baseline all around; so is a rotation that is given to begin with. All are refined and judged by a Cauchy
+    cost, and by parallax of the wrong sign.
 
     Parameters
     ----------
@@ -86,11 +87,13 @@ def candidates(
         if agree.sum() < CANDIDATES.min_inliers:
             continue
         rotation = _best_rotation(part, scale, seed)
+        given = matched.turns[k] if matched.turns else None
         if len(part.a) < CANDIDATES.few_matches:
-            around = np.broadcast_to(rotation, (len(DIRECTIONS), 3, 3))
-            poses = Poses(np.concatenate([poses.R, around]), np.concatenate([poses.t, DIRECTIONS]))
+            poses = _all_around(poses, rotation)
         else:
             poses = Poses(poses.R[:1], poses.t[:1])
+        if given is not None:
+            poses = _all_around(poses, given)
         inliers[rows] = agree
         numbers.append(k)
         turned.append(rotation)
@@ -101,6 +104,12 @@ def candidates(
         return Candidates(kept, inliers, matched.of_pairs(kept), np.zeros((0, 3, 3)), (), (), noise)
     rays = _of_inliers(matched, kept, inliers)
     return _refined(kept, inliers, rays, np.array(turned), starts, lens, scale)
+
+
+def _all_around(poses: Poses, rotation: Array) -> Poses:
+    """Further poses: a rotation (3, 3) with directions of the baseline all around."""
+    around = np.broadcast_to(rotation, (len(DIRECTIONS), 3, 3))
+    return Poses(np.concatenate([poses.R, around]), np.concatenate([poses.t, DIRECTIONS]))
 
 
 def at_other_lens(found: Candidates, lens: SharedLens, scale: float) -> Candidates:

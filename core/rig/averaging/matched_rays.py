@@ -29,11 +29,8 @@ class SharedLens:
         """The camera with this lens; a given distortion still moves the same pixels."""
         if camera.fixed:
             return camera
-        if camera.distortion.any():
-            distortion = camera.distortion * self.factor ** np.array([2.0, 4, 1, 1, 6])
-        else:
-            distortion = np.array([self.k1, 0.0, 0, 0, 0])
-        return replace(camera, K=camera.scaled(self.factor), distortion=distortion)
+        zoomed = camera.zoomed(self.factor)
+        return zoomed if camera.lens_known else replace(zoomed, distortion=np.array([self.k1, 0.0, 0, 0, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +57,8 @@ class MatchedRays:
 
     x, y (O, 2): points of both pictures over the focal length that was known before, from the principal point; focal,
     zooms, bends (2, O): that focal length in px, and whether the picture's focal length and k1 are shared (1) or given
-    (0); starts (P + 1,): where each pair begins, none is empty.
+    (0); starts (P + 1,): where each pair begins, none is empty; turns: of all pairs, before any was left out, the
+    rotation that is given to begin with, None where there is none.
     """
 
     x: Array
@@ -69,6 +67,7 @@ class MatchedRays:
     zooms: Array
     bends: Array
     starts: NDArray[np.intp]
+    turns: tuple[Array | None, ...] = ()
     # what `undistorted` found last: refining poses asks for it again and again
     _last: list[tuple[SharedLens, Rays]] = field(default_factory=list, repr=False)
 
@@ -170,7 +169,7 @@ def matched_rays(
     for camera, raw in zip(cameras, points, strict=True):
         ideal = homogeneous(undistort(raw, camera)) @ inverse_intrinsics(camera.K).T
         normalised.append(ideal[:, :2])
-        flags.append((camera.focal, float(not camera.fixed), float(not (camera.fixed or camera.distortion.any()))))
+        flags.append((camera.focal, float(not camera.fixed), float(not (camera.fixed or camera.lens_known))))
     ends, sides = [], []
     for pair in verified.pairs:
         columns = first_is(points, pair)
@@ -181,4 +180,6 @@ def matched_rays(
     x, y = (np.concatenate([side[c] for side in sides]) for c in (0, 1))
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
     focal, zooms, bends = (np.ascontiguousarray(known[:, :, k].T) for k in range(3))
-    return MatchedRays(x, y, focal, zooms, bends, starts), np.array(ends, np.intp)
+    given = [[cameras[end].start for end in pair] for pair in ends]
+    turns = tuple(None if a is None or b is None else b @ a.T for a, b in given)
+    return MatchedRays(x, y, focal, zooms, bends, starts, turns), np.array(ends, np.intp)

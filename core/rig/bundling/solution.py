@@ -53,7 +53,7 @@ def lenses_of(cameras: Sequence[Camera]) -> Lenses:
 
     Of a camera whose whole K is given, distortion is too: its points are free of it.
     """
-    keys = [(c.K.tobytes(), c.size, c.source, c.log_sigma, c.principal_sigma) for c in cameras]
+    keys = [(c.K.tobytes(), c.size, c.source, c.log_sigma, c.principal_sigma, c.lens) for c in cameras]
     first = [k for k, key in enumerate(keys) if keys.index(key) == k]
     of = [first.index(keys.index(key)) for key in keys]
     sigma = [_sigma_of(cameras[k]) for k in first]
@@ -69,16 +69,18 @@ def lenses_of(cameras: Sequence[Camera]) -> Lenses:
 
 def _sigma_of(camera: Camera) -> tuple[float, ...]:
     shift = camera.principal_sigma * max(camera.size)
-    return camera.log_sigma, BUNDLE.k1_sigma if camera.log_sigma or shift else 0.0, shift, shift
+    bends = bool(camera.log_sigma or shift) and not camera.lens_known
+    return camera.log_sigma, BUNDLE.k1_sigma if bends else 0.0, shift, shift
 
 
 def with_lens(camera: Camera, change: Array) -> Camera:
     """The camera with what was solved for of its lens (LENS,); what was given stays to the last bit."""
     log_factor, k1, *shift = change
-    K = camera.scaled(float(np.exp(log_factor)))
+    zoomed = camera.zoomed(float(np.exp(log_factor)))
+    K = zoomed.K
     K[:2, 2] += shift
-    distortion = camera.distortion if camera.distortion.any() else np.array([k1, 0, 0, 0, 0])
-    return replace(camera, K=K, distortion=distortion)
+    distortion = zoomed.distortion if camera.lens_known else np.array([k1, 0, 0, 0, 0])
+    return replace(zoomed, K=K, distortion=distortion)
 
 
 @dataclass(frozen=True, eq=False)

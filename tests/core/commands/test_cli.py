@@ -24,7 +24,7 @@ from edf_stitch.core.commands import cli
 from edf_stitch.core.commands.cli import main
 from edf_stitch.core.commands.messages import shortened
 from edf_stitch.core.output.camera_file import camera_table
-from edf_stitch.core.output.outputs import json_bytes
+from edf_stitch.core.output.json_file import json_bytes
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import load_picture, picture_from_array
 from edf_stitch.core.pipeline import StitchOptions, StitchResult

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest, cameras_for, read_camera_file
 from edf_stitch.core.output.camera_file import camera_table
-from edf_stitch.core.output.outputs import OutputRequest, check, json_bytes
+from edf_stitch.core.output.json_file import json_bytes
+from edf_stitch.core.output.outputs import OutputRequest, check
 from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.system.errors import BadRequest

@@ -9,7 +9,7 @@ from edf_stitch.core.cameras.lens import distort, undistort
 from edf_stitch.core.cameras.projective import homogeneous, project
 from edf_stitch.core.field.sphere_field import fit_sphere_field
 from edf_stitch.core.output import inspection
-from edf_stitch.core.output.outputs import json_bytes
+from edf_stitch.core.output.json_file import json_bytes
 from edf_stitch.core.panorama.projection import round_projection
 from edf_stitch.core.panorama.rig_viewpoint import rig_viewpoint
 from edf_stitch.core.panorama.rig_warp import RigSurface, build_rig_warp

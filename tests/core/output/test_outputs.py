@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.output import outputs
-from edf_stitch.core.output.outputs import OutputRequest, check, json_bytes, layer_stem, write
+from edf_stitch.core.output.json_file import json_bytes
+from edf_stitch.core.output.outputs import OutputRequest, check, layer_stem, write
 from edf_stitch.core.output.warp_file import warp_bytes, write_npz
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.pictures.exr import ExrForm
