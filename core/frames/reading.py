@@ -18,6 +18,7 @@ from ..pictures.naming import told_apart
 from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
+from .flatness import check_flat
 from .frame import Frame, size_of
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
@@ -152,10 +153,12 @@ def _picture_or_trouble(source: Source) -> Picture | UnreadableImage:
 
 
 def _picture(source: Source) -> Picture:
-    """A picture, read where it is not one yet."""
+    """A picture, read where it is not one yet; a flat one."""
     if isinstance(source, Picture):
         return source
-    return picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
+    picture = picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
+    check_flat(picture)
+    return picture
 
 
 def _copies(pictures: Sequence[Picture]) -> Iterator[tuple[int, int]]:

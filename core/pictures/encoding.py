@@ -17,9 +17,9 @@ from ..raster.lazy import AnyImage, whole
 from ..system.errors import BadRequest, UnwritableOutput
 from ..system.output_files import OutputFiles
 from ..system.threads import in_order
-from .decoding import quiet_opencv
 from .exr import write_exr
 from .metadata import Exif, embed
+from .opencv import quiet_opencv
 from .options import WRITING
 from .picture import curves_for
 from .png import encode_png

@@ -14,15 +14,21 @@ from ..raster.arrays import strips
 from ..raster.lazy import AnyImage
 from ..system.errors import UnreadableImage
 from ..system.threads import each
+from .exr_colour import from_luminance_chroma, in_rec709, with_square_pixels
 from .metadata import SOFTWARE, Exif
+
+# The bit of a file's second byte of flags that says that parts are not flat (OpenEXR, File Layout).
+_DEEP = 0x08
 
 
 class ExrPixels(NamedTuple):
-    """pixels: float32 H×W×C (1 or 3) as stored, premultiplied; alpha: float32 H×W as stored, or None; warning or ""."""
+    """pixels: float32 H×W×C (1 or 3) as stored, premultiplied, in Rec. 709; alpha: float32 H×W as stored, or None;
+    warnings; surround: whether the header calls it a map of all directions."""
 
     pixels: NDArray[Any]
     alpha: NDArray[Any] | None
-    warning: str
+    warnings: tuple[str, ...]
+    surround: bool = False
 
 
 class _Layer(NamedTuple):
@@ -42,6 +48,8 @@ def read_exr(data: bytes, check: Callable[[list[tuple[int, int]], int], None]) -
     """
     import OpenEXR
 
+    if len(data) > 5 and data[5] & _DEEP:
+        raise UnreadableImage("deep data, many depths at each pixel: flatten it, or render the picture without them")
     # OpenEXR prints a line to sys.stdout for a damaged part and leaves it out.
     with contextlib.redirect_stdout(io.StringIO()):
         headers = OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True).parts
@@ -58,14 +66,16 @@ def read_exr(data: bytes, check: Callable[[list[tuple[int, int]], int], None]) -
     if not layers:
         raise UnreadableImage("no layer with the channels R, G, B or Y; render a colour pass (Combined) into the file")
     best = min(layers, key=_rank)  # the first of equals
+    header = best.part.header
     pixels, alpha = _in_display_window(best)
+    pixels, alpha, stretched = with_square_pixels(in_rec709(pixels, header), alpha, header)
     others = [layer.name for layer in layers if layer is not best and _rank(layer) == _rank(best)]
     warning = ""
     if _rank(best) > 2 and len(layers) > 1:
         warning = f"no combined picture among the layers of the file; the layer {best.name!r} was taken"
     elif others:
         warning = f"several pictures in the file; {best.name!r} was taken, not {', '.join(map(repr, others))}"
-    return ExrPixels(pixels, alpha, warning)
+    return ExrPixels(pixels, alpha, tuple(filter(None, (warning, stretched))), "envmap" in header)
 
 
 def exr_size(data: bytes) -> tuple[int, int]:
@@ -89,7 +99,9 @@ def _layers(parts: list[Any]) -> Iterator[_Layer]:
             groups.setdefault(layer, {})[component.upper()] = channel.pixels
         for layer, found in groups.items():
             colours = [found[name] for name in "RGB" if name in found]
-            if len(colours) < 3:
+            if len(colours) < 3 and {"Y", "RY", "BY"} <= found.keys():
+                colours = from_luminance_chroma(found, part.header)
+            elif len(colours) < 3:
                 colours = [found["Y"]] if "Y" in found else []
             # Depth and normals come as X, Y, Z
             if not colours or (len(colours) == 1 and ("X" in found or "Z" in found)):

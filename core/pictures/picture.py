@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from ..raster.lazy import AnyImage, Coded, whole
 from ..system.errors import BadRequest, UnreadableImage
-from .containers import foreign_kind, read_structure
+from .containers import foreign_kind, read_structure, says_surround
 from .decoding import check_size, decode_exr, decode_file, read_file, turn
 from .metadata import Exif, read_exif
 from .options import READING
@@ -53,6 +53,8 @@ class Picture:
         File name, or "array".
     warnings : tuple of str
         For the user.
+    surround : bool
+        Whether the file says that it is a map of many directions (a sphere, a cylinder), no flat picture.
     """
 
     light: AnyImage
@@ -63,6 +65,7 @@ class Picture:
     icc: bytes | None
     name: str
     warnings: tuple[str, ...] = ()
+    surround: bool = False
 
     @property
     def pixels(self) -> NDArray[Any]:
@@ -114,8 +117,9 @@ def _load(path: Path, pixels_per_byte: int) -> Picture:
     if structure is None:
         raise UnreadableImage(f"not a picture of a known kind; export it as {_READABLE}")
     if structure.kind == "exr":
-        raw, warnings = decode_exr(data, pixels_per_byte)
-        return _picture(raw, True, Exif(), None, path.name, warnings)
+        found = decode_exr(data, pixels_per_byte)
+        picture = _picture(found.raw, True, Exif(), None, path.name, list(found.warnings))
+        return replace(picture, surround=found.surround)
     if structure.damage:
         kind = structure.kind.upper()
         raise UnreadableImage(f"the {kind} file is damaged: {structure.damage}; copy or export it again")
@@ -123,9 +127,10 @@ def _load(path: Path, pixels_per_byte: int) -> Picture:
     exif = read_exif(structure.exif)
     if structure.tiff is not None:  # the value that decoding set aside, in BigTIFF too, which ExifRead does not know
         exif = replace(exif, orientation=structure.tiff.orientation if 1 <= structure.tiff.orientation <= 8 else 1)
-    raw, warnings = decode_file(data, structure)
-    associated = structure.tiff is not None and structure.tiff.extra == 1
-    return _picture(turn(raw, exif.orientation), associated, exif.upright(), structure.icc, path.name, warnings)
+    found = decode_file(data, structure)
+    raw, warnings = turn(found.raw, exif.orientation), list(found.warnings)
+    picture = _picture(raw, found.associated, exif.upright(), structure.icc, path.name, warnings)
+    return replace(picture, surround=says_surround(data))
 
 
 def picture_from_array(array: NDArray[Any], name: str = "array") -> Picture:
