@@ -100,3 +100,59 @@ class FlatnessOptions:
 
 
 FLATNESS = FlatnessOptions()
+
+
+@dataclass(frozen=True)
+class OverlayOptions:
+    """What is taken for burnt into pictures: dates, logos (`overlays`)."""
+
+    least_side: int = 64
+    """px of a picture's shorter side, at least."""
+
+    side: int = 1200
+    """px of the longer side that is looked at: strokes of a date have 0.2 % of it and more."""
+
+    steep: float = 140.0
+    """Sobel's response that makes an outline, levels of 255 over all channels: a step of 20 levels in gray has 140."""
+
+    same_level: float = 9.0
+    """Levels of 255, standard deviation over the pictures, of what is the same: compression, beside an outline."""
+
+    outlined: float = 0.7
+    """Share of the pictures that have an outline there, at least: the scene behind may have the overlay's colour."""
+
+    reach: float = 0.03
+    """Share of the longer side within which outlines are one thing: letters, and lines of them."""
+
+    margin: float = 0.015
+    """The same by which it is left out around: shadows of letters, and what compression spreads."""
+
+    rim: int = 4
+    """px along the borders in which nothing is sought: scans and exports leave lines there."""
+
+    least_outline: int = 200
+    """px beside outlines that are the same, at least: dates have 216 and more, what meets by chance 172 at most."""
+
+    least_further: int = 40
+    """The same of further parts where something is burnt in: a word, the time beside a date."""
+
+    least_width: int = 5
+    """px of its height and width, at least: a line along a border is no date."""
+
+    dense_of_two: float = 0.2
+    """Share of its place that they take, of two pictures, at least: dates 0.24 and more, what meets by chance 0.12."""
+
+    dense: float = 0.1
+    """The same of more pictures, in which hardly anything meets by chance."""
+
+    least_alike: float = 0.42
+    """Correlation of what is there, at least; between letters the scene shows."""
+
+    most_agree: float = 0.25
+    """As many as that of outlines beside it, and all over, at most: else nothing moves, and it may be scene."""
+
+    most_share: float = 0.12
+    """Share of the picture that is left out, at most: what is larger is no date."""
+
+
+OVERLAYS = OverlayOptions()

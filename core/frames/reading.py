@@ -20,6 +20,7 @@ from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
 from .flatness import check_flat
 from .frame import Frame, size_of
+from .overlays import overlays_in
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
 Source = str | Path | NDArray[Any] | Picture
@@ -95,26 +96,40 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     """
     copies, names = copies or {}, [picture.name for picture in pictures]
     masks = options.ignored_in(names)
-    worked_on: list[Picture] = []
-    sizes: list[tuple[int, int]] = []
+    shown: list[Picture] = []
     shown_by: list[int] = []
     for number, picture in enumerate(pictures):
-        shown_by.append(shown_by[copies[number]] if number in copies else len(worked_on))
+        shown_by.append(shown_by[copies[number]] if number in copies else len(shown))
         if number in copies:
             continue
-        mask, shown = masks[number], picture
+        mask = masks[number]
         if mask is not None:
-            shown = without(picture, read_mask(mask, size_of(picture), called(number, names)))
-        worked_on.append(resized(shown, options.scale))
-        sizes.append(size_of(picture))
+            picture = without(picture, read_mask(mask, size_of(picture), called(number, names)))
+        shown.append(picture)
+    burnt_in = overlays_in(shown)
+    worked_on = [
+        resized(picture if mask is None else without(picture, mask), options.scale)
+        for picture, mask in zip(shown, burnt_in, strict=True)
+    ]
     warnings = tuple(
         f"{names[number]} is given twice: it is used once"
         if names[number] == names[first]
         else f"{names[number]} is the same picture as {names[first]}: it is used once"
         for number, first in copies.items()
     )
+    if any(mask is not None for mask in burnt_in):
+        marked = [picture.name for picture, mask in zip(shown, burnt_in, strict=True) if mask is not None]
+        option = "--ignore-ref, --ignore-target" if len(shown) == 2 else "--ignore NAME=MASK"
+        warnings = (*warnings, f"{_listed(marked)}: something is burnt in at the same place (a date, a logo); it is "
+                    f"left out ({option} for what else is)")  # fmt: skip
     painted = None if options.mask is None else read_painted(options.mask)
-    return Frame(tuple(worked_on), tuple(sizes), painted, warnings, tuple(shown_by))
+    sizes = tuple(size_of(picture) for picture in shown)
+    return Frame(tuple(worked_on), sizes, painted, warnings, tuple(shown_by))
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The names of pictures; of many only how many they are."""
+    return " and ".join(names) if len(names) <= 2 else f"{len(names)} pictures"
 
 
 def _all_read(sources: Sequence[Source]) -> list[Picture]:

@@ -7,7 +7,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-
 from edf_stitch.core.frames.flatness import check_flat, kind_of
 from edf_stitch.core.pictures.picture import load_picture, picture_from_array
 from edf_stitch.core.system.errors import UnreadableImage

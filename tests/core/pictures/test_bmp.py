@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from edf_stitch.core.pictures.picture import load_picture
 
 WIDTH, HEIGHT = 13, 9

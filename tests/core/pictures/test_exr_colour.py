@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
-
 from edf_stitch.core.pictures.picture import Picture, load_picture
 from edf_stitch.core.raster.primaries import REC709, rgb_to_xyz, to_rec709
 from edf_stitch.core.system.errors import UnreadableImage

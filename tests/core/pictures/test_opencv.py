@@ -9,7 +9,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-
 from edf_stitch.core.pictures.opencv import decoded
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.system.errors import UnreadableImage

@@ -10,7 +10,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-
 from edf_stitch.core.pictures.picture import Picture, load_picture
 from edf_stitch.core.pictures.tiff import read_tiff
 from edf_stitch.core.system.errors import UnreadableImage

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from edf_stitch.core.raster.primaries import REC709, columns_under_d50, rgb_to_xyz, to_rec709
 
 
