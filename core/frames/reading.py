@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..cameras.sources import called
 from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_painted, without
-from ..pictures.naming import told_apart
+from ..pictures.naming import in_words, told_apart
 from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
@@ -120,16 +120,11 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     if any(mask is not None for mask in burnt_in):
         marked = [picture.name for picture, mask in zip(shown, burnt_in, strict=True) if mask is not None]
         option = "--ignore-ref, --ignore-target" if len(shown) == 2 else "--ignore NAME=MASK"
-        warnings = (*warnings, f"{_listed(marked)}: something is burnt in at the same place (a date, a logo); it is "
+        warnings = (*warnings, f"{in_words(marked)}: something is burnt in at the same place (a date, a logo); it is "
                     f"left out ({option} for what else is)")  # fmt: skip
     painted = None if options.mask is None else read_painted(options.mask)
     sizes = tuple(size_of(picture) for picture in shown)
     return Frame(tuple(worked_on), sizes, painted, warnings, tuple(shown_by))
-
-
-def _listed(names: Sequence[str]) -> str:
-    """The names of pictures; of many only how many they are."""
-    return " and ".join(names) if len(names) <= 2 else f"{len(names)} pictures"
 
 
 def _all_read(sources: Sequence[Source]) -> list[Picture]:
