@@ -39,7 +39,8 @@ from .panorama.warp import Warp
 from .pictures.picture import Picture
 from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
-from .pose.exif_doubt import by_exif_or_without, exif_warning
+from .pose.exif_doubt import by_exif_or_without
+from .pose.mirrored import unless_mirrored
 from .pose.options import EDGE_FOCAL
 from .pose.pair_matches import found_in, given_of
 from .rig.given_matches import given_matches
@@ -207,7 +208,7 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     if len(pictures) > 2:
         found = _of_many(frames[0], cameras, warnings, options, progress)
     else:
-        found = _of_pair(frames, cameras, warnings, options, progress)
+        found = unless_mirrored(pictures, lambda: _of_pair(frames, cameras, warnings, options, progress))
     frame = frames[0]
     places = Places(frame.names, frame.shown_by, found.numbers, found.centres)
     return replace(found, scale=scale_for(options.scale_metres, cameras, places))
@@ -238,8 +239,6 @@ def _of_pair(
             ideal, cameras, options.seed, lambda these, known: _estimated(these, known, options.seed, pictures)
         ),
     )  # fmt: skip
-    if used[0].knowledge != cameras[0].knowledge:
-        warnings = [*warnings, exif_warning("both pictures", cameras[0], two_view.K[0, 0])]
     return Geometry(used, (Edge(0, 1, matches, ideal, two_view),), (*warnings, *two_view.warnings))
 
 

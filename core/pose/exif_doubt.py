@@ -8,6 +8,7 @@ knows no focal length, the start without EXIF is made as well.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,7 +44,7 @@ def by_exif_or_without(
     -------
     TwoView
     (Camera, Camera)
-        Those that it was found with: where EXIF was not believed, without it.
+        Those that it was found with: where EXIF was not believed, without it, and with a warning.
     """
     by_exif = estimate(matches, cameras)
     known = {camera.knowledge for camera in cameras}
@@ -56,7 +57,10 @@ def by_exif_or_without(
         without = estimate(matches, free)
     except StitchError:
         return by_exif, tuple(cameras)
-    return (without, free) if _clearly_better(matches, without, by_exif) else (by_exif, tuple(cameras))
+    if not _clearly_better(matches, without, by_exif):
+        return by_exif, tuple(cameras)
+    told = exif_warning("the pictures", cameras[0], without.K[0, 0])
+    return replace(without, warnings=(told, *without.warnings)), free
 
 
 def exif_warning(names: str, camera: Camera, focal: float) -> str:

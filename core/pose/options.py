@@ -267,12 +267,25 @@ class ExifDoubtOptions:
     agreeing: float = 0.15
 
 
+@dataclass(frozen=True)
+class MirrorOptions:
+    """When a picture is taken for mirrored (`mirrored`)."""
+
+    # Inliers from which nobody asks: a symmetric front has fewer with its mirror image.
+    enough: int = 250
+    # Matches of the mirrored picture, at least, and times as many as of the picture as it is: symmetric scenes have
+    # half as many, of others a few agree by chance.
+    least: int = 40
+    factor: float = 1.5
+
+
 FEATURES = FeatureOptions()
 FUNDAMENTAL = FundamentalOptions()
 REFINEMENT = RefinementOptions()
 ESTIMATION = EstimationOptions()
 FOCAL = FocalOptions()
 EDGE_FOCAL = EdgeFocalOptions()
+MIRROR = MirrorOptions()
 EXIF_DOUBT = ExifDoubtOptions()
 ROTATION = RotationOptions()
 ZOOM = ZoomOptions()

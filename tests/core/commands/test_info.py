@@ -19,7 +19,8 @@ def folder(tmp_path: Path) -> Path:
     """Files of some kinds, one of them damaged, and one that is no flat photograph."""
     exif = Image.Exif()
     exif[271], exif[272], exif[274] = "Canon", "Canon EOS 6D", 6
-    exif.get_ifd(0x8769).update({42036: "EF24-105mm", 41989: 50, 37386: TiffImagePlugin.IFDRational(50), 36867: "2020:01:02 03:04:05"})
+    lens = {42036: "EF24-105mm", 41989: 50, 37386: TiffImagePlugin.IFDRational(50)}
+    exif.get_ifd(0x8769).update(lens | {36867: "2020:01:02 03:04:05"})
     Image.fromarray(NOISE[..., :3]).save(tmp_path / "a.jpg", exif=exif, quality=95)
     cv2.imwrite(str(tmp_path / "b.png"), NOISE.astype(np.uint16) * 257)
     cv2.imwrite(str(tmp_path / "c.tif"), NOISE[..., 0])
