@@ -108,7 +108,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         shown.append(picture)
     burnt_in = overlays_in(shown)
     worked_on = [
-        resized(picture if mask is None else without(picture, mask), options.scale)
+        resized(picture if mask is None else replace(without(picture, mask), burnt_in=mask), options.scale)
         for picture, mask in zip(shown, burnt_in, strict=True)
     ]
     warnings = tuple(

@@ -32,10 +32,11 @@ def neutral_bmp(data: bytes) -> bytes:
         return data
     (data_at,) = struct.unpack_from("<I", data, 10)
     bits = data[24:26]
-    palette = b"".join(data[at : at + 3] + b"\0" for at in range(26, min(data_at, len(data)) - 2, 3))
+    palette = b"".join(data[at : at + 3] + b"\0" for at in range(26, min(data_at, 26 + 3 * 256) - 2, 3))
+    pixels = data[data_at:]
     head = struct.pack("<IiiH2s6I", _PLAIN_HEADER, *bmp_size(data), 1, bits, *[0] * 4, len(palette) // 4, 0)
     start = 14 + len(head) + len(palette)
-    return struct.pack("<2sIII", b"BM", start + len(data) - data_at, 0, start) + head + palette + data[data_at:]
+    return struct.pack("<2sIII", b"BM", start + len(pixels), 0, start) + head + palette + pixels
 
 
 def _header(data: bytes) -> int:

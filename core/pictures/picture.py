@@ -55,6 +55,8 @@ class Picture:
         For the user.
     surround : bool
         Whether the file says that it is a map of many directions (a sphere, a cylinder), no flat picture.
+    burnt_in : (H, W) bool, optional
+        Where a date or a logo was found, which alpha hides.
     """
 
     light: AnyImage
@@ -66,6 +68,7 @@ class Picture:
     name: str
     warnings: tuple[str, ...] = ()
     surround: bool = False
+    burnt_in: NDArray[np.bool_] | None = None
 
     @property
     def pixels(self) -> NDArray[Any]:
@@ -289,7 +292,8 @@ def resized(picture: Picture, scale: float) -> Picture:
         return mean
 
     view = np.clip(np.rint(weighed(picture.view)), 0, 255).astype(np.uint8)
-    return replace(picture, light=weighed(picture.pixels), alpha=alpha, view=view)
+    burnt_in = None if picture.burnt_in is None else shrink(picture.burnt_in.astype(np.float32)) > 0
+    return replace(picture, light=weighed(picture.pixels), alpha=alpha, view=view, burnt_in=burnt_in)
 
 
 def in_same_colour_space(pictures: Sequence[Picture]) -> tuple[Picture, ...]:
