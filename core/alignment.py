@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -208,9 +209,9 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     if len(pictures) > 2:
         found = _of_many(frames[0], cameras, warnings, options, progress)
     else:
-        found = unless_mirrored(pictures, lambda: _of_pair(frames, cameras, warnings, options, progress))
-    frame = frames[0]
-    places = Places(frame.names, frame.shown_by, found.numbers, found.centres)
+        pair = partial(_of_pair, frames, cameras, warnings, options, progress)
+        found = pair() if options.matches is not None else unless_mirrored(pictures, pair, not options.few_features)
+    places = Places(frames[0].names, frames[0].shown_by, found.numbers, found.centres)
     return replace(found, scale=scale_for(options.scale_metres, cameras, places))
 
 

@@ -45,9 +45,9 @@ def transparent_level(chunks: Mapping[bytes, list[bytes]], colour_type: int, dep
     """
     channels = {0: 1, 2: 3}.get(colour_type, 0)
     body = chunks.get(b"tRNS", [b""])[0]
-    if not channels or len(body) < 2 * channels:
+    if not channels or len(body) < 2 * channels or not 1 <= depth <= 16:
         return ()
-    most = (1 << min(depth, 16)) - 1
+    most = (1 << depth) - 1
     levels = struct.unpack_from(f">{channels}H", body)
     return tuple((level & most) * 255 // most if depth < 8 else level & most for level in levels)
 

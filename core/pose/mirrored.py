@@ -23,17 +23,28 @@ class _Found(Protocol):
 Found = TypeVar("Found", bound=_Found)
 
 
-def unless_mirrored(pictures: Sequence[Picture], make: Callable[[], Found]) -> Found:
+def unless_mirrored(pictures: Sequence[Picture], make: Callable[[], Found], by_all: bool = True) -> Found:
     """What is made of two pictures; where hardly anything agrees, it is asked whether the target is mirrored.
 
-    Raises DegenerateGeometry if it is, and what `make` raises.
+    Parameters
+    ----------
+    pictures : sequence of two Pictures
+    make : callable
+    by_all : bool
+        Whether it is made by all features: of a preview's few only a failure counts.
+
+    Raises
+    ------
+    DegenerateGeometry
+        The target is mirrored; and what `make` raises.
     """
     try:
         found = make()
     except (TooFewMatches, NoOverlap, DegenerateGeometry):
         _refuse_mirrored(pictures)
         raise
-    if found.edges[0].two_view.inliers.sum() < MIRROR.enough:
+    enough = min(MIRROR.enough, pictures[0].view[..., 0].size // MIRROR.px_for_one)
+    if by_all and found.edges[0].two_view.inliers.sum() < enough:
         _refuse_mirrored(pictures)
     return found
 

@@ -273,6 +273,8 @@ class MirrorOptions:
 
     # Inliers from which nobody asks: a symmetric front has fewer with its mirror image.
     enough: int = 250
+    # px of the reference for each of these, in smaller pictures.
+    px_for_one: int = 500
     # Matches of the mirrored picture, at least, and times as many as of the picture as it is: symmetric scenes have
     # half as many, of others a few agree by chance.
     least: int = 40

@@ -52,7 +52,11 @@ def test_one_that_is_not_is_taken(symmetric: bool) -> None:
 
 
 def test_where_much_agrees_nobody_asks() -> None:
-    assert unless_mirrored([], lambda: found(MIRROR.enough)).edges
+    mirrored = views(True, True)
+    assert unless_mirrored(mirrored, lambda: found(MIRROR.enough)).edges
+    assert unless_mirrored(mirrored, lambda: found(20), by_all=False).edges, "a preview"
+    small = [picture_from_array(one.view[:100, :100]) for one in mirrored]
+    assert unless_mirrored(small, lambda: found(30)).edges, "as many as a small picture has"
 
 
 def test_another_reason_stays_what_it_is() -> None:
