@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..raster.arrays import strips
 from ..raster.lazy import AnyImage
 from ..system.errors import UnreadableImage
+from ..system.streams import overheard
 from ..system.threads import each
 from .exr_colour import from_luminance_chroma, in_rec709, with_square_pixels
 from .metadata import SOFTWARE, Exif
@@ -50,8 +51,8 @@ def read_exr(data: bytes, check: Callable[[list[tuple[int, int]], int], None]) -
 
     if len(data) > 5 and data[5] & _DEEP:
         raise UnreadableImage("deep data, many depths at each pixel: flatten it, or render the picture without them")
-    # OpenEXR prints a line to sys.stdout for a damaged part and leaves it out.
-    with contextlib.redirect_stdout(io.StringIO()):
+    # OpenEXR prints a line to sys.stdout for a damaged part and leaves it out, and others to standard error.
+    with contextlib.redirect_stdout(io.StringIO()), overheard(_is_openexrs):
         headers = OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True).parts
         sizes = [(_window(part.header["displayWindow"])[1], _window(part.header["dataWindow"])[1]) for part in headers]
         samples = sum(
@@ -83,11 +84,16 @@ def exr_size(data: bytes) -> tuple[int, int]:
     import OpenEXR
 
     try:
-        with contextlib.redirect_stdout(io.StringIO()):
+        with contextlib.redirect_stdout(io.StringIO()), overheard(_is_openexrs):
             parts = OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True).parts
         return max((_window(part.header["displayWindow"])[1] for part in parts), key=lambda size: size[0] * size[1])
     except Exception:  # OpenEXR raises whatever its C++ side threw
         return 0, 0
+
+
+def _is_openexrs(line: str) -> bool:
+    """Whether a line on standard error is OpenEXR's own."""
+    return "EXR_ERR" in line or "<python_buffer>" in line
 
 
 def _layers(parts: list[Any]) -> Iterator[_Layer]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import struct
 from pathlib import Path
@@ -122,3 +123,14 @@ def test_pixels_that_are_not_square_are_stretched(tmp_path: Path, ratio: float, 
     assert picture.light.shape[:2] == size and abs(picture.pixels.mean() - LIGHT.mean()) < 0.01
     assert f"its pixels are {ratio:g} times as wide as high" in picture.warnings[0]
     assert not load(tmp_path, shaped(30)).warnings
+
+
+def test_what_openexr_prints_of_damage_is_not_shown(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    whole = exr(rgb(LIGHT))
+    refused = 0
+    for at in range(len(whole) // 2, len(whole) - 8, 8):
+        with contextlib.suppress(UnreadableImage):
+            load(tmp_path, whole[:at] + b"\xff" * 8 + whole[at + 8 :])
+            refused -= 1
+        refused += 1
+    assert refused > 0 and capfd.readouterr() == ("", "")
