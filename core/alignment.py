@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,8 @@ from .panorama.warp import Warp
 from .pictures.picture import Picture
 from .pose.edge_focal import Edges, focal_by_edges
 from .pose.estimation import estimate
+from .pose.exif_doubt import by_exif_or_without
+from .pose.mirrored import unless_mirrored
 from .pose.options import EDGE_FOCAL
 from .pose.pair_matches import found_in, given_of
 from .rig.given_matches import given_matches
@@ -206,9 +209,9 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     if len(pictures) > 2:
         found = _of_many(frames[0], cameras, warnings, options, progress)
     else:
-        found = _of_pair(frames, cameras, warnings, options, progress)
-    frame = frames[0]
-    places = Places(frame.names, frame.shown_by, found.numbers, found.centres)
+        pair = partial(_of_pair, frames, cameras, warnings, options, progress)
+        found = pair() if options.matches is not None else unless_mirrored(pictures, pair, not options.few_features)
+    places = Places(frames[0].names, frames[0].shown_by, found.numbers, found.centres)
     return replace(found, scale=scale_for(options.scale_metres, cameras, places))
 
 
@@ -230,12 +233,14 @@ def _of_pair(
 
     progress("geometry", 0.0)
     ideal = replace(matches, x=undistort(matches.x, cameras[0]), y=undistort(matches.y, cameras[1]))
-    looked_at = pictures if all(camera.assumed for camera in cameras) else ()
-    two_view = cache.remember(
+    looked_at = pictures if all(camera.log_sigma for camera in cameras) else ()
+    two_view, used = cache.remember(
         "two_view", (ideal, cameras, options.seed, tuple((picture.view, picture.alpha) for picture in looked_at)),
-        lambda: _estimated(ideal, cameras, options.seed, looked_at),
+        lambda: by_exif_or_without(
+            ideal, cameras, options.seed, lambda these, known: _estimated(these, known, options.seed, pictures)
+        ),
     )  # fmt: skip
-    return Geometry(cameras, (Edge(0, 1, matches, ideal, two_view),), (*warnings, *two_view.warnings))
+    return Geometry(used, (Edge(0, 1, matches, ideal, two_view),), (*warnings, *two_view.warnings))
 
 
 def _of_many(
@@ -243,6 +248,7 @@ def _of_many(
     progress: ReportProgress,
 ) -> Geometry:  # fmt: skip
     """The geometry of more than two pictures; of two of them, if no more connect."""
+    from .rig.exif_doubt import without_wrong_exif, wrong_exif
     from .rig.from_pictures import content_order, matched_pictures, registered  # a pair starts sooner without it
 
     pictures, cache = frame.pictures, Cache(options.cache)
@@ -252,10 +258,14 @@ def _of_many(
     else:
         worked = [camera.size for camera in cameras]
         matched = given_matches(options.matches, pictures, frame.full_sizes, worked)
+    doubted = cache.remember(
+        "exif", (cameras, matched, options.seed), lambda: wrong_exif(cameras, matched, options.seed)
+    )
+    cameras, overruled = without_wrong_exif(cameras, doubted, frame.names)
     found = registered(pictures, order, cameras, matched, options.seed, cache, progress)
     check_connected(found, frame.names, options.require_all)
     left_out = tuple((frame.names[number], why) for number, why in found.left_out.items())
-    warnings = (*warnings, *left_out_warnings(found, cameras, frame.names))
+    warnings = (*warnings, *overruled, *left_out_warnings(found, cameras, frame.names))
     found = seen_from(found, options.viewpoint, frame.names, frame.shown_by)
     if len(found.numbers) == 2:
         pair_options = replace(options, viewpoint=None, scale_metres=None)
@@ -265,11 +275,11 @@ def _of_many(
     return Geometry(found.rig.cameras, edges, warnings, found.numbers, found.rig, left_out)
 
 
-def _estimated(ideal: Matches, cameras: tuple[Camera, ...], seed: int, pictures: Sequence[Picture]) -> TwoView:
-    """The geometry by matches, ideal px; with a focal length that straight edges of the pictures ask for, if any are
-    given, where that explains as many matches."""
+def _estimated(ideal: Matches, cameras: Sequence[Camera], seed: int, pictures: Sequence[Picture]) -> TwoView:
+    """The geometry by matches, ideal px; where nothing is known of the cameras with a focal length that straight edges
+    of the pictures ask for, if that explains as many matches."""
     two_view = estimate(ideal, cameras[0], cameras[1], seed=seed)
-    if not pictures or two_view.model != "general":
+    if not all(camera.assumed for camera in cameras) or two_view.model != "general":
         return two_view
     found = [straight_edges(one, camera, np.eye(3)) for one, camera in zip(pictures, cameras, strict=True)]
     first, second = (Edges(edges.rays[..., :2] / edges.rays[..., 2:], edges.lengths) for edges in found)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .alignment import Alignment, Geometry, estimate_geometry, fit_and_warp
+from .compose.burnt_in import shown_where_alone
 from .compose.composition import Composition, composed
 from .compose.crop import crop_box
 from .compose.decided import Decided
@@ -167,7 +168,8 @@ def compose(
     # two pictures keep what earlier releases made of them
     by_root = len(pictures) > 2
     hold = full is None  # of a large set, all together are no longer small
-    layers = tuple(layer_of(picture, one, by_root, hold) for picture, one in zip(pictures, whole.maps, strict=True))
+    shown = shown_where_alone(pictures, whole.maps) if full is None else pictures
+    layers = tuple(layer_of(picture, one, by_root, hold) for picture, one in zip(shown, whole.maps, strict=True))
 
     floats = [picture.bits == 32 for picture in pictures]
 

@@ -24,6 +24,8 @@ class IntrinsicsOptions:
     contradiction: float = 0.15
     # Difference of the log of the aspect ratio from which a picture was cropped since it was taken.
     cropped_aspect: float = 0.03
+    # Difference of the log of diagonals within which a sensor is one of those that there are.
+    same_sensor: float = 0.08
     # σ of the principal point in units of the longer side: the axis does not meet the sensor in its middle.
     principal_sigma: float = 0.01
 

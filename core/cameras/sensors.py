@@ -39,3 +39,8 @@ def sensor_diagonal(make: str | None, model: str | None) -> float | None:
     name = f"{make or ''} {model or ''} ".lower()
     fitting = [part for part in _DIAGONALS if part in name]
     return _DIAGONALS[max(fitting, key=len)] if fitting else None
+
+
+def sensor_diagonals() -> frozenset[float]:
+    """Diagonals in mm of all sensors in the table."""
+    return frozenset(_DIAGONALS.values())

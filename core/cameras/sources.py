@@ -17,7 +17,7 @@ from .options import INTRINSICS
 from .plausible import check_plausible, fold_warning
 from .programs.lensfun import LensProfile
 from .programs.recognised import read_any
-from .sensors import sensor_diagonal
+from .sensors import sensor_diagonal, sensor_diagonals
 
 if TYPE_CHECKING:
     from ..pictures.metadata import Exif
@@ -177,17 +177,20 @@ def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]
     if exif.focal35_mm:
         found.append((_from_35mm(exif.focal35_mm, size), "EXIF 35 mm equivalent"))
     diagonal = sensor_diagonal(exif.make, exif.model)
+    # a digital zoom enlarges the middle of the sensor; makers count it in the 35 mm equivalent
+    zoom, zoomed_by = exif.digital_zoom or 1.0, f", digital zoom {exif.digital_zoom:g}" if exif.digital_zoom else ""
     if exif.focal_mm and diagonal:
-        found.append((exif.focal_mm / diagonal * float(np.hypot(*size)), "EXIF focal length and sensor table"))
+        focal = exif.focal_mm * zoom / diagonal * float(np.hypot(*size))
+        found.append((focal, f"EXIF focal length and sensor table{zoomed_by}"))
+    by_table = len(found)
     if exif.focal_mm and exif.focal_plane_x_per_mm and exif.width and exif.height:
         shrink = max(size) / max(exif.width, exif.height)
-        found.append((exif.focal_mm * exif.focal_plane_x_per_mm * shrink, "EXIF focal length and sensor resolution"))
+        focal = exif.focal_mm * zoom * exif.focal_plane_x_per_mm * shrink
+        found.append((focal, f"EXIF focal length and sensor resolution{zoomed_by}"))
     least, most = INTRINSICS.least_focal * max(size), INTRINSICS.most_focal * max(size)
     found = [(f, source) for f, source in found if least < f < most]
     if not found:
-        sides, sigma = INTRINSICS.assumed_focal, INTRINSICS.assumed_sigma
-        source = f"assumed ({sides:g} × the longer side)"
-        return _camera(sides * max(size), size, source, sigma, Knowledge.ASSUMED)
+        return _assumed(size)
     focal, source = found[0]
     for other, other_source in found[1:]:
         if abs(np.log(other / focal)) > INTRINSICS.contradiction:
@@ -196,6 +199,8 @@ def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]
                 f"{other_source}; the first is used"
             )
     sigma = INTRINSICS.exif_sigma
+    if not by_table and not _is_a_sensor(exif):
+        sigma = INTRINSICS.cropped_sigma  # the resolution is that of the picture before it was shrunk, mostly
     if exif.width and exif.height:
         aspect, original = max(size) / min(size), max(exif.width, exif.height) / min(exif.width, exif.height)
         if abs(np.log(aspect / original)) > INTRINSICS.cropped_aspect:
@@ -206,6 +211,29 @@ def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]
                 "length is only a hint; give the focal length if you know it"
             )
     return _camera(focal, size, source, sigma, Knowledge.EXIF)
+
+
+def _is_a_sensor(exif: Exif) -> bool:
+    """Whether the focal plane's resolution and the picture's size make a sensor of a size that there is."""
+    if not (exif.focal_plane_x_per_mm and exif.width and exif.height):
+        return False
+    diagonal = float(np.hypot(exif.width, exif.height)) / exif.focal_plane_x_per_mm
+    return any(abs(np.log(diagonal / known)) < INTRINSICS.same_sensor for known in sensor_diagonals())
+
+
+def _assumed(size: tuple[int, int]) -> Camera:
+    """The camera of a picture of which nothing is known."""
+    sides, sigma = INTRINSICS.assumed_focal, INTRINSICS.assumed_sigma
+    source = f"assumed ({sides:g} × the longer side)"
+    return _camera(sides * max(size), size, source, sigma, Knowledge.ASSUMED)
+
+
+def without_exif(camera: Camera) -> Camera:
+    """A camera as if nothing were known of its focal length; its principal point and distortion stay."""
+    assumed = _assumed(camera.size)
+    K = assumed.K.copy()
+    K[:2, 2] = camera.K[:2, 2]
+    return replace(camera, K=K, source=assumed.source, log_sigma=assumed.log_sigma, knowledge=assumed.knowledge)
 
 
 def _from_35mm(focal35: float, size: tuple[int, int]) -> float:

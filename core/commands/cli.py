@@ -12,12 +12,14 @@ import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
 from .arguments import add_options, numbered, options_from
 from .file_arguments import add_batch_files, add_files, exr_form, shard
+from .info import INFO, add_info
+from .meant import what_was_meant
 from .messages import print_summary, progress_shown, say, shortened, verdict_line
 from .options import MESSAGES
 
@@ -25,11 +27,28 @@ _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
 class _Parser(argparse.ArgumentParser):
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self._given = list(sys.argv[1:] if args is None else args)
+        return super().parse_known_args(args, namespace)
+
     def error(self, message: str) -> NoReturn:
-        if not message.startswith("argument -"):  # what is wrong with one option's value, its own line says
+        meant = what_was_meant(message, self._given, _options_of(self))
+        if meant:
+            message = meant
+        elif not message.startswith("argument -"):  # what is wrong with one option's value, its own line says
             self.print_usage(sys.stderr)
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(2)
+
+
+def _options_of(parser: argparse.ArgumentParser) -> list[str]:
+    """The options of a parser and of its commands, as they are written."""
+    found: list[str] = []
+    for action in parser._actions:
+        found += action.option_strings
+        if isinstance(action, argparse._SubParsersAction):
+            found += [name for command in action.choices.values() for name in _options_of(command)]
+    return found
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -123,6 +142,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_stitch(commands.add_parser("stitch", help="stitch pictures into one panorama", description=_STITCH))
+    add_info(commands.add_parser("info", help="say what was understood of each picture", description=INFO))
     _add_batch(commands.add_parser("batch", help="stitch a list of panoramas and clips", description=_BATCH))
     _add_compare(
         commands.add_parser("compare", help="every field on every pair, in one table", description=_COMPARE)

@@ -82,7 +82,7 @@ def _in_a_row(pictures: Sequence[Picture], count: int) -> list[Bracket]:
         order = _by_exposure(pictures, copies)
         relations = []
         for one, other in pairwise(order):
-            relation, why = relation_of(copies[one], copies[other], _told(pictures, one, other), given=True)
+            relation, why = relation_of(copies[one], copies[other], _stops_between(pictures, one, other), given=True)
             if relation is None:
                 raise BadRequest(
                     f"--brackets {count}: {pictures[one].name} and {pictures[other].name} are no exposures of one "
@@ -102,7 +102,7 @@ def _found(pictures: Sequence[Picture]) -> list[Bracket]:
     copies = dict(zip(wanted, in_order(lambda k: SmallCopy.of(pictures[k], BRACKETS.working_px), wanted), strict=True))
 
     def related(pair: tuple[int, int]) -> bool:
-        relation, _ = relation_of(copies[pair[0]], copies[pair[1]], _told(pictures, *pair))
+        relation, _ = relation_of(copies[pair[0]], copies[pair[1]], _stops_between(pictures, *pair))
         return relation is not None and abs(relation.stops) >= BRACKETS.least_stops
 
     joined = [pair for pair, is_so in zip(candidates, in_order(related, candidates), strict=True) if is_so]
@@ -117,7 +117,7 @@ def _is_exposure(picture: Picture) -> bool:
     return picture.bits < 32 and picture.alpha is None
 
 
-def _told(pictures: Sequence[Picture], one: int, other: int) -> float | None:
+def _stops_between(pictures: Sequence[Picture], one: int, other: int) -> float | None:
     """By how many stops another picture is brighter by EXIF."""
     before, after = stops_told(pictures[one]), stops_told(pictures[other])
     return None if before is None or after is None else after - before
@@ -135,7 +135,7 @@ def _candidates(pictures: Sequence[Picture]) -> list[tuple[int, int]]:
     for numbers in kinds.values():
         small = {number: SmallCopy.of(pictures[number], BRACKETS.thumbnail_px) for number in numbers}
         out += [pair for pair in combinations(numbers, 2)
-                if _may_be_one_view(small[pair[0]], small[pair[1]], _told(pictures, *pair))]  # fmt: skip
+                if _may_be_one_view(small[pair[0]], small[pair[1]], _stops_between(pictures, *pair))]  # fmt: skip
     return out
 
 
@@ -175,7 +175,7 @@ def _chains(pictures: Sequence[Picture], copies: dict[int, SmallCopy], order: Se
     brackets: list[Bracket] = []
     numbers, relations = [order[0]], list[Relation]()
     for other in order[1:]:
-        relation, _ = relation_of(copies[numbers[-1]], copies[other], _told(pictures, numbers[-1], other))
+        relation, _ = relation_of(copies[numbers[-1]], copies[other], _stops_between(pictures, numbers[-1], other))
         if relation is not None and relation.stops < BRACKETS.least_stops:
             continue
         if relation is None:

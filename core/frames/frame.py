@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..pictures.picture import Picture, resized
-from .merging import MergedBracket
+
+if TYPE_CHECKING:
+    from .merging import MergedBracket
 
 
 @dataclass(frozen=True)

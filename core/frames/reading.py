@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 from ..cameras.sources import called
 from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_painted, without
-from ..pictures.naming import told_apart
+from ..pictures.naming import in_words, told_apart
 from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
 from ..pictures.raw_development import RawExposure, exposure_of_first
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
 from .brackets import brackets_in
+from .flatness import check_flat
 from .frame import Frame, size_of
 from .merging import MergedBracket, merged
+from .overlays import overlays_in
 from .used_parts import within_lenses
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
@@ -83,7 +85,7 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
         The same picture twice, and no other.
     """
     check_count(len(sources), options)
-    given = _named_apart(_all_read(sources), sources)
+    given = _named_apart(_all_read(sources, options.camera.cameras is not None), sources)
     views, members, brackets = _views_of(given, options)
     if brackets:
         _check_views(len(views), options)
@@ -161,18 +163,21 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     """
     copies, names = copies or {}, [picture.name for picture in pictures]
     masks = options.ignored_in(names)
-    worked_on: list[Picture] = []
-    sizes: list[tuple[int, int]] = []
+    shown: list[Picture] = []
     shown_by: list[int] = []
     for number, picture in enumerate(pictures):
-        shown_by.append(shown_by[copies[number]] if number in copies else len(worked_on))
+        shown_by.append(shown_by[copies[number]] if number in copies else len(shown))
         if number in copies:
             continue
-        mask, shown = masks[number], picture
+        mask = masks[number]
         if mask is not None:
-            shown = without(picture, read_mask(mask, size_of(picture), called(number, names)))
-        worked_on.append(resized(shown, options.scale))
-        sizes.append(size_of(picture))
+            picture = without(picture, read_mask(mask, size_of(picture), called(number, names)))
+        shown.append(picture)
+    burnt_in = overlays_in(shown)
+    worked_on = [
+        resized(picture if mask is None else replace(without(picture, mask), burnt_in=mask), options.scale)
+        for picture, mask in zip(shown, burnt_in, strict=True)
+    ]
     warnings = tuple(
         f"{names[number]} is given twice: it is used once"
         if names[number] == names[first]
@@ -185,17 +190,23 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
             f"camera RAW stands beside {finished[0]}: how its camera changed tones and colours cannot be undone, so "
             "they match only roughly; use RAW files of all pictures, or of none",
         )
+    if any(mask is not None for mask in burnt_in):
+        marked = [picture.name for picture, mask in zip(shown, burnt_in, strict=True) if mask is not None]
+        option = "--ignore-ref, --ignore-target" if len(shown) == 2 else "--ignore NAME=MASK"
+        warnings = (*warnings, f"{in_words(marked)}: something is burnt in at the same place (a date, a logo); it is "
+                    f"left out ({option} for what else is)")  # fmt: skip
     painted = None if options.mask is None else read_painted(options.mask)
-    frame = Frame(tuple(worked_on), tuple(sizes), painted, warnings, tuple(shown_by))
+    sizes = tuple(size_of(picture) for picture in shown)
+    frame = Frame(tuple(worked_on), sizes, painted, warnings, tuple(shown_by))
     return within_lenses(frame, options.camera)
 
 
-def _all_read(sources: Sequence[Source]) -> list[Picture]:
+def _all_read(sources: Sequence[Source], lens_given: bool) -> list[Picture]:
     """The pictures. Raises UnreadableImage about all that cannot be read at once."""
     pictures: list[Picture] = []
     troubles: list[UnreadableImage] = []
     exposure = exposure_of_first(sources)
-    for one in in_order(partial(_picture_or_trouble, exposure=exposure), sources):
+    for one in in_order(partial(_picture_or_trouble, exposure=exposure, lens_given=lens_given), sources):
         if isinstance(one, UnreadableImage):
             troubles.append(one)
         else:
@@ -219,20 +230,26 @@ def _named_apart(pictures: list[Picture], sources: Sequence[Source]) -> list[Pic
     return out
 
 
-def _picture_or_trouble(source: Source, exposure: RawExposure | None) -> Picture | UnreadableImage:
+def _picture_or_trouble(
+    source: Source, exposure: RawExposure | None, lens_given: bool
+) -> Picture | UnreadableImage:
     try:
-        return _picture(source, exposure)
+        return _picture(source, exposure, lens_given)
     except UnreadableImage as trouble:
         return trouble
 
 
-def _picture(source: Source, exposure: RawExposure | None) -> Picture:
-    """A picture, read where it is not one yet; exposure: what camera RAW is developed with."""
+def _picture(source: Source, exposure: RawExposure | None, lens_given: bool) -> Picture:
+    """A picture, read where it is not one yet; a flat one, or one whose lens is given. exposure: what camera RAW is
+    developed with."""
     if isinstance(source, Picture):
         return source
     if isinstance(source, np.ndarray):
-        return picture_from_array(source)
-    return load_picture(source, exposure=exposure)
+        picture = picture_from_array(source)
+    else:
+        picture = load_picture(source, exposure=exposure)
+    check_flat(picture, lens_given)
+    return picture
 
 
 def _copies(pictures: Sequence[Picture]) -> Iterator[tuple[int, int]]:

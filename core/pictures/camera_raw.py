@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from .containers import TiffEntry, _tiff_integers, container_brand, read_structure, tiff_directory
+from .containers import TiffEntry, container_brand, read_structure, tiff_directory, tiff_integers
 from .heif import boxes
 from .metadata import joined_exif
 
@@ -68,7 +68,7 @@ def raw_damage(data: bytes) -> str:
     if data.startswith(_TIFF):
         for entries in _directories(data):
             for at, length in ((273, 279), (324, 325)):
-                starts, lengths = (_tiff_integers(data, entries.get(tag)) for tag in (at, length))
+                starts, lengths = (tiff_integers(data, entries.get(tag)) for tag in (at, length))
                 ends += [start + size for start, size in zip(starts, lengths, strict=False)]
     elif data.startswith(b"FUJIFILMCCD-RAW"):
         ends += [sum(int.from_bytes(data[at : at + 4], "big") for at in (place, place + 4)) for place in (84, 100)]
@@ -128,7 +128,7 @@ def _directories(data: bytes) -> Iterator[dict[int, TiffEntry]]:
         entries = {entry.tag: entry for entry in directory[0]}
         yield entries
         waiting += [directory[1] or None] if directory[1] else []
-        waiting += _tiff_integers(data, entries.get(SUBDIRECTORIES))[:_MOST_DIRECTORIES]
+        waiting += tiff_integers(data, entries.get(SUBDIRECTORIES))[:_MOST_DIRECTORIES]
 
 
 def _is_of_sensor(data: bytes, entries: dict[int, TiffEntry]) -> bool:
@@ -136,4 +136,4 @@ def _is_of_sensor(data: bytes, entries: dict[int, TiffEntry]) -> bool:
 
 
 def _first(data: bytes, entries: dict[int, TiffEntry], tag: int) -> int:
-    return (_tiff_integers(data, entries.get(tag)) or [0])[0]
+    return (tiff_integers(data, entries.get(tag)) or [0])[0]

@@ -12,6 +12,8 @@ import zlib
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from . import png_chunks
+from .bmp import bmp_is_opaque, bmp_size
 from .heif import HeifFacts, read_heif
 from .options import READING
 from .radiance_header import is_radiance, read_header
@@ -40,7 +42,8 @@ class Structure:
     """A picture file from outside. kind: png, jpeg, tiff, webp, bmp, heic, hdr or exr; width, height px, or 0.
 
     damage says in words what is broken, or is empty. exif: the raw block as a TIFF structure (for TIFF the file
-    itself). gray: a PNG without colour, which decoders may widen to RGBA for the sake of its alpha.
+    itself). gray: a PNG without colour, which decoders may widen to RGBA for the sake of its alpha. opaque: what a
+    decoder takes for alpha is none. transparent: the level of each channel that a PNG shows nothing at, or none.
     """
 
     kind: str
@@ -50,6 +53,8 @@ class Structure:
     exif: bytes | None = None
     icc: bytes | None = None
     gray: bool = False
+    opaque: bool = False
+    transparent: tuple[int, ...] = ()
     tiff: TiffFacts | None = None
     heif: HeifFacts | None = None
 
@@ -82,8 +87,7 @@ def read_structure(data: bytes) -> Structure | None:
         header = read_header(data)
         return Structure("hdr", *header.size, header.damage)
     if data[:2] == b"BM" and len(data) >= 26:
-        width, height = struct.unpack_from("<ii", data, 18)
-        return Structure("bmp", abs(width), abs(height))
+        return Structure("bmp", *bmp_size(data), opaque=bmp_is_opaque(data))
     return None
 
 
@@ -100,6 +104,15 @@ def container_brand(data: bytes) -> str:
     brands = [data[8:12], *(data[at : at + 4] for at in range(16, min(64, _u32(data, 0)), 4))]
     kinds = [_BRANDS[brand] for brand in brands if brand in _BRANDS]
     return "AVIF" if "AVIF" in kinds else kinds[0] if kinds else ""
+
+
+# GPano's property of XMP, as an attribute or an element; whatever it says, the picture is not flat
+_SURROUND = re.compile(rb"GPano:ProjectionType\s*(=\s*[\"']|>)\s*(equirectangular|cylindrical)", re.IGNORECASE)
+
+
+def says_surround(data: bytes) -> bool:
+    """Whether a file's XMP calls it a map of many directions (GPano)."""
+    return _SURROUND.search(data) is not None
 
 
 def _u32(data: bytes, at: int) -> int:
@@ -149,6 +162,7 @@ def _jpeg(data: bytes) -> Structure:
 def _png(data: bytes) -> Structure:
     found = Structure("png", damage="it is cut off: its end chunk is missing")
     at, holds_data = 8, False
+    further: dict[bytes, list[bytes]] = {}
     while at + 12 <= len(data):
         length, name = _u32(data, at), data[at + 4 : at + 8]
         body = data[at + 8 : at + 8 + length]
@@ -164,9 +178,14 @@ def _png(data: bytes) -> Structure:
             found = replace(found, exif=body)
         elif name == b"iCCP":
             found = replace(found, icc=_bounded_inflate(body[body.find(b"\0") + 2 :]))
+        elif name in png_chunks.KEPT:
+            further.setdefault(name, []).append(body)
         holds_data = holds_data or name == b"IDAT"
         if name == b"IEND":
-            return replace(found, damage="" if holds_data else "it holds no picture data")
+            damage = "" if holds_data else "it holds no picture data"
+            return replace(found, damage=damage, transparent=png_chunks.transparent_level(further, data[25], data[24]),
+                           exif=found.exif or png_chunks.exif_in_text(further, READING.max_icc_bytes),
+                           icc=found.icc or png_chunks.profile_of(further, found.gray))
         at += 12 + length
     return found
 
@@ -179,7 +198,8 @@ def neutral_png(data: bytes) -> bytes:
     parts, at = [data[:8]], 8
     while at + 12 <= len(data):
         end = at + 12 + _u32(data, at)
-        if data[at + 4 : at + 8] in (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"):
+        # decoders mind tRNS of some kinds of pictures: without a palette it is `Structure.transparent`
+        if data[at + 4 : at + 8] in (b"IHDR", b"PLTE", b"IDAT", b"IEND", *[b"tRNS"] * (data[25] == 3)):
             parts.append(data[at:end])
         if data[at + 4 : at + 8] == b"IEND":
             break
@@ -218,7 +238,7 @@ def tiff_directory(data: bytes, at: int | None = None) -> tuple[list[TiffEntry],
 
     data: a TIFF structure, classic or BigTIFF. None where it is damaged. Raises nothing.
     """
-    order, big = _tiff_layout(data)
+    order, big = tiff_layout(data)
     try:
         if at is None:
             (at,) = struct.unpack_from(order + ("Q" if big else "I"), data, 8 if big else 4)
@@ -245,17 +265,19 @@ def tiff_bytes(data: bytes, entry: TiffEntry) -> bytes:
     return data[entry.at : entry.at + entry.values * _TIFF_SIZES.get(entry.kind, 1)]
 
 
-def _tiff_layout(data: bytes) -> tuple[str, bool]:
+def tiff_layout(data: bytes) -> tuple[str, bool]:
+    """The byte order ("<" or ">") of a TIFF structure, and whether it is a BigTIFF."""
     return "<" if data[:2] == b"II" else ">", b"+" in data[2:4]
 
 
-def _tiff_integers(data: bytes, entry: TiffEntry | None) -> list[int]:
+def tiff_integers(data: bytes, entry: TiffEntry | None) -> list[int]:
+    """The values of a directory entry, none where it is absent or holds something else."""
     letter = _TIFF_INTEGERS.get(entry.kind) if entry is not None else None
     if entry is None or letter is None:
         return []
     raw = tiff_bytes(data, entry)
     count = len(raw) // struct.calcsize("<" + letter)
-    return list(struct.unpack_from(f"{_tiff_layout(data)[0]}{count}{letter}", raw))
+    return list(struct.unpack_from(f"{tiff_layout(data)[0]}{count}{letter}", raw))
 
 
 def _tiff(data: bytes) -> Structure:
@@ -265,10 +287,10 @@ def _tiff(data: bytes) -> Structure:
     entries = {entry.tag: entry for entry in directory[0]}
 
     def first(tag: int, otherwise: int) -> int:
-        return (_tiff_integers(data, entries.get(tag)) or [otherwise])[0]
+        return (tiff_integers(data, entries.get(tag)) or [otherwise])[0]
 
-    starts = _tiff_integers(data, entries.get(273) or entries.get(324))
-    lengths = _tiff_integers(data, entries.get(279) or entries.get(325))
+    starts = tiff_integers(data, entries.get(273) or entries.get(324))
+    lengths = tiff_integers(data, entries.get(279) or entries.get(325))
     damage = ""
     if not starts:
         damage = "it holds no picture data"
@@ -293,7 +315,7 @@ def _tiff_pages(data: bytes, following: int) -> int:
         if directory is None:
             break
         kind = next((entry for entry in directory[0] if entry.tag == 254), None)
-        pages += not (_tiff_integers(data, kind) or [0])[0] & 1
+        pages += not (tiff_integers(data, kind) or [0])[0] & 1
         following = directory[1]
     return pages
 
@@ -307,5 +329,5 @@ def neutral_tiff(data: bytes) -> bytes:
     patched = bytearray(data)
     for entry in directory[0] if directory is not None else []:
         if entry.tag in (274, 338) and entry.kind == 3 and entry.values >= 1 and entry.at + 2 <= len(patched):
-            struct.pack_into(_tiff_layout(data)[0] + "H", patched, entry.at, 1)
+            struct.pack_into(tiff_layout(data)[0] + "H", patched, entry.at, 1)
     return bytes(patched)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..system.errors import StitchError, UnreadableImage
+from .bmp import neutral_bmp
 from .containers import Structure, neutral_png, neutral_tiff
 from .exr import read_exr
+from .jpeg import refuse_unusual_jpeg
+from .opencv import decoded
 from .options import READING
+from .tiff import read_tiff
 
 
 def read_file(path: Path) -> bytes:
@@ -50,42 +53,39 @@ def check_size(width: int, height: int, stored: int, pixels_per_byte: int = READ
             " memory; copy or export it again")
 
 
-@contextmanager
-def quiet_opencv() -> Iterator[None]:
-    """OpenCV reports damaged files on stderr by itself; the user gets our message instead."""
-    # from 4.13 on these two stand in a module of their own
-    log = cv2 if hasattr(cv2, "getLogLevel") else cv2.utils.logging
-    level = log.getLogLevel()
-    log.setLogLevel(0)
-    try:
-        yield
-    finally:
-        log.setLogLevel(level)
+@dataclass(frozen=True)
+class Decoded:
+    """raw: (H, W, 1 to 4) uint8, uint16 or float32 as stored, in R, G, B, A order, not turned; associated: the colours
+    are multiplied by alpha; warnings in words; surround: whether it says to be a map of all directions."""
+
+    raw: NDArray[Any]
+    associated: bool = False
+    warnings: tuple[str, ...] = ()
+    surround: bool = False
 
 
-def decode_file(data: bytes, structure: Structure) -> tuple[NDArray[Any], list[str]]:
-    """Raw samples, and warnings.
+def decode_file(data: bytes, structure: Structure) -> Decoded:
+    """The samples of a whole file of the given structure (not EXR). Raises UnreadableImage."""
+    warnings: tuple[str, ...] = ()
+    if structure.tiff is not None:
+        if structure.tiff.pages > 1:
+            warnings = (f"the TIFF file has {structure.tiff.pages} pages; only the first is used",)
+        found = read_tiff(data)
+        if found is not None:
+            return Decoded(found.raw, found.associated, (*warnings, *found.warnings))
+    return Decoded(_decode_by_opencv(data, structure), False, warnings)
 
-    data: a whole file of the given structure (not EXR). Returns H×W×C (1 to 4) uint8, uint16 or float32 as stored, in
-    R, G, B, A order, not turned. Raises UnreadableImage.
-    """
-    tiff, warnings = structure.tiff, []
+
+def _decode_by_opencv(data: bytes, structure: Structure) -> NDArray[Any]:
     if structure.kind == "png":
         data = neutral_png(data)
-    if tiff is not None:
+    if structure.tiff is not None:
         data = neutral_tiff(data)
-        if tiff.photometric == 5 and tiff.bits > 8:
-            raise UnreadableImage("CMYK of more than 8 bits cannot be read; convert the picture to RGB")
-        if tiff.pages > 1:
-            warnings.append(f"the TIFF file has {tiff.pages} pages; only the first is used")
-        if tiff.samples == 2:
-            warnings.append("the alpha of a gray TIFF file cannot be read; it is treated as opaque, with 8 bits")
-    try:
-        with quiet_opencv():
-            # Unchanged: depth and alpha stay, and OpenCV leaves the orientation of JPEG and PNG alone.
-            raw = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except (cv2.error, MemoryError):
-        raw = None
+    if structure.kind == "bmp":
+        data = neutral_bmp(data)
+    if structure.kind == "jpeg":
+        refuse_unusual_jpeg(data)
+    raw = decoded(data)
     if raw is None or raw.shape[:2] != (structure.height, structure.width):
         raise UnreadableImage(
             f"the {structure.kind.upper()} file cannot be decoded: it is damaged or of an unusual kind; open it in an"
@@ -96,19 +96,19 @@ def decode_file(data: bytes, structure: Structure) -> tuple[NDArray[Any], list[s
         raise UnreadableImage(f"{raw.dtype} samples cannot be read; save the picture with 8, 16 or (float) 32 bits")
     if raw.ndim == 2:
         raw = raw[..., None]
+    elif structure.opaque:
+        raw = cv2.cvtColor(raw[..., :3], cv2.COLOR_BGR2RGB)
     elif structure.gray:
         raw = np.ascontiguousarray(raw[..., [0, 3]] if raw.shape[2] == 4 else raw[..., :1])
     else:
         raw = cv2.cvtColor(raw, cv2.COLOR_BGR2RGB if raw.shape[2] == 3 else cv2.COLOR_BGRA2RGBA)
-    # White is zero: OpenCV minds that up to 8 bits.
-    if tiff is not None and tiff.photometric == 0 and raw.dtype == np.uint16:
-        raw = 65535 - raw
-    return raw, warnings
+    if structure.transparent and raw.shape[2] == len(structure.transparent):
+        shown = (raw != np.array(structure.transparent, raw.dtype)).any(axis=2, keepdims=True)
+        raw = np.concatenate([raw, shown * np.array(np.iinfo(raw.dtype).max, raw.dtype)], axis=2)
+    return raw
 
 
-def decode_exr(
-    data: bytes, pixels_per_byte: int = READING.photograph_pixels_per_byte
-) -> tuple[NDArray[Any], list[str]]:
+def decode_exr(data: bytes, pixels_per_byte: int = READING.photograph_pixels_per_byte) -> Decoded:
     """Like `decode_file` for EXR: float32, premultiplied by alpha where there is one; see `check_size`."""
 
     def check(sizes: list[tuple[int, int]], samples: int) -> None:
@@ -120,12 +120,14 @@ def decode_exr(
                 f" {READING.max_exr_samples // 10**6} can be read; render only the picture (Combined) into the file")
 
     try:
-        pixels, alpha, warning = read_exr(data, check)
+        pixels, alpha, warnings, surround = read_exr(data, check)
     except StitchError:
         raise
     except Exception as error:  # OpenEXR raises whatever its C++ side threw
         raise UnreadableImage("the EXR file is damaged or cut off; copy or render it again") from error
-    return pixels if alpha is None else np.dstack([pixels, alpha]), [warning] if warning else []
+    if alpha is not None and not alpha.any() and pixels.any():
+        alpha, warnings = None, (*warnings, "its alpha is 0 everywhere, though it shows something: taken as opaque")
+    return Decoded(pixels if alpha is None else np.dstack([pixels, alpha]), True, warnings, surround)
 
 
 def turn(raw: NDArray[Any], orientation: int) -> NDArray[Any]:

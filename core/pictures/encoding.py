@@ -17,10 +17,10 @@ from ..raster.lazy import AnyImage, whole
 from ..system.errors import BadRequest, UnwritableOutput
 from ..system.output_files import OutputFiles
 from ..system.threads import in_order
-from .decoding import quiet_opencv
 from .exr import DEFAULT_FORM, ExrForm, write_exr
 from .gpano import SpherePart, xmp_packet
 from .metadata import SOFTWARE, Exif, embed
+from .opencv import quiet_opencv
 from .options import WRITING
 from .picture import curves_for
 from .png import encode_png

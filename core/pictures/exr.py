@@ -15,20 +15,27 @@ from ..choices import EXR_COMPRESSIONS, EXR_DEPTHS
 from ..raster.arrays import strips
 from ..raster.lazy import AnyImage
 from ..system.errors import BadRequest, UnreadableImage
+from ..system.streams import overheard
 from ..system.threads import in_order
+from .exr_colour import from_luminance_chroma, in_rec709, with_square_pixels
 from .metadata import SOFTWARE, Exif
 from .options import WRITING
 
 # x, y of red, green, blue and white of Rec. 709, as the attribute `chromaticities` holds them
 _REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
+# The bit of a file's second byte of flags that says that parts are not flat (OpenEXR, File Layout).
+_DEEP = 0x08
+
 
 class ExrPixels(NamedTuple):
-    """pixels: float32 H×W×C (1 or 3) as stored, premultiplied; alpha: float32 H×W as stored, or None; warning or ""."""
+    """pixels: float32 H×W×C (1 or 3) as stored, premultiplied, in Rec. 709; alpha: float32 H×W as stored, or None;
+    warnings; surround: whether the header calls it a map of all directions."""
 
     pixels: NDArray[Any]
     alpha: NDArray[Any] | None
-    warning: str
+    warnings: tuple[str, ...]
+    surround: bool = False
 
 
 class _Layer(NamedTuple):
@@ -48,8 +55,10 @@ def read_exr(data: bytes, check: Callable[[list[tuple[int, int]], int], None]) -
     """
     import OpenEXR
 
-    # OpenEXR prints a line to sys.stdout for a damaged part and leaves it out.
-    with contextlib.redirect_stdout(io.StringIO()):
+    if len(data) > 5 and data[5] & _DEEP:
+        raise UnreadableImage("deep data, many depths at each pixel: flatten it, or render the picture without them")
+    # OpenEXR prints a line to sys.stdout for a damaged part and leaves it out, and others to standard error.
+    with contextlib.redirect_stdout(io.StringIO()), overheard(_is_openexrs):
         headers = OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True).parts
         sizes = [(_window(part.header["displayWindow"])[1], _window(part.header["dataWindow"])[1]) for part in headers]
         samples = sum(
@@ -64,14 +73,16 @@ def read_exr(data: bytes, check: Callable[[list[tuple[int, int]], int], None]) -
     if not layers:
         raise UnreadableImage("no layer with the channels R, G, B or Y; render a colour pass (Combined) into the file")
     best = min(layers, key=_rank)  # the first of equals
+    header = best.part.header
     pixels, alpha = _in_display_window(best)
+    pixels, alpha, stretched = with_square_pixels(in_rec709(pixels, header), alpha, header)
     others = [layer.name for layer in layers if layer is not best and _rank(layer) == _rank(best)]
     warning = ""
     if _rank(best) > 2 and len(layers) > 1:
         warning = f"no combined picture among the layers of the file; the layer {best.name!r} was taken"
     elif others:
         warning = f"several pictures in the file; {best.name!r} was taken, not {', '.join(map(repr, others))}"
-    return ExrPixels(pixels, alpha, warning)
+    return ExrPixels(pixels, alpha, tuple(filter(None, (warning, stretched))), "envmap" in header)
 
 
 def exr_size(data: bytes) -> tuple[int, int]:
@@ -79,11 +90,16 @@ def exr_size(data: bytes) -> tuple[int, int]:
     import OpenEXR
 
     try:
-        with contextlib.redirect_stdout(io.StringIO()):
+        with contextlib.redirect_stdout(io.StringIO()), overheard(_is_openexrs):
             parts = OpenEXR.File(io.BytesIO(data), separate_channels=True, header_only=True).parts
         return max((_window(part.header["displayWindow"])[1] for part in parts), key=lambda size: size[0] * size[1])
     except Exception:  # OpenEXR raises whatever its C++ side threw
         return 0, 0
+
+
+def _is_openexrs(line: str) -> bool:
+    """Whether a line on standard error is OpenEXR's own."""
+    return "EXR_ERR" in line or "<python_buffer>" in line
 
 
 def _layers(parts: list[Any]) -> Iterator[_Layer]:
@@ -95,7 +111,9 @@ def _layers(parts: list[Any]) -> Iterator[_Layer]:
             groups.setdefault(layer, {})[component.upper()] = channel.pixels
         for layer, found in groups.items():
             colours = [found[name] for name in "RGB" if name in found]
-            if len(colours) < 3:
+            if len(colours) < 3 and {"Y", "RY", "BY"} <= found.keys():
+                colours = from_luminance_chroma(found, part.header)
+            elif len(colours) < 3:
                 colours = [found["Y"]] if "Y" in found else []
             # Depth and normals come as X, Y, Z
             if not colours or (len(colours) == 1 and ("X" in found or "Z" in found)):

@@ -53,6 +53,7 @@ class Exif:
     lens: str = ""
     focal_mm: float | None = None
     focal35_mm: float | None = None
+    digital_zoom: float | None = None
     focal_plane_x_per_mm: float | None = None
     focal_plane_y_per_mm: float | None = None
     width: int | None = None
@@ -106,6 +107,7 @@ def read_exif(block: bytes | None) -> Exif:
         lens=_text(tags.get("EXIF LensModel")),
         focal_mm=_number(tags.get("EXIF FocalLength"), 0.1, 10000),
         focal35_mm=_number(tags.get("EXIF FocalLengthIn35mmFilm"), 1, 10000),
+        digital_zoom=_zoom(tags.get("EXIF DigitalZoomRatio")),
         focal_plane_x_per_mm=plane_per_mm[0], focal_plane_y_per_mm=plane_per_mm[1],
         width=None if size[0] is None else int(size[0]), height=None if size[1] is None else int(size[1]),
         heading=_number(tags.get("GPS GPSImgDirection"), 0, 360) if _text(north) == "T" else None,
@@ -153,6 +155,12 @@ def _number(tag: Any, least: float, most: float) -> float | None:
     except (AttributeError, IndexError, TypeError, ValueError, ArithmeticError):
         return None
     return value if math.isfinite(value) and least <= value <= most else None
+
+
+def _zoom(tag: Any) -> float | None:
+    """A digital zoom above 1; cameras write 0 or 1 where there was none."""
+    ratio = _number(tag, 1.0, 100.0)
+    return ratio if ratio is not None and ratio > 1.0 else None
 
 
 def _value(tag: Any, kind: int) -> str | int | tuple[int, int] | None:

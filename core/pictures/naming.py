@@ -60,3 +60,8 @@ def told_apart(names: Sequence[str]) -> list[str]:
 
 def _ends_in(path: Path, end: Path) -> bool:
     return bool(end.parts) and path.parts[-len(end.parts) :] == end.parts
+
+
+def in_words(names: Sequence[str]) -> str:
+    """The names of pictures; of more than two only how many they are."""
+    return " and ".join(names) if len(names) <= 2 else f"{len(names)} pictures"

@@ -21,7 +21,7 @@ from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from ..raster.lazy import AnyImage, Coded, whole
 from ..system.errors import BadRequest, UnreadableImage
 from .camera_raw import is_raw
-from .containers import container_brand, read_structure
+from .containers import container_brand, read_structure, says_surround
 from .decoding import check_size, decode_exr, decode_file, read_file, turn
 from .heif_decoding import decode_heif
 from .metadata import Exif, read_exif
@@ -57,6 +57,10 @@ class Picture:
         For the user.
     clips_at : float
         Light from which a float picture is clipped: camera RAW has such, others have infinity.
+    surround : bool
+        Whether the file says that it is a map of many directions (a sphere, a cylinder), no flat picture.
+    burnt_in : (H, W) bool, optional
+        Where a date or a logo was found, which alpha hides.
     """
 
     light: AnyImage
@@ -68,6 +72,8 @@ class Picture:
     name: str
     warnings: tuple[str, ...] = ()
     clips_at: float = float("inf")
+    surround: bool = False
+    burnt_in: NDArray[np.bool_] | None = None
 
     @property
     def pixels(self) -> NDArray[Any]:
@@ -126,8 +132,9 @@ def _load(path: Path, pixels_per_byte: int, exposure: RawExposure | None) -> Pic
     if structure is None:
         raise UnreadableImage(f"not a picture of a known kind; export it as {_READABLE}")
     if structure.kind == "exr":
-        raw, warnings = decode_exr(data, pixels_per_byte)
-        return _picture(raw, True, Exif(), None, path.name, warnings)
+        found = decode_exr(data, pixels_per_byte)
+        picture = _picture(found.raw, True, Exif(), None, path.name, list(found.warnings))
+        return replace(picture, surround=found.surround)
     if structure.damage:
         kind = structure.kind.upper()
         raise UnreadableImage(f"the {kind} file is damaged: {structure.damage}; copy or export it again")
@@ -141,9 +148,10 @@ def _load(path: Path, pixels_per_byte: int, exposure: RawExposure | None) -> Pic
         return _picture(heif.pixels, heif.associated, upright, heif.icc, path.name, [*heif.warnings])
     if structure.tiff is not None:  # the value that decoding set aside, in BigTIFF too, which ExifRead does not know
         exif = replace(exif, orientation=structure.tiff.orientation if 1 <= structure.tiff.orientation <= 8 else 1)
-    raw, warnings = decode_file(data, structure)
-    associated = structure.tiff is not None and structure.tiff.extra == 1
-    return _picture(turn(raw, exif.orientation), associated, exif.upright(), structure.icc, path.name, warnings)
+    found = decode_file(data, structure)
+    raw, warnings = turn(found.raw, exif.orientation), list(found.warnings)
+    picture = _picture(raw, found.associated, exif.upright(), structure.icc, path.name, warnings)
+    return replace(picture, surround=says_surround(data))
 
 
 def _developed(data: bytes, exposure: RawExposure | None, name: str) -> Picture:
@@ -315,7 +323,8 @@ def resized(picture: Picture, scale: float) -> Picture:
         return mean
 
     view = np.clip(np.rint(weighed(picture.view)), 0, 255).astype(np.uint8)
-    return replace(picture, light=weighed(picture.pixels), alpha=alpha, view=view)
+    burnt_in = None if picture.burnt_in is None else shrink(picture.burnt_in.astype(np.float32)) > 0
+    return replace(picture, light=weighed(picture.pixels), alpha=alpha, view=view, burnt_in=burnt_in)
 
 
 def in_same_colour_space(pictures: Sequence[Picture]) -> tuple[Picture, ...]:

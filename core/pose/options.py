@@ -244,11 +244,50 @@ class ZoomOptions:
     iterations: int = 20
 
 
+@dataclass(frozen=True)
+class ExifDoubtOptions:
+    """When the matches overrule a focal length by EXIF (`exif_doubt`); measured on 12 pairs with EXIF as it is, and
+    multiplied by 0.5 to 2."""
+
+    # Times the noise of the matches about a free fundamental matrix from which the start without EXIF is tried: right
+    # EXIF gave 0.92 to 1.21 and once 1.57, wrong 1.25 to 2.7 where it did harm.
+    noise_factor: float = 1.15
+    # Times the cost without EXIF from which that is taken: right EXIF gave 1.11 at most (lens distortion), EXIF that
+    # was off by a factor of 2 gave 1.3 to 2.6.
+    cost_factor: float = 1.15
+    # The same as a difference, in squared units of noise: fewer matches than some dozen decide nothing.
+    least_gain: float = 50.0
+    # Deviation of log f without EXIF, at most: else the matches do not know it.
+    most_deviation: float = 0.1
+    # Difference of log f, at least: what is less is within what EXIF rounds.
+    apart: float = 0.12
+    # Pairs of a set that are asked: those with the most matches.
+    pairs_asked: int = 3
+    # Difference of log f within which what they say is one answer.
+    agreeing: float = 0.15
+
+
+@dataclass(frozen=True)
+class MirrorOptions:
+    """When a picture is taken for mirrored (`mirrored`)."""
+
+    # Inliers from which nobody asks: a symmetric front has fewer with its mirror image.
+    enough: int = 250
+    # px of the reference for each of these, in smaller pictures.
+    px_for_one: int = 500
+    # Matches of the mirrored picture, at least, and times as many as of the picture as it is: symmetric scenes have
+    # half as many, of others a few agree by chance.
+    least: int = 40
+    factor: float = 1.5
+
+
 FEATURES = FeatureOptions()
 FUNDAMENTAL = FundamentalOptions()
 REFINEMENT = RefinementOptions()
 ESTIMATION = EstimationOptions()
 FOCAL = FocalOptions()
 EDGE_FOCAL = EdgeFocalOptions()
+MIRROR = MirrorOptions()
+EXIF_DOUBT = ExifDoubtOptions()
 ROTATION = RotationOptions()
 ZOOM = ZoomOptions()

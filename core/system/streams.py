@@ -1,10 +1,13 @@
-"""Standard streams that lose their other end: a terminal that was closed, a pipe nobody reads, a full disk."""
+"""Standard streams that lose their other end (a terminal that was closed, a pipe nobody reads, a full disk), and what
+libraries print on them."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
@@ -62,3 +65,44 @@ def silence(stream: TextIO) -> None:
     with suppress(OSError, ValueError), open(os.devnull, "w", encoding="utf-8") as nowhere:
         os.dup2(nowhere.fileno(), stream.fileno())
         stream.flush()
+
+
+_ERRORS = 2  # the file number of standard error, which libraries in C write to
+_LISTENING = threading.Lock()
+
+
+@contextmanager
+def overheard(belongs: Callable[[str], bool]) -> Iterator[list[str]]:
+    """What libraries print on standard error in this context: filled into the list that is given, when it ends.
+
+    Parameters
+    ----------
+    belongs : callable
+        Whether a line is a library's. All others, of other threads, are passed on when the context ends.
+
+    Notes
+    -----
+    Where standard error cannot be redirected nothing is heard. One thread listens at a time.
+    """
+    lines: list[str] = []
+    with _LISTENING:
+        try:
+            shown, kept = os.dup(_ERRORS), tempfile.TemporaryFile()
+        except OSError:
+            yield lines
+            return
+        with kept:
+            os.dup2(kept.fileno(), _ERRORS)
+            try:
+                yield lines
+            finally:
+                os.dup2(shown, _ERRORS)
+                os.close(shown)
+                kept.seek(0)
+                for raw in kept.read().splitlines(keepends=True):
+                    line = raw.decode(errors="replace")
+                    if belongs(line):
+                        lines.append(line.strip())
+                    else:
+                        with suppress(OSError):
+                            os.write(_ERRORS, raw)

@@ -463,7 +463,6 @@ REFUSED = {
     "a thread": ((noise(1, 33_000, 12), noise(2, 33_000, 12)), TooFewMatches, "at least 16 needed.*choose a larger"),
     "unrelated noise": ((noise(1, 180, 240), noise(2, 180, 240)), TooFewMatches, "at least 16 needed.*choose"),
     "unrelated clouds": ((clouds(1), clouds(2)), (TooFewMatches, NoOverlap), "needed"),
-    "a transparent one": ((np.dstack([clouds(1), np.zeros((300, 400), np.uint8)]), clouds(2)), TooFewMatches, "only 0"),
 }
 
 
@@ -473,6 +472,11 @@ def test_what_cannot_be_stitched_is_refused_with_advice(case: str) -> None:
     with pytest.raises(kind, match=words) as refused:
         stitch(pictures)
     assert refused.value.exit_code == 3
+
+
+def test_a_transparent_picture_is_refused_before_anything_is_sought() -> None:
+    with pytest.raises(UnreadableImage, match="entirely transparent: export it"):
+        stitch((np.dstack([clouds(1), np.zeros((300, 400), np.uint8)]), clouds(2)))
 
 
 def test_chance_look_alikes_are_refused(small_pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:

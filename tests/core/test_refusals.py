@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.pictures import decoding
+from edf_stitch.core.pictures import opencv
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.pictures.picture import Picture, load_picture
@@ -152,8 +152,8 @@ def test_opencv_is_quiet_by_either_spelling(monkeypatch: pytest.MonkeyPatch, new
     level = [3]
     spelt = SimpleNamespace(getLogLevel=lambda: level[0], setLogLevel=lambda value: level.__setitem__(0, value))
     whole = SimpleNamespace(utils=SimpleNamespace(logging=spelt)) if newer else spelt
-    monkeypatch.setattr(decoding, "cv2", whole)
-    with decoding.quiet_opencv():
+    monkeypatch.setattr(opencv, "cv2", whole)
+    with opencv.quiet_opencv():
         assert level == [0]
     assert level == [3]
 

@@ -189,6 +189,23 @@ def test_the_order_stands_as_a_whole() -> None:
     assert all(word in source for word, source in zip(words, sources, strict=True)), sources
 
 
+def test_a_digital_zoom_counts_beside_the_sensors_size() -> None:
+    """It enlarges the middle of the sensor; in the 35 mm equivalent makers have counted it."""
+    plain, _, _ = cameras(exif=Exif(**IPHONE))
+    zoomed, _, _ = cameras(exif=Exif(**IPHONE, digital_zoom=2.0))
+    assert zoomed.focal == pytest.approx(2 * plain.focal) and "digital zoom 2" in zoomed.source
+    counted, _, _ = cameras(exif=Exif(focal35_mm=56.0, digital_zoom=2.0))
+    assert counted.focal == pytest.approx(cameras(exif=Exif(focal35_mm=56.0))[0].focal)
+
+
+def test_a_resolution_that_makes_no_sensor_counts_less() -> None:
+    """4000 px at 650 a mm make the sensor of a small camera, 1000 px at the same resolution none that there is."""
+    for width, height, sigma in ((4000, 3000, INTRINSICS.exif_sigma), (1000, 750, INTRINSICS.cropped_sigma)):
+        exif = Exif(focal_mm=5.0, focal_plane_x_per_mm=650.0, focal_plane_y_per_mm=650.0, width=width, height=height)
+        first, _, _ = cameras(exif=exif, size=(width, height))
+        assert first.log_sigma == sigma
+
+
 def test_nonsense_in_exif_is_passed_over() -> None:
     first, _, _ = cameras(exif=Exif(**IPHONE, focal35_mm=1.0))  # 116 px across 4000
     assert "table" in first.source

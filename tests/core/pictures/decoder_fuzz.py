@@ -46,7 +46,7 @@ def whole_files() -> dict[str, bytes]:
     made["progressive.jpg"] = _encoded(".jpg", noise[..., :3], cv2.IMWRITE_JPEG_PROGRESSIVE, 1)
     made["restarts.jpg"] = _encoded(".jpg", noise[..., :3], cv2.IMWRITE_JPEG_RST_INTERVAL, 2)
     made["lossy.webp"] = _encoded(".webp", noise[..., :3], cv2.IMWRITE_WEBP_QUALITY, 60)
-    made |= _by_pillow(noise) | _by_tifffile(noise) | _by_openexr(noise) | _radiance(noise)
+    made |= _by_pillow(noise) | _by_tifffile(noise) | _by_openexr(noise) | _radiance(noise) | _by_hand(noise)
     return made
 
 
@@ -84,7 +84,7 @@ def _by_pillow(noise: np.ndarray) -> dict[str, bytes]:
 
 
 def _by_tifffile(noise: np.ndarray) -> dict[str, bytes]:
-    """Tiles, BigTIFF, planes, the other byte order."""
+    """Tiles, BigTIFF, planes, the other byte order, half floats, further channels."""
     import tifffile
 
     made = {}
@@ -97,7 +97,34 @@ def _by_tifffile(noise: np.ndarray) -> dict[str, bytes]:
             pixels = np.ascontiguousarray(noise[..., :3])
             file.write(np.moveaxis(pixels, 2, 0) if name == "planes.tif" else pixels, photometric="rgb", **options)
         made[name] = stream.getvalue()
+    deep = np.ascontiguousarray(noise[..., :3]).astype(np.uint16) * 257
+    for name, pixels, options in (
+        ("deep_planes.tif", np.moveaxis(deep, 2, 0), {"planarconfig": "separate", "compression": "zlib"}),
+        ("half.tif", (deep / 65535).astype(np.float16), {"compression": "zlib"}),
+        ("infrared.tif", np.ascontiguousarray(noise), {"extrasamples": ["unspecified"]}),
+        ("inks.tif", np.ascontiguousarray(noise), {"photometric": "separated"}),
+        ("small_tiles.tif", deep, {"tile": (16, 16), "compression": "zlib"}),
+    ):  # fmt: skip
+        stream = io.BytesIO()
+        tifffile.imwrite(stream, np.ascontiguousarray(pixels), **{"photometric": "rgb"} | options)
+        made[name] = stream.getvalue()
     return made
+
+
+def _by_hand(noise: np.ndarray) -> dict[str, bytes]:
+    """A BMP of OS/2, a PNG with a transparent level, a gamma and EXIF in a text."""
+    rows = noise[::-1, :, :3].reshape(HEIGHT, -1)
+    head = struct.pack("<2sIHHIIHHHH", b"BM", 26 + rows.size, 0, 0, 26, 12, WIDTH, HEIGHT, 1, 24)
+    png = _encoded(".png", noise[..., 0])
+    exif = b"II*\0" + struct.pack("<IHHHIHHI", 8, 1, 274, 3, 1, 6, 0, 0)
+    further = b"".join(
+        struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+        for name, body in (
+            (b"gAMA", struct.pack(">I", 100_000)), (b"tRNS", b"\0\x50"),
+            (b"tEXt", b"Raw profile type exif\0\nexif\n %d\n%s" % (len(exif), exif.hex().encode())),
+        )
+    )  # fmt: skip
+    return {"os2.bmp": head + rows.tobytes(), "chunks.png": png[:33] + further + png[33:]}
 
 
 def _by_openexr(noise: np.ndarray) -> dict[str, bytes]:
@@ -113,6 +140,10 @@ def _by_openexr(noise: np.ndarray) -> dict[str, bytes]:
     kinds = {
         "half.exr": ({"compression": OpenEXR.PIZ_COMPRESSION, "type": scan}, half),
         "layers.exr": ({"compression": OpenEXR.ZIPS_COMPRESSION, "type": scan}, layers),
+        "aces.exr": (
+            {"compression": OpenEXR.ZIP_COMPRESSION, "type": scan,
+             "chromaticities": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767)}, colours,
+        ),
         "tiles.exr": (
             {"compression": OpenEXR.ZIP_COMPRESSION, "type": tiled, "tiles": OpenEXR.TileDescription()}, colours,
         ),

@@ -1,0 +1,107 @@
+"""`edf info`: what was understood of each picture file, a line each, or a document."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..system.errors import StitchError, UnreadableImage
+
+if TYPE_CHECKING:
+    from ..pictures.picture import Picture
+
+INFO = """Say what was understood of each picture: size, depth, colour, camera, lens, focal length and where that comes
+from, orientation, and what is wrong with it. A line for each on stdout, or a document with --json. Exit codes: 0 all
+can be used, 2 the call is wrong, 4 one can't be read or is no flat photograph, 130 interrupted."""
+
+
+def add_info(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `edf info`."""
+    parser.set_defaults(run=_info)
+    parser.add_argument(
+        "pictures", metavar="PICTURE", type=Path, nargs="+", help="files, folders, or patterns like IMG_*.jpg"
+    )
+    parser.add_argument("--json", action="store_true", help="a document instead of lines (docs/formats.md)")
+
+
+def _info(args: argparse.Namespace) -> int:
+    from ..pictures.listing import listed
+
+    entries = [entry_of(path) for path in listed(args.pictures)]
+    if args.json:
+        print(json.dumps({"schema": 1, "pictures": entries}, indent=1))
+    else:
+        for entry in entries:
+            print(line_of(entry))
+    sys.stdout.flush()
+    return UnreadableImage.exit_code if any(entry["error"] for entry in entries) else 0
+
+
+def entry_of(path: Path) -> dict[str, Any]:
+    """What was understood of a file; `error` says why it cannot be used, "" if it can."""
+    from ..cameras.sources import CameraRequest, cameras_for
+    from ..frames.frame import size_of
+    from ..pictures.picture import load_picture
+
+    try:
+        picture = load_picture(path)
+    except StitchError as error:
+        return {"file": str(path), "error": str(error).removeprefix(f"{path}: ")}
+    size = size_of(picture)
+    (camera,), problems = cameras_for(CameraRequest(), [path.name], [size], [picture.exif])
+    exif = picture.exif
+    return {
+        "file": str(path), "error": _not_flat(picture), "kind": _kind(path), "width": size[0], "height": size[1],
+        "bits": picture.bits, "channels": picture.light.shape[2], "alpha": picture.alpha is not None,
+        "colours": _colours(picture), "make": exif.make, "model": exif.model, "lens": exif.lens,
+        "taken": exif.text(36867) or exif.text(306), "focal_px": None if camera.assumed else round(camera.focal, 2),
+        "focal_source": camera.source, "focal_mm": exif.focal_mm, "focal35_mm": exif.focal35_mm,
+        "orientation": exif.orientation, "problems": [*picture.warnings, *problems],
+    }  # fmt: skip
+
+
+def _not_flat(picture: Picture) -> str:
+    """Why a picture is no flat photograph, "" if it is one."""
+    from ..frames.flatness import check_flat
+
+    try:
+        check_flat(picture)
+    except UnreadableImage as why:
+        return str(why).removeprefix(f"{picture.name}: ")
+    return ""
+
+
+def _kind(path: Path) -> str:
+    """The kind of file by its content; its ending where that is none of the plain kinds."""
+    from ..pictures.containers import read_structure
+    from ..pictures.decoding import read_file
+
+    structure = read_structure(read_file(path))
+    return structure.kind.upper() if structure is not None else path.suffix.lstrip(".").upper()
+
+
+def _colours(picture: Picture) -> str:
+    if picture.bits == 32:
+        return "scene-linear"
+    return "its own profile" if picture.icc is not None else "sRGB"
+
+
+def line_of(entry: dict[str, Any]) -> str:
+    """The same in a line."""
+    if "kind" not in entry:
+        return f"{entry['file']}: cannot be used: {entry['error']}"
+    depth = "float" if entry["bits"] == 32 else f"{entry['bits']} bit"
+    channels = ("gray" if entry["channels"] == 1 else "colour") + (" and alpha" if entry["alpha"] else "")
+    make, model = entry["make"], entry["model"]
+    camera = model if make and model.startswith(make) else " ".join(filter(None, (make, model))) or "camera unknown"
+    lens = f", {entry['lens']}" if entry["lens"] else ""
+    focal = f"f {entry['focal_px']:.0f} px ({entry['focal_source']})" if entry["focal_px"] else "f unknown"
+    turned = "upright" if entry["orientation"] == 1 else f"turned upright (orientation {entry['orientation']})"
+    parts = [f"{entry['width']}×{entry['height']} {entry['kind']}, {depth}, {channels}, {entry['colours']}",
+             camera + lens, focal, turned]  # fmt: skip
+    parts += [f"problem: {problem}" for problem in entry["problems"]]
+    parts += [f"cannot be used: {entry['error']}"] if entry["error"] else []
+    return f"{entry['file']}: {'; '.join(parts)}"

@@ -1,0 +1,133 @@
+"""What is burnt into pictures, a date or a logo: the same pixels at the same place, while the scene behind them moves.
+
+Such a thing has outlines that all pictures share to the pixel. Outlines of the scene do not, unless nothing moves: then
+nothing is taken for an overlay. Even skies, dark corners and clipped light have no outlines, however much they agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pictures.picture import Picture
+from .frame import size_of
+from .options import OVERLAYS
+
+
+def overlays_in(pictures: Sequence[Picture]) -> list[NDArray[np.bool_] | None]:
+    """Where something is burnt in, in pictures of one size all at the same place.
+
+    Parameters
+    ----------
+    pictures : sequence of Picture
+        Those of equal size are compared with each other.
+
+    Returns
+    -------
+    list of (H, W) bool arrays or None
+        Of each picture; None where nothing is.
+    """
+    found: list[NDArray[np.bool_] | None] = [None] * len(pictures)
+    sizes = [size_of(picture) for picture in pictures]
+    for size in dict.fromkeys(sizes):
+        numbers = [number for number, one in enumerate(sizes) if one == size]
+        if len(numbers) > 1:
+            mask = _burnt_into([pictures[number] for number in numbers])
+            for number in numbers:
+                found[number] = mask
+    return found
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """What pictures (H, W) have in common: shared outlines; those of any; of how pixels differ from what is around
+    them the mean over all products of two pictures, and over all squares."""
+
+    shared: NDArray[np.bool_]
+    any: NDArray[np.bool_]
+    products: NDArray[np.float32]
+    squares: NDArray[np.float32]
+
+
+def _burnt_into(pictures: Sequence[Picture]) -> NDArray[np.bool_] | None:
+    width, height = size_of(pictures[0])
+    if min(width, height) < OVERLAYS.least_side:
+        return None
+    share = min(1.0, OVERLAYS.side / max(width, height))
+    shape = max(1, round(height * share)), max(1, round(width * share))
+    reach = max(3, round(OVERLAYS.reach * max(shape)))
+    compared = _compared(pictures, shape, reach)
+    count = compared.shared.sum()
+    if count < OVERLAYS.least_outline or count > OVERLAYS.most_agree * compared.any.sum():
+        return None
+    joined = cv2.morphologyEx(compared.shared.astype(np.uint8), cv2.MORPH_CLOSE, _disc(reach))
+    contours = cv2.findContours(joined, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
+    dense = OVERLAYS.dense_of_two if len(pictures) == 2 else OVERLAYS.dense
+    outlines = [_burnt_in_outline(contour, compared, reach, dense) for contour in contours]
+    mask = np.zeros(shape, np.uint8)
+    if max(outlines) >= OVERLAYS.least_outline:  # where one is, smaller ones are of its kind
+        for contour, outline in zip(contours, outlines, strict=True):
+            if outline >= OVERLAYS.least_further:
+                cv2.drawContours(mask, [contour], 0, 1, cv2.FILLED)
+    if not mask.any() or mask.mean() > OVERLAYS.most_share:
+        return None
+    grown = cv2.dilate(mask, _disc(max(2, round(OVERLAYS.margin * max(shape)))))
+    full: NDArray[np.uint8] = cv2.resize(grown, (width, height), interpolation=cv2.INTER_NEAREST)
+    return full > 0
+
+
+def _compared(pictures: Sequence[Picture], shape: tuple[int, int], reach: int) -> _Compared:
+    """Pictures of one size compared pixel by pixel, at (H, W) px."""
+    often, some = np.zeros(shape, np.int32), np.zeros(shape, bool)
+    sums, squared, total = (np.zeros((*shape, 3), np.float32) for _ in range(3))
+    squares = np.zeros(shape, np.float32)
+    beside = np.ones((3, 3), np.uint8)
+    for picture in pictures:
+        view = cv2.resize(picture.view, shape[::-1], interpolation=cv2.INTER_AREA).reshape(*shape, -1)
+        view = np.repeat(view, 3, axis=2) if view.shape[2] == 1 else view
+        steep = np.sqrt(sum(np.square(cv2.Sobel(view, cv2.CV_32F, *way)).sum(axis=2) for way in ((1, 0), (0, 1))))
+        strong = steep > OVERLAYS.steep
+        if picture.alpha is not None:
+            strong &= cv2.resize(picture.alpha, shape[::-1], interpolation=cv2.INTER_AREA) > 0.99
+        often += cv2.dilate(strong.astype(np.uint8), beside)
+        some |= strong
+        levels = view.astype(np.float32)
+        sums += levels
+        squared += np.square(levels)
+        levels -= cv2.blur(levels, (2 * reach + 1,) * 2)
+        total += levels
+        squares += np.square(levels).sum(axis=2)
+    count, rim = len(pictures), OVERLAYS.rim
+    differ = (squared / count - np.square(sums / count)).max(axis=2)
+    shared = (often >= max(2, OVERLAYS.outlined * count)) & (differ <= OVERLAYS.same_level**2)
+    shared[:rim] = shared[-rim:] = shared[:, :rim] = shared[:, -rim:] = False
+    products = (np.square(total).sum(axis=2) - squares) / (count * (count - 1))
+    return _Compared(shared, some, products, squares / count)
+
+
+def _burnt_in_outline(contour: NDArray[np.int32], compared: _Compared, reach: int, dense: float) -> int:
+    """px beside outlines that are the same in all pictures in a contour, 0 unless it looks burnt in: densely filled
+    with them, alike in all pictures, and unlike what is around it."""
+    left, top, width, height = cv2.boundingRect(contour)
+    if min(width, height) < OVERLAYS.least_width or width * height > OVERLAYS.most_share * compared.any.size:
+        return 0
+    around = np.s_[max(0, top - 4 * reach) : top + height + 4 * reach,
+                   max(0, left - 4 * reach) : left + width + 4 * reach]  # fmt: skip
+    shared, strong = compared.shared[around], compared.any[around]
+    offset = -around[1].start, -around[0].start
+    inside = cv2.drawContours(np.zeros(shared.shape, np.uint8), [contour], 0, 1, cv2.FILLED, offset=offset)
+    near, beside = inside > 0, cv2.dilate(inside, _disc(2 * reach)) == 0
+    own = int((near & shared).sum())
+    alike = compared.products[around][near].sum() / max(1e-6, float(compared.squares[around][near].sum()))
+    moving = float((beside & shared).sum()) / max(1, int((beside & strong).sum()))
+    burnt_in = own >= dense * near.sum() and alike >= OVERLAYS.least_alike and moving <= OVERLAYS.most_agree
+    return own if burnt_in else 0
+
+
+def _disc(radius: int) -> NDArray[np.uint8]:
+    kernel: NDArray[np.uint8] = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
+    return kernel

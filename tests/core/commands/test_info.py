@@ -1,0 +1,75 @@
+"""`edf info` says what was understood of each file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.commands.cli import main
+from PIL import Image, TiffImagePlugin
+
+NOISE = cv2.GaussianBlur(np.random.default_rng(1).integers(0, 256, (90, 120, 4), np.uint8), (0, 0), 2)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Files of some kinds, one of them damaged, and one that is no flat photograph."""
+    exif = Image.Exif()
+    exif[271], exif[272], exif[274] = "Canon", "Canon EOS 6D", 6
+    lens = {42036: "EF24-105mm", 41989: 50, 37386: TiffImagePlugin.IFDRational(50)}
+    exif.get_ifd(0x8769).update(lens | {36867: "2020:01:02 03:04:05"})
+    Image.fromarray(NOISE[..., :3]).save(tmp_path / "a.jpg", exif=exif, quality=95)
+    cv2.imwrite(str(tmp_path / "b.png"), NOISE.astype(np.uint16) * 257)
+    cv2.imwrite(str(tmp_path / "c.tif"), NOISE[..., 0])
+    (tmp_path / "d.jpg").write_bytes((tmp_path / "a.jpg").read_bytes()[:-300])
+    transparent = NOISE.copy()
+    transparent[..., 3] = 0
+    cv2.imwrite(str(tmp_path / "e.png"), transparent)
+    return tmp_path
+
+
+def test_a_line_for_each_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(folder)]) == 4
+    out, err = capsys.readouterr()
+    lines = out.splitlines()
+    assert err == "" and [Path(line.partition(": ")[0]).name for line in lines] == [
+        "a.jpg", "b.png", "c.tif", "d.jpg", "e.png",
+    ]  # fmt: skip
+    focal = 50 * float(np.hypot(90, 120)) / 43.27
+    assert "90×120 JPEG, 8 bit, colour, sRGB; Canon EOS 6D, EF24-105mm; " in lines[0]
+    assert f"f {focal:.0f} px (EXIF 35 mm equivalent)" in lines[0] and "orientation 6" in lines[0]
+    assert "120×90 PNG, 16 bit, colour and alpha, sRGB; camera unknown; f unknown; upright" in lines[1]
+    assert "120×90 TIFF, 8 bit, gray" in lines[2]
+    assert "d.jpg: cannot be used: the JPEG file is damaged" in lines[3]
+    assert lines[4].endswith("cannot be used: it is entirely transparent: export it without transparency, or with the "
+                             "right one")  # fmt: skip
+
+
+def test_a_document_holds_the_same(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(folder / "a.jpg"), str(folder / "d.jpg"), "--json"]) == 4
+    found = json.loads(capsys.readouterr().out)
+    first, damaged = found["pictures"]
+    assert found["schema"] == 1
+    assert first | {"file": "", "focal_px": 0} == {
+        "file": "", "error": "", "kind": "JPEG", "width": 90, "height": 120, "bits": 8, "channels": 3, "alpha": False,
+        "colours": "sRGB", "make": "Canon", "model": "Canon EOS 6D", "lens": "EF24-105mm",
+        "taken": "2020:01:02 03:04:05", "focal_px": 0, "focal_source": "EXIF 35 mm equivalent", "focal_mm": 50.0,
+        "focal35_mm": 50.0, "orientation": 6, "problems": [],
+    }  # fmt: skip
+    assert set(damaged) == {"file", "error"} and "damaged" in damaged["error"]
+
+
+def test_good_files_give_0_and_warnings_are_problems(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pages = [Image.fromarray(NOISE[..., 0]), Image.fromarray(NOISE[..., 1])]
+    pages[0].save(tmp_path / "pages.tif", save_all=True, append_images=pages[1:])
+    assert main(["info", str(tmp_path / "*.tif")]) == 0
+    assert "problem: the TIFF file has 2 pages" in capsys.readouterr().out
+
+
+def test_what_stands_for_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(tmp_path)]) == 2
+    assert main(["info", str(tmp_path / "none.jpg")]) == 4
+    assert "no such file" in capsys.readouterr().err

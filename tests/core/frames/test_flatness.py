@@ -1,0 +1,109 @@
+"""Spheres, fisheye circles and pictures of nothing are told from flat photographs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.frames.flatness import check_flat, kind_of
+from edf_stitch.core.pictures.picture import load_picture, picture_from_array
+from edf_stitch.core.system.errors import UnreadableImage
+
+
+def texture(height: int, width: int, seed: int = 1) -> np.ndarray:
+    """A field of blobs of some sizes, levels 60 to 255."""
+    noise = np.random.default_rng(seed).random((height, width, 3)).astype(np.float32)
+    levels = sum(cv2.GaussianBlur(noise, (0, 0), sigma) * sigma for sigma in (1.5, 5, 15))
+    return (60 + 195 * (levels - levels.min()) / np.ptp(levels)).astype(np.uint8)
+
+
+def sphere(height: int, seed: int = 1) -> np.ndarray:
+    """A texture in space as all directions see it."""
+    latitude, longitude = np.mgrid[0.5:height, 0.5 : 2 * height] * np.pi / height
+    rays = [np.sin(latitude) * np.cos(longitude), np.sin(latitude) * np.sin(longitude), np.cos(latitude)]
+    rng = np.random.default_rng(seed)
+    levels = np.zeros((height, 2 * height, 3))
+    for _ in range(40):
+        phase = sum(weight * axis for weight, axis in zip(rng.normal(0, 9, 3), rays, strict=True))
+        levels += np.sin(phase + rng.uniform(0, 6.3))[..., None] * rng.random(3)
+    return (255 * (levels - levels.min()) / np.ptp(levels)).astype(np.uint8)
+
+
+def circle(
+    height: int, width: int, radius: float, centre: tuple[float, float] = (0.5, 0.5), soft: float = 0.0
+) -> np.ndarray:
+    row, column = np.mgrid[:height, :width]
+    off = np.hypot(column - centre[0] * width, row - centre[1] * height)
+    disc = (off < radius * min(height, width)).astype(np.float32)
+    if soft:
+        disc = cv2.GaussianBlur(disc, (0, 0), soft)
+    return (texture(height, width) * disc[..., None]).astype(np.uint8)
+
+
+def kind(levels: np.ndarray) -> str:
+    return kind_of(picture_from_array(levels))
+
+
+@pytest.mark.parametrize("height", [100, 300, 700])
+def test_a_sphere_is_known_by_its_ends_and_poles(height: int) -> None:
+    levels = sphere(height)
+    assert kind(levels) == "sphere"
+    assert kind(levels.astype(np.uint16) * 257) == "sphere"
+    assert kind(levels[: height // 2]) == "flat", "of another shape"
+    compressed = cv2.imdecode(cv2.imencode(".jpg", levels, [cv2.IMWRITE_JPEG_QUALITY, 70])[1], cv2.IMREAD_COLOR)
+    assert kind(compressed) == "sphere"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_wide_photograph_is_none(seed: int) -> None:
+    assert kind(texture(200, 400, seed)) == "flat"
+    assert kind(np.tile(texture(200, 200, seed), (1, 2, 1))) == "flat", "a pattern, but no poles"
+    assert kind(np.random.default_rng(seed).integers(0, 9, (200, 400, 3), np.uint8)) == "flat", "night"
+    fog = 128 + np.random.default_rng(seed).integers(0, 3, (200, 400, 3))
+    assert kind(fog.astype(np.uint8)) == "flat"
+
+
+@pytest.mark.parametrize("xmp", [
+    b'<rdf:Description GPano:ProjectionType="equirectangular"/>',
+    b"<GPano:ProjectionType>cylindrical</GPano:ProjectionType>",
+])  # fmt: skip
+def test_a_file_that_calls_itself_a_map_of_directions_is_believed(tmp_path: Path, xmp: bytes) -> None:
+    data = cv2.imencode(".jpg", texture(120, 160))[1].tobytes()
+    segment = b"http://ns.adobe.com/xap/1.0/\0" + xmp
+    data = data[:2] + b"\xff\xe1" + (len(segment) + 2).to_bytes(2, "big") + segment + data[2:]
+    (tmp_path / "picture.jpg").write_bytes(data)
+    with pytest.raises(UnreadableImage, match="a whole turn.*cut flat views"):
+        check_flat(load_picture(tmp_path / "picture.jpg"))
+
+
+@pytest.mark.parametrize("levels", [
+    circle(300, 300, 0.48), circle(300, 450, 0.45), circle(450, 300, 0.45), circle(600, 800, 0.6),
+    circle(900, 900, 0.42, (0.47, 0.53)), circle(300, 300, 0.45, soft=1.5),
+    np.hstack([circle(300, 300, 0.45), circle(300, 300, 0.46)]),
+], ids=["square", "wide", "high", "cut", "aside", "shrunk", "two"])  # fmt: skip
+@pytest.mark.parametrize("quality", [None, 60])
+def test_the_circle_of_a_fisheye_is_known(levels: np.ndarray, quality: int | None) -> None:
+    if quality is not None:
+        encoded = cv2.imencode(".jpg", levels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+        levels = cv2.imdecode(encoded, cv2.IMREAD_COLOR)
+    assert kind(levels) == "circle"
+    with pytest.raises(UnreadableImage, match="circle of a fisheye"):
+        check_flat(picture_from_array(levels))
+
+
+def test_dark_corners_and_lamps_are_no_circles() -> None:
+    row, column = np.mgrid[:300, :450]
+    off = np.hypot(column - 225, row - 150) / 270
+    vignette = (texture(300, 450) * np.clip(1.3 - 1.3 * off**2, 0, 1)[..., None]).astype(np.uint8)
+    assert kind(vignette) == "flat"
+    assert kind(circle(300, 450, 0.1)) == "flat", "a lamp at night"
+    assert kind(np.pad(texture(200, 300), ((50, 50), (75, 75), (0, 0)))) == "flat", "a black frame"
+    assert kind(np.zeros((200, 300, 3), np.uint8)) == "flat"
+
+
+def test_a_picture_of_nothing_is_refused() -> None:
+    nothing = np.dstack([texture(80, 90), np.zeros((80, 90, 1), np.uint8)])
+    with pytest.raises(UnreadableImage, match="entirely transparent"):
+        check_flat(picture_from_array(nothing))
