@@ -20,7 +20,7 @@ Kind = Literal["flat", "sphere", "circle", "transparent"]
 _ADVICE = {
     "sphere": "it shows a whole turn (an equirectangular or cylindrical panorama), no flat photograph: cut flat views "
     "out of it with a panorama program, or give the photographs that it was made from",
-    "circle": "it is the circle of a fisheye lens on black: give the lens (--cameras), or turn it into a flat view with "
+    "circle": "it is the circle of a fisheye lens on black: give the lens (--cameras), or turn it into a flat one with "
     "a lens correction program first",
     "transparent": "it is entirely transparent: export it without transparency, or with the right one",
 }
