@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -63,12 +64,11 @@ def decoded(kind: str, data: bytes, asked: dict[str, Any]) -> tuple[dict[str, An
     try:
         with process:
             assert process.stdin is not None and process.stdout is not None
-            try:
+            with suppress(OSError):  # it has ended already; the status says how
                 process.stdin.write(json.dumps(asked).encode() + b"\n")
                 process.stdin.write(data)
+            with suppress(OSError):  # what it has not read goes with it
                 process.stdin.close()
-            except OSError:  # it has ended already; the status says how
-                pass
             facts = _facts(process.stdout.readline())
             samples = _rest_of(process.stdout, facts.get("bytes", 0))
     except BaseException:
