@@ -87,7 +87,7 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
     check_count(len(sources), options)
     given = _named_apart(_all_read(sources, options.camera.cameras is not None), sources)
     views, members, brackets = _views_of(given, options)
-    if brackets:
+    if brackets or len(views) > MOST_PICTURES:
         _check_views(len(views), options)
     pictures = in_same_colour_space(views)
     copies = dict(_copies(pictures))

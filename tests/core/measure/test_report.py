@@ -155,7 +155,7 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
         "field": "slack", "fade": "plane", "dense": True, "projection": "reference", "level": "auto", "scale": 1.0,
         "crop": "full", "blend": "multiband", "seam": "graphcut", "exposure": "reference",
         "holes": "transparent", "seed": 0, "slide": 0, "centre": None, "fov": None,
-        "scale_metres": None, "preview": False}
+        "scale_metres": None, "preview": False, "brackets": "auto"}
     assert report["composition"]["exposure_blocks"] > 100
     assert report["composition"]["exposure_gain"] == pytest.approx([1, 1, 1], abs=0.01)
     # nothing hides anything here: what dense refinement takes for an edge is next to nothing

@@ -8,7 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.pictures.containers import foreign_kind, read_structure
+from edf_stitch.core.pictures.camera_raw import is_raw
+from edf_stitch.core.pictures.containers import read_structure
 from edf_stitch.core.pictures.encoding import encode_picture, output_bits
 from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.pictures.picture import Picture, load_picture
@@ -171,7 +172,7 @@ def test_other_kinds_of_pixels_are_named(tmp_path: Path) -> None:
 def test_a_header_that_is_not_whole(tmp_path: Path, header: bytes) -> None:
     with pytest.raises(UnreadableImage, match="HDR file is damaged"):
         loaded(tmp_path, header)
-    assert foreign_kind(header, ".hdr") == ""
+    assert not is_raw(header, ".hdr")
 
 
 def test_a_file_that_ends_anywhere_is_refused(tmp_path: Path) -> None:
