@@ -46,9 +46,9 @@ def frame_of(canvas: Canvas, K: Array) -> Frame:
         kind, focal, distance, rotation = projection.kind, projection.focal, projection.distance, projection.rotation
         centre = np.array(projection.centre) + np.array(canvas.offset, float)
     if kind in ("cylindrical", "equirectangular"):
-        away = ((size[0] - 1) / 2 - centre[0]) / focal
-        rotation = rotation @ rotation_from_vector(np.array([0.0, away, 0.0]))
-        centre = np.array([(size[0] - 1) / 2, centre[1]])
+        middle = (size[0] + size[0] % 2 - 1) / 2  # Hugin makes an odd width even
+        rotation = rotation @ rotation_from_vector(np.array([0.0, (middle - centre[0]) / focal, 0.0]))
+        centre = np.array([middle, centre[1]])
     around = [_evenly(middle, side) for middle, side in zip(centre, size, strict=True)]
     (left, width), (top, height) = around
     extra = f' P"{50 * (3 - 1.5 / (distance + 0.5)):.9f} 0 0"' if kind == "pannini" else ""
@@ -75,4 +75,4 @@ def _width_angle(kind: str, width: float, distance: float) -> float:
         return float((distance + 1) * np.sin(half) / (distance + np.cos(half)) - width / 2)
 
     most = float(np.pi - np.arccos(distance)) if distance < 1 else np.pi
-    return 2 * float(brentq(off, 0.0, most * (1 - 1e-9), xtol=1e-15))
+    return 2 * float(brentq(off, 0.0, most * (1 - 1e-6), xtol=1e-15))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.lens_models import Lens, LensProjection
 from edf_stitch.core.compose.tone.exposure import Exposure
 from edf_stitch.core.compose.tone.graph_exposure import graph_exposures, lenses_of
 from edf_stitch.core.compose.tone.picture_blocks import blocks_meet, overlaps_of, picture_blocks
@@ -152,7 +154,8 @@ def test_lenses_are_told_apart_by_their_intrinsics() -> None:
     first = Camera(np.diag([50.0, 50.0, 1.0]), (60, 40), "a", 0.0)
     wider = Camera(np.diag([40.0, 40.0, 1.0]), (60, 40), "b", 0.0)
     bent = Camera(first.K.copy(), (60, 40), "c", 0.0, np.array([0.1, 0, 0, 0, 0]))
-    assert lenses_of([first, wider, Camera(first.K.copy(), (60, 40), "d", 0.1), bent]) == [0, 1, 0, 2]
+    fisheye = replace(first, lens=Lens(LensProjection.EQUIDISTANT))
+    assert lenses_of([first, wider, Camera(first.K.copy(), (60, 40), "d", 0.1), bent, fisheye]) == [0, 1, 0, 2, 3]
 
 
 def test_a_neighbour_tells_what_was_clipped() -> None:

@@ -45,13 +45,14 @@ def test_what_hugin_lacks_is_fitted_and_said() -> None:
     lens = hugin_lens(camera, "a")
     assert 0.1 < lens.off < 6
     found = FoundCamera("a.png", camera, np.eye(3), np.zeros(3))
-    canvas = Canvas(100, 50, (0, 0), Projection("cylindrical", 300.0, (50, 25), np.eye(3), K))
+    canvas = Canvas(100, 50, (0, 0), projection=Projection("cylindrical", 300.0, (50, 25), np.eye(3), K))
     warnings = hugin_project([found], frame_of(canvas, K), [])[1]
     assert len(warnings) == 1 and "a.png: Hugin's lens" in warnings[0]
 
 
 def test_names_and_pictures_that_its_lines_do_not_hold_are_refused() -> None:
-    frame = frame_of(Canvas(100, 50, (0, 0), Projection("cylindrical", 300.0, (50, 25), np.eye(3), K)), K)
+    canvas = Canvas(100, 50, (0, 0), projection=Projection("cylindrical", 300.0, (50, 25), np.eye(3), K))
+    frame = frame_of(canvas, K)
     with pytest.raises(UnwritableOutput, match="hold no such name"):
         hugin_project([FoundCamera('a"b.png', CAMERA, np.eye(3), np.zeros(3))], frame, [])
     wide = replace(CAMERA, K=np.array([[390.0, 0, 405.0], [0, 390.0, 290.5], [0, 0, 1]]), lens=Lens("orthographic"))
@@ -68,7 +69,7 @@ def off_hugin(
     points = rng.uniform(0, 1, (300, 2)) * (canvas.width - 1, canvas.height - 1)
     flat = points - np.array(canvas.offset, float)
     rays = homogeneous(flat) @ np.linalg.inv(own).T if canvas.projection is None else canvas.projection.rays(flat)
-    worst = 0.0
+    off = []
     for number, (turn, camera) in enumerate(zip(R, cameras, strict=True)):
         q = rays @ (camera.K @ turn).T
         ahead = np.flatnonzero(q[:, 2] > 0.1)
@@ -80,8 +81,8 @@ def off_hugin(
         ).stdout
         theirs = np.array([line.split() for line in out.splitlines()], float)
         assert len(theirs) == inside.sum() > 10
-        worst = max(worst, float(np.abs(theirs - ours[inside]).max()))
-    return worst
+        off.append(np.abs(theirs - ours[inside]).max())
+    return float(np.max(off))
 
 
 @with_hugin
@@ -106,7 +107,7 @@ def test_every_projection_is_hugins(
     """The frame is cropped and looks aside; its middle may lie between pixels."""
     level = rotation_from_angles(20.0, -8.0, 5.0)
     projection = None if kind is None else Projection(kind, 400.0, (0.0, half), level, K, distance)
-    canvas = Canvas(901, 500, (320, 170) if kind else (40, -20), projection)
+    canvas = Canvas(901, 500, (320, 170) if kind else (40, -20), projection=projection)
     cameras = [CAMERA, replace(CAMERA, lens=Lens(LensProjection.EQUIDISTANT))]
     turns = [np.eye(3), rotation_from_angles(15.0, 3.0, -20.0).T]
     found = [FoundCamera(name, camera, R, np.zeros(3)) for name, camera, R in zip("ab", cameras, turns, strict=True)]
