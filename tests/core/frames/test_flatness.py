@@ -60,6 +60,9 @@ def test_a_sphere_is_known_by_its_ends_and_poles(height: int) -> None:
 def test_a_wide_photograph_is_none(seed: int) -> None:
     assert kind(texture(200, 400, seed)) == "flat"
     assert kind(np.tile(texture(200, 200, seed), (1, 2, 1))) == "flat", "a pattern, but no poles"
+    closed, share = texture(200, 400, seed).astype(float), np.linspace(0, 1, 60)[None, :, None]
+    closed[:, -60:] = (1 - share) * closed[:, -60:] + share * closed[:, 59::-1]
+    assert kind(closed.astype(np.uint8)) == "flat", "its ends meet, but it has no poles"
     assert kind(np.random.default_rng(seed).integers(0, 9, (200, 400, 3), np.uint8)) == "flat", "night"
     fog = 128 + np.random.default_rng(seed).integers(0, 3, (200, 400, 3))
     assert kind(fog.astype(np.uint8)) == "flat"
