@@ -165,8 +165,9 @@ def _picture_or_trouble(source: Source) -> Picture | UnreadableImage:
 def _picture(source: Source) -> Picture:
     """A picture, read where it is not one yet; a flat one."""
     if isinstance(source, Picture):
-        return source
-    picture = picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
+        picture = source
+    else:
+        picture = picture_from_array(source) if isinstance(source, np.ndarray) else load_picture(source)
     check_flat(picture)
     return picture
 
