@@ -269,6 +269,6 @@ def test_nested_beyond_what_python_bears(tmp_path: Path) -> None:
 
 
 def test_a_mirrored_picture_is_refused_in_words(small_pair: Pair) -> None:
-    with pytest.raises(StitchError, match="behind the second camera: check whether one is mirrored"):
+    with pytest.raises(StitchError, match="one of the pictures is mirrored: .* flip one of them"):
         tried_first, second, options = changed(small_pair, {"flipped": True, "principal": (0.0, 322.0)})
         stitch((tried_first, second), options)
