@@ -6,6 +6,11 @@ the table keeps the sensors' own diagonals.
 
 from __future__ import annotations
 
+import math
+
+FULL_FRAME_DIAGONAL = math.hypot(36.0, 24.0)
+"""mm of the 36 × 24 mm frame that "35 mm equivalent" and crop factors refer to."""
+
 # Diagonal in mm: parts of "make model" as EXIF has them, lower case. The longest part that fits decides.
 _MODELS: dict[float, str] = {
     4.5: "iphone 3gs",

@@ -1,4 +1,4 @@
-"""Intrinsics as given, from a camera file, from EXIF, or assumed; and how precise they are."""
+"""Intrinsics as given or from a camera file, else by EXIF; and how precise they are."""
 
 from __future__ import annotations
 
@@ -12,18 +12,15 @@ from numpy.typing import NDArray
 
 from ..system.errors import BadRequest
 from .camera import Camera, Knowledge
+from .from_exif import camera_from_exif, camera_of_focal, focal_from_35mm
 from .lens_entries import lens_of
 from .options import INTRINSICS
 from .plausible import check_plausible, fold_warning
 from .programs.lensfun import LensProfile
 from .programs.recognised import read_any
-from .sensors import sensor_diagonal, sensor_diagonals
 
 if TYPE_CHECKING:
     from ..pictures.metadata import Exif
-
-# Diagonal of the 36 × 24 mm frame that "35 mm equivalent" refers to.
-FULL_FRAME_DIAGONAL = float(np.hypot(36.0, 24.0))
 
 
 @dataclass(frozen=True)
@@ -151,7 +148,7 @@ def _with_lens_of(known: Camera, unknown: Camera, name: str) -> Camera:
     guess = known.focal * max(unknown.size) / max(known.size)
     # the same knowledge as the other picture's, so that the focal prior does not count it twice
     source = f"{name} ({known.source})"
-    found = _camera(guess, unknown.size, source, INTRINSICS.cropped_sigma, known.knowledge)
+    found = camera_of_focal(guess, unknown.size, source, INTRINSICS.cropped_sigma, known.knowledge)
     return replace(found, lens_of=name)
 
 
@@ -162,89 +159,13 @@ def _one_camera(
         return values[min(index, len(values) - 1)]
 
     if request.focal_px:
-        return _camera(pick(request.focal_px), size, "given in px", 0.0)
+        return camera_of_focal(pick(request.focal_px), size, "given in px", 0.0)
     if request.focal_mm:
         # the sensor's width lies along the picture's longer side, however the camera was turned
-        return _camera(pick(request.focal_mm) / pick(request.sensor_mm) * max(size), size, "given in mm", 0.0)
+        return camera_of_focal(pick(request.focal_mm) / pick(request.sensor_mm) * max(size), size, "given in mm", 0.0)
     if request.focal35:
-        return _camera(_from_35mm(pick(request.focal35), size), size, "given as 35 mm equivalent", 0.0)
-    return _from_exif(exif, size, name, warnings)
-
-
-def _from_exif(exif: Exif, size: tuple[int, int], name: str, warnings: list[str]) -> Camera:
-    """EXIF's 35 mm equivalent, else its focal length with the sensor's size, else 0.9·max(W, H)."""
-    found: list[tuple[float, str]] = []
-    if exif.focal35_mm:
-        found.append((_from_35mm(exif.focal35_mm, size), "EXIF 35 mm equivalent"))
-    diagonal = sensor_diagonal(exif.make, exif.model)
-    # a digital zoom enlarges the middle of the sensor; makers count it in the 35 mm equivalent
-    zoom, zoomed_by = exif.digital_zoom or 1.0, f", digital zoom {exif.digital_zoom:g}" if exif.digital_zoom else ""
-    if exif.focal_mm and diagonal:
-        focal = exif.focal_mm * zoom / diagonal * float(np.hypot(*size))
-        found.append((focal, f"EXIF focal length and sensor table{zoomed_by}"))
-    by_table = len(found)
-    if exif.focal_mm and exif.focal_plane_x_per_mm and exif.width and exif.height:
-        shrink = max(size) / max(exif.width, exif.height)
-        focal = exif.focal_mm * zoom * exif.focal_plane_x_per_mm * shrink
-        found.append((focal, f"EXIF focal length and sensor resolution{zoomed_by}"))
-    least, most = INTRINSICS.least_focal * max(size), INTRINSICS.most_focal * max(size)
-    found = [(f, source) for f, source in found if least < f < most]
-    if not found:
-        return _assumed(size)
-    focal, source = found[0]
-    for other, other_source in found[1:]:
-        if abs(np.log(other / focal)) > INTRINSICS.contradiction:
-            warnings.append(
-                f"{name}'s EXIF contradicts itself: {focal:.0f} px by {source}, {other:.0f} px by "
-                f"{other_source}; the first is used"
-            )
-    sigma = INTRINSICS.exif_sigma
-    if not by_table and not _is_a_sensor(exif):
-        sigma = INTRINSICS.cropped_sigma  # the resolution is that of the picture before it was shrunk, mostly
-    if exif.width and exif.height:
-        aspect, original = max(size) / min(size), max(exif.width, exif.height) / min(exif.width, exif.height)
-        if abs(np.log(aspect / original)) > INTRINSICS.cropped_aspect:
-            sigma = INTRINSICS.cropped_sigma
-            warnings.append(
-                f"{name} was cropped since it was taken ({exif.width}×{exif.height} in EXIF, {size[0]}×{size[1]} "
-                "now): its EXIF focal "
-                "length is only a hint; give the focal length if you know it"
-            )
-    return _camera(focal, size, source, sigma, Knowledge.EXIF)
-
-
-def _is_a_sensor(exif: Exif) -> bool:
-    """Whether the focal plane's resolution and the picture's size make a sensor of a size that there is."""
-    if not (exif.focal_plane_x_per_mm and exif.width and exif.height):
-        return False
-    diagonal = float(np.hypot(exif.width, exif.height)) / exif.focal_plane_x_per_mm
-    return any(abs(np.log(diagonal / known)) < INTRINSICS.same_sensor for known in sensor_diagonals())
-
-
-def _assumed(size: tuple[int, int]) -> Camera:
-    """The camera of a picture of which nothing is known."""
-    sides, sigma = INTRINSICS.assumed_focal, INTRINSICS.assumed_sigma
-    source = f"assumed ({sides:g} × the longer side)"
-    return _camera(sides * max(size), size, source, sigma, Knowledge.ASSUMED)
-
-
-def without_exif(camera: Camera) -> Camera:
-    """A camera as if nothing were known of its focal length; its principal point and distortion stay."""
-    assumed = _assumed(camera.size)
-    K = assumed.K.copy()
-    K[:2, 2] = camera.K[:2, 2]
-    return replace(camera, K=K, source=assumed.source, log_sigma=assumed.log_sigma, knowledge=assumed.knowledge)
-
-
-def _from_35mm(focal35: float, size: tuple[int, int]) -> float:
-    return focal35 * float(np.hypot(*size)) / FULL_FRAME_DIAGONAL
-
-
-def _camera(
-    focal: float, size: tuple[int, int], source: str, log_sigma: float, knowledge: Knowledge = Knowledge.GIVEN
-) -> Camera:
-    K = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1.0]])
-    return Camera(K, size, source, log_sigma, principal_sigma=INTRINSICS.principal_sigma, knowledge=knowledge)
+        return camera_of_focal(focal_from_35mm(pick(request.focal35), size), size, "given as 35 mm equivalent", 0.0)
+    return camera_from_exif(exif, size, name, warnings)
 
 
 def _with_principal_point(camera: Camera, principal: tuple[float, ...]) -> Camera:

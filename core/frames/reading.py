@@ -243,8 +243,8 @@ def _picture(source: Source, exposure: RawExposure | None, lens_given: bool) -> 
     """A picture, read where it is not one yet; a flat one, or one whose lens is given. exposure: what camera RAW is
     developed with."""
     if isinstance(source, Picture):
-        return source
-    if isinstance(source, np.ndarray):
+        picture = source
+    elif isinstance(source, np.ndarray):
         picture = picture_from_array(source)
     else:
         picture = load_picture(source, exposure=exposure)

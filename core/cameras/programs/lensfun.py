@@ -17,6 +17,7 @@ import numpy as np
 from ...system.errors import BadRequest
 from ..camera import Camera
 from ..lens_models import Lens, LensProjection
+from ..sensors import FULL_FRAME_DIAGONAL
 from .values import number, shortened
 
 if TYPE_CHECKING:
@@ -30,8 +31,6 @@ _TYPES = {
 }  # fmt: skip
 # Its models of distortion, and their coefficients.
 _MODELS = {"ptlens": ("a", "b", "c"), "poly3": ("k1",), "poly5": ("k1", "k2")}
-# Diagonal of the frame that crop factors refer to, mm.
-FULL_FRAME_DIAGONAL = math.hypot(36.0, 24.0)
 # A lens may be calibrated on a sensor so many times smaller than the picture's, which rounding of crop factors makes.
 SAME_SENSOR = 1.05
 

@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.frames.flatness import check_flat, kind_of
+from edf_stitch.core.frames.reading import read_frame
+from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.picture import load_picture, picture_from_array
 from edf_stitch.core.system.errors import UnreadableImage
 
@@ -60,6 +62,9 @@ def test_a_sphere_is_known_by_its_ends_and_poles(height: int) -> None:
 def test_a_wide_photograph_is_none(seed: int) -> None:
     assert kind(texture(200, 400, seed)) == "flat"
     assert kind(np.tile(texture(200, 200, seed), (1, 2, 1))) == "flat", "a pattern, but no poles"
+    closed, share = texture(200, 400, seed).astype(float), np.linspace(0, 1, 60)[None, :, None]
+    closed[:, -60:] = (1 - share) * closed[:, -60:] + share * closed[:, 59::-1]
+    assert kind(closed.astype(np.uint8)) == "flat", "its ends meet, but it has no poles"
     assert kind(np.random.default_rng(seed).integers(0, 9, (200, 400, 3), np.uint8)) == "flat", "night"
     fog = 128 + np.random.default_rng(seed).integers(0, 3, (200, 400, 3))
     assert kind(fog.astype(np.uint8)) == "flat"
@@ -101,6 +106,14 @@ def test_dark_corners_and_lamps_are_no_circles() -> None:
     assert kind(circle(300, 450, 0.1)) == "flat", "a lamp at night"
     assert kind(np.pad(texture(200, 300), ((50, 50), (75, 75), (0, 0)))) == "flat", "a black frame"
     assert kind(np.zeros((200, 300, 3), np.uint8)) == "flat"
+
+
+def test_whatever_is_to_be_stitched_is_looked_at() -> None:
+    """Files, arrays, and Pictures that were read already, as Blender's are."""
+    levels = circle(300, 450, 0.45)
+    for source in (levels, picture_from_array(levels)):
+        with pytest.raises(UnreadableImage, match="circle of a fisheye"):
+            read_frame([texture(300, 450), source], StitchOptions())
 
 
 def test_a_picture_of_nothing_is_refused() -> None:

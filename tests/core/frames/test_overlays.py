@@ -98,6 +98,36 @@ def test_what_agrees_without_being_burnt_in() -> None:
     assert found(framed) == [None, None], "a line along the borders"
 
 
+def posters(levels: np.ndarray, places: list[tuple[int, int]]) -> np.ndarray:
+    """Pictures of 50 × 36 px pinned up at places (left, top)."""
+    rng = np.random.default_rng(9)
+    pinned = levels.copy()
+    for left, top in places:
+        pinned[top : top + 36, left : left + 50] = cv2.resize(
+            rng.integers(0, 256, (9, 12, 3), np.uint8), (50, 36), interpolation=cv2.INTER_NEAREST
+        )
+    return pinned
+
+
+def test_a_camera_that_stood_still_has_none() -> None:
+    """Posters on a blank wall, and somebody who walks through: most outlines stay where they are."""
+    wall = posters(np.full((HEIGHT, WIDTH, 3), 200, np.uint8), [(20, 20), (200, 150), (400, 300), (20, 300)])
+    views = [wall.copy(), wall.copy()]
+    for view, left in zip(views, (120, 300), strict=True):
+        view[60:120, left : left + 40] = scene(1)[0][60:120, 60:100]
+    assert found(views) == [None, None]
+
+
+def test_a_part_of_the_scene_that_stays_is_none() -> None:
+    """What is far away may stay in its place while trees beside it move: around each part of it others stay, too."""
+    still = [(x, y) for x in (10, 100) for y in (10, 90)]
+    views = scene(2)
+    for view in views:
+        view[:140, :170] = 180  # haze between what is far
+    assert found([posters(view, still) for view in views]) == [None, None]
+    assert found([posters(view, still[:1]) for view in views])[0] is not None, "a single one is a logo"
+
+
 def test_pictures_of_other_sizes_are_not_compared() -> None:
     first, second, third = (dated(view, (20, 340)) for view in scene(3))
     masks = found([first, cv2.resize(second, (240, 180)), third])
