@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..cameras.camera import Camera, Knowledge
+from ..cameras.from_exif import without_exif
 from ..cameras.matches import Matches
 from ..cameras.projective import sampson_residuals
-from ..cameras.from_exif import without_exif
 from ..cameras.two_view import TwoView
 from ..system.errors import StitchError
 from .fundamental import explained_by, fundamental_candidates

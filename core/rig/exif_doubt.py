@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..cameras.camera import Camera, Knowledge
+from ..cameras.from_exif import without_exif
 from ..cameras.lens import undistort
 from ..cameras.matches import Matches
-from ..cameras.from_exif import without_exif
 from ..pictures.naming import in_words
 from ..pose.estimation import estimate
 from ..pose.exif_doubt import by_exif_or_without, exif_warning
