@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 from ..choices import EXR_COMPRESSIONS, EXR_DEPTHS
 from ..raster.arrays import strips
 from ..raster.lazy import AnyImage
+from ..raster.primaries import REC709
 from ..system.errors import BadRequest, UnreadableImage
 from ..system.streams import overheard
 from ..system.threads import in_order
 from .exr_colour import from_luminance_chroma, in_rec709, with_square_pixels
 from .metadata import SOFTWARE, Exif
 from .options import WRITING
-
-# x, y of red, green, blue and white of Rec. 709, as the attribute `chromaticities` holds them
-_REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 # The bit of a file's second byte of flags that says that parts are not flat (OpenEXR, File Layout).
 _DEEP = 0x08
@@ -217,7 +215,7 @@ def write_exr(
     }
     attributes = {name: text for name, text in attributes.items() if text}
     if len(names) == 3:
-        attributes["chromaticities"] = _REC_709
+        attributes["chromaticities"] = REC709
     if whole_sphere:
         attributes["envmap"] = OpenEXR.ENVMAP_LATLONG
     return exr_of_channels(channels, attributes, form.compression), beyond / max(1, pixels.shape[0] * pixels.shape[1])

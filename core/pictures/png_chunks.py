@@ -5,7 +5,10 @@ from __future__ import annotations
 import re
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+
+from ..raster.matrix_profile import display_profile, gamma_curve, srgb_curve
+from ..raster.primaries import REC709, columns_under_d50
 
 # names of chunks that `read_structure` keeps for this module
 KEPT = frozenset((b"gAMA", b"cHRM", b"sRGB", b"tRNS", b"tEXt", b"zTXt"))
@@ -62,44 +65,9 @@ def profile_of(chunks: Mapping[bytes, list[bytes]], gray: bool) -> bytes | None:
     places = [value / 1e5 for value in struct.unpack_from(">8I", body)] if len(body) >= 32 else []
     stated = places[2:] + places[:2]  # white comes first there
     usual_gamma = abs(gamma / _SRGB_GAMMA - 1) < _SAME
-    usual_primaries = all(abs(one - other) < 0.003 for one, other in zip(stated, _SRGB_PRIMARIES, strict=False))
+    usual_primaries = all(abs(one - other) < 0.003 for one, other in zip(stated, REC709, strict=False))
     if not 1_000 <= gamma <= 1_000_000 or (usual_gamma and usual_primaries):
         return None
-    from ..raster.primaries import columns_under_d50  # hardly any PNG comes here
-
-    curve = _SRGB if usual_gamma else struct.pack(">4sIHHi", b"para", 0, 0, 0, round(65536 * 1e5 / gamma))
-    return _icc([] if gray else columns_under_d50(_SRGB_PRIMARIES if usual_primaries else stated), curve)
-
-
-# xy of red, green, blue and white of sRGB; its curve as a parametric one (ICC.1:2010, 10.15)
-_SRGB_PRIMARIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-_SRGB_CURVE = (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045)
-_SRGB = struct.pack(">4sIHH5i", b"para", 0, 3, 0, *(round(65536 * value) for value in _SRGB_CURVE))
-# the white that ICC profiles connect by (ICC.1:2010, 7.2.16)
-_D50 = (0.9642, 1.0, 0.8249)
-
-
-def _icc(columns: Sequence[Sequence[float]], curve: bytes) -> bytes:
-    """A display profile of version 4: XYZ of red, green and blue under D50, none for gray; the curve of each."""
-
-    def xyz(values: Sequence[float]) -> bytes:
-        return struct.pack(">4sI3i", b"XYZ ", 0, *(round(65536 * value) for value in values))
-
-    def text(words: str) -> bytes:
-        head = struct.pack(">4sIIIHHII", b"mluc", 0, 1, 12, 0x656E, 0x5553, 2 * len(words), 28)
-        return head + words.encode("utf-16-be")
-
-    tags = {b"desc": text("PNG gamma"), b"cprt": text("none"), b"wtpt": xyz(_D50)}
-    tags |= {name: xyz(column) for name, column in zip((b"rXYZ", b"gXYZ", b"bXYZ"), columns, strict=False)}
-    tags |= dict.fromkeys((b"rTRC", b"gTRC", b"bTRC") if columns else (b"kTRC",), curve)
-    table, body, at = b"", b"", 128 + 4 + 12 * len(tags)
-    for name, value in tags.items():
-        value = value.ljust(-(-len(value) // 4) * 4, b"\0")
-        table += struct.pack(">4sII", name, at + len(body), len(value))
-        body += value
-    space = b"RGB " if columns else b"GRAY"
-    head = struct.pack(
-        ">I4sI4s4s4s12s4s4s24s3i", at + len(body), b"", 0x04200000, b"mntr", space, b"XYZ ", b"", b"acsp", b"", b"",
-        *(round(65536 * value) for value in _D50),
-    )  # fmt: skip
-    return head.ljust(128, b"\0") + struct.pack(">I", len(tags)) + table + body
+    curve = srgb_curve() if usual_gamma else gamma_curve(1e5 / gamma)
+    columns = [] if gray else columns_under_d50(REC709 if usual_primaries else stated)
+    return display_profile("PNG gamma", columns, curve)

@@ -18,14 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import strips
-from ..raster.colour import srgb_of_primaries
+from ..raster.primaries import REC709, to_rec709
 from ..system.errors import UnreadableImage
 from ..system.threads import in_order
 from .options import READING
 from .radiance_header import read_header
 
-# Rec. 709's x, y of red, green, blue and white, as the line PRIMARIES holds them
-_REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 # px of a scanline that may be packed channel by channel
 _PACKED = range(8, 32768)
 # What a mantissa of 8 bits is multiplied by, for each exponent; 0 stands for black.
@@ -54,15 +52,16 @@ def decode_radiance(data: bytes) -> tuple[NDArray[np.float32], list[str]]:
     stored = stored[:: -1 if header.flip_y else 1, :: -1 if header.flip_x else 1]
     light = np.empty((height, width, 3), np.float32)
     matrix = None
-    if header.primaries is not None and not np.allclose(header.primaries, _REC_709, atol=READING.same_primaries):
-        matrix = srgb_of_primaries(header.primaries)
-        if matrix is None:
+    if header.primaries is not None and not np.allclose(header.primaries, REC709, atol=READING.same_primaries):
+        try:
+            matrix = to_rec709(header.primaries)
+        except ValueError:
             warnings.append("its line PRIMARIES describes no colours; they are taken as those of sRGB")
     for rows in strips(light.shape):
         part = (stored[rows, :, :3] + np.float32(0.5)) * _SCALE[stored[rows, :, 3]][..., None]
         with np.errstate(over="ignore", invalid="ignore"):  # what floats cannot hold is told further on
             part /= np.array(header.scale, np.float32)
-            light[rows] = part if matrix is None else part @ matrix.T.astype(np.float32)
+            light[rows] = part if matrix is None else part @ matrix.T
     return light, [*header.warnings, *warnings]
 
 
@@ -140,7 +139,7 @@ def encode_radiance(
         stored = _mantissas(light if light.shape[2] == 3 else np.repeat(light, 3, axis=2))
         return _packed(stored) if width in _PACKED else stored.tobytes()
 
-    primaries = " ".join(f"{value:.4f}" for value in _REC_709)
+    primaries = " ".join(f"{value:.4f}" for value in REC709)
     header_lines = {**lines, "PRIMARIES": primaries, "FORMAT": "32-bit_rle_rgbe"}
     header = "".join(f"{name}={text}\n" for name, text in header_lines.items())
     yield f"#?RADIANCE\n{header}\n-Y {height} +X {width}\n".encode()

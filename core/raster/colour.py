@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -21,9 +20,6 @@ _SRGB_TO_XYZ_D50 = np.array([
     [0.2225045, 0.7168786, 0.0606169],
     [0.0139322, 0.0971045, 0.7141733],
 ])
-# Bradford's matrix from XYZ to cone responses, by which white points are adapted, and the XYZ of D50.
-_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
-_D50 = np.array([0.96422, 1.0, 0.82521])
 _LEVELS = 65536
 
 
@@ -173,23 +169,6 @@ def parse_icc(icc: bytes) -> IccProfile | None:
         return IccProfile(False, tuple(curve for curve in curves if curve is not None), to_srgb)
     except (struct.error, KeyError, ValueError):
         return None
-
-
-def srgb_of_primaries(primaries: Sequence[float]) -> NDArray[np.float64] | None:
-    """The matrix (3, 3) from linear colours of some primaries to linear sRGB, white to white; None where they span no
-    colours. primaries: x, y of red, green, blue and white."""
-    x, y = np.array(primaries, np.float64).reshape(4, 2).T
-    columns = np.stack([x, y, 1 - x - y])
-    if y[3] <= 0 or abs(np.linalg.det(columns[:, :3])) < 1e-6:
-        return None
-    white = columns[:, 3] / y[3]
-    cones = _BRADFORD @ np.stack([white, _D50], axis=1)
-    if cones.min() <= 0:
-        return None
-    to_d50 = np.linalg.inv(_BRADFORD) @ np.diag(cones[:, 1] / cones[:, 0]) @ _BRADFORD
-    to_xyz = columns[:, :3] * np.linalg.solve(columns[:, :3], white)
-    matrix: NDArray[np.float64] = np.linalg.inv(_SRGB_TO_XYZ_D50) @ to_d50 @ to_xyz
-    return matrix
 
 
 def _icc_tags(icc: bytes) -> dict[bytes, bytes]:

@@ -1,17 +1,15 @@
-"""An ICC profile of given primaries, for pictures that name theirs without having one."""
+"""ICC profiles, made for pictures that name primaries or a curve without having one."""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 
-import numpy as np
+from .primaries import D50, REC709, columns_under_d50
 
 Chromaticity = tuple[float, float]
 
-D65: Chromaticity = (0.3127, 0.3290)
-_D50 = (0.9642, 1.0, 0.8249)  # XYZ of the ICC's connection space
-# From XYZ to the cone responses that Bradford's adaptation scales (ICC.1:2010, annex E).
-_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+D65: Chromaticity = REC709[6:]
 # sRGB's curve (IEC 61966-2-1) as parameters g, a, b, c, d of a parametric curve of kind 3.
 _SRGB_CURVE = (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045)
 
@@ -32,26 +30,32 @@ def matrix_profile(name: str, primaries: tuple[Chromaticity, ...], white: Chroma
     -------
     bytes
     """
-    columns = np.array([_xyz(one) for one in primaries]).T
-    of_white = np.array(_xyz(white))
-    columns = columns * np.linalg.solve(columns, of_white)
-    scale = (_BRADFORD @ _D50) / (_BRADFORD @ of_white)
-    adapted = np.linalg.inv(_BRADFORD) @ np.diag(scale) @ _BRADFORD @ columns
-    curve = b"para" + struct.pack(">IHH", 0, 3, 0) + _fixed(*_SRGB_CURVE)
-    tags = {b"desc": _text(name), b"cprt": _text("No copyright"), b"wtpt": _xyz_tag(*_D50)}
-    tags |= {letter + b"XYZ": _xyz_tag(*column) for letter, column in zip((b"r", b"g", b"b"), adapted.T, strict=True)}
-    tags |= {letter + b"TRC": curve for letter in (b"r", b"g", b"b")}
+    named = [value for one in (*primaries, white) for value in one]
+    return display_profile(name, columns_under_d50(named), srgb_curve())
+
+
+def srgb_curve() -> bytes:
+    """The tag of sRGB's curve."""
+    return struct.pack(">4sIHH", b"para", 0, 3, 0) + _fixed(*_SRGB_CURVE)
+
+
+def gamma_curve(gamma: float) -> bytes:
+    """The tag of a curve that is a power."""
+    return struct.pack(">4sIHH", b"para", 0, 0, 0) + _fixed(gamma)
+
+
+def display_profile(name: str, columns: Sequence[Sequence[float]], curve: bytes) -> bytes:
+    """A display profile of version 4: XYZ of red, green and blue under D50, none for gray; the curve of each."""
+    tags = {b"desc": _text(name), b"cprt": _text("No copyright"), b"wtpt": _xyz_tag(*D50)}
+    tags |= {key: _xyz_tag(*column) for key, column in zip((b"rXYZ", b"gXYZ", b"bXYZ"), columns, strict=False)}
+    tags |= dict.fromkeys((b"rTRC", b"gTRC", b"bTRC") if columns else (b"kTRC",), curve)
     at, listed, body = 128 + 4 + 12 * len(tags), struct.pack(">I", len(tags)), b""
     for key, value in tags.items():
         listed += struct.pack(">4sII", key, at + len(body), len(value))
         body += value + bytes(-len(value) % 4)
-    header = struct.pack(">I4xI4s4s4s12x4s28x", at + len(body), 0x04000000, b"mntr", b"RGB ", b"XYZ ", b"acsp")
-    return (header + _fixed(*_D50)).ljust(128, b"\0") + listed + body
-
-
-def _xyz(chromaticity: Chromaticity) -> tuple[float, float, float]:
-    x, y = chromaticity
-    return x / y, 1.0, (1 - x - y) / y
+    space = b"RGB " if columns else b"GRAY"
+    header = struct.pack(">I4xI4s4s4s12x4s28x", at + len(body), 0x04200000, b"mntr", space, b"XYZ ", b"acsp")
+    return (header + _fixed(*D50)).ljust(128, b"\0") + listed + body
 
 
 def _fixed(*values: float) -> bytes:

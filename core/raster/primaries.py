@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .arrays import Array
+if TYPE_CHECKING:
+    from .arrays import Array
 
 # CIE 1931 xy of red, green, blue and white of Rec. 709 and sRGB (ITU-R BT.709-6, IEC 61966-2-1).
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)

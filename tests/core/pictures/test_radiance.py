@@ -14,7 +14,7 @@ from edf_stitch.core.pictures.encoding import encode_picture, output_bits
 from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.pictures.picture import Picture, load_picture
 from edf_stitch.core.pictures.radiance import decode_radiance, encode_radiance
-from edf_stitch.core.raster.colour import srgb_of_primaries
+from edf_stitch.core.raster.primaries import to_rec709
 from edf_stitch.core.system.errors import UnreadableImage
 
 RANDOM = np.random.default_rng(5)
@@ -148,7 +148,7 @@ def test_primaries_are_those_of_srgb_in_the_end(tmp_path: Path) -> None:
     plain, _ = decode_radiance(by_hand(stored().tobytes(), "-Y 30 +X 44"))
     assert np.array_equal(loaded(tmp_path, file_of()).pixels, plain)
     rec_2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290)
-    matrix = srgb_of_primaries(rec_2020)
+    matrix = to_rec709(rec_2020)
     # ITU-R BT.2087, from 2020 to 709
     assert np.allclose(matrix, [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]],
                        atol=1e-3)  # fmt: skip
