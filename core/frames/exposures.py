@@ -81,13 +81,10 @@ class Relation:
 def stops_told(picture: Picture) -> float | None:
     """How much light an exposure takes in by its EXIF, in stops from one second at f/1 and ISO 100; None where it does
     not say."""
-    kept = dict(picture.exif.kept)
-    time, aperture, iso = (kept.get(tag) for tag in (33434, 33437, 34855))
-    if not isinstance(time, tuple) or not time[0]:
+    seconds, stop, speed = (picture.exif.number(tag) for tag in (33434, 33437, 34855))
+    if not seconds > 0:
         return None
-    seconds = time[0] / time[1]
-    stop = aperture[0] / aperture[1] if isinstance(aperture, tuple) and aperture[0] else 1.0
-    speed = iso if isinstance(iso, int) and iso > 0 else 100
+    stop, speed = stop if stop > 0 else 1.0, speed if speed > 0 else 100.0
     return float(np.log2(seconds / stop**2 * speed / 100))
 
 

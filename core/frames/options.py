@@ -157,11 +157,6 @@ class MergeOptions:
     shows most of it."""
 
 
-PREVIEW = PreviewOptions()
-BRACKETS = BracketOptions()
-MERGE = MergeOptions()
-
-
 @dataclass(frozen=True)
 class FlatnessOptions:
     """What tells a sphere and a fisheye's circle from flat photographs (`flatness`)."""
@@ -233,9 +228,6 @@ class FlatnessOptions:
     """Times that the circle is fitted to what lies near it."""
 
 
-FLATNESS = FlatnessOptions()
-
-
 @dataclass(frozen=True)
 class OverlayOptions:
     """What is taken for burnt into pictures: dates, logos (`overlays`)."""
@@ -289,4 +281,8 @@ class OverlayOptions:
     """Share of the picture that is left out, at most: what is larger is no date."""
 
 
+PREVIEW = PreviewOptions()
+BRACKETS = BracketOptions()
+MERGE = MergeOptions()
+FLATNESS = FlatnessOptions()
 OVERLAYS = OverlayOptions()
