@@ -114,13 +114,16 @@ def _found(pictures: Sequence[Picture]) -> list[Bracket]:
 
 
 def _is_exposure(picture: Picture) -> bool:
-    return picture.bits < 32 and picture.alpha is None
+    return (picture.bits < 32 or picture.is_raw) and picture.alpha is None
 
 
 def _stops_between(pictures: Sequence[Picture], one: int, other: int) -> float | None:
-    """By how many stops another picture is brighter by EXIF."""
+    """By how many stops another picture is brighter by what it says of itself; None where one says nothing."""
     before, after = stops_told(pictures[one]), stops_told(pictures[other])
-    return None if before is None or after is None else after - before
+    # RAW files that do not say how they were exposed were developed as if they had been exposed alike
+    if before is None or after is None or (before == after and pictures[one].is_raw):
+        return None
+    return after - before
 
 
 def _candidates(pictures: Sequence[Picture]) -> list[tuple[int, int]]:
@@ -164,7 +167,7 @@ def _groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
 def _by_exposure(pictures: Sequence[Picture], copies: dict[int, SmallCopy]) -> list[int]:
     """The numbers of exposures of one view, the darkest first."""
     told = {number: stops_told(pictures[number]) for number in copies}
-    if any(stops is None for stops in told.values()):
+    if None in told.values() or len(set(told.values())) == 1:
         told = {number: float(copy.gray.mean()) for number, copy in copies.items()}
     return sorted(copies, key=lambda number: (told[number], number))
 

@@ -1,4 +1,8 @@
-"""Two exposures of one view: how much brighter one of them is, and where its pixels lie in the other."""
+"""Two exposures of one view: how much brighter one of them is, and where its pixels lie in the other.
+
+Finished pictures show by how much. Camera RAW was developed to one scale for all pictures and looks alike however it
+was exposed: its light divided by that at which it clips is what the sensor took, and that is compared.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pictures.picture import Picture
-from ..raster.arrays import Array
+from ..raster.arrays import Array, strips
 from ..raster.colour import decode, encode
+from ..system.threads import each
 from .options import BRACKETS
 
 
@@ -32,11 +37,12 @@ class SmallCopy:
 
     @staticmethod
     def of(picture: Picture, longest_px: int) -> SmallCopy:
-        """The copy of a picture, at most so many px along its longer side."""
-        height, width = picture.view.shape[:2]
+        """The copy of a picture as it was exposed, at most so many px along its longer side."""
+        view = view_as_exposed(picture)
+        height, width = view.shape[:2]
         scale = min(1.0, longest_px / max(width, height))
         size = max(1, round(width * scale)), max(1, round(height * scale))
-        small = picture.view if scale == 1 else cv2.resize(picture.view, size, interpolation=cv2.INTER_AREA)
+        small = view if scale == 1 else cv2.resize(view, size, interpolation=cv2.INTER_AREA)
         return SmallCopy(small.reshape(size[1], size[0], -1), scale)
 
     @cached_property
@@ -78,9 +84,36 @@ class Relation:
     shift: float
 
 
+def light_as_exposed(picture: Picture, rows: slice) -> NDArray[np.float32]:
+    """Light (h, W, C) of rows of a picture as its sensor took it: white is 1."""
+    light: NDArray[np.float32] = picture.light[rows, 0 : picture.light.shape[1]]
+    return light * np.float32(1 / picture.clips_at) if picture.is_raw else light
+
+
+def rows_as_exposed(picture: Picture, rows: slice) -> NDArray[np.uint8]:
+    """Display-encoded levels (h, W, C) of the same."""
+    levels: NDArray[np.uint8] = encode(light_as_exposed(picture, rows), 8) if picture.is_raw else picture.view[rows]
+    return levels
+
+
+def view_as_exposed(picture: Picture) -> NDArray[np.uint8]:
+    """All of them (H, W, C)."""
+    if not picture.is_raw:
+        return picture.view
+    levels = np.empty(picture.light.shape, np.uint8)
+
+    def put(rows: slice) -> None:
+        levels[rows] = rows_as_exposed(picture, rows)
+
+    each(put, strips(levels.shape))
+    return levels
+
+
 def stops_told(picture: Picture) -> float | None:
     """How much light an exposure takes in by its EXIF, in stops from one second at f/1 and ISO 100; None where it does
-    not say."""
+    not say. Of camera RAW, in stops from the picture that all were developed like."""
+    if picture.is_raw:
+        return -float(np.log2(picture.clips_at))
     seconds, stop, speed = (picture.exif.number(tag) for tag in (33434, 33437, 34855))
     if not seconds > 0:
         return None
@@ -93,7 +126,7 @@ def relation_of(
 ) -> tuple[Relation | None, str]:
     """How two exposures lie to each other; or None, and why they are not two of one view.
 
-    told: by how many stops the second is brighter by EXIF; given: the user says that they show one view.
+    told: by how many stops the second is brighter by what it says of itself; given: the user says that they show one view.
     """
     if first.levels.shape != second.levels.shape:
         return None, "their sizes differ"

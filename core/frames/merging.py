@@ -5,7 +5,8 @@ of the radiance R. With weights u that fall to 0 where an exposure clips and whe
 
     R = sum u L / sum u e
 
-weighs each exposure's R by u e: by its time, as its noise is worth. What moved between them is taken from one.
+weighs each exposure's R by u e: by its time, as its noise is worth. What moved between them is taken from one. Camera
+RAW is merged as its sensor took it, and brought back to the scale that all of its set were developed to.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ..raster.arrays import Array, strips
 from ..raster.colour import decode
 from ..system.threads import each
 from .brackets import Bracket
-from .exposures import SmallCopy
+from .exposures import SmallCopy, light_as_exposed, rows_as_exposed
 from .options import BRACKETS, MERGE
 
 Plane = NDArray[np.float32]
@@ -95,9 +96,13 @@ def merged(pictures: Sequence[Picture], bracket: Bracket) -> tuple[Picture, Merg
         _add(light, weights, one, homography, gain, ends, share)
     # where none counts, the middle one does
     _add(light, weights, middle, np.eye(3), 1.0, (True, True), np.full((1, 1), MERGE.last_resort, np.float32))
-    each(lambda rows: np.divide(light[rows], weights[rows][..., None], out=light[rows]), strips(light.shape))
+    to_scale = np.float32(middle.clips_at if middle.is_raw else 1)
+    each(lambda rows: np.multiply(light[rows], (to_scale / weights[rows])[..., None], out=light[rows]),
+         strips(light.shape))  # fmt: skip
     warnings = tuple(dict.fromkeys(warning for one in taken for warning in one.warnings))
     made = replace(picture_from_array(light, middle.name), exif=middle.exif, icc=middle.icc, warnings=warnings)
+    if middle.is_raw:
+        made = replace(made, clips_at=middle.clips_at / gains[0])
     is_still = all(_is_still(homography) for homography in bracket.homographies)
     return made, MergedBracket(
         tuple(one.name for one in taken), bracket.stops,
@@ -142,13 +147,13 @@ def _add(
     height, width = weights.shape
 
     def of_rows(rows: slice) -> tuple[Plane, Plane]:
-        level = picture.view[rows].max(axis=2).astype(np.float32) / np.float32(255)
+        level = rows_as_exposed(picture, rows).max(axis=2).astype(np.float32) / np.float32(255)
         weight = np.ones_like(level)
         if not ends[0]:
             weight *= 1 - _step(level, *MERGE.clipping)
         if not ends[1]:
             weight *= _step(level, *MERGE.darkness)
-        return picture.light[rows, 0:width] * weight[..., None], weight
+        return light_as_exposed(picture, rows) * weight[..., None], weight
 
     is_still = _is_still(homography)
     if not is_still:

@@ -17,6 +17,7 @@ from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_painted, without
 from ..pictures.naming import in_words, told_apart
 from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
+from ..pictures.raw_clipping import clipping_warnings
 from ..pictures.raw_development import RawExposure, exposure_of_first
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
@@ -89,6 +90,7 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
     views, members, brackets = _views_of(given, options)
     if brackets or len(views) > MOST_PICTURES:
         _check_views(len(views), options)
+    views = [replace(one, warnings=(*one.warnings, *clipping_warnings(one))) for one in views]
     pictures = in_same_colour_space(views)
     copies = dict(_copies(pictures))
     if len(pictures) - len(copies) == 1:
@@ -185,7 +187,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         for number, first in copies.items()
     )
     finished = [picture.name for picture in pictures if picture.bits < 32]
-    if finished and any(np.isfinite(picture.clips_at) for picture in pictures):
+    if finished and any(picture.is_raw for picture in pictures):
         warnings += (
             f"camera RAW stands beside {finished[0]}: how its camera changed tones and colours cannot be undone, so "
             "they match only roughly; use RAW files of all pictures, or of none",

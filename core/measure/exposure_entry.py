@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..compose.options import EXPOSURE
-from ..raster.arrays import in_any_channel, strips
+from ..pictures.raw_clipping import clipped_share
+from ..raster.arrays import in_any_channel
 from .options import WARNING
 
 if TYPE_CHECKING:
@@ -50,8 +51,5 @@ def exposure_warnings(pictures: Sequence[Picture], exposures: Sequence[Exposure]
 def _clipped_share(picture: Picture) -> float:
     """Share of a picture that is clipped in any channel; float pictures do not clip, but for camera RAW."""
     if picture.bits == 32:
-        height, width = picture.light.shape[:2]
-        limit = np.float32(WARNING.raw_clipped * picture.clips_at)
-        rows = strips(picture.light.shape) if np.isfinite(limit) else ()
-        return sum(int(in_any_channel(picture.light[part, 0:width] >= limit).sum()) for part in rows) / (height * width)
+        return clipped_share(picture)
     return float(in_any_channel(picture.view >= EXPOSURE.clipped_level).mean())

@@ -130,9 +130,6 @@ class WarningOptions:
     overexposed_share: float = 0.05
     """Share of what both pictures show that is clipped in one alone: a sky is more, lamps and glints are less."""
 
-    raw_clipped: float = 0.99
-    """Share of the light at which camera RAW clips from which it counts as clipped: sensors differ by a little."""
-
 
 @dataclass(frozen=True)
 class VerdictOptions:

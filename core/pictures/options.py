@@ -72,7 +72,7 @@ class MaskOptions:
 
 @dataclass(frozen=True)
 class DecodingOptions:
-    """Decoding HEIC and camera RAW (`decoder_process`, `raw_development`)."""
+    """Decoding HEIC and camera RAW (`decoder_process`, `raw_development`, `raw_clipping`)."""
 
     # Seconds after which a decoder counts as hung: the largest pictures take some ten, slow machines ten times that.
     most_seconds: float = 300.0
@@ -82,6 +82,8 @@ class DecodingOptions:
     # less is hardly seen.
     longer_stops: float = 0.2
     much_clipped: float = 0.01
+    # Share of the light at which camera RAW clips from which it counts as clipped: sensors differ by a little.
+    raw_clipped: float = 0.99
 
 
 READING = ReadingOptions()

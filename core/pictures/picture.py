@@ -80,6 +80,11 @@ class Picture:
         """All of its light as an array (H, W, C) float32."""
         return whole(self.light)
 
+    @property
+    def is_raw(self) -> bool:
+        """Whether it is camera RAW, which alone of all float pictures says where it clips."""
+        return bool(np.isfinite(self.clips_at))
+
     def shows(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which points (N, 2) px lie where it is not transparent (N,)."""
         if self.alpha is None:

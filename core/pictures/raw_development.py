@@ -102,12 +102,6 @@ def develop(data: bytes, like: RawExposure | None, check: Callable[[int, int], N
         f"its file does not say {what}: it is taken as exposed with the same as the first camera RAW picture"
         for what in unknown
     ]
-    clipped = float((levels == 65535).any(axis=2).mean())
-    if stops > DECODING.longer_stops and clipped > DECODING.much_clipped:
-        warnings.append(
-            f"{clipped:.0%} of it is over-exposed, and it was exposed {stops:.1f} stops more than the first camera RAW "
-            "picture: there it shows less light than there was"
-        )
     if not facts["is_balanced"] and like is None:
         warnings.append("its file has no white balance: that of daylight was taken")
     curve = Curve((np.linspace(0.0, 1.0, 65536) * 2.0**-stops).astype(np.float32))

@@ -15,6 +15,7 @@ from edf_stitch.core.pictures.camera_raw import is_raw, raw_bytes, raw_damage, r
 from edf_stitch.core.pictures.metadata import read_exif
 from edf_stitch.core.pictures.options import READING
 from edf_stitch.core.pictures.picture import Picture, load_picture
+from edf_stitch.core.pictures.raw_clipping import clipped_share, clipping_warnings
 from edf_stitch.core.pictures.raw_development import exposure_of_first
 from edf_stitch.core.raster.lazy import Coded
 from edf_stitch.core.system.errors import UnreadableImage
@@ -156,8 +157,11 @@ def test_what_is_clipped_is_white_and_is_said_where_it_was_exposed_longer(tmp_pa
     inside = picture.pixels[25:55, 25:55]
     assert picture.clips_at == pytest.approx(0.5)
     assert np.abs(inside - 0.5).max() < 1e-4, "the most it can say, without a tint"
-    assert "8% of it is over-exposed" in picture.warnings[0] and "1.0 stops more" in picture.warnings[0]
-    assert not load_picture(tmp_path / "b.dng").warnings
+    (said,) = clipping_warnings(picture)
+    assert "8% of it is over-exposed" in said and "1.0 stops more" in said
+    assert clipped_share(picture) == pytest.approx(1600 / (120 * 160), rel=0.1)
+    alone = load_picture(tmp_path / "b.dng")
+    assert clipped_share(alone) == clipped_share(picture) and not clipping_warnings(alone)
 
 
 def test_what_a_file_does_not_say_is_taken_as_equal_and_said(tmp_path: Path) -> None:
