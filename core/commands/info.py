@@ -54,7 +54,7 @@ def entry_of(path: Path) -> dict[str, Any]:
     (camera,), problems = cameras_for(CameraRequest(), [path.name], [size], [picture.exif])
     exif = picture.exif
     return {
-        "file": str(path), "error": _not_flat(picture), "kind": _kind(path), "width": size[0], "height": size[1],
+        "file": str(path), "error": _not_flat(picture), "kind": _kind(path, picture), "width": size[0], "height": size[1],
         "bits": picture.bits, "channels": picture.light.shape[2], "alpha": picture.alpha is not None,
         "colours": _colours(picture), "make": exif.make, "model": exif.model, "lens": exif.lens,
         "taken": exif.text(36867) or exif.text(306), "focal_px": None if camera.assumed else round(camera.focal, 2),
@@ -74,8 +74,10 @@ def _not_flat(picture: Picture) -> str:
     return ""
 
 
-def _kind(path: Path) -> str:
+def _kind(path: Path, picture: Picture) -> str:
     """The kind of file by its content; its ending where that is none of the plain kinds."""
+    if picture.is_raw:
+        return "RAW"
     from ..pictures.containers import read_structure
     from ..pictures.decoding import read_file
 

@@ -27,6 +27,7 @@ from .options import EXPOSURE, INPAINT
 from .placing import Placing, adding_order
 from .tone.exposure import Exposure, exposures_for
 from .tone.graph_exposure import graph_exposures
+from .tone.raw_highlights import without_clipped
 from .unseen import Unseen, unseen_by_each
 from .window import goes_round, window_of
 from .wraparound import middle_of_widest, rolled, rolled_layer
@@ -96,6 +97,7 @@ def composed(
         [Unseen(one.hidden, one.hidden_by_depth, one.folds) for one in decided] if decided
         else unseen_by_each(layers, warp, views, windows, partial(progress, "occlusion"))
     )  # fmt: skip
+    layers = without_clipped(layers, [one.hidden for one in unseen])
     fetched: list[Layer] = []
     exposures = (
         [one.exposure for one in decided] if decided

@@ -126,7 +126,8 @@ def relation_of(
 ) -> tuple[Relation | None, str]:
     """How two exposures lie to each other; or None, and why they are not two of one view.
 
-    told: by how many stops the second is brighter by what it says of itself; given: the user says that they show one view.
+    told: by how many stops the second is brighter by what both say of themselves; given: the user says that they show
+    one view.
     """
     if first.levels.shape != second.levels.shape:
         return None, "their sizes differ"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,10 +29,13 @@ class Layer:
         Scene-linear, float32: an array, or worked out where it is read (see `raster.lazy`).
     alpha : (H, W) array
         Straight alpha in [0, 1], float32, or bool where nothing is translucent; 0 where the picture shows nothing.
+    clips_at : float
+        Light from which it is clipped, of camera RAW; see `Picture`.
     """
 
     light: AnyImage
     alpha: NDArray[np.float32] | NDArray[np.bool_]
+    clips_at: float = float("inf")
 
     @property
     def pixels(self) -> NDArray[np.float32]:
@@ -49,11 +52,11 @@ class Layer:
         left, top, width, height = box
         if (left, top, height, width) == (0, 0, *self.alpha.shape):
             return self
-        return Layer(Placed(self.light, (-top, -left), (height, width)), cut(self.alpha, box))
+        return replace(self, light=Placed(self.light, (-top, -left), (height, width)), alpha=cut(self.alpha, box))
 
     def keep(self, part: Part) -> Layer:
         """The same layer with the light of a part kept as an array, for parts that are read more than once."""
-        return Layer(Held(self.light, (part[0].start, part[1].start), part_of(self.light, part)), self.alpha)
+        return replace(self, light=Held(self.light, (part[0].start, part[1].start), part_of(self.light, part)))
 
 
 def layer_of(picture: Picture, picture_map: CanvasMap, by_root: bool = False, hold: bool = True) -> Layer:
@@ -85,7 +88,7 @@ def layer_of(picture: Picture, picture_map: CanvasMap, by_root: bool = False, ho
             return parts[0]
         left, right = parts
         light = SideBySide(left.light, right.light, picture_map.parts[1].corner[0])
-        return Layer(light, np.maximum(left.alpha, right.alpha))
+        return Layer(light, np.maximum(left.alpha, right.alpha), picture.clips_at)
     return _fetched_layer(picture, picture_map.arrays(), by_root, hold)
 
 
@@ -96,7 +99,7 @@ def _pasted_layer(picture: Picture, picture_map: ReferenceMap) -> Layer:
     x, y = canvas.offset
     alpha = np.zeros((canvas.height, canvas.width), bool if picture.alpha is None else np.float32)
     alpha[y : y + height, x : x + width] = True if picture.alpha is None else picture.alpha
-    return Layer(Placed(picture.light, (y, x), (canvas.height, canvas.width)), alpha)
+    return Layer(Placed(picture.light, (y, x), (canvas.height, canvas.width)), alpha, picture.clips_at)
 
 
 def _fetched_layer(picture: Picture, picture_map: PictureMap, by_root: bool, hold: bool) -> Layer:
@@ -111,10 +114,10 @@ def _fetched_layer(picture: Picture, picture_map: PictureMap, by_root: bool, hol
     light = whole(fetched) if hold and np.prod(fetched.shape) <= LAYER.held_values else fetched
     placed = Placed(light, (box[0].start, box[1].start), (inside.shape[0], inside.shape[1]))
     if picture.alpha is None:
-        return Layer(placed, inside)
+        return Layer(placed, inside, picture.clips_at)
     whole_alpha = np.zeros(inside.shape, np.float32)
     whole_alpha[box] = alpha
-    return Layer(placed, whole_alpha)
+    return Layer(placed, whole_alpha, picture.clips_at)
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,5 +119,20 @@ class ClippedOptions:
     """Pixels of a cell from which it counts for more than its neighbours."""
 
 
+@dataclass(frozen=True)
+class HighlightOptions:
+    """Which clipped light of camera RAW is taken from another picture (`raw_highlights`)."""
+
+    window_px: int = 9
+    """px a side of the square around a pixel of which most has to be clipped."""
+
+    least_share: float = 0.5
+    """The share of it that has to be."""
+
+    margin_px: int = 5
+    """px around it that are left out as well: the other half of the window, and what interpolation mixes."""
+
+
 TONE = ToneOptions()
 CLIPPED = ClippedOptions()
+HIGHLIGHTS = HighlightOptions()

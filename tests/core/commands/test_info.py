@@ -11,6 +11,8 @@ import pytest
 from edf_stitch.core.commands.cli import main
 from PIL import Image, TiffImagePlugin
 
+from ..pictures.raw_and_heic import dng, mosaic
+
 NOISE = cv2.GaussianBlur(np.random.default_rng(1).integers(0, 256, (90, 120, 4), np.uint8), (0, 0), 2)
 
 
@@ -46,6 +48,12 @@ def test_a_line_for_each_file(folder: Path, capsys: pytest.CaptureFixture[str]) 
     assert "d.jpg: cannot be used: the JPEG file is damaged" in lines[3]
     assert lines[4].endswith("cannot be used: it is entirely transparent: export it without transparency, or with the "
                              "right one")  # fmt: skip
+
+
+def test_camera_raw_is_called_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.dng").write_bytes(dng(mosaic(NOISE[..., :3] / 255)))
+    assert main(["info", str(tmp_path)]) == 0
+    assert "120×90 RAW, float, colour, scene-linear; Maker Model; " in capsys.readouterr().out
 
 
 def test_a_document_holds_the_same(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
