@@ -21,7 +21,7 @@ from .compose.decided import Decided
 from .compose.enlarging.draft import draft_times
 from .compose.enlarging.enlarged import EnlargedPanorama
 from .compose.enlarging.full_set import FullSet
-from .compose.enlarging.memory_need import threads_that_fit
+from .compose.enlarging.memory_need import threads_that_fit, threads_that_fit_merged
 from .compose.stitch_result import StitchResult
 from .frames.frame import Frame
 from .frames.options import PREVIEW
@@ -43,7 +43,7 @@ from .raster.enlarging import enlarged_box, reduced_box
 from .system.errors import BadRequest
 from .system.memory import give_back
 from .system.progress import Progress, Stopwatch, stages_of
-from .system.threads import ask, asking, at_most
+from .system.threads import ask, asking, at_most, count
 
 __all__ = ["StitchResult", "compose", "stitch"]
 
@@ -90,11 +90,12 @@ def stitch(
     with asking(cancelled), at_most(threads_that_fit(pictures, options)):
         stopwatch("read")
         frame = read_frame(pictures, options)
-        geometry = estimate_geometry([frame], options, stopwatch)
-        frame = frame.only(geometry.numbers)
-        if options.preview:
-            return _preview(frame, geometry, options, stopwatch)
-        return (_made if geometry.rig is None else _of_many)(frame, geometry, options, stopwatch)
+        with at_most(threads_that_fit_merged(frame.full_sizes, options) if frame.brackets else count()):
+            geometry = estimate_geometry([frame], options, stopwatch)
+            frame = frame.only(geometry.numbers)
+            if options.preview:
+                return _preview(frame, geometry, options, stopwatch)
+            return (_made if geometry.rig is None else _of_many)(frame, geometry, options, stopwatch)
 
 
 def _made(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:

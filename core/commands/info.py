@@ -54,8 +54,8 @@ def entry_of(path: Path) -> dict[str, Any]:
     (camera,), problems = cameras_for(CameraRequest(), [path.name], [size], [picture.exif])
     exif = picture.exif
     return {
-        "file": str(path), "error": _not_flat(picture), "kind": _kind(path, picture), "width": size[0], "height": size[1],
-        "bits": picture.bits, "channels": picture.light.shape[2], "alpha": picture.alpha is not None,
+        "file": str(path), "error": _not_flat(picture), "kind": _kind(path, picture), "width": size[0],
+        "height": size[1], "bits": picture.bits, "channels": picture.light.shape[2], "alpha": picture.alpha is not None,
         "colours": _colours(picture), "make": exif.make, "model": exif.model, "lens": exif.lens,
         "taken": exif.text(36867) or exif.text(306), "focal_px": None if camera.assumed else round(camera.focal, 2),
         "focal_source": camera.source, "focal_mm": exif.focal_mm, "focal35_mm": exif.focal35_mm,

@@ -11,7 +11,7 @@ RAW is merged as its sensor took it, and brought back to the scale that all of i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -127,11 +127,11 @@ def _at_working_size(picture: Picture, homography: Array, gain: float) -> _Expos
     return _Exposure(_warped(level, moved), inside, gain)
 
 
-def _warped(values: NDArray[Any], homography: Array) -> NDArray[Any]:
-    """Values (h, w[, C]) of an exposure where the middle one's px lie; 0 beyond its border."""
-    warped: NDArray[Any] = cv2.warpPerspective(
-        values, homography, values.shape[1::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    )
+def _warped(values: NDArray[Any], homography: Array, size: tuple[int, int] | None = None) -> NDArray[Any]:
+    """Values (h, w[, C]) of an exposure where the middle one's px lie; 0 beyond its border. size: (W, H) px of what
+    is asked for, that of the values by default."""
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    warped: NDArray[Any] = cv2.warpPerspective(values, homography, size or values.shape[1::-1], flags=flags)
     return warped
 
 
@@ -156,20 +156,37 @@ def _add(
         return light_as_exposed(picture, rows) * weight[..., None], weight
 
     is_still = _is_still(homography)
-    if not is_still:
-        parts = [of_rows(rows) for rows in strips(light.shape)]
-        whole_light = _warped(np.concatenate([part[0] for part in parts]), homography).reshape(light.shape)
-        whole_weight = _warped(np.concatenate([part[1] for part in parts]), homography)
     left = None if share is None else cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR)
 
     def put(rows: slice) -> None:
-        shown, weight = of_rows(rows) if is_still else (whole_light[rows], whole_weight[rows])
+        shown, weight = of_rows(rows) if is_still else _resampled(of_rows, rows, homography, light.shape)
         if left is not None:
             shown, weight = shown * left[rows][..., None], weight * left[rows]
         light[rows] += shown
         weights[rows] += np.float32(gain) * weight
 
     each(put, strips(light.shape))
+
+
+def _resampled(
+    of_rows: Callable[[slice], tuple[Plane, Plane]], rows: slice, homography: Array, shape: tuple[int, ...]
+) -> tuple[Plane, Plane]:  # fmt: skip
+    """What `of_rows` gives (h, W, C) and (h, W) of an exposure, where rows of the middle one (H, W, C) lie in it; no
+    more of its rows are asked for than these show."""
+    height, width, channels = shape
+    corners = np.array([[x, y] for y in (rows.start, rows.stop - 1) for x in (0, width - 1)], np.float64)
+    there = cv2.perspectiveTransform(corners[:, None], homography)[:, 0, 1]
+    # bilinear: a row more on either side, and one for what is rounded
+    top, bottom = (int(np.clip(y, 0, height)) for y in (np.floor(there.min()) - 2, np.ceil(there.max()) + 3))
+    if top >= bottom:
+        return np.zeros((rows.stop - rows.start, width, channels), np.float32), np.zeros(
+            (rows.stop - rows.start, width), np.float32)  # fmt: skip
+    shown, weight = of_rows(slice(top, bottom))
+    from_top, to_rows = np.eye(3), np.eye(3)
+    from_top[1, 2], to_rows[1, 2] = -top, rows.start
+    size = width, rows.stop - rows.start
+    both = _warped(np.dstack([shown, weight]), from_top @ homography @ to_rows, size)
+    return both[..., :channels], both[..., channels]
 
 
 def _step(values: Plane, low: float, high: float) -> Plane:

@@ -87,6 +87,7 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
     """
     check_count(len(sources), options)
     given = _named_apart(_all_read(sources, options.camera.cameras is not None), sources)
+    names = [picture.name for picture in given]
     views, members, brackets = _views_of(given, options)
     if brackets or len(views) > MOST_PICTURES:
         _check_views(len(views), options)
@@ -100,12 +101,12 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
         _check_views(len(pictures) - len(copies), options)
     if not brackets:
         return prepare(pictures, options, copies)
-    masks = options.ignored_in([picture.name for picture in given])
+    masks = options.ignored_in(names)
     of_views = tuple(next((masks[number] for number in one if masks[number] is not None), None) for one in members)
     frame = prepare(pictures, replace(options, ignore=of_views, ignore_in=()), copies)
     view_of = {number: view for view, numbers in enumerate(members) for number in numbers}
     return replace(
-        frame, shown_by=tuple(frame.shown_by[view_of[number]] for number in range(len(given))),
+        frame, shown_by=tuple(frame.shown_by[view_of[number]] for number in range(len(names))),
         warnings=(_said_of(brackets), *frame.warnings), brackets=tuple(brackets),
     )  # fmt: skip
 
@@ -114,7 +115,7 @@ def _views_of(
     given: list[Picture], options: StitchOptions
 ) -> tuple[list[Picture], list[tuple[int, ...]], list[MergedBracket]]:
     """Pictures of different views, exposures of one merged: of each the numbers of the pictures it was made of, in
-    order of the first; and what was merged."""
+    order of the first; and what was merged. Exposures that were merged leave the list: each may take 70 MB."""
     found = brackets_in(given, options.brackets)
     of_first = {min(bracket.numbers): bracket for bracket in found}
     joined = {number for bracket in found for number in bracket.numbers}
@@ -125,6 +126,8 @@ def _views_of(
         if number in of_first:
             picture, bracket = merged(given, of_first[number])
             brackets.append(bracket)
+            for one in of_first[number].numbers:
+                given[one] = picture
             members.append(of_first[number].numbers)
         elif number in joined:
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -64,14 +64,30 @@ def threads_that_fit(sources: Sequence[Any], options: StitchOptions) -> int:
     NotEnoughMemory
         They take more than may be used with a single one. It says what would fit.
     """
+    limits = _limits(options, len(sources))
+    return count() if limits is None else _threads([_facts(one) for one in sources], options, limits)
+
+
+def threads_that_fit_merged(sizes: Sequence[Size], options: StitchOptions) -> int:
+    """The same once brackets are merged, by the (W, H) px of each view as it came: of those that were looked for, how
+    many there are is known only now."""
+    facts = [(size, MEMORY.float_bytes) for size in sizes]
+    own = replace(options, brackets="off")
+    limits = _limits(options, len(sizes), _need(facts, own, options.scale).held)
+    return count() if limits is None else _threads(facts, own, limits)
+
+
+def _limits(options: StitchOptions, pictures: int, held: int = 0) -> tuple[float, float] | None:
+    """Bytes that a stitch may take, and that it should; None where nothing limits it. held: what it takes already."""
     if options.memory_gb is not None:
-        at_most = may_be_used = 1e9 * options.memory_gb
-    else:
-        free = free_bytes()
-        if free is None or len(sources) == 2:
-            return count()
-        at_most, may_be_used = float(free), free / 2
-    facts = [_facts(one) for one in sources]
+        return 1e9 * options.memory_gb, 1e9 * options.memory_gb
+    free = free_bytes()
+    return None if free is None or pictures == 2 else (float(free + held), (free + held) / 2)
+
+
+def _threads(facts: Sequence[tuple[Size, int]], options: StitchOptions, limits: tuple[float, float]) -> int:
+    """How many fit for pictures of (W, H) px and so many bytes a pixel. Raises NotEnoughMemory."""
+    at_most, may_be_used = limits
     need = _need(facts, options, options.scale)
     if need.bytes_with(1) > at_most:
         raise NotEnoughMemory(_what_fits(facts, options, need.bytes_with(1), at_most))
@@ -80,11 +96,18 @@ def threads_that_fit(sources: Sequence[Any], options: StitchOptions) -> int:
 
 def _need(facts: Sequence[tuple[Size, int]], options: StitchOptions, scale: float) -> Need:
     """What pictures of (W, H) px and so many bytes a pixel take at a scale."""
+    read = sum(width * height * each for (width, height), each in facts)
+    if isinstance(options.brackets, int):
+        # exposures are let go once they are merged; views are of floats
+        largest = max(width * height for (width, height), _ in facts)
+        facts = [(size, MEMORY.float_bytes) for size, _ in facts[:: options.brackets]]
+        merged = sum(width * height * each for (width, height), each in facts)
+        read = max(read, merged + MEMORY.merging_bytes * largest)
     sizes = tuple((max(1, round(scale * width)), max(1, round(scale * height))) for (width, height), _ in facts)
-    full = sum(width * height * each for (width, height), each in facts)
     # shrunk pictures are of floats, and have a view beside
-    held = full if scale == 1 else sum(width * height * MEMORY.float_bytes for width, height in sizes)
-    return Need(sizes, full if scale == 1 else full + held, held, draft_times(sizes, options))
+    each_held = [each if scale == 1 else MEMORY.float_bytes for _, each in facts]
+    held = sum(width * height * each for (width, height), each in zip(sizes, each_held, strict=True))
+    return Need(sizes, read if scale == 1 else read + held, held, draft_times(sizes, options))
 
 
 def _what_fits(facts: Sequence[tuple[Size, int]], options: StitchOptions, needed: int, at_most: float) -> str:
@@ -92,7 +115,8 @@ def _what_fits(facts: Sequence[tuple[Size, int]], options: StitchOptions, needed
     megapixels = sum(width * height for (width, height), _ in facts) / 1e6
     scales = [s / 20 for s in range(int(20 * options.scale), 0, -1) if s / 20 < options.scale]
     fitting = next((s for s in scales if _need(facts, options, s).bytes_with(1) <= at_most), None)
-    fewer = next((n for n in range(len(facts) - 1, 1, -1)
+    step = options.brackets if isinstance(options.brackets, int) else 1
+    fewer = next((n for n in range(len(facts) - step, step, -step)
                   if _need(facts[:n], options, options.scale).bytes_with(1) <= at_most), None)  # fmt: skip
     ways = [] if fitting is None else [f"--scale {fitting:g}"]
     ways += [] if fewer is None else [f"the first {fewer} of them"]

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.compose.enlarging import memory_need
-from edf_stitch.core.compose.enlarging.memory_need import threads_that_fit
+from edf_stitch.core.compose.enlarging.memory_need import threads_that_fit, threads_that_fit_merged
 from edf_stitch.core.compose.enlarging.options import MEMORY
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.encoding import save_picture
@@ -108,3 +108,25 @@ def test_heic_and_camera_raw_count_with_what_their_decoders_take(tmp_path: Path)
     assert raw == pytest.approx((MEMORY.program_bytes + 36e6 * MEMORY.raw_bytes + shrunk) / 1e9, abs=0.06)
     levels = np.zeros(PHONE.shape, np.uint16)
     assert needed(heic(levels, "RGB;16"), "deep.heic") > needed(heic(PHONE), "a.heic") + 0.15
+
+
+def test_brackets_count_with_what_merging_takes_and_as_floats() -> None:
+    """Ten views of three exposures: fewer pictures to compose than thirty, but each takes five times the bytes."""
+    need = memory_need._need([memory_need._facts(PHONE)] * 30, asked(None, brackets=3), 1.0)
+    assert len(need.sizes) == 10 and need.held == 10 * 12e6 * MEMORY.float_bytes
+    assert need.read == need.held + 12e6 * MEMORY.merging_bytes
+    looked_for = memory_need._need([memory_need._facts(PHONE)] * 30, asked(None), 1.0)
+    assert looked_for.read == looked_for.held == 30 * 12e6 * 3, "they may be none"
+    with pytest.raises(NotEnoughMemory, match="the first (6|9|12|15|18|21|24) of them"):
+        threads_that_fit([PHONE] * 30, asked(2.5, brackets=3))
+
+
+def test_once_they_are_merged_it_is_known_how_many_views_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    views = [(4000, 3000)] * 10
+    fitting = [threads_that_fit_merged(views, asked(gb)) for gb in (4.6, 64)]
+    assert 1 <= fitting[0] < fitting[1] == 8
+    with pytest.raises(NotEnoughMemory, match="10 pictures of 120 megapixels"):
+        threads_that_fit_merged(views, asked(3.0))
+    monkeypatch.setattr(memory_need, "free_bytes", lambda: int(3.5e9))
+    assert threads_that_fit_merged(views, asked(None)) == 1, "what they hold already is not free, and theirs"
+    assert threads_that_fit_merged(views[:2], asked(None)) == 8

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.frames.brackets import Bracket, brackets_in
-from edf_stitch.core.frames.merging import MergedBracket, merged
+from edf_stitch.core.frames.merging import MergedBracket, _resampled, merged
 from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.pictures.picture import Picture
 
@@ -143,3 +143,27 @@ def test_the_same_bytes_again() -> None:
     pictures = bracket_of(cv2.GaussianBlur(VIEW, (0, 0), 1))
     first, second = (merge(pictures)[0].pixels for _ in range(2))
     assert first.tobytes() == second.tobytes()
+
+
+@pytest.mark.parametrize("move", [(0.0, 3.3, 0.2), (0.0, -7.6, -0.3), (4.0, 400.0, 0.0)])
+def test_rows_are_resampled_as_the_whole_is(move: tuple[float, float, float]) -> None:
+    """Some rows at a time, with as many of the exposure's as they show; the last move leaves nothing of it."""
+    dx, dy, turn = move
+    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    homography = np.array([[c, -s, dx], [s, c, dy], [1e-6, -2e-6, 1]])
+    rng = np.random.default_rng(3)
+    light, weight = rng.random((HEIGHT, WIDTH, 3), np.float32), rng.random((HEIGHT, WIDTH), np.float32)
+    asked = []
+
+    def of_rows(rows: slice) -> tuple[np.ndarray, np.ndarray]:
+        asked.append(rows.stop - rows.start)
+        return light[rows], weight[rows]
+
+    whole = cv2.warpPerspective(np.dstack([light, weight]), homography, (WIDTH, HEIGHT),
+                                flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)  # fmt: skip
+    for top in range(0, HEIGHT, 40):
+        rows = slice(top, min(HEIGHT, top + 40))
+        shown, mass = _resampled(of_rows, rows, homography, light.shape)
+        # positions are rounded to 1/32 px
+        assert np.abs(np.dstack([shown, mass]) - whole[rows]).max() < 0.1
+    assert max(asked, default=0) < 60
