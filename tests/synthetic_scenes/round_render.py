@@ -1,4 +1,5 @@
-"""Runs with bpy: renders through Blender's own panoramic camera, or a World through a camera. Arguments: JOB.json."""
+"""Runs with bpy: renders through Blender's own panoramic camera, or a World, and a gray ball in it, through a camera.
+Arguments: JOB.json."""
 
 from __future__ import annotations
 
@@ -52,6 +53,17 @@ else:  # what a camera sees of a panorama that surrounds it
         (texture.outputs[0], background.inputs["Color"]), (background.outputs[0], output.inputs["Surface"]),
     ):  # fmt: skip
         tree.links.new(source, entry)
+if "ball" in job:  # where it lies
+    scene.render.engine = "CYCLES"
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, location=job["ball"])
+    bpy.ops.object.shade_smooth()
+    gray = bpy.data.materials.new("gray")
+    gray.use_nodes = True
+    gray.node_tree.nodes.clear()
+    surface, shown = (gray.node_tree.nodes.new(kind) for kind in ("ShaderNodeBsdfDiffuse", "ShaderNodeOutputMaterial"))
+    surface.inputs["Color"].default_value = (0.5, 0.5, 0.5, 1.0)
+    gray.node_tree.links.new(surface.outputs[0], shown.inputs["Surface"])
+    bpy.context.object.data.materials.append(gray)
 render.filepath = job["out"]
 bpy.context.view_layer.update()
 bpy.ops.render.render(write_still=True)
