@@ -101,7 +101,8 @@ def cameras_for(
     -------
     cameras : list of Camera
     warnings : list of str
-        Where EXIF contradicts itself, a camera file names what is no picture, or a distortion folds the picture.
+        Where EXIF contradicts itself, a camera file names what is no picture, or a distortion folds the picture or
+        was removed already.
 
     Raises
     ------
@@ -136,7 +137,12 @@ def cameras_for(
         cameras = [
             _with_principal_point(camera, values[min(number, len(values) - 1)]) for number, camera in enumerate(cameras)
         ]
-    for number, camera in enumerate(cameras):
+    for number, (camera, exif) in enumerate(zip(cameras, exifs, strict=True)):
+        if exif.undistorted and camera.distortion.any():
+            warnings.append(
+                f"{called(number, names)} says that its lens's distortion was removed already, and --cameras removes it "
+                "once more: give its focal length without a distortion, or pictures as the camera took them"
+            )
         check_plausible(camera, called(number, names))
         folds = fold_warning(camera, called(number, names))
         warnings += [folds] if folds else []

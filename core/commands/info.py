@@ -59,6 +59,7 @@ def entry_of(path: Path) -> dict[str, Any]:
         "colours": _colours(picture), "make": exif.make, "model": exif.model, "lens": exif.lens,
         "taken": exif.text(36867) or exif.text(306), "focal_px": None if camera.assumed else round(camera.focal, 2),
         "focal_source": camera.source, "focal_mm": exif.focal_mm, "focal35_mm": exif.focal35_mm,
+        "undistorted": exif.undistorted,
         "orientation": exif.orientation, "problems": [*picture.warnings, *problems],
     }  # fmt: skip
 
@@ -104,6 +105,7 @@ def line_of(entry: dict[str, Any]) -> str:
     turned = "upright" if entry["orientation"] == 1 else f"turned upright (orientation {entry['orientation']})"
     parts = [f"{entry['width']}×{entry['height']} {entry['kind']}, {depth}, {channels}, {entry['colours']}",
              camera + lens, focal, turned]  # fmt: skip
+    parts += ["distortion removed already"] if entry["undistorted"] else []
     parts += [f"problem: {problem}" for problem in entry["problems"]]
     parts += [f"cannot be used: {entry['error']}"] if entry["error"] else []
     return f"{entry['file']}: {'; '.join(parts)}"

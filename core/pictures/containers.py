@@ -115,6 +115,19 @@ def says_surround(data: bytes) -> bool:
     return _SURROUND.search(data) is not None
 
 
+# Properties of XMP by which cameras and Adobe's programs say that they removed the lens's distortion; a profile alone is
+# what would be done to camera RAW
+_UNDISTORTED, _PROFILE_USED, _DONE = (
+    re.compile(name + rb"\s*(=\s*[\"']|>)\s*(true|1)\b", re.IGNORECASE)
+    for name in (rb"aux:DistortionCorrectionAlreadyApplied", rb"crs:LensProfileEnable", rb"crs:AlreadyApplied")
+)
+
+
+def says_undistorted(data: bytes) -> bool:
+    """Whether a file's XMP says that its lens's distortion was removed."""
+    return bool(_UNDISTORTED.search(data) or (_PROFILE_USED.search(data) and _DONE.search(data)))
+
+
 def _u32(data: bytes, at: int) -> int:
     return int.from_bytes(data[at : at + 4], "big")
 

@@ -43,7 +43,8 @@ class Exif:
 
     orientation: 1..8 as stored in the file. width, height (ExifImageWidth/Height) in pixels and focal_plane_*_per_mm in
     sensor pixels per mm belong to the picture as the sensor held it, unless `upright` turned them. heading: degrees
-    from true north to the east at which the camera looked. kept: (tag number, value) of the tags that are written
+    from true north to the east at which the camera looked. undistorted: whether the file says that its lens's
+    distortion was removed, which XMP does. kept: (tag number, value) of the tags that are written
     again; a value is a text, an integer, or (numerator, denominator).
     """
 
@@ -59,6 +60,7 @@ class Exif:
     width: int | None = None
     height: int | None = None
     heading: float | None = None
+    undistorted: bool = False
     kept: tuple[tuple[int, str | int | tuple[int, int]], ...] = ()
 
     def upright(self) -> Exif:

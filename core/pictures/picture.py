@@ -21,7 +21,7 @@ from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from ..raster.lazy import AnyImage, Coded, whole
 from ..system.errors import BadRequest, UnreadableImage
 from .camera_raw import is_raw
-from .containers import container_brand, read_structure, says_surround
+from .containers import container_brand, read_structure, says_surround, says_undistorted
 from .decoding import check_size, decode_exr, decode_file, read_file, turn
 from .heif_decoding import decode_heif
 from .metadata import Exif, read_exif
@@ -147,7 +147,7 @@ def _load(path: Path, pixels_per_byte: int, exposure: RawExposure | None) -> Pic
     if structure.kind == "hdr":
         raw, warnings = decode_radiance(data)
         return _picture(raw, False, Exif(), None, path.name, warnings)
-    exif = read_exif(structure.exif)
+    exif = replace(read_exif(structure.exif), undistorted=says_undistorted(data))
     if structure.heif is not None:  # its decoder has turned it
         heif, upright = decode_heif(data, structure), replace(exif.upright(), orientation=1)
         return _picture(heif.pixels, heif.associated, upright, heif.icc, path.name, [*heif.warnings])

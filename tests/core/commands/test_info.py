@@ -50,6 +50,22 @@ def test_a_line_for_each_file(folder: Path, capsys: pytest.CaptureFixture[str]) 
                              "right one")  # fmt: skip
 
 
+@pytest.mark.parametrize(("said", "removed"), [
+    ('aux:DistortionCorrectionAlreadyApplied="True"', True), ("<crs:LensProfileEnable>1</crs:LensProfileEnable>", False),
+    ('crs:LensProfileEnable="1" crs:AlreadyApplied="True"', True),
+    ('crs:LensProfileEnable="0" crs:AlreadyApplied="True"', False),
+    ("<aux:DistortionCorrectionAlreadyApplied>False</aux:DistortionCorrectionAlreadyApplied>", False),
+])  # fmt: skip
+def test_whether_the_distortion_was_removed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], said: str, removed: bool
+) -> None:
+    body = b"http://ns.adobe.com/xap/1.0/\0" + f"<x:xmpmeta>{said}</x:xmpmeta>".encode()
+    jpeg = cv2.imencode(".jpg", NOISE[..., :3])[1].tobytes()
+    (tmp_path / "a.jpg").write_bytes(jpeg[:2] + b"\xff\xe1" + (len(body) + 2).to_bytes(2, "big") + body + jpeg[2:])
+    assert main(["info", str(tmp_path)]) == 0
+    assert ("distortion removed already" in capsys.readouterr().out) is removed
+
+
 def test_camera_raw_is_called_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.dng").write_bytes(dng(mosaic(NOISE[..., :3] / 255)))
     assert main(["info", str(tmp_path)]) == 0
@@ -65,7 +81,7 @@ def test_a_document_holds_the_same(folder: Path, capsys: pytest.CaptureFixture[s
         "file": "", "error": "", "kind": "JPEG", "width": 90, "height": 120, "bits": 8, "channels": 3, "alpha": False,
         "colours": "sRGB", "make": "Canon", "model": "Canon EOS 6D", "lens": "EF24-105mm",
         "taken": "2020:01:02 03:04:05", "focal_px": 0, "focal_source": "EXIF 35 mm equivalent", "focal_mm": 50.0,
-        "focal35_mm": 50.0, "orientation": 6, "problems": [],
+        "focal35_mm": 50.0, "undistorted": False, "orientation": 6, "problems": [],
     }  # fmt: skip
     assert set(damaged) == {"file", "error"} and "damaged" in damaged["error"]
 
