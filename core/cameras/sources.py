@@ -140,8 +140,8 @@ def cameras_for(
     for number, (camera, exif) in enumerate(zip(cameras, exifs, strict=True)):
         if exif.undistorted and camera.distortion.any():
             warnings.append(
-                f"{called(number, names)} says that its lens's distortion was removed already, and --cameras removes it "
-                "once more: give its focal length without a distortion, or pictures as the camera took them"
+                f"{called(number, names)} says that its lens's distortion was removed already, and --cameras removes "
+                "it once more: give its focal length without a distortion, or pictures as the camera took them"
             )
         check_plausible(camera, called(number, names))
         folds = fold_warning(camera, called(number, names))

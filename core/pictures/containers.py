@@ -115,8 +115,8 @@ def says_surround(data: bytes) -> bool:
     return _SURROUND.search(data) is not None
 
 
-# Properties of XMP by which cameras and Adobe's programs say that they removed the lens's distortion; a profile alone is
-# what would be done to camera RAW
+# Properties of XMP by which cameras and Adobe's programs say that they removed the lens's distortion; a profile alone
+# is what would be done to camera RAW
 _UNDISTORTED, _PROFILE_USED, _DONE = (
     re.compile(name + rb"\s*(=\s*[\"']|>)\s*(true|1)\b", re.IGNORECASE)
     for name in (rb"aux:DistortionCorrectionAlreadyApplied", rb"crs:LensProfileEnable", rb"crs:AlreadyApplied")

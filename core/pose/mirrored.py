@@ -1,4 +1,4 @@
-"""Whether one of two pictures is mirrored: a symmetric scene is stitched all the same, and any other has no matches."""
+"""Whether a picture is mirrored beside others: a symmetric scene is stitched all the same, any other has no matches."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from ..system.errors import DegenerateGeometry, NoOverlap, TooFewMatches
 from . import features
 from .fundamental import explained_by, fundamental_candidates
 from .options import ESTIMATION, FEATURES, MIRROR
+
+# Which pictures are mirrored, in a message.
+OFTEN_SO = "scans of slides and selfies are often so"
 
 
 class _Found(Protocol):
@@ -43,33 +46,65 @@ def unless_mirrored(pictures: Sequence[Picture], make: Callable[[], Found], by_a
     except (TooFewMatches, NoOverlap, DegenerateGeometry):
         _refuse_mirrored(pictures)
         raise
-    enough = min(MIRROR.enough, pictures[0].view[..., 0].size // MIRROR.px_for_one)
-    if by_all and found.edges[0].two_view.inliers.sum() < enough:
+    if by_all and found.edges[0].two_view.inliers.sum() < enough_to_trust(pictures[0]):
         _refuse_mirrored(pictures)
     return found
 
 
+def enough_to_trust(picture: Picture) -> int:
+    """As many matches that agree as no mirror image has."""
+    return min(MIRROR.enough, picture.view[..., 0].size // MIRROR.px_for_one)
+
+
+def mirrored_among(pictures: Sequence[Picture], asked: Sequence[int]) -> dict[int, tuple[int, int]]:
+    """Which pictures (numbers) are mirrored beside others, of those that are asked about.
+
+    Returns
+    -------
+    dict
+        Of each the number of one that it agrees with only if it is flipped, and by how many points. Beside each other
+        both are mirrored: what is so beside most comes first, and then counts no more.
+    """
+    plain = [_few_features(picture) for picture in pictures] if asked else []
+    agree: dict[int, dict[int, int]] = {}
+    for number in asked:
+        mirror_image = _few_features(pictures[number], True)
+        for other, features_of_it in enumerate(plain):
+            mirrored = 0 if other == number else _agreeing(features_of_it, mirror_image)
+            if mirrored >= max(MIRROR.least, MIRROR.factor * _agreeing(features_of_it, plain[number])):
+                agree.setdefault(number, {})[other] = mirrored
+                agree.setdefault(other, {})[number] = mirrored
+    out = {}
+    while any(agree.values()):
+        worst = max(agree, key=lambda number: (len(agree[number]), sum(agree[number].values()), -number))
+        out[worst] = max(agree[worst].items(), key=lambda found: found[1])
+        for other in agree.pop(worst):
+            del agree[other][worst]
+    return out
+
+
 def _refuse_mirrored(pictures: Sequence[Picture]) -> None:
-    mirrored = _agreeing(pictures, True)
-    as_it_is = _agreeing(pictures, False) if mirrored >= MIRROR.least else 0
-    if mirrored >= max(MIRROR.least, MIRROR.factor * as_it_is):
+    found = mirrored_among(pictures, [1])
+    if found:
+        ((_, points),) = found.values()
         raise DegenerateGeometry(
-            f"one of the pictures is mirrored: {mirrored} points of the reference agree with the target if it is "
-            f"flipped left to right, {as_it_is} as it is; flip one of them (scans of slides and selfies are often so)"
+            f"one of the pictures is mirrored: {points} points of the reference agree with the target only if it is "
+            f"flipped left to right; flip one of them ({OFTEN_SO})"
         )
 
 
-def _agreeing(pictures: Sequence[Picture], flipped: bool) -> int:
-    """How many of few features agree on one geometry, with the target mirrored or not."""
-    views = [(picture.view, picture.alpha) for picture in pictures]
-    if flipped:
-        view, alpha = views[1]
-        views[1] = np.ascontiguousarray(view[:, ::-1]), None if alpha is None else np.ascontiguousarray(alpha[:, ::-1])
-    first, second = (
-        features.detect(view, alpha, FEATURES.preview_budget, FEATURES.preview_pixels) for view, alpha in views
-    )
+def _few_features(picture: Picture, flipped: bool = False) -> features.Features:
+    """As many as a preview has, of a picture or its mirror image."""
+    step = -1 if flipped else 1
+    view = np.ascontiguousarray(picture.view[:, ::step])
+    alpha = None if picture.alpha is None else np.ascontiguousarray(picture.alpha[:, ::step])
+    return features.detect(view, alpha, FEATURES.preview_budget, FEATURES.preview_pixels)
+
+
+def _agreeing(first: features.Features, second: features.Features) -> int:
+    """How many of few features agree on one geometry."""
     matches = features.match(first, second)
-    if len(matches) < ESTIMATION.min_matches:
+    if len(matches) < max(ESTIMATION.min_matches, MIRROR.least):
         return 0
     try:
         F = fundamental_candidates(matches, 0)[0]

@@ -10,6 +10,7 @@ import numpy as np
 from ..cameras.camera import Camera
 from ..cameras.rig import PictureMatches, Registration, Rig
 from ..pictures.picture import Picture
+from ..pose.mirrored import OFTEN_SO, enough_to_trust, mirrored_among
 from ..system.cache import Cache
 from ..system.progress import ReportProgress
 from .averaging.pairs import chosen_pairs
@@ -80,6 +81,9 @@ def registered(
         The same in whatever order the pictures are given, but for their numbers: those that connect come in the order
         that they were given in, and the first one's frame is the rig's.
     """
+    mirrored = _mirrored(pictures, matched)
+    right = tuple(one for one in matched.matches if mirrored.keys().isdisjoint((one.i, one.j)))
+    matched = replace(matched, matches=right)
     inner = renumbered(matched, np.argsort(order).tolist())
     cameras = tuple(cameras[number] for number in order)
     names = tuple(pictures[number].name for number in order)
@@ -92,10 +96,22 @@ def registered(
     kept = cache.remember("registration", (cameras, inner.points, inner.matches, inner.scale, seed, names), found)
     numbers = [order[number] for number in kept.numbers]
     ascending = np.argsort(numbers).tolist()
-    return Registration(
-        reordered(kept.rig, ascending), tuple(sorted(numbers)),
-        {order[number]: why for number, why in sorted(kept.left_out, key=lambda one: order[one[0]])},
-    )  # fmt: skip
+    left_out = {order[number]: why for number, why in sorted(kept.left_out, key=lambda one: order[one[0]])}
+    return Registration(reordered(kept.rig, ascending), tuple(sorted(numbers)), left_out | mirrored)
+
+
+def _mirrored(pictures: Sequence[Picture], matched: Matched) -> dict[int, str]:
+    """Which pictures are mirrored, of those that have few matches with any other, and what is said of them."""
+    most = [0] * len(pictures)
+    for one in matched.matches:
+        for number in (one.i, one.j):
+            most[number] = max(most[number], len(one.index))
+    asked = [number for number, picture in enumerate(pictures) if most[number] < enough_to_trust(picture)]
+    return {
+        number: f"it is mirrored: {points} points of {pictures[other].name} agree with it only if it is flipped left "
+        f"to right; flip it ({OFTEN_SO})"
+        for number, (other, points) in mirrored_among(pictures, [] if matched.given else asked).items()
+    }
 
 
 def renumbered(matched: Matched, numbers: Sequence[int]) -> Matched:

@@ -30,8 +30,9 @@ def by_uid(kind: Iterable[Any], uid: int | None) -> Any:
 def written_as(scene: bpy.types.Scene, file_format: str, bits: int) -> Iterator[bpy.types.Scene]:
     """The scene, as long as it lasts, with this format and depth for `Image.save_render`."""
     settings = scene.render.image_settings
+    mode = "RGB" if file_format == "HDR" else "RGBA"  # Radiance has no alpha
     # in this order: what a format offers depends on what stands before. 5.0 has media_type (movies, multilayer files).
-    wanted = {"media_type": "IMAGE", "file_format": file_format, "color_mode": "RGBA", "color_depth": str(bits)}
+    wanted = {"media_type": "IMAGE", "file_format": file_format, "color_mode": mode, "color_depth": str(bits)}
     names = [name for name in wanted if hasattr(settings, name)]
     before = [getattr(settings, name) for name in names]
     try:

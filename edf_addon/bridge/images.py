@@ -250,8 +250,8 @@ def _in_memory(loaded: bpy.types.Image) -> bpy.types.Image:
 
 
 def save(image: bpy.types.Image, path: Path) -> None:
-    """Writes an image with its values kept, whole or not at all: .exr 32-bit float, .png and .tif 8 bit, or 16 for
-    float images. Raises Unusable (no pixels, or a kind that is not written), OSError."""
+    """Writes an image with its values kept, whole or not at all: .exr 32-bit float, .hdr float without alpha, .png
+    and .tif 8 bit, or 16 for float images. Raises Unusable (no pixels, or a kind that is not written), OSError."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise Unusable(f"pictures are not saved as {path.suffix or 'files of no kind'}: use {', '.join(KINDS)}")
@@ -267,7 +267,7 @@ def save(image: bpy.types.Image, path: Path) -> None:
         beside.unlink(missing_ok=True)
 
 
-KINDS = {".exr": "OPEN_EXR", ".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF"}
+KINDS = {".exr": "OPEN_EXR", ".hdr": "HDR", ".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF"}
 _SIGNS = {".exr": b"\x76\x2f\x31\x01", ".png": b"\x89PNG\r\n\x1a\n"}
 
 
@@ -277,6 +277,6 @@ def _write(image: bpy.types.Image, path: Path, kind: str) -> None:
     if packed is not None and not image.is_dirty and sign is not None and packed.data[: len(sign)] == sign:
         path.write_bytes(packed.data)  # the file that the worker made, EXIF and ICC profile included
         return
-    bits = 32 if kind == "OPEN_EXR" else 16 if image.is_float else 8
+    bits = 32 if kind in ("OPEN_EXR", "HDR") else 16 if image.is_float else 8
     with compat.saving_scene(kind, bits) as scene:
         image.save_render(str(path), scene=scene)

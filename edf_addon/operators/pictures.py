@@ -111,7 +111,7 @@ class EDF_OT_swap(bpy.types.Operator):  # noqa: N801
 
 
 class EDF_OT_save(bpy.types.Operator):  # noqa: N801
-    """Save the panorama as a file with its values kept: EXR (float), PNG or TIFF"""
+    """Save the panorama as a file with its values kept: EXR or Radiance HDR (float), PNG or TIFF"""
 
     bl_idname = idnames.Operator.SAVE
     bl_label = "Save Panorama"

@@ -51,7 +51,8 @@ def test_a_line_for_each_file(folder: Path, capsys: pytest.CaptureFixture[str]) 
 
 
 @pytest.mark.parametrize(("said", "removed"), [
-    ('aux:DistortionCorrectionAlreadyApplied="True"', True), ("<crs:LensProfileEnable>1</crs:LensProfileEnable>", False),
+    ('aux:DistortionCorrectionAlreadyApplied="True"', True),
+    ("<crs:LensProfileEnable>1</crs:LensProfileEnable>", False),
     ('crs:LensProfileEnable="1" crs:AlreadyApplied="True"', True),
     ('crs:LensProfileEnable="0" crs:AlreadyApplied="True"', False),
     ("<aux:DistortionCorrectionAlreadyApplied>False</aux:DistortionCorrectionAlreadyApplied>", False),

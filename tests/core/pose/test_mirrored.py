@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
-from edf_stitch.core.pose.mirrored import unless_mirrored
+from edf_stitch.core.pose.mirrored import mirrored_among, unless_mirrored
 from edf_stitch.core.pose.options import MIRROR
 from edf_stitch.core.system.errors import DegenerateGeometry, NoOverlap
 
@@ -67,3 +67,14 @@ def test_another_reason_stays_what_it_is() -> None:
         unless_mirrored(views(False, False), fail)
     with pytest.raises(DegenerateGeometry, match="mirrored"):
         unless_mirrored(views(False, True), fail)
+
+
+def test_of_several_the_one_that_is_so_beside_most_is_named() -> None:
+    first, mirrored = views(False, True)
+    _, second = views(False, False)
+    stray = picture_from_array(np.random.default_rng(5).integers(0, 256, first.view.shape, np.uint8))
+    pictures = [stray, first, mirrored, second]
+    for asked in ([2], [0, 1, 2, 3]):
+        found = mirrored_among(pictures, asked)
+        assert list(found) == [2] and found[2][0] in (1, 3) and found[2][1] >= MIRROR.least
+    assert mirrored_among(pictures, [0]) == {} and mirrored_among([first, second], [0, 1]) == {}

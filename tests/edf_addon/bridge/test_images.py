@@ -258,6 +258,18 @@ def test_saving_keeps_the_values(blender, tmp_path, make, suffix):
     assert not [path for path in tmp_path.iterdir() if ".part" in path.name]
 
 
+@pytest.mark.parametrize("make", ["packed", "generated"])
+def test_saving_as_radiance_keeps_light_brighter_than_white(blender, tmp_path, make):
+    light = picture_from_array(gradient()).pixels * np.float32(40)
+    picture_files.write(tmp_path / "x.exr", light)
+    image = images.bring(tmp_path / "x.exr", "x", make == "packed", False)
+    images.save(image, tmp_path / "out.hdr")
+    saved = picture_files.read(tmp_path / "out.hdr")
+    assert saved.bits == 32 and (tmp_path / "out.hdr").read_bytes().startswith(b"#?RADIANCE")
+    # eight bits of the brightest channel
+    assert (np.abs(saved.pixels - light).max(axis=2) <= light.max(axis=2) / 120).all() and saved.pixels.max() > 30
+
+
 @pytest.mark.parametrize("suffix", [".png", ".tif", ".exr"])
 @pytest.mark.parametrize("channels", [3, 4])
 def test_saving_bytes_keeps_every_level(blender, tmp_path, suffix, channels):
