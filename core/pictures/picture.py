@@ -21,8 +21,9 @@ from ..raster.colour import Curve, encode, icc_channels, parse_icc, srgb_curve
 from ..raster.lazy import AnyImage, Coded, whole
 from ..system.errors import BadRequest, UnreadableImage
 from .camera_raw import is_raw
-from .containers import container_brand, read_structure, says_surround, says_undistorted
+from .containers import read_structure, says_surround, says_undistorted
 from .decoding import check_size, decode_exr, decode_file, read_file, turn
+from .foreign import foreign_kind
 from .heif_decoding import decode_heif
 from .metadata import Exif, read_exif
 from .options import READING
@@ -131,10 +132,11 @@ def _load(path: Path, pixels_per_byte: int, exposure: RawExposure | None) -> Pic
     data = read_file(path)
     if is_raw(data, path.suffix.lower()):
         return _developed(data, exposure, path.name)
-    if container_brand(data) == "AVIF":
-        raise UnreadableImage("AVIF pictures cannot be read; export it as PNG or JPEG")
     structure = read_structure(data)
     if structure is None:
+        foreign = foreign_kind(data)
+        if foreign is not None:
+            raise UnreadableImage(f"it is {foreign[0]}, which is not read; {foreign[1]}")
         raise UnreadableImage(f"not a picture of a known kind; export it as {_READABLE}")
     if structure.kind == "exr":
         found = decode_exr(data, pixels_per_byte)

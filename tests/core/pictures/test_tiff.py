@@ -219,6 +219,14 @@ def test_data_that_end_too_soon_are_damage() -> None:
             raw(by_hand(strips, [8] * 3, 3, HEIGHT, **tags))
 
 
+@pytest.mark.parametrize(("photometric", "name"), [(8, "CIELab"), (9, "ICCLab"), (10, "ITULab"), (32845, "LogLuv")])
+def test_colours_that_are_not_read_are_named(photometric: int, name: str) -> None:
+    """libtiff makes a yellowish picture of CIELab, whose white is another one."""
+    data = by_hand([scene(np.uint8).tobytes()], [8] * 3, 3, HEIGHT, t262=photometric)
+    with pytest.raises(UnreadableImage, match=f"holds {name} colours, which are not read; save it as RGB"):
+        read_tiff(data)
+
+
 @pytest.mark.parametrize(("compression", "name"), [
     (50002, "JPEG XL"), (50001, "WebP"), (50000, "Zstandard"), (34712, "JPEG 2000"), (34887, "LERC"), (34925, "LZMA"),
     (6, "JPEG of the old kind"),
