@@ -313,7 +313,12 @@ def _viewpoint(text: str) -> int | str:
 
 
 def _brackets(text: str) -> Brackets:
-    return int(text) if text.isdecimal() and int(text) > 1 else _choice(BRACKETS)(text)
+    if text.isdecimal() and int(text) > 1:
+        return int(text)
+    if text in BRACKETS:
+        return text
+    known = ", ".join(BRACKETS)
+    raise argparse.ArgumentTypeError(f"{text!r} is not known; choose from: {known}, or a number from 2")
 
 
 def _scale_metres(text: str) -> tuple[int | str, int | str, float]:

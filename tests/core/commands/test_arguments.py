@@ -219,3 +219,9 @@ def test_a_preview_is_one_of_a_stitch() -> None:
     assert not options_from(parser.parse_args([]), measure=False).preview
     with pytest.raises(BadRequest, match="leave it out"):
         options("--preview", "--crop", "1,2,30,40")
+
+
+def test_numbers_of_exposures_are_told_of(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parsed("--brackets", "0")
+    assert "'0' is not known; choose from: auto, off, or a number from 2" in capsys.readouterr().err
