@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest
 export OPENBLAS_NUM_THREADS := 1
 export BLENDER_RUN
 
-.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint bench extension clean
+.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference bench extension clean
 
 setup: $(READY)
 
@@ -85,6 +85,10 @@ lint: setup
 	mkdir -p .venv/types && ln -sfn ../.. .venv/types/edf_stitch
 	MYPYPATH=.venv/types $(BIN)/mypy --strict --follow-imports=silent --cache-dir=.mypy_cache/strict -p edf_stitch.core
 	MYPYPATH=.venv/types $(BIN)/mypy -p edf_stitch.edf_addon -p edf_stitch.synthetic_scenes
+
+# docs/reference.md, from the program itself.
+reference: setup
+	$(BIN)/python .ci/reference.py
 
 bench: setup
 	$(BIN)/python tests/benchmarks/bench.py

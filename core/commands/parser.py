@@ -21,6 +21,12 @@ class Parser(argparse.ArgumentParser):
         self._given = list(sys.argv[1:] if args is None else args)
         return super().parse_known_args(args, namespace)
 
+    @property
+    def commands(self) -> dict[str, argparse.ArgumentParser]:
+        """Its commands by their names."""
+        found = (action.choices for action in self._actions if isinstance(action, argparse._SubParsersAction))
+        return next(found, {})
+
     def error(self, message: str) -> NoReturn:
         meant = what_was_meant(message, self._given, _options_of(self))
         if meant:
@@ -33,12 +39,8 @@ class Parser(argparse.ArgumentParser):
 
 def _options_of(parser: argparse.ArgumentParser) -> list[str]:
     """The options of a parser and of its commands, as they are written."""
-    found: list[str] = []
-    for action in parser._actions:
-        found += action.option_strings
-        if isinstance(action, argparse._SubParsersAction):
-            found += [name for command in action.choices.values() for name in _options_of(command)]
-    return found
+    commands = parser.commands.values() if isinstance(parser, Parser) else ()
+    return [name for one in (parser, *commands) for action in one._actions for name in action.option_strings]
 
 
 def edf_parser() -> Parser:
