@@ -93,7 +93,11 @@ def test_options_that_are_named_exist(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", **named(WITH_COMMANDS))
-def test_commands_are_understood(page: Path) -> None:
+def test_commands_are_understood(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the configuration that the page shows, in the file that it names."""
+    for block in re.findall(r"```toml\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
+        (tmp_path / re.match(r"# (\S+):", block)[1]).write_text(block, "utf-8")
+    monkeypatch.chdir(tmp_path)
     calls = list(commands(page))
     for call in calls:
         edf_parser().parse_args(call)

@@ -6,6 +6,7 @@ Nothing heavy is imported before the arguments are understood.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import signal
 import sys
@@ -18,7 +19,7 @@ from ..system.streams import messages_may_be_lost, silence
 from .arguments import numbered, options_from
 from .file_arguments import exr_form
 from .info import run_info
-from .messages import print_summary, progress_shown, say, shortened, verdict_line
+from .messages import print_result, print_summary, progress_shown, say, shortened, verdict_line
 from .options import MESSAGES
 from .parser import edf_parser
 
@@ -137,16 +138,18 @@ def _stitch(args: argparse.Namespace) -> int:
             show("write", MESSAGES.written_share)
             warnings = [*result.warnings, *write(result, outputs, files)]
         _too_late_to_interrupt()
-    for warning in warnings:
-        print(f"edf: warning: {warning}", file=sys.stderr)
-    if not args.quiet:
-        height, width = result.panorama.alpha.shape
-        print(f"edf: {args.output}: {width}×{height}", file=sys.stderr)
-    if args.verbose:
-        print_summary(result.report, result.seconds)
     verdict = result.report["verdict"]
     if not args.quiet or verdict["is"] != "good":
         print(f"edf: verdict: {verdict_line(verdict)}", file=sys.stderr)
+    if not args.quiet:
+        height, width = result.panorama.alpha.shape
+        print(f"edf: {args.output}: {width}×{height}", file=sys.stderr)
+    for warning in warnings:
+        print(f"edf: warning: {warning}", file=sys.stderr)
+    if args.verbose:
+        print_summary(result.report, result.seconds)
+    if args.json:
+        print_result(outputs, result.report, warnings)
     return 1 if args.strict_verdict and verdict["is"] == "not usable" else 0
 
 
@@ -185,6 +188,8 @@ def _batch(args: argparse.Namespace) -> int:
     if not args.quiet:
         counts = ", ".join(f"{summary.count(status)} {status}" for status in ("done", "skipped", "failed"))
         print(f"edf: {request.summary}: {counts}", file=sys.stderr)
+    if args.json:
+        print(json.dumps(summary.as_dict(), indent=1))
     return summary.exit_code
 
 

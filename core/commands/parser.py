@@ -11,15 +11,64 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from .arguments import add_options
+from .config_file import add_config, with_config
 from .file_arguments import add_batch_files, add_files, shard
 from .info import INFO, add_info
 from .meant import what_was_meant
 
+# What most people need of the commands with many options: `--help` shows these, `--help-all` all of them.
+_COMMON = {
+    "stitch": (
+        "--output", "--projection", "--crop", "--viewpoint", "--focal35", "--exposure", "--preview", "--report",
+        "--depth", "--overwrite",
+    ),
+    "batch": (
+        "--output", "--resume", "--shard", "--format", "--projection", "--crop", "--focal35", "--exposure", "--depth",
+        "--overwrite",
+    ),
+    "compare": ("--output", "--fields", "--overwrite"),
+}  # fmt: skip
+_EXIT_CODES = """Exit codes of all commands: 0 done, 1 measured but not within its limits, 2 the call is wrong, 3 the
+pictures can't be stitched, 4 a file can't be read or written, 130 interrupted. `edf COMMAND --help` says more of
+each."""
+
 
 class Parser(argparse.ArgumentParser):
+    """A parser that says what was meant, takes arguments from a file, and has a short help beside the whole one.
+
+    common: the options that the short one shows; with none there is only the whole one.
+    """
+
+    common: tuple[str, ...] = ()
+
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         self._given = list(sys.argv[1:] if args is None else args)
-        return super().parse_known_args(args, namespace)
+        known = self._option_string_actions
+        return super().parse_known_args(
+            with_config(self._given, known) if "--config" in known else self._given, namespace
+        )
+
+    def format_help(self) -> str:
+        """What `--help` prints."""
+        if not self.common:
+            return super().format_help()
+        words = [action for action in self._actions if not action.option_strings]
+        options = [self._option_string_actions[name] for name in self.common]
+        formatter = self._get_formatter()
+        several = " ..." if words[0].nargs == "+" else ""
+        formatter.add_usage(f"%(prog)s {words[0].metavar}{several} -o {options[0].metavar} [options]", [], [])
+        formatter.add_text(self.description)
+        formatter.add_arguments(words)
+        formatter.start_section("what most people need")
+        formatter.add_arguments(options)
+        formatter.end_section()
+        rest = len([action for action in self._actions if action.option_strings]) - len(options)
+        formatter.add_text(f"{rest} more options, in groups: {self.prog} --help-all")
+        return formatter.format_help()
+
+    def format_full_help(self) -> str:
+        """What `--help-all` prints."""
+        return super().format_help()
 
     @property
     def commands(self) -> dict[str, argparse.ArgumentParser]:
@@ -48,6 +97,7 @@ def edf_parser() -> Parser:
     parser = Parser(
         prog="edf",
         description="Stitches photographs taken from different places into one picture seen from one place.",
+        epilog=_EXIT_CODES,
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and leave")
     commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND", required=True)
@@ -61,7 +111,20 @@ def edf_parser() -> Parser:
         commands.add_parser("validate", help="render scenes with known cameras and measure", description=_VALIDATE)
     )
     _add_demo(commands.add_parser("demo", help="make pictures, stitch them, say what was measured", description=_DEMO))
+    for name, common in _COMMON.items():
+        command = parser.commands[name]
+        assert isinstance(command, Parser)
+        command.common = common
+        command.add_argument("--help-all", action=_HelpAll, nargs=0, help="show all options, in groups, and exit")
+        add_config(command)
     return parser
+
+
+class _HelpAll(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        assert isinstance(parser, Parser)
+        print(parser.format_full_help(), end="")
+        raise SystemExit(0)
 
 
 class _Version(argparse.Action):
@@ -74,9 +137,9 @@ class _Version(argparse.Action):
 
 _STITCH = """Stitch 2 to 60 pictures into one, seen from one place. Of two, the first is REF and the other TARGET, which
 slides along its epipolar lines to meet it; more may come in any order, and those that connect with no others are left
-out and named. Messages go to stderr; the last line says whether the panorama is good, where to look at it, or why it is
-not usable. Exit codes: 0 done, 1 not usable (with --strict-verdict), 2 the call is wrong, 3 the pictures can't be
-stitched, 4 a file can't be read or written, 130 interrupted."""
+out and named. Messages go to stderr; of what came out the first line says whether the panorama is good, where to look
+at it, or why it is not usable. Exit codes: 0 done, 1 not usable (with --strict-verdict), 2 the call is wrong, 3 the
+pictures can't be stitched, 4 a file can't be read or written, 130 interrupted."""
 _BATCH = """Stitch every line of LIST.csv: pictures, a folder of them, or a clip of cameras that stand still
 (a_%04d.png or a_####.png), whose frames share one alignment. A line holds reference,target and, if wanted, a name; a
 header may name picture3 and so on, first, last, step, focal_px and focal35 as well. A bad one is reported and the rest
@@ -110,6 +173,7 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict-verdict", action="store_true", help="exit with 1 where the panorama is found not to be usable"
     )
+    _add_json(parser)
 
 
 def _add_batch(parser: argparse.ArgumentParser) -> None:
@@ -118,6 +182,7 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
     add_options(parser)
     add_batch_files(parser)
     _add_loudness(parser)
+    _add_json(parser)
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
@@ -161,6 +226,10 @@ def _add_demo(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     _add_loudness(parser)
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="what came out as a document on stdout (docs/formats.md)")
 
 
 def _add_loudness(parser: argparse.ArgumentParser) -> None:
