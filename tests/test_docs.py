@@ -28,7 +28,7 @@ def named(pages: list[Path]) -> dict[str, list]:
 
 def prose(page: Path) -> str:
     """A page without its blocks of code."""
-    return re.sub(r"^(```.*?^```|(?: {4}.*\n)+)", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    return re.sub(r"^(```.*?^```$|(?: {4}[^\n]*\n)+)", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
 
 
 def anchors(page: Path) -> set[str]:

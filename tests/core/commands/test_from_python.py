@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import edf_stitch
@@ -15,6 +16,7 @@ from edf_stitch.core.commands.parser import edf_parser
 from edf_stitch.core.commands.python_result import panorama_of
 from edf_stitch.core.output.camera_file import camera_table
 from edf_stitch.core.output.depth.range_image import range_image
+from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.pictures.picture import load_picture
 from edf_stitch.core.pipeline import StitchResult
 
@@ -79,6 +81,12 @@ def test_keywords_become_options(chosen: Callable[..., StitchOptions], tmp_path:
     assert kept.cache == tmp_path and kept.memory_gb == 2.5 and chosen().cache is None
 
 
+def test_it_knows_the_files_that_it_was_made_of(monkeypatch: pytest.MonkeyPatch, small_result: StitchResult) -> None:
+    monkeypatch.setattr(from_python, "stitch_pictures", lambda *_: small_result)
+    made = stitch(["left.jpg", np.zeros((9, 9, 3), np.uint8)], ignore=[None, "m.png"])
+    assert made.sources == (Path("left.jpg"), Path("m.png"))
+
+
 def test_options_are_accepted_whole_but_not_beside_keywords(chosen: Callable[..., StitchOptions]) -> None:
     options = StitchOptions(crop="full")
     assert chosen(options) is options
@@ -103,9 +111,17 @@ def test_a_notebook_shows_a_small_copy_and_the_verdict(
     small = load_picture(tmp_path / "small.png")
     height, width = small.light.shape[:2]
     assert 60 < max(height, width) <= 120
-    inside = panorama.alpha > 0
-    assert small.light[small.alpha > 0].mean() == pytest.approx(panorama.pixels[inside].mean(), rel=0.03)
+    assert small.light[small.alpha == 1].mean() == pytest.approx(panorama.pixels[panorama.alpha > 0].mean(), rel=0.05)
     assert "verdict" not in panorama._repr_html_() and "perspective: good&gt;" in panorama._repr_html_()
+
+
+def test_what_is_transparent_lends_no_colour_to_the_small_copy(panorama: Panorama) -> None:
+    """Columns by turns: gray that is shown, and white that is not."""
+    odd = np.arange(300) % 2 == 1
+    light, alpha = np.full((30, 300, 3), 0.25, np.float32), np.repeat(~odd[None], 30, axis=0)
+    light[:, odd] = 1.0
+    colours, covered = python_result._small(replace(panorama, panorama=Layer(light, alpha)), 150)
+    assert colours.shape == (15, 150, 3) and np.allclose(colours, 0.25) and np.allclose(covered, 0.5)
 
 
 def test_it_saves_what_the_command_would(panorama: Panorama, tmp_path: Path) -> None:

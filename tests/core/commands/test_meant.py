@@ -19,7 +19,7 @@ from edf_stitch.core.commands.cli import main
     (["stitch", "a", "b", "-o", "o.png", "--focal_px", "3"], "is --focal-px meant?"),
     (["stitch", "a", "b", "-o", "o.png", "--projektion", "x"], "is --projection meant?"),
     (["stich", "a", "b"], "is stitch meant?"),
-    (["stitch", "a", "b", "-o", "o.png", "--seam", "grphcut"], "is graphcut meant?"),
+    (["stitch", "a", "b", "-o", "o.png", "--seam", "GRAPHCUT"], "is graphcut meant?"),
     (["stitch", "a", "b", "-o", "o.png", "--projection", "panini:0.3"], "is pannini meant?"),
     (["stitch", "a", "b", "-o", "o.png", "--exposure", "Refrence"], "is reference meant?"),
     (["stitch", "a", "b", "-o", "o.png", "--exr-depth", "hafl"], "is half meant?"),
