@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest
 export OPENBLAS_NUM_THREADS := 1
 export BLENDER_RUN
 
-.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference bench extension clean
+.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference docs bench extension clean
 
 setup: $(READY)
 
@@ -90,6 +90,18 @@ lint: setup
 reference: setup
 	$(BIN)/python .ci/reference.py
 
+# The pages as a site in build/docs. Sphinx, since it is well kept, turns what it warns of into errors, and with MyST takes the
+# pages as they are: with the anchors of where the code is read.
+DOCS := .venv-docs
+$(DOCS)/.ready: Makefile
+	rm -rf $(DOCS)
+	$(PYTHON) -m venv $(DOCS)
+	$(DOCS)/bin/python -m pip install --quiet sphinx==9.0.4 myst-parser==5.2.0
+	touch $@
+
+docs: $(DOCS)/.ready
+	$(DOCS)/bin/sphinx-build -q -W --keep-going -b html docs build/docs
+
 bench: setup
 	$(BIN)/python tests/benchmarks/bench.py
 
@@ -100,4 +112,4 @@ extension: setup
 		--blender "$$BLENDER_RUN" --output-dir dist
 
 clean:
-	rm -rf .venv $(OLDEST) $(NEWEST) build dist wheels demo_output validation_quick validation_full validation_sets *.egg-info
+	rm -rf .venv $(OLDEST) $(NEWEST) $(DOCS) build dist wheels demo_output validation_quick validation_full validation_sets *.egg-info
