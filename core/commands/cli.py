@@ -160,6 +160,7 @@ def _batch(args: argparse.Namespace) -> int:
         from ..batch.list import read_list
         from ..batch.run import Outcome, run_batch
         from ..batch.units import BatchRequest
+        from ..measure.report import plain
         from ..system.memory import use_again
 
     use_again()
@@ -189,7 +190,7 @@ def _batch(args: argparse.Namespace) -> int:
         counts = ", ".join(f"{summary.count(status)} {status}" for status in ("done", "skipped", "failed"))
         print(f"edf: {request.summary}: {counts}", file=sys.stderr)
     if args.json:
-        print(json.dumps(summary.as_dict(), indent=1))
+        print(json.dumps(plain(summary.as_dict()), indent=1))
     return summary.exit_code
 
 
