@@ -9,8 +9,11 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from edf_stitch.core.commands.parser import edf_parser
+from edf_stitch.core.pictures.picture import load_picture
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [*(ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")),
@@ -107,10 +110,15 @@ def test_commands_are_understood(page: Path, tmp_path: Path, monkeypatch: pytest
     assert calls
 
 
-def test_the_readmes_python_runs(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = (ROOT / "README.md").read_text("utf-8")
-    (block,) = re.findall(r"^((?: {4}.*\n)*    from edf_stitch import .*\n(?: {4}.*\n)*)", text, re.MULTILINE)
+@pytest.mark.parametrize("page", **named([ROOT / "README.md", ROOT / "docs" / "how-to.md"]))
+def test_python_runs(page: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a folder with the files that it names; errors would be caught there, so what it saves is looked for."""
+    lines = r"(?:(?: {4}.*)?\n)*"
+    (block,) = re.findall(rf"^({lines} {{4}}from edf_stitch import .*\n{lines})", page.read_text("utf-8"), re.MULTILINE)
     for name, source in (("left.jpg", "reference.png"), ("right.jpg", "target.png")):
         shutil.copy(folder / source, tmp_path / name)
+    height, width = load_picture(folder / "target.png").light.shape[:2]
+    cv2.imwrite(str(tmp_path / "walker.png"), np.zeros((height, width), np.uint8))
     monkeypatch.chdir(tmp_path)
     exec("\n".join(line[4:] for line in block.splitlines()), {})
+    assert (tmp_path / "panorama.exr").is_file()
