@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest
 export OPENBLAS_NUM_THREADS := 1
 export BLENDER_RUN
 
-.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint bench extension clean
+.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference docs bench extension clean
 
 setup: $(READY)
 
@@ -86,6 +86,22 @@ lint: setup
 	MYPYPATH=.venv/types $(BIN)/mypy --strict --follow-imports=silent --cache-dir=.mypy_cache/strict -p edf_stitch.core
 	MYPYPATH=.venv/types $(BIN)/mypy -p edf_stitch.edf_addon -p edf_stitch.synthetic_scenes
 
+# docs/reference.md, from the program itself.
+reference: setup
+	$(BIN)/python .ci/reference.py
+
+# The pages as a site in build/docs. Sphinx, since it is well kept, turns what it warns of into errors, and with MyST takes the
+# pages as they are: with the anchors of where the code is read.
+DOCS := .venv-docs
+$(DOCS)/.ready: Makefile
+	rm -rf $(DOCS)
+	$(PYTHON) -m venv $(DOCS)
+	$(DOCS)/bin/python -m pip install --quiet sphinx==9.0.4 myst-parser==5.2.0
+	touch $@
+
+docs: $(DOCS)/.ready
+	$(DOCS)/bin/sphinx-build -q -W --keep-going -b html docs build/docs
+
 bench: setup
 	$(BIN)/python tests/benchmarks/bench.py
 
@@ -96,4 +112,4 @@ extension: setup
 		--blender "$$BLENDER_RUN" --output-dir dist
 
 clean:
-	rm -rf .venv $(OLDEST) $(NEWEST) build dist wheels demo_output validation_quick validation_full validation_sets *.egg-info
+	rm -rf .venv $(OLDEST) $(NEWEST) $(DOCS) build dist wheels demo_output validation_quick validation_full validation_sets *.egg-info

@@ -9,15 +9,41 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .core.cameras.sources import CameraRequest
+    from .core.commands.from_python import stitch
+    from .core.commands.python_result import Panorama
     from .core.options import StitchOptions
-    from .core.pipeline import stitch
-    from .core.system.errors import StitchError
+    from .core.system.errors import (
+        BadRequest,
+        Cancelled,
+        DegenerateGeometry,
+        NoOverlap,
+        NotEnoughMemory,
+        OutputTooLarge,
+        StitchError,
+        TooFewMatches,
+        UnreadableImage,
+        UnwritableOutput,
+    )
 
     __version__: str
 
-__all__ = ["StitchError", "StitchOptions", "__version__", "register", "stitch", "unregister"]
+# What is public: it changes only with a version that says so (docs/reference.md). Blender calls register, unregister.
+__all__ = [
+    "BadRequest", "CameraRequest", "Cancelled", "DegenerateGeometry", "NoOverlap", "NotEnoughMemory", "OutputTooLarge",
+    "Panorama", "StitchError", "StitchOptions", "TooFewMatches", "UnreadableImage", "UnwritableOutput", "__version__",
+    "register", "stitch", "unregister",
+]  # fmt: skip
 
-_HOMES = {"StitchError": ".core.system.errors", "StitchOptions": ".core.options", "stitch": ".core.pipeline"}
+_HOMES = {
+    "CameraRequest": ".core.cameras.sources", "Panorama": ".core.commands.python_result",
+    "StitchOptions": ".core.options", "stitch": ".core.commands.from_python",
+} | dict.fromkeys(
+    (
+        "BadRequest", "Cancelled", "DegenerateGeometry", "NoOverlap", "NotEnoughMemory", "OutputTooLarge",
+        "StitchError", "TooFewMatches", "UnreadableImage", "UnwritableOutput",
+    ), ".core.system.errors",
+)  # fmt: skip
 
 
 def register() -> None:

@@ -181,7 +181,10 @@ def test_nothing_names_a_registrys_host_or_a_place_on_somebodys_machine():
 
 def test_the_wheel_holds_every_package():
     """The list in pyproject.toml names them one by one; a room that it lacks is missing wherever pip installs."""
-    listed = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]["packages"]
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]
+    listed, data = settings["packages"], settings["package-data"]["edf_stitch"]
+    # type checkers look for the mark beside the package that is imported
+    assert set(data) == {"blender_manifest.toml", "py.typed"} and all((ROOT / name).is_file() for name in data)
     folders = {path.parent for package in PACKAGES for path in (ROOT / package).rglob("__init__.py")}
     names = [".".join(("edf_stitch", *folder.relative_to(ROOT).parts)) for folder in folders]
     assert sorted(listed) == sorted(["edf_stitch", *names])

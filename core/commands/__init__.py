@@ -1,4 +1,4 @@
-"""The command line and the worker process that Blender starts.
+"""The doors: the command line, the call from Python, and the worker process that Blender starts.
 
 May import everything in core.
 """

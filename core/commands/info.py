@@ -20,14 +20,14 @@ can be used, 2 the call is wrong, 4 one can't be read or is no flat photograph, 
 
 def add_info(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `edf info`."""
-    parser.set_defaults(run=_info)
     parser.add_argument(
         "pictures", metavar="PICTURE", type=Path, nargs="+", help="files, folders, or patterns like IMG_*.jpg"
     )
     parser.add_argument("--json", action="store_true", help="a document instead of lines (docs/formats.md)")
 
 
-def _info(args: argparse.Namespace) -> int:
+def run_info(args: argparse.Namespace) -> int:
+    """Says what was understood; returns the exit code."""
     from ..pictures.listing import listed
 
     entries = [entry_of(path) for path in listed(args.pictures)]

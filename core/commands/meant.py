@@ -33,6 +33,10 @@ def what_was_meant(message: str, given: Sequence[str], options: Sequence[str]) -
     if message == "the following arguments are required: -o/--output":
         more = "--preview makes a smaller one, which goes to a file too: " if "--preview" in given else ""
         return f"where the panorama or the results go is missing: {more}add -o and a name, like -o panorama.png"
+    wrong = re.search(r"'([^']*)' ?(?:is not known; choose from:|is neither .* one of:|\(choose from) (.*)", message)
+    if wrong is not None:
+        near = get_close_matches(wrong[1].lower(), re.findall(r"[\w.]+", wrong[2]), 1)
+        return f"{message}: is {near[0]} meant?" if near else ""
     unknown = re.match(r"unrecognized arguments: (--[^\s=]+)", message)
     near = get_close_matches(unknown[1].replace("_", "-"), options, 1, 0.7) if unknown is not None else []
     return f"{message}: is {near[0]} meant?" if near else ""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .options import MESSAGES
+
+if TYPE_CHECKING:
+    from ..output.outputs import OutputRequest
 
 
 def say(line: str) -> None:
@@ -50,6 +54,18 @@ def print_summary(report: dict[str, Any], seconds: dict[str, float]) -> None:
         _seconds_line(seconds),
     ]
     print("\n".join(f"edf: {line}" for line in lines), file=sys.stderr)
+
+
+def print_result(outputs: OutputRequest, report: dict[str, Any], warnings: Sequence[str]) -> None:
+    """What came out of a stitch, as a document on stdout; for --json."""
+    files = {"panorama": outputs.panorama, "report": outputs.report, "layers": outputs.layers, "warp": outputs.warp,
+             "cameras": outputs.cameras, "depth": outputs.depth, "mesh": outputs.mesh}  # fmt: skip
+    document = {
+        "schema": 1, "files": {what: str(path) for what, path in files.items() if path is not None},
+        "width": report["canvas"]["width"], "height": report["canvas"]["height"], "verdict": report["verdict"],
+        "warnings": list(warnings),
+    }  # fmt: skip
+    print(json.dumps(document, indent=1))
 
 
 def said(value: float | None, form: str) -> str:

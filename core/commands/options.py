@@ -36,5 +36,14 @@ class WorkerOptions:
     """The share told at most before everything is done."""
 
 
+@dataclass(frozen=True)
+class NotebookOptions:
+    """What a notebook shows of a panorama (`python_result`)."""
+
+    side: int = 800
+    """Longest side of the small copy, px: about the width of a notebook's cell."""
+
+
 MESSAGES = MessageOptions()
+NOTEBOOK = NotebookOptions()
 WORKER = WorkerOptions()

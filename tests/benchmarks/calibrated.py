@@ -1,4 +1,4 @@
-"""The README's table of cameras: estimated geometry against the known cameras of calibrated photographs.
+"""A table of docs/validation.md of cameras: estimated geometry against the known cameras of calibrated photographs.
 
     calibrated.py [--data DIR]
 

@@ -1,4 +1,4 @@
-"""The README's table of cameras of many pictures: all of a folder at once, against their known cameras.
+"""A table of docs/validation.md of cameras of many pictures: all of a folder at once, against their known cameras.
 
     calibrated_sets.py [--data DIR]
 

@@ -1,4 +1,4 @@
-"""The README's table: `edf stitch` on every pair of a folder, judged by an outside program.
+"""A table of docs/validation.md: `edf stitch` on every pair of a folder, judged by an outside program.
 
     score_pairs.py [--pairs DIR] [--score SCORE.py] [--field FIELD] [-o OUTDIR]
 

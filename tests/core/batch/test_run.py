@@ -56,6 +56,12 @@ def test_a_bad_pair_is_reported_and_the_rest_goes_on(
     assert looked_at.in_words() == "3×2, look at 2 places"
 
 
+def test_json_prints_the_summary_on_stdout(work: Path, quick: list, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(work, "--json", "--quiet") == 0
+    out, err = capsys.readouterr()
+    assert err == "" and json.loads(out) == summary(work / "out") and json.loads(out)["done"] == 3
+
+
 @pytest.mark.parametrize(("troubles", "expected"), [
     ({}, 0), ({"reference1": UnreadableImage("x")}, 4), ({"reference3": BadRequest("x")}, 2),
     ({"reference1": UnreadableImage("x"), "reference2": BadRequest("x")}, 4),

@@ -83,7 +83,7 @@ def test_a_stitch_from_files_to_files(
     out, err = said()
     assert out == ""
     height, width = small_result.alpha.shape
-    assert err.splitlines()[-2:] == [f"edf: {tmp_path / 'out.png'}: {width}×{height}", "edf: verdict: good"]
+    assert err.splitlines()[-2:] == ["edf: verdict: good", f"edf: {tmp_path / 'out.png'}: {width}×{height}"]
     assert set(files(tmp_path)) == {
         "out.png", "report.json", "report.timing.json", "report.matches.csv", "warp.npz", "layers/00_reference.png",
         "layers/01_target.png", "layers/occluded_01.png", "layers/confidence.png", "layers/labels.png",
@@ -166,14 +166,14 @@ def test_warnings_are_told_even_when_quiet(
     assert json.loads(report.read_text("utf-8"))["warnings"] == ["the sky is falling"]
 
 
-@pytest.mark.parametrize("rating, last, code", [
+@pytest.mark.parametrize("rating, told, code", [
     ("good", None, 0),
     ("look", "edf: verdict: look at these places: a seam (3,4 5×6, 7,8 9×10); a fold (1,2 3×4); it is mirrored; "
              "mend it", 0),
     ("not usable", "edf: verdict: not usable: it is mirrored; mend it", 1),
 ])  # fmt: skip
-def test_the_verdict_is_the_last_line_and_may_be_the_exit_code(
-    rating: str, last: str | None, code: int, pictures: list[str], tmp_path: Path, said: Callable,
+def test_the_verdict_comes_first_and_may_be_the_exit_code(
+    rating: str, told: str | None, code: int, pictures: list[str], tmp_path: Path, said: Callable,
     monkeypatch: pytest.MonkeyPatch, small_result: StitchResult,
 ) -> None:  # fmt: skip
     places = [([3, 4, 5, 6], "a seam"), ([1, 2, 3, 4], "a fold"), ([7, 8, 9, 10], "a seam")]
@@ -181,13 +181,24 @@ def test_the_verdict_is_the_last_line_and_may_be_the_exit_code(
         "is": rating, "because": "it is mirrored", "what_to_do": "mend it",
         "places": [{"box": box, "what": what} for box, what in places],
     }  # fmt: skip
-    told = replace(small_result, report={**small_result.report, "verdict": verdict})
-    monkeypatch.setattr(pipeline, "stitch", lambda *_, **__: told)
+    result = replace(small_result, report={**small_result.report, "verdict": verdict}, warnings=("rain",))
+    monkeypatch.setattr(pipeline, "stitch", lambda *_, **__: result)
     given = ["stitch", *pictures, "-o", str(tmp_path / "out.png"), "--overwrite"]
     assert main(given) == 0
-    assert said()[1].splitlines()[-1] == (last or "edf: verdict: good")
+    lines = [line for line in said()[1].splitlines() if "write (" not in line]
+    assert lines[0] == (told or "edf: verdict: good") and lines[-1] == "edf: warning: rain"
     assert main([*given, "--quiet", "--strict-verdict"]) == code
-    assert said()[1].splitlines() == ([last] if last else [])
+    assert said()[1].splitlines() == [*([told] if told else []), "edf: warning: rain"]
+
+
+def test_json_is_a_document_on_stdout(pictures: list[str], tmp_path: Path, said: Callable, quick: list) -> None:
+    out, report = str(tmp_path / "out.png"), str(tmp_path / "r.json")
+    assert main(["stitch", *pictures, "-o", out, "--report", report, "--json", "--quiet"]) == 0
+    document, err = said()
+    found = json.loads(document)
+    assert err == "" and found["files"] == {"panorama": out, "report": report} and found["schema"] == 1
+    assert found["verdict"]["is"] == "good" and found["warnings"] == []
+    assert load_picture(Path(out)).light.shape[:2] == (found["height"], found["width"])
 
 
 def test_pictures_and_options_reach_the_stitch(pictures: list[str], tmp_path: Path, quick: list) -> None:
@@ -573,4 +584,4 @@ def test_on_a_terminal_there_is_a_bar(folder: Path, tmp_path: Path) -> None:
     os.close(ours)
     text = shown.decode("utf-8")
     assert "features" in text and " %" in text and "\r" in text and "edf: features" not in text
-    assert re.search(r"out\.png: \d+×\d+\s+edf: verdict: good$", text.rstrip()), "the last lines are the panorama's"
+    assert re.search(r"edf: verdict: good\s+edf: .*out\.png: \d+×\d+\s+edf: warning", text), "and then what came out"

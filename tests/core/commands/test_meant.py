@@ -18,6 +18,11 @@ from edf_stitch.core.commands.cli import main
     (["compare", "x"], "add -o"), (["validate"], "add -o"),
     (["stitch", "a", "b", "-o", "o.png", "--focal_px", "3"], "is --focal-px meant?"),
     (["stitch", "a", "b", "-o", "o.png", "--projektion", "x"], "is --projection meant?"),
+    (["stich", "a", "b"], "is stitch meant?"),
+    (["stitch", "a", "b", "-o", "o.png", "--seam", "GRAPHCUT"], "is graphcut meant?"),
+    (["stitch", "a", "b", "-o", "o.png", "--projection", "panini:0.3"], "is pannini meant?"),
+    (["stitch", "a", "b", "-o", "o.png", "--exposure", "Refrence"], "is reference meant?"),
+    (["stitch", "a", "b", "-o", "o.png", "--exr-depth", "hafl"], "is half meant?"),
 ])  # fmt: skip
 def test_one_line_says_what_to_write(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(words) == 2

@@ -1,0 +1,125 @@
+"""`edf_stitch.stitch`: the whole stitch in one call, with the options of the command line as keywords."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cameras.scale import ScaleMetres
+from ..cameras.sources import CameraRequest
+from ..choices import Brackets, Crop, Exposing, Level, Slide
+from ..frames.reading import Source
+from ..options import StitchOptions
+from ..pipeline import stitch as stitch_pictures
+from ..system.cache import default_folder
+from ..system.errors import BadRequest
+from .python_result import Panorama, panorama_of
+
+Numbers = float | Sequence[float]
+Mask = str | Path | NDArray[Any]
+
+
+def stitch(
+    pictures: Sequence[Source], options: StitchOptions | None = None,
+    progress: Callable[[str, float], None] | None = None, cancelled: Callable[[], bool] | None = None, *,
+    focal_px: Numbers = (), focal_mm: Numbers = (), sensor_mm: Numbers = (), focal35: Numbers = (),
+    principal: Sequence[float] = (), cameras: str | Path | dict[str, Any] | None = None,
+    scale_metres: ScaleMetres | None = None, matches: str | Path | NDArray[Any] | None = None,
+    ignore: Mapping[str, Mask] | Sequence[Mask | None] = (), viewpoint: int | str | None = None,
+    require_all: bool = False, brackets: Brackets = "auto", scale: float = 1.0, crop: Crop = "auto",
+    field: str = "slack", fade: str = "continue", dense: bool = True, slide: Slide = "auto", projection: str = "auto",
+    level: Level = "auto", centre: tuple[float, float] | None = None, fov: float | None = None,
+    blend: str = "multiband", seam: str = "graphcut", mask: Mask | None = None, exposure: Exposing = "auto",
+    holes: str = "auto", preview: bool = False, cache: bool | str | Path = False, memory: float | None = None,
+    seed: int = 0, measure: bool = True,
+) -> Panorama:  # fmt: skip
+    """Stitch pictures into one panorama.
+
+    Parameters
+    ----------
+    pictures : sequence of str, Path or ndarray
+        2 to 60 files or arrays (8 and 16 bit display-encoded, float scene-linear; RGB(A) or gray). Of two the first is
+        the reference; more may come in any order.
+    options : StitchOptions, optional
+        All that may be chosen in one object, instead of the keywords from `focal_px` on.
+    progress : callable, optional
+        Called with a stage's name and the share (0..1) of everything that is done.
+    cancelled : callable, optional
+        Called between the steps of the work; says whether to stop.
+    focal_px, focal_mm, sensor_mm, focal35 : float or (float, float)
+        What is known of the cameras: one value for all pictures, or two of a pair. By default EXIF, or an estimate.
+    principal : (x, y) or (x, y, x', y')
+        Principal point, px.
+    cameras : str, Path or dict, optional
+        A camera file, or its content (docs/formats.md).
+    matches : str, Path or ndarray (N, 4 or 5), optional
+        Matches instead of those that are found.
+    ignore : dict or sequence of mask
+        Masks of what is kept out of everything, white = ignored: by picture's name, or one for each picture, or None.
+    mask : str, Path or ndarray, optional
+        Painted over the panorama of a pair: black = from the reference, white = from the target.
+    cache : bool, str or Path
+        Whether features, geometry and field are kept for the next stitch of the same pictures, or in which folder.
+    memory : float, optional
+        GB that may be taken; by default half of what is free.
+    measure : bool
+        Whether the report also compares the pictures in the overlap, which takes time.
+    scale_metres, viewpoint, require_all, brackets, scale, crop, field, fade, dense, slide, projection, level, centre, \
+fov, blend, seam, exposure, holes, preview, seed
+        As the options of `edf stitch` of these names, and in StitchOptions.
+
+    Returns
+    -------
+    Panorama
+
+    Raises
+    ------
+    StitchError
+        And its kinds, each saying what was found, what was needed and what to do. BadRequest: the call is wrong.
+        UnreadableImage: a file cannot be read. TooFewMatches, NoOverlap, DegenerateGeometry: the pictures cannot be
+        stitched. OutputTooLarge, NotEnoughMemory: the panorama is too large. Cancelled: asked to stop.
+    """
+    keep = default_folder() if cache is True else Path(cache) if cache else None
+    masks = {} if not isinstance(ignore, Mapping) else {"ignore_in": tuple((k, _file(v)) for k, v in ignore.items())}
+    camera = CameraRequest(
+        focal_px=_numbers(focal_px), focal_mm=_numbers(focal_mm), sensor_mm=_numbers(sensor_mm),
+        focal35=_numbers(focal35), principal=tuple(principal), cameras=cameras,
+    )  # fmt: skip
+    chosen = StitchOptions(
+        field=field, fade=fade, camera=camera,
+        matches=_file(matches), ignore=() if masks else tuple(map(_file, ignore)), viewpoint=viewpoint,
+        require_all=require_all, brackets=brackets, scale_metres=scale_metres, slide=slide, projection=projection,
+        level=level, centre=centre, fov=fov, scale=scale, crop=crop, dense=dense, blend=blend, seam=seam,
+        mask=_file(mask), exposure=exposure, holes=holes, preview=preview, seed=seed, measure=measure,
+        memory_gb=memory, cache=keep, **masks,
+    )  # fmt: skip
+    if options is not None and (given := _not_default(chosen)):
+        raise BadRequest(f"{given[0]} is given beside options: put it into the options, or give keywords only")
+    used = options or chosen
+    result = stitch_pictures(pictures, used, progress, cancelled)
+    return panorama_of(result, [Path(one) for one in pictures if isinstance(one, (str, Path))] + used.files_read)
+
+
+def _numbers(values: Numbers) -> tuple[float, ...]:
+    return tuple(values) if isinstance(values, Sequence) else (float(values),)
+
+
+def _file(given: Any) -> Any:
+    """A file's name as a path; anything else as it is."""
+    return Path(given) if isinstance(given, str) else given
+
+
+def _not_default(options: StitchOptions) -> list[str]:
+    """The names of the options that were chosen."""
+    default = StitchOptions()
+
+    def same(name: str) -> bool:
+        one, usual = getattr(options, name), getattr(default, name)
+        return one is usual or (not isinstance(one, np.ndarray) and bool(one == usual))
+
+    return [one.name for one in fields(options) if not same(one.name)]

@@ -1,0 +1,124 @@
+"""What is written for users is true: links lead somewhere, options exist, commands are understood, snippets run."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shlex
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.commands.parser import edf_parser
+from edf_stitch.core.pictures.picture import load_picture
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [*(ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")),
+         *sorted((ROOT / "docs").glob("*.md"))]  # fmt: skip
+WITH_COMMANDS = [ROOT / "README.md", ROOT / "docs" / "tutorial.md", ROOT / "docs" / "how-to.md"]
+# Scripts have options of their own, and what changed may name what is gone.
+OF_EDF = [page for page in PAGES if page.name not in ("CHANGELOG.md", "CONTRIBUTING.md")]
+# Options of other programs: pip's and Blender's own.
+FOREIGN = {"--command", "--enable", "--python"}
+
+
+def named(pages: list[Path]) -> dict[str, list]:
+    return {"argvalues": pages, "ids": [page.name for page in pages]}
+
+
+def prose(page: Path) -> str:
+    """A page without its blocks of code."""
+    return re.sub(r"^(```.*?^```$|(?: {4}[^\n]*\n)+)", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def anchors(page: Path) -> set[str]:
+    """What its headings are called in links."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def options() -> set[str]:
+    """Every option of every command."""
+    parser = edf_parser()
+    known = {name for action in parser._actions for name in action.option_strings}
+    for command in parser.commands.values():
+        known |= {name for action in command._actions for name in action.option_strings}
+    return known
+
+
+def commands(page: Path) -> Iterator[list[str]]:
+    """The calls of `edf` in its blocks of code, but for what shows how a call is formed."""
+    for line in re.findall(r"^ {4}(?:.*--command )?(edf .*)$", page.read_text("utf-8"), re.MULTILINE):
+        call = re.split(r" {2,}|#", line)[0]
+        if not re.search(r"\[|…", call):
+            yield shlex.split(call)[1:]
+
+
+@pytest.mark.parametrize("page", **named(PAGES))
+def test_links_lead_somewhere(page: Path) -> None:
+    """Files and headings of this repository; nothing is asked of a network."""
+    for target in re.findall(r"\]\(([^)\s]+)\)", prose(page)):
+        if re.match(r"\w+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        assert file.exists(), target
+        assert not anchor or anchor in anchors(file), target
+
+
+def test_the_map_names_every_page() -> None:
+    named_there = set(re.findall(r"\]\((\w[\w-]*\.md)\)", (ROOT / "docs" / "index.md").read_text("utf-8")))
+    assert named_there == {page.name for page in (ROOT / "docs").glob("*.md")} - {"index.md"}
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= 130
+
+
+def test_pictures_are_small_and_shown() -> None:
+    text = "".join(page.read_text("utf-8") for page in PAGES)
+    for picture in (ROOT / "docs").glob("*.jpg"):
+        assert picture.stat().st_size < 250_000 and re.search(rf"!\[.*\]\((docs/)?{picture.name}\)", text), picture.name
+
+
+def test_the_reference_is_what_the_program_says() -> None:
+    spec = importlib.util.spec_from_file_location("ci_reference", ROOT / ".ci" / "reference.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.FILE.read_text("utf-8") == module.reference(), "run `make reference`"
+
+
+@pytest.mark.parametrize("page", **named(OF_EDF))
+def test_options_that_are_named_exist(page: Path) -> None:
+    text = re.sub(r"`\.venv/bin/python [^`]*`|\]\([^)]*\)", "", page.read_text("utf-8"))
+    found = set(re.findall(r"(?<![\w-])--[a-z][\w-]*(?<!-)", text))
+    assert found - options() <= FOREIGN
+
+
+@pytest.mark.parametrize("page", **named(WITH_COMMANDS))
+def test_commands_are_understood(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the configuration that the page shows, in the file that it names."""
+    for block in re.findall(r"```toml\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
+        (tmp_path / re.match(r"# (\S+):", block)[1]).write_text(block, "utf-8")
+    monkeypatch.chdir(tmp_path)
+    calls = list(commands(page))
+    for call in calls:
+        edf_parser().parse_args(call)
+    assert calls
+
+
+@pytest.mark.parametrize("page", **named([ROOT / "README.md", ROOT / "docs" / "how-to.md"]))
+def test_python_runs(page: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a folder with the files that it names; errors would be caught there, so what it saves is looked for."""
+    lines = r"(?:(?: {4}.*)?\n)*"
+    (block,) = re.findall(rf"^({lines} {{4}}from edf_stitch import .*\n{lines})", page.read_text("utf-8"), re.MULTILINE)
+    for name, source in (("left.jpg", "reference.png"), ("right.jpg", "target.png")):
+        shutil.copy(folder / source, tmp_path / name)
+    height, width = load_picture(folder / "target.png").light.shape[:2]
+    cv2.imwrite(str(tmp_path / "walker.png"), np.zeros((height, width), np.uint8))
+    monkeypatch.chdir(tmp_path)
+    exec("\n".join(line[4:] for line in block.splitlines()), {})
+    assert (tmp_path / "panorama.exr").is_file()
