@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..cameras.bodies import Bodies
 from ..cameras.camera import Camera
 from ..cameras.rig import PictureMatches, Registration, Rig
 from ..pictures.picture import Picture
@@ -24,8 +25,9 @@ def content_order(pictures: Sequence[Picture]) -> list[int]:
 
 
 def matched_pictures(
-    pictures: Sequence[Picture], order: Sequence[int], quick: bool, cache: Cache, progress: ReportProgress
-) -> Matched:
+    pictures: Sequence[Picture], order: Sequence[int], bodies: Bodies, quick: bool, cache: Cache,
+    progress: ReportProgress,
+) -> Matched:  # fmt: skip
     """What pictures have in common.
 
     Parameters
@@ -33,6 +35,8 @@ def matched_pictures(
     pictures : sequence of Picture
     order : sequence of int
         See `content_order`.
+    bodies : Bodies
+        Of the pictures: views of one sphere are not compared with each other.
     quick : bool
         Whether a preview's few features will do.
     cache : Cache
@@ -49,7 +53,9 @@ def matched_pictures(
         [pictures[number] for number in order], quick, cache, lambda share: progress("features", share)
     )
     progress("matches", 0.0)
-    found = found_matches(seen, chosen_pairs(seen), cache, lambda share: progress("matches", share))
+    body = bodies.of[list(order)]
+    pairs = [(i, j) for i, j in chosen_pairs(seen) if body[i] != body[j]]
+    found = found_matches(seen, pairs, cache, lambda share: progress("matches", share))
     return renumbered(found, order)
 
 
