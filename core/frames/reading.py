@@ -61,7 +61,8 @@ def _check_views(count: int, options: StitchOptions, counted: str = "") -> None:
             f"{count} pictures given{counted}, at most {MOST_PICTURES} make one panorama: leave out those that show "
             "nothing new"
         )
-    options.check_goes_with(count)
+    if count > 2:  # of two one may be a sphere, which is more
+        options.check_goes_with(count)
 
 
 def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
@@ -180,8 +181,10 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         for view, camera in _as_flat(picture, number):
             shown.append(view)
             known.append(camera)
-    if any(known):
+    if len(shown) > len(pictures):
         _check_views(len(shown), options, " (a sphere counts as its eight views)")
+    elif len(shown) == 2:
+        options.check_goes_with(2)
     flat = [number for number, camera in enumerate(known) if camera is None]
     overlays = dict(zip(flat, overlays_in([shown[number] for number in flat]), strict=True))
     burnt_in = [overlays.get(number) for number in range(len(shown))]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..cameras.bodies import Bodies
+from ..cameras.bodies import Bodies, bodies_of
 from ..cameras.camera import Camera
 from ..cameras.rig import PictureMatches, Registration, Rig
 from ..pictures.picture import Picture
@@ -87,8 +87,12 @@ def registered(
         that they were given in, and the first one's frame is the rig's.
     """
     inner = renumbered(matched, np.argsort(order).tolist())
+    first_of_body = bodies_of(cameras).of.tolist()
     cameras = tuple(cameras[number] for number in order)
-    names = tuple(pictures[number].name for number in order)
+    names = tuple(
+        pictures[number].name if camera.view_of is None else camera.view_of.name
+        for number, camera in zip(order, cameras, strict=True)
+    )
 
     def found() -> _Kept:
         one = register(cameras, inner.points, inner.matches, inner.scale, seed, progress, names)
@@ -98,10 +102,8 @@ def registered(
     kept = cache.remember("registration", (cameras, inner.points, inner.matches, inner.scale, seed, names), found)
     numbers = [order[number] for number in kept.numbers]
     ascending = np.argsort(numbers).tolist()
-    return Registration(
-        reordered(kept.rig, ascending), tuple(sorted(numbers)),
-        {order[number]: why for number, why in sorted(kept.left_out, key=lambda one: order[one[0]])},
-    )  # fmt: skip
+    left_out = {first_of_body[order[number]]: why for number, why in kept.left_out}
+    return Registration(reordered(kept.rig, ascending), tuple(sorted(numbers)), dict(sorted(left_out.items())))
 
 
 def renumbered(matched: Matched, numbers: Sequence[int]) -> Matched:

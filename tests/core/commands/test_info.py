@@ -67,10 +67,9 @@ def test_a_document_holds_the_same(folder: Path, capsys: pytest.CaptureFixture[s
 
 def test_spheres_and_circles_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     part = SpherePart((400, 200), (100, 20, 120, 90))
-    whole, cropped = (encode_picture(picture_from_array(NOISE[:60, :, :3]).pixels, None, 8, ".png", sphere=one)[0]
-                      for one in (whole_sphere((120, 60)), part))  # fmt: skip
-    (tmp_path / "whole.png").write_bytes(whole)
-    (tmp_path / "part.png").write_bytes(cropped)
+    for name, one in ("whole.png", whole_sphere((120, 60))), ("part.png", part):
+        pixels = picture_from_array(NOISE[: one.box[3], :, :3]).pixels
+        (tmp_path / name).write_bytes(encode_picture(pixels, None, 8, ".png", sphere=one)[0])
     row, column = np.mgrid[:200, :300]
     disc = np.hypot(column - 150, row - 100) < 95
     cv2.imwrite(str(tmp_path / "circle.png"), disc.astype(np.uint8) * 200)
