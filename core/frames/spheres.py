@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from ..cameras.camera import Camera, ViewOf
 from ..cameras.lens_models import Lens
 from ..pictures.gpano import SpherePart
+from ..pictures.naming import VIEWS, view_name
 from ..pictures.picture import Picture
 from ..raster.arrays import Array, bounds, dilated, larger_parts, small_strips
 from ..raster.lazy import Coded, whole
@@ -25,9 +25,8 @@ from ..raster.log_encoding import log_decode, log_encode
 from ..raster.sampling import fetch
 from .options import SPHERES
 
-# What a view is called, and where it looks: degrees to the right of the middle of what the sphere shows, and upwards.
-_RING = ("front", "front right", "back right", "back", "back left", "front left")
-_LOOKS = {name: (60.0 * number, 0.0) for number, name in enumerate(_RING)} | {"up": (0.0, 90.0), "down": (0.0, -90.0)}
+# Where views look: degrees to the right of the middle of what the sphere shows, and upwards.
+_LOOKS = (*((60.0 * number, 0.0) for number in range(6)), (0.0, 90.0), (0.0, -90.0))
 
 
 def views_of_sphere(picture: Picture, part: SpherePart, number: int) -> Iterator[tuple[Picture, Camera]]:
@@ -50,7 +49,7 @@ def views_of_sphere(picture: Picture, part: SpherePart, number: int) -> Iterator
     """
     sphere = _Sphere.of(picture, part)
     middle = 360 * ((part.box[0] + part.box[2] / 2) / part.full[0] - 0.5)
-    for name, (heading, pitch) in _LOOKS.items():
+    for name, (heading, pitch) in zip(VIEWS, _LOOKS, strict=True):
         turn = _rotation(middle + heading, pitch)
         across, down = SPHERES.pole_deg if pitch else SPHERES.ring_deg
         found = _cut_out(sphere, turn, across, down)
@@ -62,12 +61,6 @@ def views_of_sphere(picture: Picture, part: SpherePart, number: int) -> Iterator
             K, (width, height), "its sphere", 0.0, lens=Lens(), view_of=ViewOf(number, picture.name, turn)
         )
         yield replace(view, name=view_name(picture.name, name)), camera
-
-
-def view_name(sphere: str, view: str) -> str:
-    """What a view of the picture of this name is called."""
-    path = Path(sphere)
-    return path.with_name(f"{path.stem} ({view}){path.suffix}").as_posix()
 
 
 def _rotation(heading: float, pitch: float) -> Array:

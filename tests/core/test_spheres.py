@@ -13,7 +13,7 @@ from edf_stitch.core.pictures.picture import Picture, picture_from_array
 from edf_stitch.core.pipeline import stitch
 from edf_stitch.core.system.errors import NoOverlap
 
-from .textured_room import flat, seen, sphere, sphere_rays, turned
+from .textured_room import circle, flat, seen, sphere, sphere_rays, turned
 
 HEIGHT, SIZE, FOCAL = 400, (320, 240), 190.0
 # Places (m) and rotations, world to camera.
@@ -117,3 +117,16 @@ def test_the_panorama_from_its_place_is_the_sphere(whole: Picture) -> None:
     assert result.panorama.alpha.min() > 0.99
     assert np.median(off) < 0.012 and np.percentile(off, 99.9) < 0.1
     assert [picture.name for picture in result.pictures][:2] == ["drone (front).jpg", "drone (front right).jpg"]
+
+
+def test_a_fisheyes_circle_and_stills_are_placed() -> None:
+    """No lens is given: the circle's middle and radius and 180° are one."""
+    fisheye = picture_from_array(circle(AT_SPHERE, TILTED, 290, (620, 600)), "eye.jpg")
+    frame, geometry = aligned([fisheye, *taken(0, 2)])
+    rig = geometry.rig
+    assert sum("eye.jpg is the circle of a fisheye" in line for line in geometry.warnings) == 1
+    assert any("80° from the lens's axis is left out of eye.jpg" in line for line in frame.warnings)
+    assert len(rig) == 3 and rig.cameras[0].focal == pytest.approx(290 / (np.pi / 2), rel=0.01)
+    for number in (0, 2):  # which share a corner: a wall alone leaves two poses
+        R = rig.R[of(f"{number}.png", frame, geometry)]
+        assert rotation_angle(R, STILLS[number][1] @ TILTED.T) < 0.3

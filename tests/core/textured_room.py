@@ -65,3 +65,14 @@ def sphere(place: np.ndarray, R: np.ndarray, height: int, seed: int = 0) -> np.n
     """What a sphere at a place sees, levels float32 (H, 2 H, 3)."""
     fine = seen(place, sphere_rays(2 * height) @ R, seed)
     return cv2.resize(fine, (2 * height, height), interpolation=cv2.INTER_AREA)
+
+
+def circle(place: np.ndarray, R: np.ndarray, radius: int, size: tuple[int, int], seed: int = 0) -> np.ndarray:
+    """What an equidistant fisheye of 180° sees, levels uint8: a circle of so many px about the middle, black around."""
+    (width, height), focal = size, radius / (np.pi / 2)
+    v, u = np.mgrid[:height, :width].astype(float)
+    x, y = u - (width - 1) / 2, v - (height - 1) / 2
+    off = np.hypot(x, y)
+    across = np.sin(off / focal) / np.maximum(off, 1e-9)
+    levels = seen(place, np.stack([x * across, y * across, np.cos(off / focal)], -1) @ R, seed)
+    return np.where((off < radius)[..., None], np.rint(levels), 0).astype(np.uint8)
