@@ -7,8 +7,7 @@ from pathlib import Path
 
 from ..system.errors import BadRequest
 
-
-# What the flat views of a sphere are called: six around from the left to the right, then the poles.
+# What the flat views of a sphere are called: six around, each to the right of the one before, and two at the poles.
 VIEWS = ("front", "front right", "back right", "back", "back left", "front left", "up", "down")
 
 

@@ -57,7 +57,8 @@ def test_a_document_holds_the_same(folder: Path, capsys: pytest.CaptureFixture[s
     first, damaged = found["pictures"]
     assert found["schema"] == 1
     assert first | {"file": "", "focal_px": 0} == {
-        "file": "", "error": "", "shows": "flat picture", "kind": "JPEG", "width": 90, "height": 120, "bits": 8, "channels": 3, "alpha": False,
+        "file": "", "error": "", "shows": "flat picture",
+        "kind": "JPEG", "width": 90, "height": 120, "bits": 8, "channels": 3, "alpha": False,
         "colours": "sRGB", "make": "Canon", "model": "Canon EOS 6D", "lens": "EF24-105mm",
         "taken": "2020:01:02 03:04:05", "focal_px": 0, "focal_source": "EXIF 35 mm equivalent", "focal_mm": 50.0,
         "focal35_mm": 50.0, "orientation": 6, "problems": [],
