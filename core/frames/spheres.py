@@ -75,7 +75,7 @@ def _rotation(heading: float, pitch: float) -> Array:
 class _Sphere:
     """A picture and what of a sphere it shows; values: its levels, or its light log-encoded, view: what features see of
     it where that is something else, opaque: where it shows something (H, W) float32; all with a margin of `margin` px
-    that goes on over ±180° and the poles where it has them, and else is transparent."""
+    (`_padded`)."""
 
     picture: Picture
     part: SpherePart
@@ -114,15 +114,10 @@ def _missing(picture: Picture) -> NDArray[np.bool_]:
 
 
 def _padded(values: NDArray[Any], part: SpherePart, margin: int) -> NDArray[Any]:
-    """Values (H, W[, C]) of a sphere with a margin: what lies on its other side, or the border repeated."""
-    (_, top, width, height), full = part.box, part.full
+    """Values (H, W[, C]) of a sphere with a margin: at the ends of a whole turn the other end, else the border."""
     flat = values.reshape(*values.shape[:2], -1)
-    if width == full[0]:
-        across = np.roll(flat, width // 2, axis=1)
-        above = across[:margin][::-1] if top == 0 else np.repeat(flat[:1], margin, axis=0)
-        below = across[-margin:][::-1] if top + height == full[1] else np.repeat(flat[-1:], margin, axis=0)
-        return np.pad(np.concatenate([above, flat, below]), [(0, 0), (margin, margin), (0, 0)], mode="wrap")
-    return np.pad(flat, [(margin, margin), (margin, margin), (0, 0)], mode="edge")
+    higher = np.pad(flat, [(margin, margin), (0, 0), (0, 0)], mode="edge")
+    return np.pad(higher, [(0, 0), (margin, margin), (0, 0)], mode="wrap" if part.box[2] == part.full[0] else "edge")
 
 
 def _cut_out(sphere: _Sphere, turn: Array, across: float, down: float) -> tuple[Picture, Array] | None:

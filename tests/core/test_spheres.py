@@ -60,6 +60,7 @@ def test_a_sphere_and_stills_are_placed(whole: Picture) -> None:
     for number in views:
         assert np.allclose(rig.R[number], rig.cameras[number].view_of.R, atol=1e-9), "the first view is the frame"
     assert not rig.t[views].any()
+    assert not any({edge.i, edge.j} <= set(views) for edge in rig.edges), "views of one sphere are not compared"
     places, true = [], []
     for number, (place, R) in enumerate(STILLS):
         j = of(f"{number}.png", frame, geometry)
@@ -82,6 +83,7 @@ def test_a_sphere_and_one_still_are_stitched_as_seen_from_either(whole: Picture)
     assert np.allclose(geometry.rig.R[0], np.eye(3)) and not geometry.rig.t[0].any()
 
 
+@pytest.mark.slow
 def test_two_spheres_from_different_places(whole: Picture) -> None:
     place, R = np.array([0.5, 0.2, 0.2]), turned(-70, -6, 5)
     other = picture_from_array(np.rint(sphere(place, R, HEIGHT)).astype(np.uint8), "other.jpg")
@@ -94,6 +96,7 @@ def test_two_spheres_from_different_places(whole: Picture) -> None:
     assert np.linalg.norm(found - true / np.linalg.norm(true)) < 0.01, "the only length is the unit"
 
 
+@pytest.mark.slow
 def test_a_sphere_of_another_room_is_left_out_and_named_once(whole: Picture) -> None:
     elsewhere = picture_from_array(flat(*STILLS[0], FOCAL, SIZE, seed=1), "elsewhere.png")
     with pytest.raises(NoOverlap, match="no two of these|no two pictures connect"):

@@ -21,7 +21,7 @@ HEIGHT = 160
 
 def smooth(rays: np.ndarray) -> np.ndarray:
     """Levels 0 to 1 (…, 3) that change slowly with direction."""
-    waves = np.array([[4.0, 1, 2], [-1, 3, 2], [2, -3, 3]])
+    waves = 2 * np.array([[4.0, 1, 2], [-1, 3, 2], [2, -3, 3]])
     return 0.5 + 0.4 * np.sin(rays @ waves.T)
 
 
@@ -53,7 +53,7 @@ def worst(picture: Picture, part: SpherePart | None = None) -> float:
 
 def test_every_pixel_of_a_view_shows_what_it_looks_at() -> None:
     eight = picture_from_array(np.rint(255 * LEVELS).astype(np.uint8), "s.jpg")
-    assert worst(eight) < 0.008, "over ±180° and the poles too"
+    assert worst(eight) < 0.01, "over ±180° and the poles too"
     found = views(eight)
     assert [view.name for view, _ in found][:2] == ["s (front).jpg", "s (front right).jpg"] and len(found) == 8
     assert all(view.alpha is None for view, _ in found)
@@ -69,7 +69,7 @@ def test_every_pixel_of_a_view_shows_what_it_looks_at() -> None:
 
 def test_depths_of_bits_stay() -> None:
     sixteen = picture_from_array(np.rint(65535 * LEVELS).astype(np.uint16))
-    assert worst(sixteen) < 0.008
+    assert worst(sixteen) < 0.01
     view = views(sixteen)[0][0]
     assert isinstance(view.light, Coded) and view.light.levels.dtype == np.uint16 and view.bits == 16
     lamp = LEVELS.astype(np.float32).copy()
@@ -87,7 +87,7 @@ def test_of_a_part_there_are_only_the_views_that_show_something() -> None:
     part = picture_from_array(np.rint(255 * LEVELS[top : top + height, left : left + width]).astype(np.uint8), "p")
     found = views(part, SpherePart((2 * HEIGHT, HEIGHT), box))
     assert [view.name for view, _ in found] == ["p (front)", "p (front right)", "p (front left)"]
-    assert worst(part, SpherePart((2 * HEIGHT, HEIGHT), box)) < 0.008
+    assert worst(part, SpherePart((2 * HEIGHT, HEIGHT), box)) < 0.01
     front = found[0][1]
     assert np.degrees(np.arctan2(front.view_of.R[2, 0], front.view_of.R[2, 2])) == pytest.approx(
         360 * (left + width / 2) / (2 * HEIGHT) - 180
