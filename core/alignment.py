@@ -204,14 +204,14 @@ def estimate_geometry(frames: Sequence[Frame], options: StitchOptions, progress:
     pictures, sizes = frames[0].pictures, frames[0].full_sizes
     if any(frame.full_sizes != sizes for frame in frames):
         raise BadRequest("the frames of a clip differ in size: one alignment is for one camera each")
-    full, warnings = cameras_for(options.camera, frames[0].names, sizes, [picture.exif for picture in pictures])
+    full, warnings = cameras_for(options.camera, frames[0].names, sizes, frames[0].exifs, frames[0].known)
     cameras = tuple(camera.resized(size_of(picture)) for camera, picture in zip(full, pictures, strict=True))
     if len(pictures) > 2:
         found = _of_many(frames[0], cameras, warnings, options, progress)
     else:
         pair = partial(_of_pair, frames, cameras, warnings, options, progress)
         found = pair() if options.matches is not None else unless_mirrored(pictures, pair, not options.few_features)
-    places = Places(frames[0].names, frames[0].shown_by, found.numbers, found.centres)
+    places = Places(frames[0].called, frames[0].shown_by, found.numbers, found.centres)
     return replace(found, scale=scale_for(options.scale_metres, cameras, places))
 
 
@@ -254,7 +254,7 @@ def _of_many(
     pictures, cache = frame.pictures, Cache(options.cache)
     order = content_order(pictures)
     if options.matches is None:
-        matched = matched_pictures(pictures, order, options.few_features, cache, progress)
+        matched = matched_pictures(pictures, order, frame.bodies, options.few_features, cache, progress)
     else:
         worked = [camera.size for camera in cameras]
         matched = given_matches(options.matches, pictures, frame.full_sizes, worked)
@@ -263,10 +263,10 @@ def _of_many(
     )
     cameras, overruled = without_wrong_exif(cameras, doubted, frame.names)
     found = registered(pictures, order, cameras, matched, options.seed, cache, progress)
-    check_connected(found, frame.names, options.require_all)
-    left_out = tuple((frame.names[number], why) for number, why in found.left_out.items())
-    warnings = (*warnings, *overruled, *left_out_warnings(found, cameras, frame.names))
-    found = seen_from(found, options.viewpoint, frame.names, frame.shown_by)
+    check_connected(found, frame.called, options.require_all)
+    left_out = tuple((frame.called[number], why) for number, why in found.left_out.items())
+    warnings = (*warnings, *overruled, *left_out_warnings(found, cameras, frame.called))
+    found = seen_from(found, options.viewpoint, frame.called, frame.shown_by)
     if len(found.numbers) == 2:
         pair_options = replace(options, viewpoint=None, scale_metres=None)
         pair = estimate_geometry([frame.only(found.numbers)], pair_options, progress)

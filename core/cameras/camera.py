@@ -21,6 +21,16 @@ class Knowledge(StrEnum):
     ASSUMED = "assumed"  # not known at all: a usual focal length
 
 
+@dataclass(frozen=True, eq=False)
+class ViewOf:
+    """That a picture is a view of a sphere: the sphere's number among the pictures given and its name, and the
+    rotation R (3, 3) from its axes to the view's."""
+
+    sphere: int
+    name: str
+    R: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class Camera:
     """One picture's camera as known before matching.
@@ -51,6 +61,8 @@ class Camera:
         A lens of another kind, which then is known; None where `distortion` says all.
     start : (3, 3), optional
         A rotation, world to camera, to begin with: nothing is held by it.
+    view_of : ViewOf, optional
+        Where the picture is a view of a sphere, whose views turn and move as one.
     """
 
     K: NDArray[np.float64]
@@ -65,6 +77,7 @@ class Camera:
     in_metres: bool = False
     lens: Lens | None = None
     start: NDArray[np.float64] | None = None
+    view_of: ViewOf | None = None
 
     @property
     def focal(self) -> float:

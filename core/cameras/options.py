@@ -28,6 +28,8 @@ class IntrinsicsOptions:
     same_sensor: float = 0.08
     # σ of the principal point in units of the longer side: the axis does not meet the sensor in its middle.
     principal_sigma: float = 0.01
+    # Degrees that a fisheye's circle is taken to show: most are built for 180, from 170 to 190 are sold.
+    circle_deg: float = 180.0
 
 
 @dataclass(frozen=True)

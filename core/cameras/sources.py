@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..system.errors import BadRequest
 from .camera import Camera, Knowledge
+from .from_circle import assumed_of_circle
 from .from_exif import camera_from_exif, camera_of_focal, focal_from_35mm
 from .lens_entries import lens_of
 from .options import INTRINSICS
@@ -80,8 +81,9 @@ def called(number: int, names: Sequence[str]) -> str:
 
 
 def cameras_for(
-    request: CameraRequest, names: Sequence[str], sizes: Sequence[tuple[int, int]], exifs: Sequence[Exif]
-) -> tuple[list[Camera], list[str]]:
+    request: CameraRequest, names: Sequence[str], sizes: Sequence[tuple[int, int]], exifs: Sequence[Exif],
+    known: Sequence[Camera | None] = (),
+) -> tuple[list[Camera], list[str]]:  # fmt: skip
     """What is known of the pictures' cameras before matching.
 
     The user's word comes first, then EXIF, then another picture's focal length, then a usual one.
@@ -96,6 +98,9 @@ def cameras_for(
         (W, H) px after orientation was applied.
     exifs : sequence of Exif
         Of the upright pictures.
+    known : sequence of (Camera or None), optional
+        Cameras that follow from what a picture is; only a camera file knows better, and no other picture is taken by
+        them.
 
     Returns
     -------
@@ -113,12 +118,15 @@ def cameras_for(
     """
     warnings: list[str] = []
     profiles: dict[str, LensProfile] = {}
-    held: Sequence[Camera | None] = [None] * len(names)
+    known = known or [None] * len(names)
+    held: Sequence[Camera | None] = known
     if request.cameras is not None:
         table, unit = camera_table(request.cameras, names, exifs)
         profiles = {name: entry for name, entry in table.items() if isinstance(entry, LensProfile)}
         if not profiles:
-            held = read_camera_file({"cameras": table, "unit": unit}, names, sizes)
+            told = read_camera_file({"cameras": table, "unit": unit}, names, sizes)
+            held = [own if one is None else replace(one, view_of=own.view_of) if own else one
+                    for one, own in zip(told, known, strict=True)]  # fmt: skip
         if len(names) > 2 and set(table) - set(names):
             warnings.append(f"the camera file names what is none of the pictures: {_strangers(table, names)}")
     cameras = [
@@ -126,18 +134,27 @@ def cameras_for(
         for number, (camera, size, exif) in enumerate(zip(held, sizes, exifs, strict=True))
     ]
     if None in held:
-        lender = next((number for number, camera in enumerate(cameras) if not camera.assumed), None)
+        lenders = (n for n, camera in enumerate(cameras) if known[n] is None and not camera.assumed)
+        lender = next(lenders, None)
         if lender is not None:  # one lens took all pictures more often than not
-            known, name = cameras[lender], "the other picture" if len(names) == 2 else names[lender]
-            cameras = [_with_lens_of(known, camera, name) if camera.assumed else camera for camera in cameras]
+            lent, name = cameras[lender], "the other picture" if len(names) == 2 else names[lender]
+            cameras = [_with_lens_of(lent, camera, name) if camera.assumed else camera for camera in cameras]
     if profiles:
-        cameras = [profiles[name].on(camera) for name, camera in zip(names, cameras, strict=True)]
+        cameras = [
+            profiles[name].on(camera) if own is None else camera
+            for name, camera, own in zip(names, cameras, known, strict=True)
+        ]
     if request.principal:
         values = [request.principal[i : i + 2] for i in range(0, len(request.principal), 2)]
         cameras = [
-            _with_principal_point(camera, values[min(number, len(values) - 1)]) for number, camera in enumerate(cameras)
+            camera if known[number] else _with_principal_point(camera, values[min(number, len(values) - 1)])
+            for number, camera in enumerate(cameras)
         ]
+    warnings += [assumed_of_circle(name) for name, own, camera in zip(names, known, cameras, strict=True)
+                 if camera is own and camera.view_of is None]  # fmt: skip
     for number, (camera, exif) in enumerate(zip(cameras, exifs, strict=True)):
+        if known[number] is not None:
+            continue
         if exif.undistorted and camera.distortion.any():
             warnings.append(
                 f"{called(number, names)} says that its lens's distortion was removed already, and --cameras removes "

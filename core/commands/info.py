@@ -51,10 +51,11 @@ def entry_of(path: Path) -> dict[str, Any]:
     except StitchError as error:
         return {"file": str(path), "error": str(error).removeprefix(f"{path}: ")}
     size = size_of(picture)
+    shows, why_not = _shown(picture)
     (camera,), problems = cameras_for(CameraRequest(), [path.name], [size], [picture.exif])
     exif = picture.exif
     return {
-        "file": str(path), "error": _not_flat(picture), "kind": _kind(path, picture), "width": size[0],
+        "file": str(path), "error": why_not, "shows": shows, "kind": _kind(path, picture), "width": size[0],
         "height": size[1], "bits": picture.bits, "channels": picture.light.shape[2], "alpha": picture.alpha is not None,
         "colours": _colours(picture), "make": exif.make, "model": exif.model, "lens": exif.lens,
         "taken": exif.text(36867) or exif.text(306), "focal_px": None if camera.assumed else round(camera.focal, 2),
@@ -64,15 +65,17 @@ def entry_of(path: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _not_flat(picture: Picture) -> str:
-    """Why a picture is no flat photograph, "" if it is one."""
-    from ..frames.flatness import check_flat
+def _shown(picture: Picture) -> tuple[str, str]:
+    """What kind of picture it is, in words, and why it cannot be used, "" if it can."""
+    from ..frames.flatness import circle_in, usable
 
     try:
-        check_flat(picture)
+        part = usable(picture).part
     except UnreadableImage as why:
-        return str(why).removeprefix(f"{picture.name}: ")
-    return ""
+        return "", str(why).removeprefix(f"{picture.name}: ")
+    if part is not None:
+        return "whole sphere" if part.is_whole else f"part of a sphere of {part.full[0]}×{part.full[1]}", ""
+    return "flat picture" if circle_in(picture) is None else "circle of a fisheye", ""
 
 
 def _kind(path: Path, picture: Picture) -> str:
@@ -103,8 +106,9 @@ def line_of(entry: dict[str, Any]) -> str:
     lens = f", {entry['lens']}" if entry["lens"] else ""
     focal = f"f {entry['focal_px']:.0f} px ({entry['focal_source']})" if entry["focal_px"] else "f unknown"
     turned = "upright" if entry["orientation"] == 1 else f"turned upright (orientation {entry['orientation']})"
-    parts = [f"{entry['width']}×{entry['height']} {entry['kind']}, {depth}, {channels}, {entry['colours']}",
-             camera + lens, focal, turned]  # fmt: skip
+    parts = [f"{entry['width']}×{entry['height']} {entry['kind']}, {depth}, {channels}, {entry['colours']}"]
+    parts += [entry["shows"]] if entry["shows"] not in ("", "flat picture") else []
+    parts += [camera + lens, focal, turned]
     parts += ["distortion removed already"] if entry["undistorted"] else []
     parts += [f"problem: {problem}" for problem in entry["problems"]]
     parts += [f"cannot be used: {entry['error']}"] if entry["error"] else []

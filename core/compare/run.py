@@ -224,6 +224,8 @@ def _compared(
     watch, start = progress.begin("registration"), time.process_time()
     watch("read")
     frame = read_frame((pair.reference, pair.target), options)
+    if len(frame.pictures) > 2:
+        raise BadRequest("a sphere is worked with as several views, and fields are compared on two flat pictures")
     geometry = estimate_geometry([frame], options, watch)
     edge = geometry.edges[0]
     seconds = {"registration": time.process_time() - start}

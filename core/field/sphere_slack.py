@@ -63,8 +63,11 @@ def fit_sphere_slack(rig: Rig, number: int, field: Callable[[Array], Array], uni
     Returns
     -------
     SphereSlack or None
-        None if there are too few points, or they are off by chance alone.
+        None if there are too few points, or they are off by chance alone; and for a view of a sphere, which has no lens
+        to stand for, and whose neighbours agree with it exactly as it is.
     """
+    if rig.cameras[number].view_of is not None:
+        return None
     scale, view, seen = px_scale(rig), rig.views[number], rig.observations
     here = seen.used & (seen.picture == number)
     rays = rig.rays[seen.point[here]]

@@ -1,46 +1,55 @@
-"""Pictures that are no flat photographs, found before anything is made of them.
-
-Here they are refused. What is to become of spheres and fisheye circles as inputs begins at `kind_of`.
+"""Pictures that are no flat photographs, found before anything is made of them: spheres are worked with as flat views
+(`spheres`); what cannot be is refused here.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..pictures.gpano import whole_sphere
 from ..pictures.picture import Picture
 from ..raster.arrays import Array
 from ..system.errors import UnreadableImage
 from .options import FLATNESS
 
-Kind = Literal["flat", "sphere", "circle", "transparent"]
+Kind = Literal["flat", "sphere", "surround", "circle", "circles", "transparent"]
 _ADVICE = {
-    "sphere": "it shows a whole turn (an equirectangular or cylindrical panorama), no flat photograph: cut flat views "
-    "out of it with a panorama program, or give the photographs that it was made from",
-    "circle": "it is the circle of a fisheye lens on black: give the lens (--cameras), or turn it into a flat one with "
-    "a lens correction program first",
+    "surround": "it says that it shows directions all around, but not as an equirectangular sphere (2:1, or with "
+    "GPano's numbers of the whole one): export it as such a sphere, or give the photographs that it was made from",
+    "circles": "it shows two circles of fisheye lenses on black: cut them apart into two pictures, or make a sphere of "
+    "them with the camera maker's program",
     "transparent": "it is entirely transparent: export it without transparency, or with the right one",
 }
 
 
-def check_flat(picture: Picture, lens_given: bool = False) -> None:
-    """Refuses (UnreadableImage) what shows nothing, a whole sphere, or, if no lens is given, a fisheye's circle, with
-    what to do."""
+def usable(picture: Picture) -> Picture:
+    """The picture; of a sphere with the part of it that it shows, which files need not say. Refuses (UnreadableImage)
+    what shows nothing, what goes around in another way than a sphere, and two circles of fisheyes, with what to do."""
     kind = kind_of(picture)
-    if kind != "flat" and not (kind == "circle" and lens_given):
+    if kind == "sphere":
+        height, width = picture.view.shape[:2]
+        return replace(picture, part=picture.part or whole_sphere((width, height)))
+    if kind in _ADVICE:
         raise UnreadableImage(f"{picture.name}: {_ADVICE[kind]}")
+    return picture
 
 
 def kind_of(picture: Picture) -> Kind:
     """What a picture is: a flat photograph, or one of those that need another projection, or none."""
     if picture.alpha is not None and not picture.alpha.any():
         return "transparent"
-    if not picture.surround and _shows_circles(picture.view):  # first: black ends meet as well
-        return "circle"
-    return "sphere" if picture.surround or _ends_meet(picture.view) else "flat"
+    if not picture.surround:  # first: black ends meet as well
+        circles = _circles_in(picture.view)
+        if circles:
+            return "circle" if len(circles) == 1 else "circles"
+    if picture.part is not None or (not picture.surround and _ends_meet(picture.view)):
+        return "sphere"
+    return "surround" if picture.surround else "flat"
 
 
 def _ends_meet(view: NDArray[np.uint8]) -> bool:
@@ -62,38 +71,51 @@ def _ends_meet(view: NDArray[np.uint8]) -> bool:
     )
 
 
-def _shows_circles(view: NDArray[np.uint8]) -> bool:
-    """Whether all that a picture shows is a circle on black, or two beside each other."""
+def circle_in(picture: Picture) -> tuple[Array, float] | None:
+    """Centre (2,) and radius, px, of the circle on black that is all that a picture shows; None where it is none."""
+    circles = [] if picture.surround else _circles_in(picture.view)
+    return circles[0] if len(circles) == 1 else None
+
+
+def _circles_in(view: NDArray[np.uint8]) -> list[tuple[Array, float]]:
+    """The circle on black that is all that a picture shows, or two beside each other: centres (2,) and radii, px."""
     if min(view.shape[:2]) < FLATNESS.least_side:
-        return False
+        return []
     height, width = view.shape[:2]
     double = abs(width - 2 * height) <= FLATNESS.double_aspect * width
     share = min(1.0, FLATNESS.circle_side / max(height, width // 2 if double else width))
     small = _resized(view, (max(1, round(width * share)), max(1, round(height * share)))).max(axis=2)
     middle = small.shape[1] // 2
-    return all(_is_circle(half) for half in ([small[:, :middle], small[:, middle:]] if double else [small]))
+    found = []
+    for part in [small[:, :middle], small[:, middle:]] if double else [small]:
+        circle = _circle_of(part)
+        if circle is None:
+            return []
+        found.append(((circle[0] + 0.5) / share - 0.5, circle[1] / share))
+    return found
 
 
-def _is_circle(small: NDArray[np.uint8]) -> bool:
+def _circle_of(small: NDArray[np.uint8]) -> tuple[Array, float] | None:
     small = np.ascontiguousarray(small)
     lit = cv2.medianBlur(small, 5) > FLATNESS.black
     corners = [lit[:4, :4], lit[:4, -4:], lit[-4:, :4], lit[-4:, -4:]]
     if any(corner.any() for corner in corners) or lit.mean() < FLATNESS.circle_share:
-        return False
+        return None
     points = _outline(lit)
     circle = _fitted(points, max(small.shape))
     if circle is None:
-        return False
+        return None
     centre, radius = circle
     row, column = np.mgrid[: small.shape[0], : small.shape[1]]
     off = np.hypot(column - centre[0], row - centre[1])
     outside = off > FLATNESS.outside * radius
     at_rim = np.abs(off / radius - FLATNESS.inside) < 0.01
-    return bool(
+    shown = (
         outside.mean() > FLATNESS.least_outside
         and (small[outside] <= FLATNESS.black).mean() > FLATNESS.black_outside
         and np.median(small[at_rim]) > FLATNESS.bright_rim
     )
+    return circle if shown else None
 
 
 def _outline(lit: NDArray[np.bool_]) -> Array:

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.bodies import Bodies, bodies_of
 from ..pictures.picture import Picture, resized
 
 if TYPE_CHECKING:
+    from ..cameras.camera import Camera
+    from ..pictures.metadata import Exif
     from .merging import MergedBracket
 
 
@@ -34,6 +37,9 @@ class Frame:
         exposures of one view together.
     brackets : tuple of MergedBracket
         What became of exposures of one view.
+    known : tuple of (Camera or None)
+        Of each picture the camera of its full px that follows from what the picture is (a view of a sphere, a
+        fisheye's circle); empty where all are flat photographs.
     """
 
     pictures: tuple[Picture, ...]
@@ -42,11 +48,32 @@ class Frame:
     warnings: tuple[str, ...] = ()
     shown_by: tuple[int, ...] = ()
     brackets: tuple[MergedBracket, ...] = ()
+    known: tuple[Camera | None, ...] = ()
 
     @property
     def names(self) -> list[str]:
         """What the pictures are called."""
         return [picture.name for picture in self.pictures]
+
+    @property
+    def called(self) -> list[str]:
+        """The same as a user names them: the first view of a sphere stands for it."""
+        names, spheres = self.names, set[int]()
+        for number, camera in enumerate(self.known):
+            if camera is not None and camera.view_of is not None and camera.view_of.sphere not in spheres:
+                spheres.add(camera.view_of.sphere)
+                names[number] = camera.view_of.name
+        return names
+
+    @property
+    def exifs(self) -> list[Exif]:
+        """What their files' EXIF says."""
+        return [picture.exif for picture in self.pictures]
+
+    @property
+    def bodies(self) -> Bodies:
+        """Which of them are views of one sphere."""
+        return bodies_of(self.known or [None] * len(self.pictures))
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -58,7 +85,9 @@ class Frame:
         if list(numbers) == list(range(len(self.pictures))):
             return self
         pictures = tuple(self.pictures[number] for number in numbers)
-        return replace(self, pictures=pictures, full_sizes=tuple(self.full_sizes[number] for number in numbers))
+        known = tuple(self.known[number] for number in numbers) if self.known else ()
+        sizes = tuple(self.full_sizes[number] for number in numbers)
+        return replace(self, pictures=pictures, full_sizes=sizes, known=known)
 
     def resized(self, share: float) -> Frame:
         """The same with its pictures shrunk to a share of their sides."""

@@ -229,6 +229,36 @@ class FlatnessOptions:
 
 
 @dataclass(frozen=True)
+class SphereOptions:
+    """The flat views that spheres are worked with as (`spheres`)."""
+
+    ring_deg: tuple[float, float] = (84.0, 110.0)
+    """Degrees across and down of the six views around, 60° apart: neighbours share 24°, enough for bands to blend in,
+    and where they meet they reach 51° up and down."""
+
+    pole_deg: tuple[float, float] = (100.0, 100.0)
+    """Degrees of the views up and down: they begin at 40°."""
+
+    own_share: float = 0.75
+    """Share of a view's columns, those in its middle, of which its neighbours do not show all: 68° of 84°."""
+
+    least_shown: float = 0.02
+    """Share of a view that must show something there for it to be worked with."""
+
+    margin_px: int = 3
+    """px beyond the borders that cubic interpolation may take."""
+
+    black: int = 4
+    """Levels of 255 that are black where nothing is shown in files without transparency, after compression."""
+
+    least_missing: float = 0.005
+    """Share of the sphere that such a black part has, at least, at a pole."""
+
+    missing_margin_px: int = 8
+    """px by which such a part is widened: compression spreads its edge over a block."""
+
+
+@dataclass(frozen=True)
 class OverlayOptions:
     """What is taken for burnt into pictures: dates, logos (`overlays`)."""
 
@@ -285,4 +315,5 @@ PREVIEW = PreviewOptions()
 BRACKETS = BracketOptions()
 MERGE = MergeOptions()
 FLATNESS = FlatnessOptions()
+SPHERES = SphereOptions()
 OVERLAYS = OverlayOptions()

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.camera import Camera
+from ..cameras.from_circle import camera_of_circle
 from ..cameras.sources import called
 from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_painted, without
@@ -22,10 +24,11 @@ from ..pictures.raw_development import RawExposure, exposure_of_first
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
 from .brackets import brackets_in
-from .flatness import check_flat
+from .flatness import circle_in, usable
 from .frame import Frame, size_of
 from .merging import MergedBracket, merged
 from .overlays import overlays_in
+from .spheres import views_of_sphere
 from .used_parts import within_lenses
 
 # What can be stitched: a file's name, an array, or a Picture that was read already.
@@ -50,15 +53,17 @@ def check_count(count: int, options: StitchOptions) -> None:
         _check_views(count, options)
 
 
-def _check_views(count: int, options: StitchOptions) -> None:
-    """The same of pictures of different views."""
+def _check_views(count: int, options: StitchOptions, counted: str = "") -> None:
+    """The same of pictures of different views; counted: how, where that is not plain."""
     if count < 2:
         raise BadRequest("one picture alone makes no panorama: give two that were taken from different places")
     if count > MOST_PICTURES:
         raise BadRequest(
-            f"{count} pictures given, at most {MOST_PICTURES} make one panorama: leave out those that show nothing new"
+            f"{count} pictures given{counted}, at most {MOST_PICTURES} make one panorama: leave out those that show "
+            "nothing new"
         )
-    options.check_goes_with(count)
+    if count > 2:  # of two one may be a sphere, which is more
+        options.check_goes_with(count)
 
 
 def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
@@ -86,7 +91,7 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
         The same picture twice, and no other.
     """
     check_count(len(sources), options)
-    given = _named_apart(_all_read(sources, options.camera.cameras is not None), sources)
+    given = _named_apart(_all_read(sources), sources)
     names = [picture.name for picture in given]
     views, members, brackets = _views_of(given, options)
     if brackets or len(views) > MOST_PICTURES:
@@ -169,6 +174,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     copies, names = copies or {}, [picture.name for picture in pictures]
     masks = options.ignored_in(names)
     shown: list[Picture] = []
+    known: list[Camera | None] = []
     shown_by: list[int] = []
     for number, picture in enumerate(pictures):
         shown_by.append(shown_by[copies[number]] if number in copies else len(shown))
@@ -177,8 +183,16 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         mask = masks[number]
         if mask is not None:
             picture = without(picture, read_mask(mask, size_of(picture), called(number, names)))
-        shown.append(picture)
-    burnt_in = overlays_in(shown)
+        for view, camera in _as_flat(picture, number):
+            shown.append(view)
+            known.append(camera)
+    if len(shown) > len(pictures):
+        _check_views(len(shown), options, " (a sphere counts as its eight views)")
+    elif len(shown) == 2:
+        options.check_goes_with(2)
+    flat = [number for number, camera in enumerate(known) if camera is None]
+    overlays = dict(zip(flat, overlays_in([shown[number] for number in flat]), strict=True))
+    burnt_in = [overlays.get(number) for number in range(len(shown))]
     worked_on = [
         resized(picture if mask is None else replace(without(picture, mask), burnt_in=mask), options.scale)
         for picture, mask in zip(shown, burnt_in, strict=True)
@@ -202,16 +216,27 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
                     f"left out ({option} for what else is)")  # fmt: skip
     painted = None if options.mask is None else read_painted(options.mask)
     sizes = tuple(size_of(picture) for picture in shown)
-    frame = Frame(tuple(worked_on), sizes, painted, warnings, tuple(shown_by))
+    cameras = tuple(known) if any(known) else ()
+    frame = Frame(tuple(worked_on), sizes, painted, warnings, tuple(shown_by), known=cameras)
     return within_lenses(frame, options.camera)
 
 
-def _all_read(sources: Sequence[Source], lens_given: bool) -> list[Picture]:
+def _as_flat(picture: Picture, number: int) -> Iterator[tuple[Picture, Camera | None]]:
+    """A picture as it is worked with, and its camera where that follows from what it is: a sphere as views of it,
+    and a fisheye's circle."""
+    if picture.part is not None:
+        yield from views_of_sphere(picture, picture.part, number)
+        return
+    circle = circle_in(picture)
+    yield picture, None if circle is None else camera_of_circle(*circle, size_of(picture))
+
+
+def _all_read(sources: Sequence[Source]) -> list[Picture]:
     """The pictures. Raises UnreadableImage about all that cannot be read at once."""
     pictures: list[Picture] = []
     troubles: list[UnreadableImage] = []
     exposure = exposure_of_first(sources)
-    for one in in_order(partial(_picture_or_trouble, exposure=exposure, lens_given=lens_given), sources):
+    for one in in_order(partial(_picture_or_trouble, exposure=exposure), sources):
         if isinstance(one, UnreadableImage):
             troubles.append(one)
         else:
@@ -235,26 +260,22 @@ def _named_apart(pictures: list[Picture], sources: Sequence[Source]) -> list[Pic
     return out
 
 
-def _picture_or_trouble(
-    source: Source, exposure: RawExposure | None, lens_given: bool
-) -> Picture | UnreadableImage:
+def _picture_or_trouble(source: Source, exposure: RawExposure | None) -> Picture | UnreadableImage:
     try:
-        return _picture(source, exposure, lens_given)
+        return _picture(source, exposure)
     except UnreadableImage as trouble:
         return trouble
 
 
-def _picture(source: Source, exposure: RawExposure | None, lens_given: bool) -> Picture:
-    """A picture, read where it is not one yet; a flat one, or one whose lens is given. exposure: what camera RAW is
-    developed with."""
+def _picture(source: Source, exposure: RawExposure | None) -> Picture:
+    """A picture that can be worked with, read where it is not one yet. exposure: what camera RAW is developed with."""
     if isinstance(source, Picture):
         picture = source
     elif isinstance(source, np.ndarray):
         picture = picture_from_array(source)
     else:
         picture = load_picture(source, exposure=exposure)
-    check_flat(picture, lens_given)
-    return picture
+    return usable(picture)
 
 
 def _copies(pictures: Sequence[Picture]) -> Iterator[tuple[int, int]]:

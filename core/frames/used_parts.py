@@ -25,7 +25,7 @@ def within_lenses(frame: Frame, request: CameraRequest) -> Frame:
     ----------
     frame : Frame
     request : CameraRequest
-        Only its camera file matters.
+        Only its camera file matters, beside what the frame knows.
 
     Returns
     -------
@@ -37,11 +37,11 @@ def within_lenses(frame: Frame, request: CameraRequest) -> Frame:
     BadRequest, UnreadableImage
         About the camera file.
     """
-    if request.cameras is None:
+    if request.cameras is None and not any(camera is not None and camera.bent for camera in frame.known):
         return frame
-    exifs = [picture.exif for picture in frame.pictures]
-    table, _ = camera_table(request.cameras, frame.names, exifs)
-    cameras, _ = cameras_for(request, frame.names, frame.full_sizes, exifs)
+    exifs = frame.exifs
+    table = {} if request.cameras is None else camera_table(request.cameras, frame.names, exifs)[0]
+    cameras, _ = cameras_for(request, frame.names, frame.full_sizes, exifs, frame.known)
     pictures: list[Picture] = []
     warnings: list[str] = []
     lost: dict[float, list[str]] = {}

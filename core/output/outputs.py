@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..panorama.layers import Layer
 from ..pictures.encoding import encode_into, encode_picture, output_bits
 from ..pictures.exr import ExrForm
+from ..pictures.naming import VIEWS, view_name
 from ..raster.arrays import cut
 from ..raster.colour import decode
 from ..raster.enlarging import repeated
@@ -142,7 +143,8 @@ def check(
     if request.layers is not None:
         names = layer_files(pictures, (".png", ".exr"))
         files.check_folder(request.layers, names)
-        _refuse_other_files(request.layers, _possible_files(pictures, seam, inpainted, slides))
+        if not _holds_views(request.layers, pictures):  # which of them are spheres is only known later
+            _refuse_other_files(request.layers, _possible_files(pictures, seam, inpainted, slides))
         taken = {(request.layers / name).resolve() for name in names}
         for path in single:
             if path.resolve() in taken:
@@ -158,6 +160,12 @@ def _possible_files(pictures: Sequence[str], seam: bool, inpainted: bool, slides
         layer_stem(number, name) + suffix for number in range(len(pictures)) for name in pictures
         for suffix in (".png", ".exr")
     ]  # fmt: skip
+
+
+def _holds_views(folder: Path, pictures: Sequence[str]) -> bool:
+    """Whether a folder holds layers of a sphere's views, the sphere being one of these pictures."""
+    views = {layer_stem(0, view_name(name, view))[2:] for name in pictures for view in VIEWS}
+    return any(path.stem[2:] in views for path in folder.glob("[0-9][0-9]_*.*"))
 
 
 def _refuse_other_files(folder: Path, names: Sequence[str]) -> None:
@@ -271,7 +279,7 @@ def _add_layers(result: StitchResult, folder: Path, exr: ExrForm, files: OutputF
         """What lies on the warp's canvas (h, w) in px of the panorama."""
         return cut(repeated(values, result.times), place)
 
-    if result.rig is not None:
+    if result.rig is not None or _holds_views(folder, names):
         _refuse_other_files(folder, layer_files(names, (".png", ".exr")))
     for number, picture in enumerate(result.pictures):
         layer = result.full_layer(number).within(place)

@@ -1,4 +1,5 @@
-"""What viewers of spheres need to be told: an XMP packet with the properties of Google's Photo Sphere (GPano).
+"""What viewers of spheres need to be told, and what files tell of being one: XMP with the properties of Google's Photo
+Sphere (GPano).
 
 References
 ----------
@@ -7,6 +8,7 @@ Google, Photo Sphere XMP Metadata.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from ..raster.arrays import Box
@@ -35,6 +37,47 @@ class SpherePart:
     def is_whole(self) -> bool:
         """Whether all of the sphere is shown."""
         return self.box == (0, 0, *self.full)
+
+
+def whole_sphere(size: tuple[int, int]) -> SpherePart:
+    """All of a sphere, in a picture of (W, H) px."""
+    return SpherePart(size, (0, 0, *size))
+
+
+# A property of XMP, as an attribute or an element.
+_TOLD = rb"GPano:%b\s*(?:=\s*[\"']|>)\s*([\w.+-]+)"
+
+
+def sphere_part_told(data: bytes, size: tuple[int, int]) -> SpherePart | None:
+    """Which part of a sphere a picture of (W, H) px shows, by its file's XMP; None where that does not say, or says
+    what cannot be. Numbers about another size, of a picture that was resized, are taken in proportion."""
+    if _text(data, "ProjectionType").lower() != "equirectangular":
+        return None
+    width, height = size
+    left, top, own_width, own_height, full_width, full_height = (
+        _number(data, name) for name in (
+            "CroppedAreaLeftPixels", "CroppedAreaTopPixels", "CroppedAreaImageWidthPixels",
+            "CroppedAreaImageHeightPixels", "FullPanoWidthPixels", "FullPanoHeightPixels",
+        )
+    )  # fmt: skip
+    if full_width is None or full_height is None:  # only a whole sphere needs no numbers
+        return whole_sphere(size) if width == 2 * height else None
+    across, down = width / (own_width or width), height / (own_height or height)
+    full = round(full_width * across), round(full_height * down)
+    box = round((left or 0) * across), round((top or 0) * down), width, height
+    inside = box[0] >= 0 and box[1] >= 0 and box[0] + width <= full[0] and box[1] + height <= full[1]
+    return SpherePart(full, box) if inside and abs(full[0] - 2 * full[1]) <= 2 else None
+
+
+def _text(data: bytes, name: str) -> str:
+    found = re.search(_TOLD % name.encode(), data)
+    return "" if found is None else found[1].decode("ascii", "replace")
+
+
+def _number(data: bytes, name: str) -> float | None:
+    """A property that is a number above or at 0, None where it is none."""
+    text = _text(data, name)
+    return float(text) if re.fullmatch(r"\d+(\.\d*)?", text) else None
 
 
 def xmp_packet(part: SpherePart) -> bytes:

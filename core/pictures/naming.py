@@ -7,6 +7,15 @@ from pathlib import Path
 
 from ..system.errors import BadRequest
 
+# What the flat views of a sphere are called: six around, each to the right of the one before, and two at the poles.
+VIEWS = ("front", "front right", "back right", "back", "back left", "front left", "up", "down")
+
+
+def view_name(sphere: str, view: str) -> str:
+    """What a view of the picture of this name is called."""
+    path = Path(sphere)
+    return path.with_name(f"{path.stem} ({view}){path.suffix}").as_posix()
+
 
 def number_of(name: str, names: Sequence[str], asked_by: str) -> int:
     """The number of the picture that has a name.

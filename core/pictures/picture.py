@@ -24,6 +24,7 @@ from .camera_raw import is_raw
 from .containers import read_structure, says_surround, says_undistorted
 from .decoding import check_size, decode_exr, decode_file, read_file, turn
 from .foreign import foreign_kind
+from .gpano import SpherePart, sphere_part_told, whole_sphere
 from .heif_decoding import decode_heif
 from .metadata import Exif, read_exif
 from .options import READING
@@ -60,6 +61,8 @@ class Picture:
         Light from which a float picture is clipped: camera RAW has such, others have infinity.
     surround : bool
         Whether the file says that it is a map of many directions (a sphere, a cylinder), no flat picture.
+    part : SpherePart, optional
+        Which part of a sphere it shows, where the file says that.
     burnt_in : (H, W) bool, optional
         Where a date or a logo was found, which alpha hides.
     """
@@ -74,6 +77,7 @@ class Picture:
     warnings: tuple[str, ...] = ()
     clips_at: float = float("inf")
     surround: bool = False
+    part: SpherePart | None = None
     burnt_in: NDArray[np.bool_] | None = None
 
     @property
@@ -141,7 +145,9 @@ def _load(path: Path, pixels_per_byte: int, exposure: RawExposure | None) -> Pic
     if structure.kind == "exr":
         found = decode_exr(data, pixels_per_byte)
         picture = _picture(found.raw, True, Exif(), None, path.name, list(found.warnings))
-        return replace(picture, surround=found.surround)
+        height, width = found.raw.shape[:2]
+        whole = found.surround and width == 2 * height
+        return replace(picture, surround=found.surround, part=whole_sphere((width, height)) if whole else None)
     if structure.damage:
         kind = structure.kind.upper()
         raise UnreadableImage(f"the {kind} file is damaged: {structure.damage}; copy or export it again")
@@ -158,7 +164,8 @@ def _load(path: Path, pixels_per_byte: int, exposure: RawExposure | None) -> Pic
     found = decode_file(data, structure)
     raw, warnings = turn(found.raw, exif.orientation), list(found.warnings)
     picture = _picture(raw, found.associated, exif.upright(), structure.icc, path.name, warnings)
-    return replace(picture, surround=says_surround(data))
+    size = picture.view.shape[1], picture.view.shape[0]
+    return replace(picture, surround=says_surround(data), part=sphere_part_told(data, size))
 
 
 def _developed(data: bytes, exposure: RawExposure | None, name: str) -> Picture:

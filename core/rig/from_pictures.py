@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..cameras.bodies import Bodies, bodies_of
 from ..cameras.camera import Camera
 from ..cameras.rig import PictureMatches, Registration, Rig
 from ..pictures.picture import Picture
@@ -25,8 +26,9 @@ def content_order(pictures: Sequence[Picture]) -> list[int]:
 
 
 def matched_pictures(
-    pictures: Sequence[Picture], order: Sequence[int], quick: bool, cache: Cache, progress: ReportProgress
-) -> Matched:
+    pictures: Sequence[Picture], order: Sequence[int], bodies: Bodies, quick: bool, cache: Cache,
+    progress: ReportProgress,
+) -> Matched:  # fmt: skip
     """What pictures have in common.
 
     Parameters
@@ -34,6 +36,8 @@ def matched_pictures(
     pictures : sequence of Picture
     order : sequence of int
         See `content_order`.
+    bodies : Bodies
+        Of the pictures: views of one sphere are not compared with each other.
     quick : bool
         Whether a preview's few features will do.
     cache : Cache
@@ -50,7 +54,9 @@ def matched_pictures(
         [pictures[number] for number in order], quick, cache, lambda share: progress("features", share)
     )
     progress("matches", 0.0)
-    found = found_matches(seen, chosen_pairs(seen), cache, lambda share: progress("matches", share))
+    body = bodies.of[list(order)]
+    pairs = [(i, j) for i, j in chosen_pairs(seen) if body[i] != body[j]]
+    found = found_matches(seen, pairs, cache, lambda share: progress("matches", share))
     return renumbered(found, order)
 
 
@@ -85,8 +91,12 @@ def registered(
     right = tuple(one for one in matched.matches if mirrored.keys().isdisjoint((one.i, one.j)))
     matched = replace(matched, matches=right)
     inner = renumbered(matched, np.argsort(order).tolist())
+    first_of_body = bodies_of(cameras).of.tolist()
     cameras = tuple(cameras[number] for number in order)
-    names = tuple(pictures[number].name for number in order)
+    names = tuple(
+        pictures[number].name if camera.view_of is None else camera.view_of.name
+        for number, camera in zip(order, cameras, strict=True)
+    )
 
     def found() -> _Kept:
         one = register(cameras, inner.points, inner.matches, inner.scale, seed, progress, names)
@@ -96,8 +106,9 @@ def registered(
     kept = cache.remember("registration", (cameras, inner.points, inner.matches, inner.scale, seed, names), found)
     numbers = [order[number] for number in kept.numbers]
     ascending = np.argsort(numbers).tolist()
-    left_out = {order[number]: why for number, why in sorted(kept.left_out, key=lambda one: order[one[0]])}
-    return Registration(reordered(kept.rig, ascending), tuple(sorted(numbers)), left_out | mirrored)
+    left_out = {first_of_body[order[number]]: why for number, why in kept.left_out}
+    left_out = dict(sorted(left_out.items())) | {first_of_body[number]: why for number, why in mirrored.items()}
+    return Registration(reordered(kept.rig, ascending), tuple(sorted(numbers)), left_out)
 
 
 def _mirrored(pictures: Sequence[Picture], matched: Matched) -> dict[int, str]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from ..cameras.bodies import bodies_of
 from ..cameras.rig import Registration, Rig, RigEdge
 from ..choices import CENTRE
 from ..pictures.naming import number_of
@@ -116,13 +117,13 @@ def reordered(rig: Rig, order: Sequence[int]) -> Rig:
 
 def best_connected(rig: Rig) -> int:
     """The number of the picture from which all others are reached over the strongest edges: an edge is as long as one
-    over the number of its inliers, and the sum of the ways to all others is the shortest."""
-    count = len(rig)
-    # int32 is what SciPy's graphs take
-    i, j = np.array([(edge.i, edge.j) for edge in rig.edges], np.int32).T
-    lengths = [1 / edge.inliers for edge in rig.edges]
+    over the number of its inliers, and the sum of the ways to all others is the shortest; of a sphere its front."""
+    count, bodies = len(rig), bodies_of(rig.cameras)
+    # int32 is what SciPy's graphs take; a length of 0 is no link to them
+    i, j = np.array([*((edge.i, edge.j) for edge in rig.edges), *bodies.pairs], np.int32).T
+    lengths = [*(1 / edge.inliers for edge in rig.edges), *[1e-9] * len(bodies.pairs)]
     ways = dijkstra(coo_array((lengths, (i, j)), (count, count)).tocsr(), directed=False)
-    return int(np.argmin(ways.sum(axis=1)))
+    return int(bodies.of[np.argmin(ways.sum(axis=1))])
 
 
 def _renumbered(edge: RigEdge, new_number: NDArray[np.intp]) -> RigEdge:

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from ..cameras.bodies import Bodies, bodies_of
 from ..cameras.camera import Camera
 from ..cameras.lens import undistort
 from ..cameras.rig import FocalGuess, Observations, PictureMatches, Registration, Rig, RigEdge
@@ -98,6 +99,7 @@ def _registered(
     plain = [camera.without_lens() for camera in cameras]
     verified = verify(ideal, _watched(matches, progress), scale, seed)
     check_given_poses(plain, ideal, verified, names)
+    bodies = bodies_of(cameras)
     averages = hypotheses(plain, ideal, verified, partial(progress, "geometry", _VERIFIED))
     found = []
     for k, rotated in enumerate(averages):
@@ -108,7 +110,8 @@ def _registered(
     if not found:
         raise NoOverlap(_nothing_connects(verified))
     found.sort(key=lambda solved: solved.cost)
-    return _registration_of(cameras, points, verified, found, names)
+    left_out = _left_out(names, found[0].averaged.members, verified, bodies)
+    return _registration_of(cameras, points, found, left_out)
 
 
 def _watched(matches: Sequence[PictureMatches], progress: ReportProgress) -> Iterator[PictureMatches]:
@@ -119,9 +122,8 @@ def _watched(matches: Sequence[PictureMatches], progress: ReportProgress) -> Ite
 
 
 def _registration_of(
-    cameras: Sequence[Camera], points: Sequence[Array], verified: Verified, found: Sequence[Solved],
-    names: Sequence[str],
-) -> Registration:  # fmt: skip
+    cameras: Sequence[Camera], points: Sequence[Array], found: Sequence[Solved], left_out: dict[int, str]
+) -> Registration:
     best = found[0]
     framed = replace(best.found, solution=best.found.solution.seen_from(0).rescaled())
     pairs = sorted(best.averaged.pairs, key=lambda pair: (pair.i, pair.j))
@@ -130,7 +132,7 @@ def _registration_of(
     edges = _edges(best, framed, pairs, lengths)
     guessed = guessed_places(pairs, members, lengths, framed)
     rig = _rig(cameras, points, best, framed, edges, _guesses(found), guessed)
-    return Registration(rig, members, _left_out(names, members, verified))
+    return Registration(rig, members, left_out)
 
 
 def _rig(
@@ -215,14 +217,16 @@ def _guesses(found: Sequence[Solved]) -> tuple[FocalGuess, ...]:
     return tuple(guesses)
 
 
-def _left_out(names: Sequence[str], members: Sequence[int], verified: Verified) -> dict[int, str]:
-    """Why each other picture is not in the rig."""
+def _left_out(
+    names: Sequence[str], members: Sequence[int], verified: Verified, bodies: Bodies
+) -> dict[int, str]:
+    """Why each other picture is not in the rig; of the views of a sphere it is said once, of the first."""
     count, pairs = len(names), [(pair.i, pair.j) for pair in verified.pairs]
-    groups = {k: group for group in components(count, pairs) for k in group}
+    groups = {k: group for group in components(count, pairs, bodies.of.tolist()) for k in group}
     told = {}
-    for k in sorted(set(range(count)) - set(members)):
-        best = int(verified.best[k])
-        others = [other for other in groups[k] if other != k]
+    for k in sorted(set(bodies.of.tolist()) - set(members)):
+        best = int(verified.best[bodies.members(k)].max())
+        others = sorted({int(bodies.of[other]) for other in groups[k]} - {k})
         if not others:
             told[k] = (
                 f"connects to no other picture: at best {best} matches agree on how the camera moved, "

@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from edf_stitch.core.cameras.bodies import Bodies
 from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.cameras.projective import rotation_angle
 from edf_stitch.core.cameras.rig import Rig
@@ -42,7 +43,8 @@ def main() -> None:
         true = [known[path.name] for path in paths]
         order = content_order(pictures)
         began = time.process_time()
-        matched = matched_pictures(pictures, order, False, Cache(None), lambda stage, share: None)
+        alone = Bodies.alone(len(pictures))
+        matched = matched_pictures(pictures, order, alone, False, Cache(None), lambda stage, share: None)
         matching = time.process_time() - began
         for way in ("K", "f to 5 %"):
             began = time.process_time()

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...cameras.bodies import Bodies, bodies_of
 from ...cameras.camera import Camera
 from ...cameras.rig import PictureMatches
 from ...raster.arrays import Array
@@ -153,14 +154,14 @@ def _averaged(
 ) -> Averaged:  # fmt: skip
     """Average, and again with the new lens as long as closing loops moves the focal length: rotations of pairs follow
     it linearly over some per cent only."""
-    by_pairs = fitted.together.lens
+    by_pairs, bodies = fitted.together.lens, bodies_of(cameras)
     for _ in range(AVERAGING.lens_rounds):
         tick()
         found, together = fitted.found, fitted.together
         pairs = [(int(i), int(j)) for i, j in ends[found.numbers]]
-        members = heaviest_component(len(cameras), pairs, found.rays.counts.tolist())
+        members = heaviest_component(len(cameras), pairs, found.rays.counts.tolist(), bodies.of.tolist())
         kept = np.flatnonzero(np.isin(ends[found.numbers], members).all(axis=1))
-        links = _links(found, together, [pairs[k] for k in kept], members, kept)
+        links = _with_bodies(_links(found, together, [pairs[k] for k in kept], members, kept), bodies, members)
         before = float(np.log(by_pairs.factor / together.lens.factor))
         turned = average(links, fitted.focal_information, before)
         lens = SharedLens(
@@ -171,6 +172,8 @@ def _averaged(
         if abs(turned.log_focal) < AVERAGING.same_log_focal:
             break
         fitted = _at_lens(matched, lens, fitted, verified.scale)
+    rigid = bodies_of([cameras[member] for member in members]).made_rigid(turned.R)
+    turned = replace(turned, R=rigid)
     chosen = _chosen(matched, found, kept, links, turned, lens, verified.scale)
     return _summary(cameras, verified, matched, members, links, turned, lens, chosen)
 
@@ -202,6 +205,25 @@ def _links(
     )  # fmt: skip
 
 
+def _with_bodies(links: Links, bodies: Bodies, members: Sequence[int]) -> Links:
+    """The links, and after them those between the views of each body that is among the members."""
+    place = {member: k for k, member in enumerate(members)}
+    pairs = [(i, j) for i, j in bodies.pairs if i in place]
+    if not pairs:
+        return links
+    count, most = len(pairs), links.costs.shape[1]
+    R = np.array([bodies.between(i, j) for i, j in pairs])
+    costs = np.full((count, most), NEVER)
+    costs[:, 0] = 0
+    information = np.tile(np.radians(AVERAGING.body_degrees) ** -2 * np.eye(3), (count, 1, 1))
+    return Links(
+        links.count, (*links.pairs, *((place[i], place[j]) for i, j in pairs)),
+        np.concatenate([links.R, np.tile(R[:, None], (1, most, 1, 1))]), np.concatenate([links.costs, costs]),
+        np.concatenate([links.information, information]), np.concatenate([links.by_focal, np.zeros((count, 3))]),
+        np.concatenate([links.inliers, np.full(count, AVERAGING.body_matches)]), count,
+    )  # fmt: skip
+
+
 def _of_turn(information: Array) -> Array:
     """Information (P, 3, 3) on the turns alone from that on turns and directions of the baseline (P, 5, 5)."""
     cross, own = information[:, :3, 3:], information[:, 3:, 3:]
@@ -230,8 +252,9 @@ def _chosen(
 ) -> _Chosen:  # fmt: skip
     """The chosen candidates refined at the final lens, and which matches belong to them."""
     each = np.arange(len(kept))
-    R = rotations(links.by_focal * turned.log_focal) @ links.R[each, turned.choice]
-    t = np.array([found.poses[k].t[choice] for k, choice in zip(kept, turned.choice, strict=True)])
+    choices = turned.choice[each]
+    R = rotations(links.by_focal[each] * turned.log_focal) @ links.R[each, choices]
+    t = np.array([found.poses[k].t[choice] for k, choice in zip(kept, choices, strict=True)])
     width = PAIR_FIT.cauchy_px * scale
     numbers = found.numbers[kept]
     few = found.rays.of_pairs(kept)
@@ -254,10 +277,11 @@ def _summary(
     turned: Rotations, lens: SharedLens, chosen: _Chosen,
 ) -> Averaged:  # fmt: skip
     """What is handed on: pairs that agree with the averaged rotations, from the smaller number to the larger."""
-    first, second = links.ends
+    matches = len(chosen.numbers)
+    first, second = (end[:matches] for end in links.ends)
     between = turned.R[second] @ np.swapaxes(turned.R[first], 1, 2)
     off = degrees_between(chosen.poses.R, between)
-    agrees = off < links.allowed_degrees
+    agrees = off < links.allowed_degrees[:matches]
     R = np.full((len(cameras), 3, 3), np.nan)
     R[list(members)] = turned.R
     near = degrees_between(chosen.turning.R, between) < PAIR_FIT.rotation_degrees
@@ -268,7 +292,10 @@ def _summary(
         _pair(verified, chosen, k, (members[first[k]], members[second[k]]), float(off[k]), bool(rotates[k]))
         for k in np.flatnonzero(agrees)
     )
-    connected = components(len(cameras), [(pair.i, pair.j) for pair in pairs])[0]
+    bodies = bodies_of(cameras).of.tolist()
+    connected = components(len(cameras), [(pair.i, pair.j) for pair in pairs], bodies)[0]
+    rotations_of_links = np.concatenate([chosen.poses.R, links.R[matches:, 0]])
+    closing = np.concatenate([agrees, np.ones(links.exact, bool)])
     R[np.setdiff1d(np.arange(len(cameras)), connected)] = np.nan
     pairs = tuple(pair for pair in pairs if pair.i in connected)
     return Averaged(
@@ -277,8 +304,8 @@ def _summary(
         R=R,
         pairs=pairs,
         noise_px=chosen.noise,
-        loop_degrees=worst_loop(links, chosen.poses.R, agrees),
-        one_place=_one_place(len(cameras), pairs, connected),
+        loop_degrees=worst_loop(links, rotations_of_links, closing),
+        one_place=_one_place(bodies, pairs, connected),
         cost=_cost(verified, matched, chosen, turned),
     )
 
@@ -300,11 +327,11 @@ def _pair(
     )  # fmt: skip
 
 
-def _one_place(count: int, pairs: Sequence[PairGeometry], members: Sequence[int]) -> bool:
-    """Whether pure rotations join all members and explain most matches."""
+def _one_place(bodies: Sequence[int], pairs: Sequence[PairGeometry], members: Sequence[int]) -> bool:
+    """Whether pure rotations join all members and explain most matches; bodies: as for `components`."""
     rotating = [pair for pair in pairs if pair.rotates]
     share = sum(len(pair.index) for pair in rotating) / max(sum(len(pair.index) for pair in pairs), 1)
-    joined = components(count, [(pair.i, pair.j) for pair in rotating])[0]
+    joined = components(len(bodies), [(pair.i, pair.j) for pair in rotating], bodies)[0]
     return share > PAIR_FIT.one_place_share and len(joined) == len(members)
 
 

@@ -26,21 +26,30 @@ class _Groups:
         return a != b
 
 
-def components(count: int, pairs: Iterable[Pair]) -> list[list[int]]:
-    """Groups of the nodes 0 … count − 1 that hang together, the largest first."""
+def components(count: int, pairs: Iterable[Pair], bodies: Sequence[int] | None = None) -> list[list[int]]:
+    """Groups of the nodes 0 … count − 1 that hang together, the largest first. bodies: of each node the first that
+    it is of one body with; a body hangs together and counts as one."""
     groups = _Groups(count)
     for i, j in pairs:
         groups.join(i, j)
+    of = range(count) if bodies is None else bodies
+    for node, first in enumerate(of):
+        groups.join(first, node)
     found: dict[int, list[int]] = {}
     for node in range(count):
         found.setdefault(groups.of(node), []).append(node)
-    return sorted(found.values(), key=len, reverse=True)
+    return sorted(found.values(), key=lambda group: len({of[node] for node in group}), reverse=True)
 
 
-def heaviest_component(count: int, pairs: Sequence[Pair], weights: Sequence[float]) -> list[int]:
-    """Of the largest groups the one whose pairs weigh most together: does not depend on the numbering."""
-    groups = components(count, pairs)
-    largest = [group for group in groups if len(group) == len(groups[0])]
+def heaviest_component(
+    count: int, pairs: Sequence[Pair], weights: Sequence[float], bodies: Sequence[int] | None = None
+) -> list[int]:
+    """Of the largest groups the one whose pairs weigh most together: does not depend on the numbering; bodies: as for
+    `components`."""
+    of = range(count) if bodies is None else bodies
+    groups = components(count, pairs, bodies)
+    sizes = [len({of[node] for node in group}) for group in groups]
+    largest = [group for group, size in zip(groups, sizes, strict=True) if size == sizes[0]]
     if len(largest) == 1:
         return largest[0]
     total = dict.fromkeys(range(len(largest)), 0.0)

@@ -179,6 +179,10 @@ class AveragingOptions:
     # A pair agrees with the averaged rotations within so many degrees or σ.
     agrees_degrees: float = 2.0
     agrees_sigmas: float = 4.0
+    # σ in degrees of rotations between views of one sphere while all others are averaged around them, far below any
+    # pair's; and as how many matches one counts: more than any pair has.
+    body_degrees: float = 0.01
+    body_matches: int = 10_000
     # Cauchy widths beyond which a verified match costs no more, in the figure that compares starts.
     unexplained_widths: float = 5.0
     # Changes of log f, of k1 and of any rotation up to which two hypotheses are one.

@@ -25,7 +25,8 @@ class Links:
 
     pairs: from which to which; R (P, C, 3, 3): candidates, R x_from = x_to, repeated up to C; costs (P, C): how much
     less likely (log) than the first, NEVER where repeated; information (P, 3, 3): of R, 1 / rad², turned from the left;
-    by_focal (P, 3): how R turns with the log of the focal length; inliers (P,).
+    by_focal (P, 3): how R turns with the log of the focal length; inliers (P,); exact: how many of the last are views
+    of one body, whose rotations are known.
     """
 
     count: int
@@ -35,6 +36,7 @@ class Links:
     information: Array
     by_focal: Array
     inliers: NDArray[np.intp]
+    exact: int = 0
 
     @property
     def ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -55,7 +57,9 @@ class Links:
         """Information (P, 3, 3) with what rotations err beyond it."""
         ridge = 1e-6 * np.trace(self.information, axis1=1, axis2=2)[:, None, None] * np.eye(3)
         spread = np.linalg.inv(self.information + ridge)
-        return np.linalg.inv(spread + np.radians(AVERAGING.systematic_degrees) ** 2 * np.eye(3))
+        beyond = np.full(len(self.pairs), np.radians(AVERAGING.systematic_degrees) ** 2)
+        beyond[len(beyond) - self.exact :] = 0
+        return np.linalg.inv(spread + beyond[:, None, None] * np.eye(3))
 
     @cached_property
     def allowed_degrees(self) -> Array:

@@ -2,12 +2,13 @@
 
 The cost's curvature is taken by weights (iteratively reweighted least squares). Each point is a block of 3 × 3 that is
 eliminated (Schur complement); the cameras that remain are solved densely. Cameras of one lens, or at one place, share
-columns. Reference: Triggs et al., Bundle Adjustment: A Modern Synthesis, 1999.
+columns; so do the turns of views of one sphere. Reference: Triggs et al., Bundle Adjustment: A Modern Synthesis, 1999.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -86,6 +87,7 @@ class Structure:
         self.of_picture = [order[a:b] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
         self.pairs = self._pairs_of_pictures(problem.pictures)
         self.columns = _columns(problem, settings, reference)
+        self.turns = problem.bodies.R
         self.unknowns = int(self.columns.max(initial=-1)) + 1
 
     def _pairs_of_pictures(self, count: int) -> list[tuple[int, int, Index, Index]]:
@@ -107,22 +109,28 @@ class Structure:
             return chooser.T @ whole
         return chooser.T @ whole @ chooser
 
-    @property
+    @cached_property
     def chooser(self) -> Array:
-        """(N CAMERA, C) of zeros and ones."""
+        """(N CAMERA, C): how each camera's parameters follow from the unknowns. Ones, but for turns: a body's is one
+        about its own axes, and R of a view, exp(ω) R, turns with R_view ω."""
         flat = self.columns.ravel()
         chooser = np.zeros((len(flat), self.unknowns))
         chooser[flat >= 0, flat[flat >= 0]] = 1
+        for j in np.flatnonzero(self.columns[:, 0] >= 0):
+            chooser[j * CAMERA : j * CAMERA + 3, self.columns[j, :3]] = self.turns[j]
         return chooser
 
 
 def _columns(problem: Problem, settings: Settings, reference: int) -> Index:
     columns = np.full((problem.pictures, CAMERA), -1)
-    moving = ~problem.held
-    if not problem.held.any():
-        moving = np.arange(problem.pictures) != reference
-    count = 3 * int(moving.sum())
-    columns[moving, :3] = np.arange(count).reshape(-1, 3)
+    still = problem.held
+    if not still.any():
+        still = np.arange(problem.pictures) == reference
+    bodies = problem.bodies.of
+    moving = ~np.isin(bodies, bodies[still])
+    each, number = np.unique(bodies[moving], return_inverse=True)
+    count = 3 * len(each)
+    columns[moving, :3] = 3 * number[:, None] + np.arange(3)
     if settings.depths:
         pinned = set(problem.place[~moving].tolist())
         places = {p: k for k, p in enumerate(p for p in np.unique(problem.place).tolist() if p not in pinned)}

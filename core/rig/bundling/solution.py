@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...cameras.bodies import Bodies
 from ...cameras.camera import Camera
 from ...raster.arrays import Array
 from .bundle_options import BUNDLE
@@ -89,7 +90,7 @@ class Problem:
 
     tracks: observations; lenses: priors; scale: px by which thresholds are multiplied; noise_px: of the pairs'
     matches, px; place (N,): number of the place where each picture was taken, those of one number at one place; held
-    (N,): pictures whose pose is given.
+    (N,): pictures whose pose is given; bodies: which pictures turn and move as one, those of one body at one place.
     """
 
     tracks: Tracks
@@ -98,6 +99,7 @@ class Problem:
     noise_px: float
     place: Index
     held: NDArray[np.bool_]
+    bodies: Bodies
 
     @property
     def pictures(self) -> int:
@@ -105,9 +107,10 @@ class Problem:
 
     def with_stations(self, stations: Sequence[Sequence[int]]) -> Problem:
         """The same with the pictures of each station at one place."""
-        place = np.arange(self.pictures)
+        place = self.bodies.of.copy()
         for station in stations:
-            place[list(station)] = min(station)
+            together = np.isin(place, place[list(station)])
+            place[together] = place[together].min()
         return replace(self, place=place)
 
 

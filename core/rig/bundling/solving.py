@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ...cameras.bodies import bodies_of
 from ...cameras.camera import Camera
 from ...raster.arrays import Array
 from ...system.progress import Tick
@@ -75,8 +76,8 @@ def _bundled(
     own = [cameras[k] for k in members]
     held = np.array([camera.pose is not None for camera in own])
     lenses = lenses_of(own)
-    place = np.arange(len(members))
-    problem = Problem(tracks, lenses, verified.scale, rotated.noise_px, place, held)
+    bodies = bodies_of(own)
+    problem = Problem(tracks, lenses, verified.scale, rotated.noise_px, bodies.of, held, bodies)
     by_pairs = [rotated.cameras[members[k]] for k in lenses.first]
     lens = np.zeros((len(lenses), LENS))
     lens[:, 0] = np.log([camera.focal for camera in by_pairs] / lenses.focal[lenses.first])

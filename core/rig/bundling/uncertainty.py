@@ -67,6 +67,7 @@ def _of_unknowns(structure: Structure, normal: Normal, inverses: Array, scale: A
 def _of_depths(structure: Structure, normal: Normal, inverses: Array, covariance: Array, noise_px: float) -> Array:
     """Variance (P,) of ρ: its own with the cameras held, and what theirs adds."""
     by_camera = np.matmul(normal.between.transpose(0, 2, 1), inverses[structure.point][:, :, 2:])[:, :, 0]
+    by_camera[:, :3] = np.einsum("oi,oij->oj", by_camera[:, :3], structure.turns[structure.picture])
     points = len(structure.points)
     flat = structure.columns[structure.picture]
     pulled = np.zeros((points, structure.unknowns + 1))

@@ -9,6 +9,9 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.commands.cli import main
+from edf_stitch.core.pictures.encoding import encode_picture
+from edf_stitch.core.pictures.gpano import SpherePart, whole_sphere
+from edf_stitch.core.pictures.picture import picture_from_array
 from PIL import Image, TiffImagePlugin
 
 from ..pictures.raw_and_heic import dng, mosaic
@@ -79,12 +82,27 @@ def test_a_document_holds_the_same(folder: Path, capsys: pytest.CaptureFixture[s
     first, damaged = found["pictures"]
     assert found["schema"] == 1
     assert first | {"file": "", "focal_px": 0} == {
-        "file": "", "error": "", "kind": "JPEG", "width": 90, "height": 120, "bits": 8, "channels": 3, "alpha": False,
+        "file": "", "error": "", "shows": "flat picture",
+        "kind": "JPEG", "width": 90, "height": 120, "bits": 8, "channels": 3, "alpha": False,
         "colours": "sRGB", "make": "Canon", "model": "Canon EOS 6D", "lens": "EF24-105mm",
         "taken": "2020:01:02 03:04:05", "focal_px": 0, "focal_source": "EXIF 35 mm equivalent", "focal_mm": 50.0,
         "focal35_mm": 50.0, "undistorted": False, "orientation": 6, "problems": [],
     }  # fmt: skip
     assert set(damaged) == {"file", "error"} and "damaged" in damaged["error"]
+
+
+def test_spheres_and_circles_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    part = SpherePart((400, 200), (100, 20, 120, 90))
+    for name, one in ("whole.png", whole_sphere((120, 60))), ("part.png", part):
+        pixels = picture_from_array(NOISE[: one.box[3], :, :3]).pixels
+        (tmp_path / name).write_bytes(encode_picture(pixels, None, 8, ".png", sphere=one)[0])
+    row, column = np.mgrid[:200, :300]
+    disc = np.hypot(column - 150, row - 100) < 95
+    cv2.imwrite(str(tmp_path / "circle.png"), disc.astype(np.uint8) * 200)
+    assert main(["info", str(tmp_path)]) == 0
+    circle, part_line, whole_line = capsys.readouterr().out.splitlines()
+    assert "sRGB; circle of a fisheye; camera unknown" in circle
+    assert "sRGB; part of a sphere of 400×200; " in part_line and "sRGB; whole sphere; " in whole_line
 
 
 def test_good_files_give_0_and_warnings_are_problems(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,6 +15,8 @@ from edf_stitch.core.compare import run as run_module
 from edf_stitch.core.compare.pairs import PairFiles, find_pairs
 from edf_stitch.core.compare.run import FILES, ComparisonRequest, comparable, run_comparison
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.pictures.encoding import encode_picture
+from edf_stitch.core.pictures.gpano import whole_sphere
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.errors import BadRequest, Cancelled, DegenerateGeometry, UnwritableOutput
 
@@ -88,6 +90,15 @@ def test_a_pair_that_fails_is_a_row_that_says_why(folder: Path, tmp_path: Path) 
     assert code == 3 and [entry["status"] for entry in summary["pairs"]] == ["done", "failed", "failed"]
     assert "same picture" in summary["pairs"][1]["message"] and "3 pictures" in (tmp_path / "compare.md").read_text()
     assert "homography" in lines[0] and "failed: " in lines[1] and "same picture" in lines[1]
+
+
+def test_a_sphere_is_no_half_of_a_pair(folder: Path, tmp_path: Path) -> None:
+    (pair,) = find_pairs([folder])
+    wide = np.random.default_rng(0).random((60, 120, 3)).astype(np.float32)
+    (tmp_path / "sphere.png").write_bytes(encode_picture(wide, None, 8, ".png", sphere=whole_sphere((120, 60)))[0])
+    request = ComparisonRequest(tmp_path / "out", (replace(pair, target=tmp_path / "sphere.png"),), FIELDS)
+    summary, code = run_comparison(request, ON_REFERENCE, "1.2.3")
+    assert code == 2 and "compared on two flat pictures" in summary["pairs"][0]["message"]
 
 
 def test_a_field_that_fails_stops_no_other(

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from edf_stitch.core.cameras.camera import ViewOf
 from edf_stitch.core.cameras.rig import Observations, Rig
 from edf_stitch.core.field.sphere_field import Nearby, SphereField, even_rays, fit_sphere_field
 from edf_stitch.core.field.sphere_options import SPHERE, SPHERE_SLACK
@@ -79,6 +80,16 @@ def test_a_picture_that_none_of_its_points_fit_has_no_slack() -> None:
     far = rig.observations.pixels + np.where(rig.observations.picture == 1, 500, 0)[:, None]
     slacks = fit_sphere_field(with_pixels(rig, far)).slacks
     assert slacks[1] is None
+
+
+def test_a_view_of_a_sphere_has_no_slack(ring: Rig) -> None:
+    bent = ring.observations.pixels.copy()
+    own = ring.observations.picture == 1
+    bent[own] += 3 * np.sin(bent[own] / 60)
+    rig = with_pixels(ring, bent)
+    assert fit_sphere_field(rig).slacks[1] is not None
+    view = replace(rig.cameras[1], view_of=ViewOf(0, "sphere.jpg", np.eye(3)))
+    assert fit_sphere_field(replace(rig, cameras=(rig.cameras[0], view, *rig.cameras[2:]))).slacks[1] is None
 
 
 def test_a_rig_whose_points_tell_no_range_is_refused(ring: Rig) -> None:

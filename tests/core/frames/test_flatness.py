@@ -7,9 +7,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.frames.flatness import check_flat, kind_of
+from edf_stitch.core.frames.flatness import circle_in, kind_of, usable
 from edf_stitch.core.frames.reading import read_frame
 from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.pictures.gpano import SpherePart, whole_sphere, xmp_packet
 from edf_stitch.core.pictures.picture import load_picture, picture_from_array
 from edf_stitch.core.system.errors import UnreadableImage
 
@@ -70,17 +71,34 @@ def test_a_wide_photograph_is_none(seed: int) -> None:
     assert kind(fog.astype(np.uint8)) == "flat"
 
 
+def with_xmp(levels: np.ndarray, xmp: bytes, path: Path) -> Path:
+    """A JPEG file with a packet of XMP."""
+    data = cv2.imencode(".jpg", levels)[1].tobytes()
+    segment = b"http://ns.adobe.com/xap/1.0/\0" + xmp
+    path.write_bytes(data[:2] + b"\xff\xe1" + (len(segment) + 2).to_bytes(2, "big") + segment + data[2:])
+    return path
+
+
 @pytest.mark.parametrize("xmp", [
     b'<rdf:Description GPano:ProjectionType="equirectangular"/>',
     b"<GPano:ProjectionType>cylindrical</GPano:ProjectionType>",
+    xmp_packet(SpherePart((100, 50), (90, 0, 160, 120))),
 ])  # fmt: skip
-def test_a_file_that_calls_itself_a_map_of_directions_is_believed(tmp_path: Path, xmp: bytes) -> None:
-    data = cv2.imencode(".jpg", texture(120, 160))[1].tobytes()
-    segment = b"http://ns.adobe.com/xap/1.0/\0" + xmp
-    data = data[:2] + b"\xff\xe1" + (len(segment) + 2).to_bytes(2, "big") + segment + data[2:]
-    (tmp_path / "picture.jpg").write_bytes(data)
-    with pytest.raises(UnreadableImage, match="a whole turn.*cut flat views"):
-        check_flat(load_picture(tmp_path / "picture.jpg"))
+def test_what_goes_around_in_another_way_than_a_sphere_is_refused(tmp_path: Path, xmp: bytes) -> None:
+    """A part of which nobody knows what part it is, a cylinder, numbers that cannot be."""
+    with pytest.raises(UnreadableImage, match="directions all around, but not as an equirectangular sphere"):
+        usable(load_picture(with_xmp(texture(120, 160), xmp, tmp_path / "picture.jpg")))
+
+
+def test_a_file_that_calls_itself_a_sphere_is_believed(tmp_path: Path) -> None:
+    whole = with_xmp(texture(80, 160), b'<x GPano:ProjectionType="equirectangular"/>', tmp_path / "whole.jpg")
+    assert usable(load_picture(whole)).part == whole_sphere((160, 80))
+    part = SpherePart((400, 200), (100, 20, 160, 120))
+    assert usable(load_picture(with_xmp(texture(120, 160), xmp_packet(part), tmp_path / "part.jpg"))).part == part
+    half = usable(load_picture(with_xmp(texture(60, 80), xmp_packet(part), tmp_path / "resized.jpg")))
+    assert half.part == SpherePart((200, 100), (50, 10, 80, 60))
+    assert usable(picture_from_array(sphere(100))).part == whole_sphere((200, 100)), "by its ends and poles"
+    assert usable(picture_from_array(texture(100, 200))).part is None
 
 
 @pytest.mark.parametrize("levels", [
@@ -93,9 +111,13 @@ def test_the_circle_of_a_fisheye_is_known(levels: np.ndarray, quality: int | Non
     if quality is not None:
         encoded = cv2.imencode(".jpg", levels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
         levels = cv2.imdecode(encoded, cv2.IMREAD_COLOR)
-    assert kind(levels) == "circle"
-    with pytest.raises(UnreadableImage, match="circle of a fisheye"):
-        check_flat(picture_from_array(levels))
+    picture = picture_from_array(levels)
+    two = levels.shape[1] == 2 * levels.shape[0]
+    assert kind_of(picture) == ("circles" if two else "circle")
+    if two:
+        assert circle_in(picture) is None
+        with pytest.raises(UnreadableImage, match="two circles of fisheye lenses on black: cut them apart"):
+            usable(picture)
 
 
 def test_dark_corners_and_lamps_are_no_circles() -> None:
@@ -108,15 +130,21 @@ def test_dark_corners_and_lamps_are_no_circles() -> None:
     assert kind(np.zeros((200, 300, 3), np.uint8)) == "flat"
 
 
+def test_a_circle_is_found_to_a_pixel() -> None:
+    centre, radius = circle_in(picture_from_array(circle(900, 1200, 0.42, (0.47, 0.53))))
+    assert centre == pytest.approx([0.47 * 1200, 0.53 * 900], abs=1.5) and radius == pytest.approx(378, abs=2)
+    assert circle_in(picture_from_array(texture(300, 450))) is None
+
+
 def test_whatever_is_to_be_stitched_is_looked_at() -> None:
     """Files, arrays, and Pictures that were read already, as Blender's are."""
-    levels = circle(300, 450, 0.45)
+    levels = np.hstack([circle(300, 300, 0.45)] * 2)
     for source in (levels, picture_from_array(levels)):
-        with pytest.raises(UnreadableImage, match="circle of a fisheye"):
+        with pytest.raises(UnreadableImage, match="two circles"):
             read_frame([texture(300, 450), source], StitchOptions())
 
 
 def test_a_picture_of_nothing_is_refused() -> None:
     nothing = np.dstack([texture(80, 90), np.zeros((80, 90, 1), np.uint8)])
     with pytest.raises(UnreadableImage, match="entirely transparent"):
-        check_flat(picture_from_array(nothing))
+        usable(picture_from_array(nothing))

@@ -236,6 +236,16 @@ def test_layers_of_other_pictures_are_not_mixed_with_these(small_result: StitchR
         check(all_of(tmp_path), OutputFiles(overwrite=True), NAMES)
 
 
+def test_layers_of_a_spheres_views_may_be_written_again(tmp_path: Path) -> None:
+    """How many there are is known when the sphere was read; of another sphere they are another stitch's."""
+    (tmp_path / "layers").mkdir()
+    for name in ("00_reference (front).png", "07_reference (down).png", "08_target.png"):
+        (tmp_path / "layers" / name).write_bytes(b"ours")
+    check(all_of(tmp_path), OutputFiles(overwrite=True), ("reference.png", "target.png"))
+    with pytest.raises(BadRequest, match="files of another stitch"):
+        check(all_of(tmp_path), OutputFiles(overwrite=True), ("other.png", "target.png"))
+
+
 def test_masks_that_this_stitch_does_not_write_are_not_left_beside_its_own(written: Path, tmp_path: Path) -> None:
     (tmp_path / "layers").mkdir()
     (tmp_path / "layers" / "labels.png").write_bytes((written / "layers" / "labels.png").read_bytes())

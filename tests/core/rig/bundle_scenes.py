@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from edf_stitch.core.cameras.bodies import Bodies
 from edf_stitch.core.cameras.camera import Camera, Knowledge
 from edf_stitch.core.rig.averaging.turns import rotations
 from edf_stitch.core.rig.bundling.polishing import start
@@ -30,7 +31,8 @@ def bundled_scene(
     tracks = Tracks(
         picture, point, point, np.zeros((len(point), 2)), np.arange(points) * pictures, np.zeros(points, np.intp)
     )
-    problem = Problem(tracks, lenses, 1.0, 0.5, np.arange(pictures), np.zeros(pictures, bool) if held is None else held)
+    held = np.zeros(pictures, bool) if held is None else held
+    problem = Problem(tracks, lenses, 1.0, 0.5, np.arange(pictures), held, Bodies.alone(pictures))
     lens = np.tile([0.02, k1, 3.0, -2.0], (len(lenses), 1))
     true = start(problem, rotations(rng.normal(0, 0.05, (pictures, 3))), np.where(lenses.free, lens, 0))
     rays = np.column_stack([rng.uniform(-0.5, 0.5, (points, 2)), np.ones(points)])

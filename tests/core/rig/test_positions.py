@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from edf_stitch.core.cameras.bodies import Bodies
 from edf_stitch.core.rig.averaging.averaged import PairGeometry
 from edf_stitch.core.rig.averaging.turns import rotations
 from edf_stitch.core.rig.bundling.polishing import start, total_cost
@@ -29,7 +30,8 @@ def problem_of(rig: SyntheticRig) -> tuple[Problem, Solution]:
         for pair in rig.matches
     ]  # fmt: skip
     tracks = build_tracks(pairs, rig.points, range(count))
-    problem = Problem(tracks, lenses_of(rig.cameras), 1.0, 0.5, np.arange(count), np.zeros(count, bool))
+    held, alone = np.zeros(count, bool), Bodies.alone(count)
+    problem = Problem(tracks, lenses_of(rig.cameras), 1.0, 0.5, np.arange(count), held, alone)
     lens = np.zeros((1, LENS))
     lens[0, 0] = np.log(rig.focal / rig.cameras[0].focal)
     return problem, start(problem, rig.R, lens)
