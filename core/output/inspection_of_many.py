@@ -1,5 +1,7 @@
-"""What a window shows of more than two pictures: their cameras, and the inverse depth on a coarse grid. Points are in px
-of the full pictures, lengths in the distance of the picture that was taken farthest from the first one."""
+"""What a window shows of more than two pictures: their cameras, and the inverse depth on a coarse grid.
+
+Points are in px of the full pictures, lengths in the distance of the picture that was taken farthest from the first.
+"""
 
 from __future__ import annotations
 
