@@ -50,13 +50,14 @@ def choose(settings: Any, chosen: Sequence[Any]) -> None:
 
 
 def add(settings: Any, further: Iterable[Any]) -> int:
-    """Appends those images that are not in the list yet; returns how many these are."""
-    known = {entry.image for entry in settings.pictures}
+    """Appends those images that are not in the list yet, the first of them active; returns how many these are."""
+    count, known = len(settings.pictures), {entry.image for entry in settings.pictures}
     new = [image for image in dict.fromkeys(further) if image not in known]
     with pair.choosing(settings):
         for image in new:
             settings.pictures.add().image = image
-        settings.picture_index = max(0, len(settings.pictures) - 1)
+        if new:
+            settings.picture_index = count
     return len(new)
 
 
