@@ -131,6 +131,7 @@ def test_it_is_seen_from_the_picture_that_is_asked_for(four: PictureSet) -> None
     assert third.report["options"]["viewpoint"] == 3 and third.report["options"]["fade"] == KNOWN.fade
 
 
+@pytest.mark.slow
 def test_a_distance_between_two_pictures_makes_metres_of_baselines(four: PictureSet, set_result: StitchResult) -> None:
     places = [camera.place for camera in four.cameras]
     apart = float(np.linalg.norm(places[3] - places[1]))
@@ -162,7 +163,7 @@ def test_depth_and_mesh_of_a_set_are_written(set_result: StitchResult, tmp_path:
     assert np.isfinite(image.range[shown]).mean() > 0.9 and np.isnan(image.range[~shown]).all()
 
 
-@pytest.mark.parametrize("count", [2, 4])
+@pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_preview_is_small_and_the_full_panorama_has_its_geometry(
     four: PictureSet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
 ) -> None:

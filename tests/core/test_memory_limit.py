@@ -13,7 +13,10 @@ import pytest
 from edf_stitch.core.cameras.projective import rotation_from_vector
 
 resource = pytest.importorskip("resource")
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits the address space as Linux does")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform != "linux", reason="limits the address space as Linux does"),
+]
 # Address space that is mapped and never held: libraries, and the stacks of threads.
 MAPPED = 800_000_000
 # A command whose sets are large from so many pixels on.

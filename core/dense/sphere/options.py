@@ -125,7 +125,10 @@ class SweepOptions:
     """What it costs to lie away from the field: little, it only decides where the pictures do not."""
 
     rim_levels: float = 8.0
-    """What it costs more at the very rim of what several pictures show."""
+    """What it costs more at the very rim of what several pictures show, where there is no texture."""
+
+    rim_levels_textured: float = 4.0
+    """The same where there is much."""
 
     prior_px: float = 4.0
     """px from the field from which on this is so."""

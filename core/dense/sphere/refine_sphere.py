@@ -26,7 +26,7 @@ from .place import Place, Viewed
 from .search import Hints, found_on, span_of
 from .sphere_outlines import with_outlines
 from .sphere_polish import polished
-from .sweep import MEAN_OF_COLOURS
+from .sweep import lack_of_texture
 
 if TYPE_CHECKING:
     from ...cameras.rig import Rig
@@ -187,24 +187,13 @@ def _refined(compared: Compared, hints: Hints) -> _Refined:
     where = found.where.astype(np.float32)
     guide = compared.best(compared.sampled(compared.at(found.along)))[..., :3]
     along = np.where(found.where, found.along, compared.field_px).astype(np.float32)
-    whole = filled(cv2.GaussianBlur(guide, (0, 0), 1.0).astype(np.float32), along, where, _plain(guide))
+    whole = filled(cv2.GaussianBlur(guide, (0, 0), 1.0).astype(np.float32), along, where, lack_of_texture(guide))
     along = polished(compared, whole.along, whole.known, whole.weights)
     along = where_improved(compared, with_outlines(compared, found, along, whole.edges), whole.edges)
     confidence: Plane = cv2.blur(where, (REFINE.confidence_nodes,) * 2)
     d = np.where(compared.owner >= 0, compared.at(along), compared.field)
     noise = compared.per_px * np.float32(SWEEP.noise_px)
     return _Refined(d, confidence, noise, int(compared.several.sum()), int(found.where.sum()))
-
-
-def _plain(guide: NDArray[np.uint8]) -> Plane:
-    """Lack of texture (h, w) around the nodes: 0 for much, 1 for none."""
-    gray = cv2.transform(guide.astype(np.float32), MEAN_OF_COLOURS[:, :3])
-    gray = cv2.GaussianBlur(gray, (0, 0), 1.0)
-    slope = np.zeros_like(gray)
-    for k in (0, 1):
-        slope += np.square(cv2.Scharr(gray, cv2.CV_32F, 1 - k, k, scale=1 / 32))
-    plain: Plane = REFINE.half_texture / (REFINE.half_texture + cv2.blur(slope, (7, 7)))
-    return plain
 
 
 def _swept(rig: Rig, pictures: Sequence[Picture], chart: SphereChart) -> list[SweptPicture]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...raster.arrays import Plane
+from ..options import REFINE
 from .choice import Compared, Levels
 from .options import SWEEP
 from .semi_global import summed_costs
@@ -63,7 +64,9 @@ def swept(compared: Compared, least: int, most: int) -> Swept:
 def _costs(compared: Compared, moves: Sequence[int]) -> NDArray[np.uint8]:
     """Costs (K, h, w) at moves px from the base; where only one picture shows the field, those of the field's place."""
     out = np.empty((len(moves), *compared.owner.shape), np.uint8)
-    levels_of_prior = SWEEP.prior_levels + SWEEP.rim_levels * (1 - np.minimum(compared.from_rim, 1))
+    plain = lack_of_texture(compared.best(compared.sampled(compared.field))[..., :3])
+    at_rim = SWEEP.rim_levels * plain + SWEEP.rim_levels_textured * (1 - plain)
+    levels_of_prior = SWEEP.prior_levels + at_rim * (1 - np.minimum(compared.from_rim, 1))
     for k, move in enumerate(moves):
         d = np.maximum(compared.coarse_base + move * compared.coarse_per_px, 0)
         taken = [
@@ -102,6 +105,17 @@ def difference(
     two, more = (cv2.addWeighted(first, share, second, 1 - share, 0) for share in (2 / 3, 1 / 2))
     apart = np.select([count == 0, count == 1, count == 2], [np.uint8(SWEEP.most_levels), first, two], more)
     return apart, count
+
+
+def lack_of_texture(levels: Levels) -> Plane:
+    """Lack of texture (h, w) around nodes of colours (h, w, 3), gray levels: 0 for much, 1 for none."""
+    gray = cv2.transform(levels.astype(np.float32), MEAN_OF_COLOURS[:, :3])
+    gray = cv2.GaussianBlur(gray, (0, 0), 1.0)
+    slope = np.zeros_like(gray)
+    for k in (0, 1):
+        slope += np.square(cv2.Scharr(gray, cv2.CV_32F, 1 - k, k, scale=1 / 32))
+    plain: Plane = REFINE.half_texture / (REFINE.half_texture + cv2.blur(slope, (7, 7)))
+    return plain
 
 
 def _jump_costs(compared: Compared) -> NDArray[np.int16]:

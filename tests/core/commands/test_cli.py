@@ -443,6 +443,7 @@ def test_a_stitch_loads_no_optimiser_before_it_needs_one(tmp_path: Path) -> None
     assert done.stdout == "True False\n", done.stderr
 
 
+@pytest.mark.slow
 def test_the_same_bytes_whatever_blas_was_told(folder: Path, tmp_path: Path) -> None:
     """BLAS gives other bytes with other thread counts; the command sees to it that there is one."""
     found = []

@@ -52,7 +52,10 @@ def ratio(kind: str, seed: int, points: int = 7000) -> float:
     return found.found.cost / from_truth(rig, found).cost
 
 
-@pytest.mark.parametrize(("kind", "seed", "points"), [("ring", 0, 5000), ("mixed", 2, 7000), ("half", 0, 5000)])
+@pytest.mark.parametrize(
+    ("kind", "seed", "points"),
+    [("ring", 0, 5000), pytest.param("mixed", 2, 7000, marks=pytest.mark.slow), ("half", 0, 5000)],
+)
 def test_cost_is_that_from_the_truth(kind: str, seed: int, points: int) -> None:
     """Of `mixed`, one that needs the places found without stations; of `half`, one that needs places found anew."""
     assert ratio(kind, seed, points) < ABOVE

@@ -270,6 +270,7 @@ def test_a_second_stitch_looks_for_nothing(
         stitch((small_pair.reference[:-1], small_pair.target), options)
 
 
+@pytest.mark.slow
 def test_the_same_bytes_with_it_and_without_and_with_any_number_of_threads(folder: Path, tmp_path: Path) -> None:
     """The worth of everything else here: nobody can tell from a result whether it was kept."""
     found = []
