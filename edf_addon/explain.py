@@ -14,12 +14,12 @@ MODELS = {
 }
 STAGES = {
     "read": "Reading the pictures",
-    "features": "Looking for features",
-    "matches": "Looking for matches",
+    "features": "Looking for matches",
+    "matches": "Matching each picture with the others",
     "geometry": "Finding the cameras",
     "field": "Fitting the field",
     "dense": "Refining the overlap",
-    "warp": "Bending the target",
+    "warp": "Bending the pictures",
     "occlusion": "Looking behind things",
     "exposure": "Matching the exposure",
     "seam": "Finding the seam",
@@ -38,7 +38,7 @@ def _of_many(report: dict[str, Any]) -> list[tuple[str, str]]:
     left_out = report.get("left_out", ())
     out = verdict_facts(report.get("verdict") or {})
     out += [("Used", f"{len(pictures)} of {len(pictures) + len(left_out)} pictures")]
-    out += [("", sentence(f"{one['name']} is left out: {one['why']}")) for one in left_out]
+    out += [("", switches.in_the_panel(f"{one['name']} is left out: {one['why']}")) for one in left_out]
     out += [("Size", f"{report['canvas']['width']} × {report['canvas']['height']} px")]
     out += [("Matches", f"{matches['found']}")]
     out += [("Inliers", f"{matches['inliers']} ({_share(matches['inliers'], matches['found'])})")]
@@ -78,6 +78,7 @@ def verdict_facts(verdict: dict[str, Any]) -> list[tuple[str, str]]:
     for place in verdict["places"]:
         left, top, width, height = place["box"]
         said.append(f"{left}, {top} ({width} × {height} px from the upper left): {place['what']}")
+    said += [sentence(verdict["what_to_do"])] if verdict["what_to_do"] else []
     look = "Look at these places" if verdict["places"] else "Look at it"
     heading = look if verdict["is"] == "look" else "Not usable"
     return [("Verdict", heading), *(("", words) for words in said)]

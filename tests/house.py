@@ -66,7 +66,7 @@ ADDON_MAY_IMPORT = {
     "scene": ("bridge", "properties", "editor"),
     "overlays": ("bridge", "scene", "idnames", "properties", "engine_options", "editor"),
     "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "offered", "pair", "pictures",
-                  "properties", "editor", "explain"),  # fmt: skip
+                  "properties", "editor", "switches"),  # fmt: skip
     "panels": ("bridge", "jobs", "scene", "overlays", "operators", *BESIDE),
 }
 # Names of the first layout that only its builders knew (modules, classes, functions), and what they are called now.

@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, IntProperty
 
-from .. import editor, explain, idnames, pair, pictures, properties
+from .. import editor, idnames, pair, pictures, properties, switches
 from ..bridge import result
 
 WHICH = (
@@ -158,7 +158,7 @@ def said_of(entry: Any) -> str:
     if entry.image is None:
         return "This picture is no longer in the file: remove the row"
     if entry.state == "LEFT_OUT":
-        return explain.sentence(f"{entry.image.name} is left out: {entry.why}")
+        return switches.in_the_panel(f"{entry.image.name} is left out: {entry.why}")
     return "Used by the last stitch" if entry.state == "USED" else "Not stitched yet as it is now"
 
 
