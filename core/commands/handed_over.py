@@ -45,9 +45,9 @@ class Folder:
 
     def add_layer(self, what: str, layer: Layer, is_panorama: bool = False) -> None:
         """A picture on the panorama's canvas, or the panorama, as the first picture's file has its colours."""
-        result, alpha = self._result, layer.alpha
-        if is_panorama and alpha.min() >= 1.0:
-            alpha = None  # opaque everywhere: it need not be stored
+        result = self._result
+        is_opaque = is_panorama and layer.alpha.min() >= 1.0
+        alpha = None if is_opaque else layer.alpha  # where it is 1 everywhere it need not be stored
         sphere = sphere_part_of(result) if is_panorama else None
         kind = ".png" if result.bits == 8 else ".exr"
         with open(self._named(what, kind), "wb") as file:
