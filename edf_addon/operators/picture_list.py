@@ -13,6 +13,8 @@ WHICH = (
     ("SHOWN", "Shown Image", "The image that the editor shows"),
     ("FILE", "Images of This File", "All photographs among the file's images"),
 )
+# Of images that are a picture each.
+SOURCES = ("FILE", "SEQUENCE", "GENERATED")
 WAYS = (("UP", "Up", "One row up"), ("DOWN", "Down", "One row down"))
 
 
@@ -34,9 +36,11 @@ class EDF_OT_add_images(bpy.types.Operator):  # noqa: N801
     which: EnumProperty(name="Which", items=WHICH)
 
     def execute(self, context: Any) -> set[str]:
-        found = [editor.shown(context)] if self.which == "SHOWN" else list(bpy.data.images)
-        photographs = [image for image in found if image is not None and _may_be_stitched(image)]
-        count = pictures.add(properties.settings_of(context.scene), photographs)
+        settings = properties.settings_of(context.scene)
+        found = [editor.shown(context)] if self.which == "SHOWN" else bpy.data.images
+        not_wanted = {*properties.pointers(settings).values(), *_made_by_stitches()} - {settings.seen_from}
+        photographs = [one for one in found if one and one not in not_wanted and one.source in SOURCES]
+        count = pictures.add(settings, photographs)
         if not count:
             self.report({"WARNING"}, "There is no image to add that is not in the list yet, or a panorama.")
             return {"CANCELLED"}
@@ -162,10 +166,10 @@ def said_of(entry: Any) -> str:
     return "Used by the last stitch" if entry.state == "USED" else "Not stitched yet as it is now"
 
 
-def _may_be_stitched(image: bpy.types.Image) -> bool:
-    """Whether an image is a photograph or a render, and nothing that a stitch has made."""
-    made = {other for one in bpy.data.images if result.read(one) for other in result.companions(one).values()}
-    return image.source in ("FILE", "SEQUENCE", "GENERATED") and result.read(image) is None and image not in made
+def _made_by_stitches() -> set[bpy.types.Image]:
+    """Panoramas, and the images that belong to them."""
+    panoramas = [image for image in bpy.data.images if result.read(image) is not None]
+    return {*panoramas, *(other for one in panoramas for other in result.companions(one).values())}
 
 
 CLASSES = (EDF_OT_add_images, EDF_OT_remove_picture, EDF_OT_move_picture, EDF_OT_clear_pictures, EDF_OT_see_from,

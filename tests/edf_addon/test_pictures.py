@@ -61,7 +61,7 @@ def test_files_a_folder_and_images_of_the_file_are_added(blender, folder: Path, 
     assert bpy.ops.edf.add_folder(directory=str(tmp_path)) == {"FINISHED"}
     assert listed(settings)[2:] == ["p9.png", "p10.png"], "as people count"
     assert settings.picture_index == 2, "the first of those that came"
-    new("painted")
+    settings.ignore_reference = new("mask", "painted")[0]
     assert bpy.ops.edf.add_images(which="FILE") == {"FINISHED"} and listed(settings)[4:] == ["painted"]
     assert bpy.ops.edf.add_images(which="FILE") == {"CANCELLED"}, "all are there"
     with pytest.raises(RuntimeError, match="no pictures in this folder"):
