@@ -13,14 +13,23 @@ import bpy
 
 from . import properties
 from .jobs import command, following, modal
-from .operators import mask_painting, match_editing, match_pointing, pictures, scene_objects, stitch
+from .operators import (
+    mask_painting,
+    match_editing,
+    match_pointing,
+    opening,
+    picture_list,
+    saving,
+    scene_objects,
+    stitch,
+)
 from .overlays import drawing
-from .panels import presets, sidebar
+from .panels import elsewhere, presets, sidebar
 
 # Registered in this order, unregistered in the opposite one; each has register() and unregister().
 REGISTERED = (
-    properties, modal, following, stitch, pictures, match_editing, match_pointing, mask_painting, scene_objects,
-    presets, sidebar, drawing,
+    properties, modal, following, stitch, opening, picture_list, saving, match_editing, match_pointing, mask_painting,
+    scene_objects, presets, sidebar, elsewhere, drawing,
 )  # fmt: skip
 _commands: list[Any] = []
 _registered: list[Any] = []

@@ -2,7 +2,8 @@
 
 Until version 2 of the settings there was one flat projection, the reference's own plane, called PERSPECTIVE; the
 viewpoint stayed where the reference was taken, everything was kept, and the field faded to a plane. The target's
-exposure was matched to the reference's, or nothing's: `exposure` was yes or no. Imports nothing.
+exposure was matched to the reference's, or nothing's: `exposure` was yes or no. Imports nothing. (That two pictures
+were chosen instead of a list is dealt with in `properties`.)
 """
 
 from __future__ import annotations

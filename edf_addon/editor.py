@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from . import earlier, engine_options, properties
+from . import earlier, engine_options, pictures, properties
 from .bridge import images, ownership, photo, result
 
 REFERENCE, TARGET, PANORAMA = "reference", "target", "panorama"
@@ -46,9 +46,9 @@ def report_of(context: Any) -> dict[str, Any] | None:
 
 def frame_then(settings: Any, image: bpy.types.Image | None) -> dict[str, Any] | None:
     """The frame and viewpoint (see `engine_options.frame_of`) that an image was made for, where it is a panorama of the
-    pictures that are chosen now."""
-    found = result.read(image)
-    if found is None or ownership.pictures(image) != [settings.reference, settings.target]:
+    two pictures that are chosen now."""
+    found, chosen = result.read(image), pictures.images(settings)
+    if found is None or len(chosen) != len(ownership.SIDES) or ownership.pictures(image) != chosen:
         return None
     return engine_options.frame_of(SimpleNamespace(**earlier.kept_now(found["settings"])))
 
@@ -61,11 +61,11 @@ def is_behind(settings: Any, image: bpy.types.Image | None) -> bool:
 
 
 def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:
-    """What an image is in the stitch: REFERENCE, TARGET or PANORAMA, also a mask that is painted over one of them, or
-    None."""
+    """What an image is in the stitch: REFERENCE or TARGET of two, PANORAMA, also a mask that is painted over one of
+    them, or None."""
     if image is None:
         return None
-    for side in (REFERENCE, TARGET):
+    for side in () if pictures.is_set(settings) else (REFERENCE, TARGET):
         if image in (getattr(settings, side), getattr(settings, f"ignore_{side}")):
             return side
     return PANORAMA if image == settings.seam_mask or result.read(image) is not None else None
@@ -82,11 +82,13 @@ def beneath(settings: Any, image: bpy.types.Image | None) -> bpy.types.Image | N
 
 
 def side_in(panorama: bpy.types.Image | None, picture: bpy.types.Image | None) -> str | None:
-    """What a picture is in a panorama, by the panorama's own pictures, whatever is chosen now; None where it has no
-    part in it."""
+    """What a picture is in a panorama of two, by the panorama's own pictures, whatever is chosen now; None where it has
+    no part in it."""
     if panorama is None or picture is None:
         return None
     own = ownership.pictures(panorama)
+    if len(own) != len(ownership.SIDES):
+        return None
     return PANORAMA if picture == panorama else ownership.SIDES[own.index(picture)] if picture in own else None
 
 

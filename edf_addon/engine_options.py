@@ -14,15 +14,16 @@ WHOLE = ("REFERENCE", "EQUIRECTANGULAR")
 LEAST_FOV = 1.0
 
 
-def options_of(settings: Any, scale: float | None = None) -> dict[str, Any]:
+def options_of(settings: Any, scale: float | None = None, is_set: bool = False) -> dict[str, Any]:
     """The settings as fields of StitchOptions, JSON-ready; `camera` holds those of CameraRequest. What needs images or
-    scene cameras (masks, matches, CAMERAS) is added by whoever has them. scale: instead of the settings' own."""
+    scene cameras (masks, matches, viewpoint, CAMERAS) is added by whoever has them. scale: instead of the settings'
+    own; is_set: of more than two pictures, which one lens took."""
     options: dict[str, Any] = {name: getattr(settings, name).lower() for name in CHOICES}
     options |= {name: getattr(settings, name) for name in VALUES}
     options["exposure"] = _exposure_of(settings)
     options["scale"] = settings.scale if scale is None else scale
     options |= frame_of(settings, options["scale"])
-    options["camera"] = _camera_of(settings)
+    options["camera"] = _camera_of(settings, is_set)
     return options
 
 
@@ -63,9 +64,10 @@ def _exposure_of(settings: Any) -> str | float:
     return str(settings.light.lower())
 
 
-def _camera_of(settings: Any) -> dict[str, Any]:
+def _camera_of(settings: Any, is_set: bool) -> dict[str, Any]:
     def of(name: str) -> list[float]:
-        return [getattr(settings, name), *([getattr(settings, f"target_{name}")] if settings.own_lens else [])]
+        further = [getattr(settings, f"target_{name}")] if settings.own_lens and not is_set else []
+        return [getattr(settings, name), *further]
 
     if settings.camera == "FOCAL":
         return {"focal_mm": of("focal"), "sensor_mm": of("sensor")}

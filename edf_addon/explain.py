@@ -5,6 +5,8 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
+from . import switches
+
 MODELS = {
     "general": "General scene",
     "rotation": "Rotation: both from one place",
@@ -13,10 +15,11 @@ MODELS = {
 STAGES = {
     "read": "Reading the pictures",
     "features": "Looking for matches",
+    "matches": "Matching each picture with the others",
     "geometry": "Finding the cameras",
     "field": "Fitting the field",
     "dense": "Refining the overlap",
-    "warp": "Bending the target",
+    "warp": "Bending the pictures",
     "occlusion": "Looking behind things",
     "exposure": "Matching the exposure",
     "seam": "Finding the seam",
@@ -27,6 +30,27 @@ STAGES = {
 
 def facts(report: dict[str, Any]) -> list[tuple[str, str]]:
     """(what, value) of a report, in the order in which an artist asks."""
+    return [(what, value) for what, value in (_of_pair if "two_view" in report else _of_many)(report) if value]
+
+
+def _of_many(report: dict[str, Any]) -> list[tuple[str, str]]:
+    pictures, matches, measured = report["pictures"], report["matches"], report["measured"]
+    left_out = report.get("left_out", ())
+    out = verdict_facts(report.get("verdict") or {})
+    out += [("Used", f"{len(pictures)} of {len(pictures) + len(left_out)} pictures")]
+    out += [("", switches.in_the_panel(f"{one['name']} is left out: {one['why']}")) for one in left_out]
+    out += [("Size", f"{report['canvas']['width']} × {report['canvas']['height']} px")]
+    out += [("Matches", f"{matches['found']}")]
+    out += [("Inliers", f"{matches['inliers']} ({_share(matches['inliers'], matches['found'])})")]
+    slide = (report.get("slide") or {}).get("s1")
+    place = "" if slide is None else f"the place of {pictures[0]['name']}" if not slide else f"slides by {slide:.2f}"
+    out += [("Viewpoint", place)]
+    camera = pictures[0]["camera"]
+    out += [("Focal", f"{camera['focal_px']:.0f} px"), ("Source", camera["source"])]
+    return [*out, ("Alignment", _pixels(measured.get("alignment_median_px"), measured.get("alignment_p95_px")))]
+
+
+def _of_pair(report: dict[str, Any]) -> list[tuple[str, str]]:
     view, matches, measured = report["two_view"], report["matches"], report["measured"]
     found, inliers = matches["found"], matches["inliers"]
     out = verdict_facts(report.get("verdict") or {})
@@ -41,8 +65,7 @@ def facts(report: dict[str, Any]) -> list[tuple[str, str]]:
     projectivity = measured.get("projectivity_independent_px")
     if projectivity is None:
         projectivity = measured.get("off_line_mean_px")
-    out += [("Projectivity", _pixels(projectivity))]
-    return [(what, value) for what, value in out if value]
+    return [*out, ("Projectivity", _pixels(projectivity))]
 
 
 def verdict_facts(verdict: dict[str, Any]) -> list[tuple[str, str]]:
@@ -51,21 +74,23 @@ def verdict_facts(verdict: dict[str, Any]) -> list[tuple[str, str]]:
         return []
     if verdict["is"] == "good":
         return [("Verdict", "Good")]
-    said = [] if verdict["is"] == "look" else [sentence(verdict["because"])]
+    said = [] if verdict["is"] == "look" and verdict["places"] else [sentence(verdict["because"])]
     for place in verdict["places"]:
         left, top, width, height = place["box"]
         said.append(f"{left}, {top} ({width} × {height} px from the upper left): {place['what']}")
-    heading = "Look at these places" if verdict["is"] == "look" else "Not usable"
+    said += [sentence(verdict["what_to_do"])] if verdict["what_to_do"] else []
+    look = "Look at these places" if verdict["places"] else "Look at it"
+    heading = look if verdict["is"] == "look" else "Not usable"
     return [("Verdict", heading), *(("", words) for words in said)]
 
 
 def verdict_in_short(report: dict[str, Any]) -> str:
     """The same in a few words, for the line that ends a stitch; nothing of a good panorama."""
     verdict = report.get("verdict") or {"is": "good"}
-    if verdict["is"] == "look":
-        places = len(verdict["places"])
+    if places := len(verdict.get("places", ())) if verdict["is"] == "look" else 0:
         return f"look at {places} place{'s' * (places > 1)} (see Result)"
-    return "" if verdict["is"] == "good" else f"not usable: {verdict['because']}"
+    told = {"good": "", "look": f"look at it: {verdict.get('because')}"}
+    return told.get(verdict["is"], f"not usable: {verdict.get('because')}")
 
 
 def focal_facts(view: dict[str, Any]) -> list[tuple[str, str]]:
@@ -108,9 +133,9 @@ def lines(text: str, width: float, character: float = 6.6) -> list[str]:
 
 
 def sentence(text: str) -> str:
-    """As a sentence: the engine's messages begin small, as they stand behind a colon on the command line. Nothing stays
-    nothing."""
-    text = text.strip()
+    """As a sentence in the panel's words: the engine's messages begin small, as they stand behind a colon on the
+    command line, and name its switches. Nothing stays nothing."""
+    text = switches.in_the_panel(text.strip())
     return text[:1].upper() + text[1:] + ("" if not text or text.endswith((".", "!", "?")) else ".")
 
 

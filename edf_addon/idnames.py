@@ -10,11 +10,22 @@ class Operator(StrEnum):
 
     STITCH = "edf.stitch"
     PREVIEW = "edf.preview"
+    STITCH_FILES = "edf.stitch_files"
+    ENVIRONMENT = "edf.stitch_environment"
+    SPHERE = "edf.stitch_sphere"
     RESTITCH = "edf.restitch"
     FOLLOW = "edf.follow"
     CANCEL = "edf.cancel"
+    ADD_PICTURES = "edf.add_pictures"
+    ADD_FOLDER = "edf.add_folder"
+    ADD_IMAGES = "edf.add_images"
+    DEVELOP = "edf.develop_pictures"
     OPEN_PAIR = "edf.open_pair"
-    DEVELOP_PAIR = "edf.develop_pair"
+    REMOVE_PICTURE = "edf.remove_picture"
+    MOVE_PICTURE = "edf.move_picture"
+    CLEAR_PICTURES = "edf.clear_pictures"
+    SEE_FROM = "edf.see_from"
+    PICTURE_STATE = "edf.picture_state"
     SWAP = "edf.swap"
     RESET = "edf.reset"
     REFERENCE_FRAME = "edf.reference_frame"
@@ -54,17 +65,21 @@ class Menu(StrEnum):
     """Menus."""
 
     PRESETS = "EDF_MT_presets"
+    PICTURES = "EDF_MT_pictures"
     MATCHES = "EDF_MT_matches"
 
 
 class List(StrEnum):
     """Lists."""
 
+    PICTURES = "EDF_UL_pictures"
     MATCHES = "EDF_UL_matches"
 
 
 # Where the properties hang: bpy.types.Scene.edf_stitch (settings), bpy.types.WindowManager.edf_stitch_job.
 SETTINGS = "edf_stitch"
 JOB = "edf_stitch_job"
+# The handler of files that are dropped.
+DROPPED = "EDF_FH_pictures"
 # The sidebar's tab.
 TAB = "EDF Stitch"

@@ -80,6 +80,11 @@ MATCH_STATES = (
     ("LEFT_OUT", "Left Out", "It contradicts the others and was not used"),
     ("ADDED", "Added", "Set by hand since the last stitch"),
 )
+PICTURE_STATES = (
+    ("NEW", "New", "No stitch has used it as it is now"),
+    ("USED", "Used", "The panorama shows it, or was made with its help"),
+    ("LEFT_OUT", "Left Out", "The panorama was made without it"),
+)
 OVERLAYS = (
     ("NONE", "None", "The picture alone"),
     ("DIFFERENCE", "Difference", "How much the two pictures differ where both show something; black is the same"),

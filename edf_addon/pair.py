@@ -1,4 +1,4 @@
-"""The two pictures that are chosen in the panel, and the list of matches, which belongs to them alone."""
+"""The pictures that are chosen in the panel, and the list of matches, which belongs to two of them alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _choosing: list[Any] = []
 
 @contextmanager
 def choosing(settings: Any) -> Iterator[None]:
-    """Both pictures are chosen at once, however many steps that takes; in the end the list of matches goes if nobody
+    """Pictures are chosen at once, however many steps that takes; in the end the list of matches goes if nobody
     has said that it is theirs."""
     _choosing.append(settings)
     try:

@@ -18,7 +18,9 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import earlier, idnames, offered, pair, status
+from . import earlier, idnames, offered, pictures, status
+from .bridge import compat
+from .list_entries import EDF_PG_match, EDF_PG_picture, look_again
 
 # Called with a scene's settings when an artist changes what of the scene the panorama shows, or from where.
 on_reframe: list[Callable[[Any], None]] = []
@@ -31,52 +33,38 @@ def reframe(settings: Any, _context: Any) -> None:
         follow(settings)
 
 
-def look_again(_group: Any, _context: Any) -> None:
-    """What lies over the pictures has changed: Image Editors are drawn anew (nothing under `-b`)."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "IMAGE_EDITOR":
-                area.tag_redraw()
-
-
 def is_camera(_settings: Any, object_: bpy.types.Object) -> bool:
     """What the pointers to camera objects offer."""
     return object_.type == "CAMERA"
 
 
-class EDF_PG_match(bpy.types.PropertyGroup):  # noqa: N801 (Blender's own form)
-    """A point of the reference and where the target shows the same, px of the full upright pictures: pixel centres are
-    integers, (0, 0) at the top left."""
-
-    x: FloatProperty(name="X", description="Column in the reference, from the left", precision=2)
-    y: FloatProperty(name="Y", description="Row in the reference, from the top", precision=2)
-    x2: FloatProperty(name="X", description="Column in the target, from the left", precision=2)
-    y2: FloatProperty(name="Y", description="Row in the target, from the top", precision=2)
-    weight: FloatProperty(
-        name="Weight", description="How much this match counts beside the others; 1 is usual", default=1.0, min=0.001,
-        soft_max=100.0,
-    )
-    enabled: BoolProperty(name="Use", description="Whether the next stitch may use this match", default=True,
-                          update=look_again)
-    error: FloatProperty(
-        name="Error", description="How far, in target pixels, the last stitch missed this match; -1: not measured",
-        default=-1.0, precision=2,
-    )
-    state: EnumProperty(name="State", description="What the last stitch did with it", items=offered.MATCH_STATES)
+def show_picture(settings: Any, context: Any) -> None:
+    """A row of the list was chosen: the editor that the list is in shows its picture."""
+    space = context.space_data
+    if isinstance(space, bpy.types.SpaceImageEditor) and 0 <= settings.picture_index < len(settings.pictures):
+        space.image = settings.pictures[settings.picture_index].image or space.image
 
 
 class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
-    """bpy.types.Scene.edf_stitch."""
+    """bpy.types.Scene.edf_stitch. Of a list with two pictures that are used, `reference` is the first and `target` the
+    second."""
 
-    reference: PointerProperty(
-        name="Reference", type=bpy.types.Image, update=pair.chosen,
-        description="The picture whose place and plane the panorama keeps: the one that looks at the scene more "
-        "squarely",
+    pictures: CollectionProperty(
+        name="Pictures", type=EDF_PG_picture, description="What is stitched: two, or up to 60, in any order",
     )
-    target: PointerProperty(
-        name="Target", type=bpy.types.Image, description="The picture that is bent to meet the reference",
-        update=pair.chosen,
+    picture_index: IntProperty(
+        name="Active Picture", description="The picture of the list that the editor shows", default=0, min=0,
+        options={"SKIP_SAVE"}, update=show_picture,
     )
+    seen_from: PointerProperty(
+        name="Seen From", type=bpy.types.Image, update=look_again,
+        description="The picture from whose place more than two are seen; without one, the first that connects with "
+        "others",
+    )
+    reference = property(
+        lambda self: pictures.side(self, 0), lambda self, image: pictures.set_side(self, 0, image)
+    )
+    target = property(lambda self: pictures.side(self, 1), lambda self, image: pictures.set_side(self, 1, image))
     result: PointerProperty(name="Panorama", type=bpy.types.Image, description="What was stitched last")
 
     camera: EnumProperty(name="Camera", description="Where the focal length comes from", items=offered.CAMERA_SOURCES)
@@ -296,9 +284,9 @@ class EDF_PG_job(bpy.types.PropertyGroup):  # noqa: N801
 PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))
 # What is no setting: what is stitched, what came of it, and how it is looked at.
-NO_SETTINGS = frozenset({"name", "reference", "target", "result", "matches", "matches_reference", "matches_target",
-                         "match_index", "version", "exposure", "overlay", "overlay_opacity", "show_matches",
-                         "show_epipolar", "show_places"})  # fmt: skip
+NO_SETTINGS = frozenset({"name", "pictures", "picture_index", "result", "matches", "matches_reference",
+                         "matches_target", "match_index", "version", "exposure", "overlay", "overlay_opacity",
+                         "show_matches", "show_epipolar", "show_places"})  # fmt: skip
 
 
 def names_of_settings(settings: Any) -> list[str]:
@@ -347,7 +335,13 @@ def bring_up_to_date(*_: Any) -> None:
     """What Blender calls when a file was opened or something appended: scenes of an earlier release mean the same."""
     for scene in bpy.data.scenes:
         if scene.library is None:
-            earlier.bring_up_to_date(settings_of(scene))
+            settings = settings_of(scene)
+            chosen = [compat.take_kept(settings, side) for side in ("reference", "target")]
+            if any(chosen):
+                version = settings.version
+                pictures.choose(settings, chosen)
+                settings.version = version  # to choose says that it was done now
+            earlier.bring_up_to_date(settings)
 
 
 def _handlers() -> list[list[Any]]:
@@ -356,7 +350,7 @@ def _handlers() -> list[list[Any]]:
     return [getattr(bpy.app.handlers, name) for name in names if hasattr(bpy.app.handlers, name)]
 
 
-CLASSES = (EDF_PG_match, EDF_PG_settings, EDF_PG_job)
+CLASSES = (EDF_PG_match, EDF_PG_picture, EDF_PG_settings, EDF_PG_job)
 
 
 def register() -> None:

@@ -45,22 +45,28 @@ MAY_IMPORT = {
     "pipeline": (*BELOW_MEASURE, "frames", "measure", "options", "alignment"),
 }
 # The same for the add-on. What lies beside its rooms is known to all of them, or to those after it.
-BESIDE = ("idnames", "offered", "pair", "properties", "earlier", "engine_options", "status", "editor", "explain")
+BESIDE = ("idnames", "offered", "pair", "pictures", "properties", "earlier", "engine_options", "status", "editor",
+          "explain", "list_entries", "switches")  # fmt: skip
 ADDON_MAY_IMPORT = {
     "idnames": (),
     "status": (),
-    "explain": (),
+    "switches": ("offered",),
+    "explain": ("switches",),
     "offered": (),
     "engine_options": (),
     "earlier": (),
     "pair": ("earlier", "status"),
-    "properties": ("idnames", "offered", "earlier", "pair", "status"),
+    "pictures": ("idnames", "pair"),
+    "list_entries": ("offered", "pictures"),
+    "properties": ("bridge", "list_entries", "idnames", "offered", "earlier", "pair", "pictures", "status"),
     "bridge": (),
-    "editor": ("bridge", "earlier", "engine_options", "properties"),
-    "jobs": ("bridge", "idnames", "pair", "properties", "engine_options", "editor", "status", "explain"),
+    "editor": ("bridge", "earlier", "engine_options", "pictures", "properties"),
+    "jobs": ("bridge", "idnames", "offered", "pair", "pictures", "properties", "engine_options", "editor",
+             "status", "explain"),  # fmt: skip
     "scene": ("bridge", "properties", "editor"),
     "overlays": ("bridge", "scene", "idnames", "properties", "engine_options", "editor"),
-    "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "pair", "properties", "editor"),
+    "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "offered", "pair", "pictures",
+                  "properties", "editor", "switches"),  # fmt: skip
     "panels": ("bridge", "jobs", "scene", "overlays", "operators", *BESIDE),
 }
 # Names of the first layout that only its builders knew (modules, classes, functions), and what they are called now.

@@ -5,13 +5,13 @@ afterwards, with result.json as its index. stdout carries one JSON object a line
 the end {"done": true} or {"error", "kind", "exit_code"}. The work ends on SIGINT (Windows: CTRL_BREAK) and when stdin
 closes, so that it never outlives whoever started it; FOLDER goes then too. Exit status as the command's.
 
-job.json: `reference`, `target`: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as shown; "exif_of": a
-file whose EXIF (orientation included) belongs to the array. `options`: fields of StitchOptions, their `camera` those of
-CameraRequest. `cameras`: {"reference", "target"}: {"lens": fields of BlenderLens but the resolution, "matrix_world"}.
-`masks`: {"reference", "target"}: .npy of pictures, rows as shown; {"seam"}: over the whole panorama. `matches`: .npy
-(N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as result.json had it in matches.file. `take`:
-which of "layers", "masks", "depth" to leave as pictures. `exr`: fields of ExrForm, for panorama and layers. Relative
-paths start at FOLDER. Or `try` alone: load the libraries, and no more.
+job.json: `pictures`, of two the reference first: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as
+shown; "exif_of": a file whose EXIF (orientation included) belongs to the array. `options`: fields of StitchOptions,
+their `camera` those of CameraRequest. `cameras` of two pictures: {"lens": fields of BlenderLens but the resolution,
+"matrix_world"} each. `masks`: for each picture an .npy, rows as shown, or null; `seam`: one over the whole panorama.
+`matches`: .npy (N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as result.json had it in
+matches.file. `take`: which of "layers", "masks", "depth" to leave as pictures. `exr`: fields of ExrForm, for panorama
+and layers. Relative paths start at FOLDER. Or `try` alone: load the libraries, and no more.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ from typing import Any
 
 from .options import WORKER
 
-SIDES = ("reference", "target")
 # All that a stitch may load sooner or later, besides the standard library.
 LIBRARIES = ("numpy", "cv2", "scipy.linalg", "scipy.optimize", "poselib", "OpenEXR", "exifread")
 
@@ -108,6 +107,7 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
         from ..pipeline import stitch
         from ..system.cache import default_folder
         from ..system.memory import use_again
+        from .handed_over import hand_over
 
     use_again()
     _say({"stage": "read", "share": 0.0})
@@ -122,26 +122,32 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
     if job.get("show"):
         _show(folder, job["show"])
         return
-    exposure = exposure_of_first(folder / job[side]["path"] for side in SIDES if "path" in job[side])
-    pictures, turns = zip(*(_picture(folder, job[side], exposure) for side in SIDES), strict=True)
+    given = job["pictures"]
+    exposure = exposure_of_first(folder / entry["path"] for entry in given if "path" in entry)
+    pictures, turns = zip(*(_picture(folder, entry, exposure) for entry in given), strict=True)
     camera = {key: _tuples(value) for key, value in job["options"].pop("camera", {}).items()}
     if job.get("cameras"):
         camera = {"cameras": cameras_of(job["cameras"], pictures)}
-    masks = job.get("masks", {})
+    masks = job.get("masks") or [None] * len(given)
     matches = folder / job["matches"] if job.get("matches") else None
     rows = _array(matches) if matches is not None and matches.suffix == ".npy" else None
     options = StitchOptions(
         **{key: _tuples(value) for key, value in job["options"].items()}, camera=CameraRequest(**camera),
         matches=matches if rows is None else rows[rows[:, 4] > 0],
-        ignore=tuple(_mask(folder, masks.get(side), turn) for side, turn in zip(SIDES, turns, strict=True)),
-        mask=_mask(folder, masks.get("seam"), 1),
+        ignore=tuple(_mask(folder, mask, turn) for mask, turn in zip(masks, turns, strict=True)),
+        mask=_mask(folder, job.get("seam"), 1),
         cache=default_folder(),
     )  # fmt: skip
     result = stitch(
         pictures, options, lambda stage, share: _say({"stage": stage, "share": share * WORKER.stitch_share}),
         lambda: stop.asked,  # Python swallows a KeyboardInterrupt inside a finalizer
     )  # fmt: skip
-    _write(folder, result.spread_out(), rows, job, turns)
+    hand_over(folder, result, rows, job, turns, _say_written)
+
+
+def _say_written(files: int) -> None:
+    """That so many files were begun."""
+    _say({"stage": "write", "share": min(WORKER.max_share, WORKER.stitch_share + WORKER.file_share * files)})
 
 
 def _show(folder: Path, paths: list[str]) -> None:
@@ -162,7 +168,7 @@ def _show(folder: Path, paths: list[str]) -> None:
 
 def _await(job: Path, stop: _Stop) -> None:
     """Loads what a stitch loads sooner or later, and returns when the job is there."""
-    for name in (*LIBRARIES, f"{__package__.rpartition('.')[0]}.output.inspection"):
+    for name in (*LIBRARIES, f"{__package__}.handed_over"):
         import_module(name)
     while not job.exists():
         if stop.asked:
@@ -170,12 +176,12 @@ def _await(job: Path, stop: _Stop) -> None:
         time.sleep(0.01)
 
 
-def cameras_of(entries: dict[str, Any], pictures: tuple[Any, ...]) -> dict[str, Any]:
+def cameras_of(entries: list[dict[str, Any]], pictures: tuple[Any, ...]) -> dict[str, Any]:
     """Blender's cameras in the form that `CameraRequest.cameras` takes.
 
     Parameters
     ----------
-    entries : dict
+    entries : list of dict
         `cameras` of job.json.
     pictures : tuple of Picture
         The upright pictures that they took, reference and target.
@@ -189,15 +195,16 @@ def cameras_of(entries: dict[str, Any], pictures: tuple[Any, ...]) -> dict[str, 
 
     from ..cameras.blender_camera import BlenderLens, pose_of
     from ..frames.frame import size_of
+    from .handed_over import SIDES
 
-    table = {}
-    for side, picture in zip(SIDES, pictures, strict=True):
-        lens = BlenderLens(**{**entries[side]["lens"], "resolution": size_of(picture)})
-        R, t = pose_of(np.array(entries[side]["matrix_world"], np.float64))
-        table[side] = {"K": lens.intrinsics, "R": R, "t": t}
+    tables = []
+    for entry, picture in zip(entries, pictures, strict=True):
+        lens = BlenderLens(**{**entry["lens"], "resolution": size_of(picture)})
+        R, t = pose_of(np.array(entry["matrix_world"], np.float64))
+        tables.append({"K": lens.intrinsics, "R": R, "t": t})
     # names are looked up before sides, and a reference may well be called "target"
     names = [picture.name for picture in pictures]
-    return table if names[0] == names[1] else dict(zip(names, table.values(), strict=True))
+    return dict(zip(SIDES if names[0] == names[1] else names, tables, strict=True))
 
 
 def _picture(folder: Path, entry: dict[str, Any], exposure: Any = None) -> tuple[Any, int]:
@@ -231,81 +238,6 @@ def _array(path: Path) -> Any:
     import numpy as np
 
     return np.load(path, allow_pickle=False)
-
-
-def _write(folder: Path, result: Any, rows: Any, job: dict[str, Any], turns: tuple[int, ...]) -> None:
-    """Everything the window may ask for, with result.json as the index."""
-    from ..output import inspection as seen
-    from ..output.json_file import json_bytes
-    from ..output.sphere_part import sphere_part_of
-    from ..pictures.encoding import encode_picture
-    from ..pictures.exr import ExrForm
-
-    take, exr = job.get("take", []), ExrForm(**job.get("exr", {}))
-    kind = ".png" if result.bits == 8 else ".exr"
-    files: dict[str, str] = {}
-
-    def add(name: str, data: bytes, suffix: str = kind) -> None:
-        files[name] = f"{name.replace(' ', '_')}{suffix}"
-        (folder / files[name]).write_bytes(data)
-        share = min(WORKER.max_share, WORKER.stitch_share + WORKER.file_share * len(files))
-        _say({"stage": "write", "share": share})
-
-    def picture(pixels: Any, alpha: Any, sphere: Any = None) -> bytes:
-        icc, exif = result.pictures[0].icc, result.pictures[0].exif
-        return encode_picture(pixels, alpha, result.bits, kind, icc, exif, exr, sphere)[0]
-
-    alpha = _unless_opaque(result.panorama.alpha)
-    add("panorama", picture(result.panorama.light, alpha, sphere_part_of(result)))
-    for side, layer in zip(SIDES, result.layers, strict=True):
-        if "layers" in take:
-            add(f"{side} layer", picture(layer.light, layer.alpha))
-        if "masks" in take:
-            add(f"{side} mask", _png((layer.alpha.astype("float32") * 255).round().astype("uint8")), ".png")
-    if "masks" in take:
-        add("occluded", _png(result.occluded[1].astype("uint8") * 255), ".png")
-        if result.inpainted.any():
-            add("inpainted", _png(result.inpainted.astype("uint8") * 255), ".png")
-        if result.labels is not None:
-            add("seam", _png(_painted(result.labels > 0, result.panorama.alpha > 0)), ".png")
-        if result.warp.confidence is not None:
-            add("confidence", _png((result.warp.confidence * 255).round().astype("uint8")), ".png")
-    if "depth" in take and seen.has_depth(result):
-        add("inverse depth", encode_picture(result.warp.inverse_depth[..., None], None, 32, ".exr")[0], ".exr")
-    heat, heat_range = seen.heat_map(result)
-    add("heat", _png(heat), ".png")
-    add("difference", _png(seen.difference(result)), ".png")
-    matches = seen.match_rows(result) if rows is None else seen.given_rows(result, rows)
-    index = {
-        "files": files, "report": result.report, "warnings": result.warnings, "bits": result.bits,
-        "heat_range": heat_range, "geometry": seen.full_geometry(result), "orientations": turns,
-        "has_depth": seen.has_depth(result), "depth": seen.depth_grid(result), "matches": matches,
-        "seconds": result.seconds,
-    }  # fmt: skip
-    (folder / "result.json").write_bytes(json_bytes(index))
-
-
-def _png(values: Any) -> bytes:
-    """A PNG of uint8 values (H, W) or RGBA (H, W, 4) that are no light: without a profile or a display curve."""
-    import cv2
-
-    stored = values if values.ndim == 2 else cv2.cvtColor(values, cv2.COLOR_RGBA2BGRA)
-    png: bytes = cv2.imencode(".png", stored)[1].tobytes()
-    return png
-
-
-def _painted(further: Any, shows: Any) -> Any:
-    """A seam in the form that a painted one has: RGBA (H, W, 4), white where the target is shown, transparent where
-    nothing is."""
-    import numpy as np
-
-    gray, alpha = (np.where(mask, 255, 0).astype(np.uint8) for mask in (further, shows))
-    return np.dstack([gray, gray, gray, alpha])
-
-
-def _unless_opaque(alpha: Any) -> Any:
-    """Alpha (H, W), or None where it is 1 everywhere and need not be stored."""
-    return None if alpha.min() >= 1.0 else alpha
 
 
 def _tuples(value: Any) -> Any:

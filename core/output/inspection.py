@@ -63,16 +63,26 @@ def full_geometry(result: StitchResult) -> dict[str, Any]:
         is the reference's own plane; the report's `canvas.projection` says what it shows. `viewpoint`: the attributes
         of a `Viewpoint` that slides, None where all is seen from the reference's place.
     """
-    edge, canvas = result.edges[0], result.canvas
+    edge = result.edges[0]
     view, (S, S_prime) = edge.two_view, edge.pair(scales(result))
+    return {
+        "F": S_prime.T @ view.F @ S, "K": np.linalg.inv(S) @ view.K,
+        "K_prime": np.linalg.inv(S_prime) @ view.K_prime, "R": view.R, "t": view.t, "model": view.model,
+        "distortion": result.cameras[edge.i].distortion, "distortion_prime": result.cameras[edge.j].distortion,
+        "viewpoint": asdict(result.warp.viewpoint) if isinstance(result.warp.viewpoint, Viewpoint) else None,
+        **canvas_geometry(result, S, view.K),
+    }  # fmt: skip
+
+
+def canvas_geometry(result: StitchResult, S: Array, K: Array) -> dict[str, Any]:
+    """The entries of `full_geometry` that say how the canvas lies.
+
+    S (3, 3): from px of the full first picture to px of the one that was worked on, whose intrinsics are K."""
+    canvas = result.canvas
     shift = np.eye(3) if canvas.projection is None else np.full((3, 3), np.nan)
     shift[:2, 2] += canvas.offset
     return {
-        "full_sizes": result.full_sizes, "F": S_prime.T @ view.F @ S, "K": np.linalg.inv(S) @ view.K,
-        "K_prime": np.linalg.inv(S_prime) @ view.K_prime, "R": view.R, "t": view.t, "model": view.model,
-        "distortion": result.cameras[edge.i].distortion, "distortion_prime": result.cameras[edge.j].distortion,
-        "S": shift @ S, "canvas": (canvas.width, canvas.height), "K_canvas": shift @ view.K,
-        "viewpoint": asdict(result.warp.viewpoint) if isinstance(result.warp.viewpoint, Viewpoint) else None,
+        "full_sizes": result.full_sizes, "S": shift @ S, "canvas": (canvas.width, canvas.height), "K_canvas": shift @ K,
     }  # fmt: skip
 
 
@@ -199,18 +209,23 @@ def depth_grid(result: StitchResult) -> dict[str, Any]:
         transparent): one value for each node, row by row from the top. `slide` likewise where the viewpoint slides: a
         node's depth is measured from s times the target's place.
     """
-    height, width = result.panorama.alpha.shape
-    longest = max(width, height)
-    columns, rows = (max(2, round(INSPECTION.longest_grid * side / longest)) for side in (width, height))
-    x, y = (np.rint(np.linspace(0, side - 1, n)).astype(int) for side, n in ((width, columns), (height, rows)))
+    x, y = grid_nodes(result.panorama.alpha.shape)
     depth = result.warp.inverse_depth[np.ix_(y, x)].ravel()
     slide = {}
     if result.warp.slide is not None:
         slide["slide"] = [round(float(s), 4) for s in whole(result.warp.slide)[np.ix_(y, x)].ravel()]
     return {
-        "columns": columns, "rows": rows, "inverse_depth": [float(f"{d:.5g}") for d in depth],
+        "columns": len(x), "rows": len(y), "inverse_depth": [float(f"{d:.5g}") for d in depth],
         "shows": (result.panorama.alpha[np.ix_(y, x)] > 0).astype(int).ravel(), **slide,
     }  # fmt: skip
+
+
+def grid_nodes(shape: tuple[int, ...]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """The columns and rows of a canvas (H, W) that nodes from corner to corner lie in."""
+    height, width = shape[:2]
+    counts = (max(2, round(INSPECTION.longest_grid * side / max(width, height))) for side in (width, height))
+    x, y = (np.rint(np.linspace(0, side - 1, n)).astype(int) for side, n in zip((width, height), counts, strict=True))
+    return x, y
 
 
 def has_depth(result: StitchResult) -> bool:

@@ -42,12 +42,12 @@ def _numbers(told: dict[str, Any]) -> list[float]:
     return [*lens, *told["lens"]["aspect"], *(value for row in told["matrix_world"] for value in row)]
 
 
-def describe_both(settings: Any, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
-    """The two cameras that the settings name. Raises Unusable."""
+def describe_both(settings: Any, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[dict[str, Any]]:
+    """The reference's and the target's camera, as the settings name them. Raises Unusable."""
     chosen = {"reference": settings.reference_camera, "target": settings.target_camera}
     for side, camera in chosen.items():
         if camera is None:
             raise Unusable(f"no {side} camera is chosen: pick one of the scene, or take the camera from elsewhere")
     if chosen["reference"] == chosen["target"]:
         raise Unusable(f"“{chosen['target'].name}” is chosen for both pictures: each needs the camera that took it")
-    return {side: describe(camera, scene, depsgraph) for side, camera in chosen.items()}
+    return [describe(camera, scene, depsgraph) for camera in chosen.values()]

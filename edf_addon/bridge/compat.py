@@ -21,6 +21,13 @@ def set_colour_space(image: bpy.types.Image, name: str) -> None:
         pass
 
 
+def take_kept(group: Any, name: str) -> Any:
+    """What a file keeps in a group of properties under a name that is no property any more, taken out of it; None where
+    there is nothing. Since 5.0 a group's own values are kept apart from what scripts put there."""
+    kept = group.bl_system_properties_get() if hasattr(group, "bl_system_properties_get") else group
+    return None if kept is None else kept.pop(name, None)
+
+
 def by_uid(kind: Iterable[Any], uid: int | None) -> Any:
     """The scene, image or object of a `session_uid`, which survives undo and renaming (a reference to it does not)."""
     return next((one for one in kind if one.session_uid == uid), None)

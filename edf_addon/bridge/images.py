@@ -42,12 +42,12 @@ def named(name: str) -> bpy.types.Image:
 
 
 def describe(
-    image: bpy.types.Image, side: str, folder: Path, scene: bpy.types.Scene, user: bpy.types.ImageUser | None = None
+    image: bpy.types.Image, stem: str, folder: Path, scene: bpy.types.Scene, user: bpy.types.ImageUser | None = None
 ) -> dict[str, Any]:
     """The worker's entry for a picture (core/commands/worker.py); what is no file of its own is left in `folder`.
 
-    side: reference or target; scene: whose render a Render Result is; user: of the editor that shows the image, which
-    knows the frame of a sequence. Raises Unusable.
+    stem: what its files are called; scene: whose render a Render Result is; user: of the editor that shows the image,
+    which knows the frame of a sequence. Raises Unusable.
     """
     if image.source == "MOVIE":
         raise Unusable(f"“{image.name}” is a movie: save the frame that is wanted as a picture, and choose that")
@@ -56,17 +56,17 @@ def describe(
     import numpy as np
 
     if image.type == "RENDER_RESULT":
-        return {"name": image.name, "path": _save_render(image, folder / f"{side}.exr", scene)}
+        return {"name": image.name, "path": _save_render(image, folder / f"{stem}.exr", scene)}
     path = file_of(image, user)
     if _goes_as_file(image, path):
         return {"name": image.name, "path": str(path)}
     if path is not None and stand_ins.photograph_of(image) is not None:
         raise Unusable(f"“{image.name}”: its photograph {path} is not there; put it back, or open it again")
     if path is not None and stand_ins.is_needed(path):
-        raise Unusable(f"“{image.name}”: Blender cannot show camera RAW and HEIC files; open it with Open Pair")
+        raise Unusable(f"“{image.name}”: Blender cannot show camera RAW and HEIC files; open it with Add Pictures")
     packed = image.packed_file
     if packed is not None:
-        kept = folder / f"{side}.packed"
+        kept = folder / f"{stem}.packed"
         kept.write_bytes(packed.data)
         if _goes_as_packed(image):
             return {"name": image.name, "path": kept.name}
@@ -75,8 +75,8 @@ def describe(
         raise Unusable(
             f"“{image.name}”: its file {path} is not there; find it with File ▸ External Data ▸ Find Missing Files"
         )
-    np.save(folder / f"{side}.npy", read(image))
-    entry = {"name": image.name, "array": f"{side}.npy"}
+    np.save(folder / f"{stem}.npy", read(image))
+    entry = {"name": image.name, "array": f"{stem}.npy"}
     if path is not None and path.is_file():
         entry["exif_of"] = str(path) if packed is None else path.name
     return entry
@@ -166,11 +166,12 @@ def _is_plain(image: bpy.types.Image) -> bool:
     """Whether colour space and alpha are those that the kind of file has anyway."""
     holds_light = Path(image.filepath_raw).suffix.lower() in (".exr", ".hdr")
     usual_alpha = "PREMUL" if holds_light else "STRAIGHT"
-    if image.depth not in OPAQUE_DEPTHS and image.alpha_mode != usual_alpha:
+    # an image that was not looked at yet is loaded when it is asked for its depth or floats: that comes last
+    if image.alpha_mode != usual_alpha and image.depth not in OPAQUE_DEPTHS:
         return False
     # bytes stay bytes whatever they mean, and the panorama gets their colour space; floats were converted
     usual_space = compat.LINEAR if holds_light else compat.DISPLAY
-    return not image.is_float or image.colorspace_settings.name == usual_space
+    return image.colorspace_settings.name == usual_space or not image.is_float
 
 
 def read(image: bpy.types.Image) -> NDArray[np.uint8] | NDArray[np.float32]:

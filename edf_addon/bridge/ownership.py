@@ -19,6 +19,11 @@ SIDES = ("reference", "target")
 PICTURE, SETTING = "edf_stitch_picture ", "edf_stitch_setting "
 
 
+def called(number: int, count: int) -> str:
+    """What one of a panorama's pictures is to it, in words."""
+    return f"the {SIDES[number]}" if count == len(SIDES) else f"picture {number + 1}"
+
+
 def describe(pictures: Sequence[bpy.types.Image]) -> list[dict[str, str]]:
     """Name and content of pictures, the reference first, as a result keeps them. Raises Unusable, OSError."""
     return [{"name": image.name, "fingerprint": images.fingerprint(image)} for image in pictures]
@@ -86,7 +91,8 @@ def names(panorama: bpy.types.Image) -> list[str]:
 def _named(panorama: bpy.types.Image) -> list[tuple[str, bpy.types.Image | None, str]]:
     """Words for each picture of a panorama, the picture, and its fingerprint then."""
     known: Any = result.read(panorama)
+    told = zip(names(panorama), pictures(panorama), known["pictures"], strict=True)
     return [
-        (f"“{name}”, the {side} of this panorama,", image, entry["fingerprint"])
-        for side, name, image, entry in zip(SIDES, names(panorama), pictures(panorama), known["pictures"], strict=True)
-    ]  # fmt: skip
+        (f"“{name}”, {called(number, len(known['pictures']))} of this panorama,", image, entry["fingerprint"])
+        for number, (name, image, entry) in enumerate(told)
+    ]

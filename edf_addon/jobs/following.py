@@ -46,7 +46,7 @@ def make_job(context: bpy.types.Context, folder: Path) -> tuple[dict[str, Any], 
     scale = min(settings.scale, math.sqrt(MOST_PIXELS / max(pixels, 1)))
     job, memory = stitching.make_job(context, folder, max(scale, LEAST_SCALE), result.read(settings.result))
     job["options"]["measure"] = False
-    job["masks"].pop("seam", None)
+    job.pop("seam", None)
     memory["shown"] = settings.result.session_uid
     return job, memory
 

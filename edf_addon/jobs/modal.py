@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from .. import status
+from .. import explain, status
 from ..bridge.images import Unusable
 from . import health, job
 
@@ -128,7 +128,7 @@ class LongWork:
         if _current is not self._job:  # stopped by somebody else
             self._forget_timer(context)
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS" and not self.follows:
+        if event.type == "ESC" and event.value == "PRESS" and not self.follows and _is_over_editor(context, event):
             cancel()
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
@@ -136,6 +136,8 @@ class LongWork:
         outcome = self._look()
         redraw(context)
         if outcome is None:
+            if not self.follows:
+                _say_in_status_bar(f"EDF Stitch: {explain.stage(status.now.stage)}, {status.now.share:.0%}")
             return {"PASS_THROUGH"}
         self._forget_timer(context)
         return self._take(context, outcome)
@@ -206,6 +208,25 @@ class LongWork:
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None
+        if not self.follows:
+            _say_in_status_bar(None)
+
+
+def _is_over_editor(context: bpy.types.Context, event: bpy.types.Event) -> bool:
+    """Whether the pointer is over an Image Editor, or there is no window that it could be in."""
+    if context.window is None:
+        return True
+    return any(
+        area.type == "IMAGE_EDITOR"
+        and 0 <= event.mouse_x - area.x < area.width and 0 <= event.mouse_y - area.y < area.height
+        for area in context.window.screen.areas
+    )
+
+
+def _say_in_status_bar(words: str | None) -> None:
+    """In every workspace, so that a job is seen wherever the artist goes; None: what Blender says there."""
+    for workspace in bpy.data.workspaces:
+        workspace.status_text_set(words)
 
 
 def _in_words(error: Exception) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path, PurePath
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from .. import engine_options, explain, pair, properties
+from .. import engine_options, explain, offered, pair, pictures, properties
 from ..bridge import cameras, compat, images, ownership, result
 from ..bridge.images import Unusable
 
@@ -17,14 +19,16 @@ if TYPE_CHECKING:
 # The worker's pictures that lie over the panorama: kept with it, out of the artist's lists of images.
 HIDDEN = ("heat", "difference")
 # Those that are values and no colours.
-VALUES = ("reference mask", "target mask", "occluded", "inpainted", "seam", "confidence", "inverse depth")
+VALUES = ("occluded", "inpainted", "seam", "labels", "confidence", "inverse depth")
 
 
 def why_not(settings: Any) -> str:
     """Why nothing can be stitched as things stand, in words; "" where it can."""
+    if pictures.is_set(settings):
+        return _why_no_set(settings)
     for side in ownership.SIDES:
         if getattr(settings, side) is None:
-            return f"no {side} is chosen: pick one of the file's images, or open a pair"
+            return f"no {side} is chosen: add pictures to the list, two or more"
     if settings.reference == settings.target:
         name = settings.target.name
         return f"“{name}” is both reference and target: choose two photographs taken from different places"
@@ -33,38 +37,77 @@ def why_not(settings: Any) -> str:
     return ""
 
 
+def _why_no_set(settings: Any) -> str:
+    if None in pictures.images(settings):
+        return "a picture of the list is no longer in the file: remove its row"
+    if settings.camera == "CAMERAS":
+        return "Scene Cameras are for two pictures: take the focal length from elsewhere, under Camera"
+    if settings.field not in offered.ROUND_FIELDS:
+        return "more than two pictures need a field that knows depth everywhere: choose Slack or Strict under Field"
+    if settings.fade == "INFINITY":
+        return "more than two pictures go on by the depth around them: choose another Outside under Field"
+    return ""
+
+
 def make_job(
-    context: bpy.types.Context, folder: Path, scale: float | None = None, found: dict[str, Any] | None = None
-) -> tuple[dict[str, Any], dict[str, Any]]:
+    context: bpy.types.Context, folder: Path, scale: float | None = None, found: dict[str, Any] | None = None,
+    instead: Mapping[str, Any] | None = None,
+) -> tuple[dict[str, Any], dict[str, Any]]:  # fmt: skip
     """The job for the scene's settings, its files in `folder`; and what has to be remembered until it is done.
 
-    scale: instead of the settings' own; found: a result whose matches are used, instead of a search. Raises Unusable.
+    scale: instead of the settings' own; found: a result whose matches are used, instead of a search; instead: settings
+    by name that are others this time. Raises Unusable.
     """
-    import numpy as np
-
     scene = context.scene
     settings = properties.settings_of(scene)
     if reason := why_not(settings):
         raise Unusable(reason)
-    chosen = {side: getattr(settings, side) for side in ownership.SIDES}
+    chosen, is_set = pictures.images(settings), pictures.is_set(settings)
     editor = context.space_data if isinstance(context.space_data, bpy.types.SpaceImageEditor) else None
     user = None if editor is None else editor.image_user
-    job: dict[str, Any] = {side: images.describe(image, side, folder, scene, user) for side, image in chosen.items()}
-    job["options"] = engine_options.options_of(settings, scale)
+    kept = {**properties.keep(settings), **(instead or {})}
     wanted = [name for name in ("layers", "masks", "depth") if getattr(settings, f"take_{name}")]
-    job["take"] = wanted if scale is None else []
-    job["exr"] = engine_options.exr_form_of(settings)
-    job["masks"] = {}
-    for side in ownership.SIDES:
-        mask = getattr(settings, f"ignore_{side}")
+    job: dict[str, Any] = {
+        "pictures": [
+            images.describe(image, f"picture_{number}", folder, scene, user) for number, image in enumerate(chosen)
+        ],
+        "options": engine_options.options_of(SimpleNamespace(**kept), scale, is_set),
+        "take": wanted if scale is None else [],
+        "exr": engine_options.exr_form_of(settings),
+    }  # fmt: skip
+    if is_set:
+        job["options"]["viewpoint"] = pictures.viewpoint(settings)
+    else:
+        _add_what_a_pair_has(job, context, folder, found)
+    memory = {
+        "scene": scene.session_uid, "settings": kept,
+        "pictures": ownership.describe(chosen), "cameras": job.get("cameras"),
+        # a reference to any of these would not survive an undo while the work goes on
+        "held": [image.session_uid for image in chosen],
+        "chosen": {name: one.session_uid for name, one in properties.pointers(settings).items() if one is not None},
+        "space": chosen[0].colorspace_settings.name, "edited": settings.edited_matches,
+        "pack": settings.pack, "fake_user": settings.fake_user,
+    }  # fmt: skip
+    return job, memory
+
+
+def _add_what_a_pair_has(
+    job: dict[str, Any], context: bpy.types.Context, folder: Path, found: dict[str, Any] | None
+) -> None:
+    """Masks, scene cameras and matches; found: see `make_job`."""
+    import numpy as np
+
+    settings = properties.settings_of(context.scene)
+    masks = [getattr(settings, f"ignore_{side}") for side in ownership.SIDES]
+    job["masks"] = [None if mask is None else f"ignore_{number}.npy" for number, mask in enumerate(masks)]
+    for name, mask in zip(job["masks"], masks, strict=True):
         if mask is not None:
-            np.save(folder / f"ignore_{side}.npy", images.read(mask))
-            job["masks"][side] = f"ignore_{side}.npy"
+            np.save(folder / name, images.read(mask))
     if settings.seam_mask is not None:
-        np.save(folder / "seam.npy", images.read(settings.seam_mask))
-        job["masks"]["seam"] = "seam.npy"
+        job["seam"] = "seam.npy"
+        np.save(folder / job["seam"], images.read(settings.seam_mask))
     if settings.camera == "CAMERAS":
-        job["cameras"] = cameras.describe_both(settings, scene, context.evaluated_depsgraph_get())
+        job["cameras"] = cameras.describe_both(settings, context.scene, context.evaluated_depsgraph_get())
     file = untouched_matches(settings) if settings.edited_matches else (found or {"matches": {}})["matches"].get("file")
     if file:
         job["matches"] = "matches.csv"
@@ -72,17 +115,6 @@ def make_job(
     elif settings.edited_matches:
         job["matches"] = "matches.npy"
         np.save(folder / job["matches"], match_rows(settings))
-    memory = {
-        "scene": scene.session_uid, "settings": properties.keep(settings),
-        "pictures": ownership.describe(list(chosen.values())),
-        "cameras": [job["cameras"][side] for side in ownership.SIDES] if "cameras" in job else None,
-        # a reference to any of these would not survive an undo while the work goes on
-        "held": [image.session_uid for image in chosen.values()],
-        "chosen": {name: one.session_uid for name, one in properties.pointers(settings).items() if one is not None},
-        "space": chosen["reference"].colorspace_settings.name, "edited": settings.edited_matches,
-        "pack": settings.pack, "fake_user": settings.fake_user,
-    }  # fmt: skip
-    return job, memory
 
 
 def match_rows(settings: Any) -> np.ndarray:
@@ -99,7 +131,7 @@ def untouched_matches(settings: Any) -> str:
     chosen = [getattr(settings, side) for side in ownership.SIDES]
     for image in bpy.data.images:
         found = result.read(image)
-        if found is None or ownership.pictures(image) != chosen or "file" not in found["matches"]:
+        if found is None or ownership.pictures(image) != chosen or "file" not in found.get("matches", ()):
             continue
         matches = found["matches"]
         if len(matches["rows"]) == len(settings.matches) and all(
@@ -136,9 +168,10 @@ def take_over(
     if scene is not None:
         settings = properties.settings_of(scene)
         settings.result = image
-        is_the_same_pair = [one and one.session_uid for one in (settings.reference, settings.target)] == memory["held"]
-        if is_the_same_pair:
-            fill_matches(settings, found["matches"], memory["edited"])
+        if [one and one.session_uid for one in pictures.images(settings)] == memory["held"]:
+            pictures.mark(settings, pictures.fates([one["name"] for one in memory["pictures"]], found["report"]))
+            if "matches" in found:
+                fill_matches(settings, found["matches"], memory["edited"])
         else:
             words += " Other pictures are chosen by now: Restore Settings brings its own, and their matches."
     if spaces is None:
@@ -171,7 +204,7 @@ def _bring_all(
     others = {
         what: bring(
             what, f"{'.' * (what in HIDDEN)}{panorama.name} {what}", fake_user and what not in HIDDEN,
-            compat.DATA if what in VALUES else None,
+            compat.DATA if what in VALUES or what.endswith(" mask") else None,
         )
         for what in found["files"] if what != "panorama"
     }  # fmt: skip
@@ -236,6 +269,8 @@ def _in_words(image: bpy.types.Image, found: dict[str, Any]) -> str:
     width, height = image.size
     warnings = len(found["warnings"])
     said = f", {warnings} warning{'s' * (warnings > 1)}" if warnings else ""
+    left_out = [one["name"] for one in found["report"].get("left_out", ())]
+    said += f"; left out: {', '.join(left_out)}" if left_out else ""
     verdict = explain.verdict_in_short(found["report"])
     said += f"; {verdict}" if verdict else ""
     return f"{image.name}: {width} × {height} px in {sum(found['seconds'].values()):.1f} s{said}."

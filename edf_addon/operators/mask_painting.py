@@ -5,7 +5,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from .. import editor, idnames, properties
+from .. import editor, idnames, pictures, properties
 from ..bridge import compat
 
 SIDES = (
@@ -31,10 +31,12 @@ class EDF_OT_mask_paint(bpy.types.Operator):  # noqa: N801
     @classmethod
     def poll(cls, context: Any) -> bool:
         settings = properties.settings_of(context.scene)
+        reason = pictures.PAIRS_ONLY if pictures.is_set(settings) else ""
         if settings.reference is None and settings.target is None:
-            cls.poll_message_set("Choose a reference and a target first")
-            return False
-        return True
+            reason = "Choose a reference and a target first"
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
 
     def execute(self, context: Any) -> set[str]:
         settings = properties.settings_of(context.scene)

@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty
 
-from .. import editor, idnames, pair, properties
+from .. import editor, idnames, pair, pictures, properties
 from ..bridge import photo
 
 WHICH = (
@@ -110,6 +110,8 @@ class EDF_OT_match_enable(_WithMatches, bpy.types.Operator):  # noqa: N801
 def why_not(context: Any) -> str:
     """Why matches cannot be edited now; "" where they can."""
     settings = properties.settings_of(context.scene)
+    if pictures.is_set(settings):
+        return pictures.PAIRS_ONLY
     if settings.reference is None or settings.target is None:
         return "Choose a reference and a target first"
     if getattr(context.window_manager, idnames.JOB).running:

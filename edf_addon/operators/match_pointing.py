@@ -5,7 +5,7 @@ from typing import Any
 
 import bpy
 
-from .. import editor, idnames, properties
+from .. import editor, idnames, pictures, properties
 from ..bridge import photo
 from ..overlays import drawing
 from . import match_editing
@@ -50,7 +50,7 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
 
     def modal(self, context: Any, event: Any) -> set[str]:
         settings = properties.settings_of(context.scene)
-        if settings.reference is None or settings.target is None:
+        if pictures.is_set(settings) or settings.reference is None or settings.target is None:
             return self._done(context)
         if self._pair != _pair(settings):  # chosen anew in the sidebar: what was begun belongs to the others
             self._pair, self._dragged = _pair(settings), None

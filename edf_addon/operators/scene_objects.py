@@ -18,7 +18,8 @@ ROLES = (
 _BASELINE = {
     "name": "Baseline", "default": 1.0, "min": 1e-4, "soft_max": 100.0, "unit": "LENGTH", "precision": 3,
     "options": {"SKIP_SAVE"},
-    "description": "Distance between the two cameras in the scene; pictures alone do not tell it",
+    "description": "Distance between the two cameras in the scene, or from the first to the farthest; pictures alone "
+    "do not tell it",
 }  # fmt: skip
 
 
@@ -36,7 +37,8 @@ class _OfAPanorama:
 
 
 class EDF_OT_create_cameras(_OfAPanorama, bpy.types.Operator):  # noqa: N801
-    """Put the cameras of this panorama into the scene, with the pictures as their backgrounds"""
+    """Put the cameras of this panorama into the scene, with the pictures as their backgrounds. They come selected, in
+    a collection of their own"""
 
     bl_idname = idnames.Operator.CREATE_CAMERAS
     bl_label = "Create Cameras"
@@ -44,7 +46,7 @@ class EDF_OT_create_cameras(_OfAPanorama, bpy.types.Operator):  # noqa: N801
 
     baseline: FloatProperty(**_BASELINE)
     look: BoolProperty(
-        name="Look Through the Panorama's", default=True,
+        name="Look Through the Panorama's", default=False, options={"SKIP_SAVE"},
         description="Make the panorama's camera the scene's, and the render size that of the panorama",
     )
 
@@ -57,6 +59,7 @@ class EDF_OT_create_cameras(_OfAPanorama, bpy.types.Operator):  # noqa: N801
         except ValueError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        take_along.select(context, list(made.values()))
         for words in ownership.changes(image):
             self.report({"WARNING"}, words)
         if "PANORAMA" not in made:
@@ -65,7 +68,7 @@ class EDF_OT_create_cameras(_OfAPanorama, bpy.types.Operator):  # noqa: N801
             take_along.look_through(context.scene, made["PANORAMA"])
         if "PANORAMA" in made and editor.known(image)["geometry"].get("viewpoint"):
             self.report({"INFO"}, f"The panorama's camera stands {made['PANORAMA']['place']}")
-        if "TARGET" not in made:
+        if "TARGET" not in made and len(ownership.pictures(image)) == len(ownership.SIDES):
             self.report({"WARNING"}, "The target's camera is not known: one plane does not tell where it stood")
         return {"FINISHED"}
 
@@ -119,11 +122,17 @@ class EDF_OT_look_through(_OfAPanorama, bpy.types.Operator):  # noqa: N801
 
 
 class EDF_OT_use_as_world(bpy.types.Operator):  # noqa: N801
-    """Surround the scene with this panorama, as the reference camera saw it: an equirectangular one in the World"""
+    """Surround the scene with this panorama, as the reference camera saw it: an equirectangular one in a World of its
+    own. The World of before stays in the file"""
 
     bl_idname = idnames.Operator.USE_AS_WORLD
-    bl_label = "Use as World"
+    bl_label = "Panorama to World"
     bl_options = {"REGISTER", "UNDO"}
+
+    replace: BoolProperty(
+        name="Replace the Scene's World", default=True, options={"SKIP_SAVE"},
+        description="Let the scene use it at once, instead of the World that it has",
+    )
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -132,8 +141,18 @@ class EDF_OT_use_as_world(bpy.types.Operator):  # noqa: N801
             cls.poll_message_set(reason)
         return not reason
 
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Asks before the scene's own World is replaced."""
+        if not take_along.replaces_world(context.scene):
+            return self.execute(context)
+        message = f"The scene's World “{context.scene.world.name}” is replaced, and stays in the file."
+        asked: set[str] = context.window_manager.invoke_confirm(
+            self, event, title=self.bl_label, message=message, confirm_text="Replace"
+        )
+        return asked
+
     def execute(self, context: Any) -> set[str]:
-        take_along.use_as_world(context.scene, editor.panorama(context))
+        take_along.use_as_world(context.scene, editor.panorama(context), self.replace)
         return {"FINISHED"}
 
 

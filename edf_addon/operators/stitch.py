@@ -4,11 +4,12 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from .. import editor, idnames, pair, properties
+from .. import editor, idnames, offered, pair, pictures, properties
 from ..bridge import images, ownership, result
 from ..jobs import following, modal, stitching
+from ..scene import take_along
 
 
 class _Stitching(modal.LongWork):
@@ -25,14 +26,17 @@ class _Stitching(modal.LongWork):
 
 
 class EDF_OT_stitch(_Stitching, bpy.types.Operator):  # noqa: N801
-    """Stitch the target into the reference's plane, as a new image. ESC cancels"""
+    """Make one panorama of the pictures of the list, as a new image. ESC cancels"""
 
     bl_idname = idnames.Operator.STITCH
-    bl_label = "Stitch"
+    bl_label = "Stitch Panorama"
     bl_options = {"UNDO"}
 
     reference: StringProperty(name="Reference", description="Name of the image to choose first", options={"SKIP_SAVE"})
     target: StringProperty(name="Target", description="Name of the image to choose first", options={"SKIP_SAVE"})
+    as_empty: BoolProperty(
+        name="Add to the Scene", description="As an image empty at the 3D cursor", options={"SKIP_SAVE"}
+    )
 
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
         settings = properties.settings_of(context.scene)
@@ -41,6 +45,13 @@ class EDF_OT_stitch(_Stitching, bpy.types.Operator):  # noqa: N801
             for side, image in named.items():
                 setattr(settings, side, image)
         return super().prepare(context, folder)
+
+    def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
+        words = super().finish(context, folder, found)
+        if self.as_empty:
+            empty = take_along.image_empty(context.scene, properties.settings_of(context.scene).result)
+            take_along.select(context, [empty])
+        return words
 
 
 class EDF_OT_preview(_Stitching, bpy.types.Operator):  # noqa: N801
@@ -55,6 +66,60 @@ class EDF_OT_preview(_Stitching, bpy.types.Operator):  # noqa: N801
         scale = properties.settings_of(context.scene).preview_scale
         job, self.memory = stitching.make_job(context, folder, scale)
         return job
+
+
+# What the operators of an environment are asked.
+_HOLES = {"name": "Holes", "items": [one for one in offered.HOLES if one[0] != "AUTO"], "default": "INPAINT",
+          "description": "What no picture shows between those that do; above and below them the sphere stays open"}
+_REPLACE = {"name": "Replace the Scene's World", "default": True,
+            "description": "Let the scene use it at once; the World that it has stays in the file"}
+
+
+class EDF_OT_stitch_environment(bpy.types.Operator):  # noqa: N801
+    """Make a whole sphere of the pictures of the list, exposures of one view merged, and a World that shows it"""
+
+    bl_idname = idnames.Operator.ENVIRONMENT
+    bl_label = "Stitch Environment"
+    bl_options = {"REGISTER"}
+
+    holes: EnumProperty(**_HOLES)
+    replace: BoolProperty(**_REPLACE)
+    is_asked = False
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        return not modal.is_working() and not stitching.why_not(properties.settings_of(context.scene))
+
+    def invoke(self, context: Any, _event: Any) -> set[str]:
+        self.is_asked = True
+        asked: set[str] = context.window_manager.invoke_props_dialog(self, confirm_text="Stitch")
+        return asked
+
+    def execute(self, _context: Any) -> set[str]:
+        how = "INVOKE_DEFAULT" if self.is_asked and not bpy.app.background else "EXEC_DEFAULT"
+        done: set[str] = bpy.ops.edf.stitch_sphere(how, holes=self.holes, replace=self.replace)
+        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+
+
+class EDF_OT_stitch_sphere(_Stitching, bpy.types.Operator):  # noqa: N801
+    """Make a whole sphere of the pictures of the list, and a World that shows it"""
+
+    bl_idname = idnames.Operator.SPHERE
+    bl_label = "Stitch Sphere"
+    bl_options = {"UNDO", "INTERNAL"}
+
+    holes: EnumProperty(**_HOLES)
+    replace: BoolProperty(**_REPLACE)
+
+    def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
+        instead = {"projection": "EQUIRECTANGULAR", "crop": "FULL", "holes": self.holes}
+        job, self.memory = stitching.make_job(context, folder, instead=instead)
+        return job
+
+    def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
+        words = super().finish(context, folder, found)
+        image = properties.settings_of(context.scene).result
+        return f"{words} The World “{take_along.use_as_world(context.scene, image, self.replace).name}” shows it."
 
 
 class EDF_OT_restitch(_Stitching, bpy.types.Operator):  # noqa: N801
@@ -74,7 +139,7 @@ class EDF_OT_restitch(_Stitching, bpy.types.Operator):  # noqa: N801
         settings = properties.settings_of(context.scene)
         for words in bring_back(context, editor.panorama(context, self.image)):
             self.report({"WARNING"}, words)
-        settings.edited_matches = True
+        settings.edited_matches = not pictures.is_set(settings)
         return super().prepare(context, folder)
 
 
@@ -173,14 +238,17 @@ def bring_back(context: Any, image: bpy.types.Image | None) -> list[str]:
     if lost := ownership.missing(image):
         raise images.Unusable("; ".join(lost))
     with pair.choosing(settings):
-        settings.reference, settings.target = ownership.pictures(image)
+        pictures.choose(settings, ownership.pictures(image))
         properties.restore(settings, found["settings"], ownership.chosen(image))
-        stitching.fill_matches(settings, found["matches"], edited=False)
+        if "matches" in found:
+            stitching.fill_matches(settings, found["matches"], edited=False)
     return ownership.changes(image) + ownership.camera_changes(image, context)
 
 
-CLASSES = (EDF_OT_stitch, EDF_OT_preview, EDF_OT_restitch, EDF_OT_follow, EDF_OT_restore, EDF_OT_cancel,
-           EDF_OT_reset, EDF_OT_reference_frame)
+CLASSES = (
+    EDF_OT_stitch, EDF_OT_stitch_environment, EDF_OT_stitch_sphere, EDF_OT_preview, EDF_OT_restitch, EDF_OT_follow,
+    EDF_OT_restore, EDF_OT_cancel, EDF_OT_reset, EDF_OT_reference_frame,
+)  # fmt: skip
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -15,6 +15,7 @@ from ...core.cameras.camera import Camera
 from ...core.cameras.lens import distort, undistort
 from ...core.cameras.projective import homogeneous, project
 from ...core.panorama.projection import Projection
+from ...core.panorama.rig_viewpoint import RigViewpoint
 from ...core.panorama.viewpoint import Viewpoint
 from ...core.raster.arrays import Array
 from ..scene.scene_geometry import matrix, projection_of, viewpoint_of
@@ -81,7 +82,7 @@ def from_panorama(known: dict[str, Any], points: Array) -> Array:
     return distort(seen[:, :2] / ahead, cameras_of(known["geometry"])[REFERENCE])
 
 
-def _from_reference(viewpoint: Viewpoint, rays: Array, d: Array) -> Array:
+def _from_reference(viewpoint: Viewpoint | RigViewpoint, rays: Array, d: Array) -> Array:
     """In which directions (N, 3), as long as 1/d is to be taken, the reference's place has what rays (N, 3) show."""
     directions: Array = rays + d[:, None] * viewpoint.place(rays)
     return directions
@@ -96,7 +97,9 @@ def depth_at(known: dict[str, Any], points: Array) -> Array:
     return np.maximum(d, 0.0)
 
 
-def _depth_nearby(known: dict[str, Any], projection: Projection, viewpoint: Viewpoint, q: Array) -> Array:
+def _depth_nearby(
+    known: dict[str, Any], projection: Projection, viewpoint: Viewpoint | RigViewpoint, q: Array
+) -> Array:
     """The inverse depth (N,) of what the reference shows in directions q (N, 3), z = 1, by the panorama's nodes."""
     grid, (width, height) = known["depth"], known["geometry"]["canvas"]
     x, y = np.linspace(0, width - 1, int(grid["columns"])), np.linspace(0, height - 1, int(grid["rows"]))

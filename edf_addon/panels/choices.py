@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from .. import editor, engine_options, explain, idnames, offered
+from .. import editor, engine_options, explain, idnames, offered, pictures
 from ..bridge import photo
 from ..idnames import Operator
 from .rows import NOTE, Row, SubPanel, rows, words
@@ -18,7 +18,11 @@ def _camera_is(*sources: str) -> Callable[[Any], bool]:
 
 
 def _own_lens(*sources: str) -> Callable[[Any], bool]:
-    return lambda settings: settings.own_lens and settings.camera in sources
+    return lambda settings: settings.own_lens and settings.camera in sources and not pictures.is_set(settings)
+
+
+def _may_have_own_lens(settings: Any) -> bool:
+    return settings.camera in ("FOCAL", "FOCAL35", "FOCAL_PX") and not pictures.is_set(settings)
 
 
 def _pack_why_not(settings: Any) -> str:
@@ -41,7 +45,7 @@ CAMERA = (
     Row("sensor", shown=_camera_is("FOCAL")),
     Row("focal35", shown=_camera_is("FOCAL35")),
     Row("focal_px", shown=_camera_is("FOCAL_PX")),
-    Row("own_lens", shown=_camera_is("FOCAL", "FOCAL35", "FOCAL_PX"), text="Two Lenses"),
+    Row("own_lens", shown=_may_have_own_lens, text="Two Lenses"),
     Row("target_focal", shown=_own_lens("FOCAL"), text="Target"),
     Row("target_sensor", shown=_own_lens("FOCAL"), text="Sensor Width"),
     Row("target_focal35", shown=_own_lens("FOCAL35"), text="Target"),
@@ -83,7 +87,7 @@ class EDF_PT_camera(SubPanel, bpy.types.Panel):  # noqa: N801
 
     def draw_rows(self, context: Any, settings: Any, width: float) -> None:
         rows(self.layout, settings, CAMERA, width)
-        if settings.camera == "AUTOMATIC":
+        if settings.camera == "AUTOMATIC" and not pictures.is_set(settings):
             for side in (editor.REFERENCE, editor.TARGET):
                 words(self.layout, photo.camera_words(getattr(settings, side), side), width, "CAMERA_DATA")
 

@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty
 
-from .. import idnames
+from .. import idnames, pictures
 from ..idnames import Operator
 from ..operators import mask_painting, match_editing
 from .rows import NOTE, SubPanel, words
@@ -93,6 +93,7 @@ class EDF_PT_matches(SubPanel, bpy.types.Panel):  # noqa: N801
     def draw_rows(self, context: Any, settings: Any, width: float) -> None:
         layout = self.layout
         layout.use_property_split = False
+        layout.enabled = not pictures.is_set(settings)
         if reason := match_editing.why_not(context):
             words(layout, reason, width, NOTE)
         elif not len(settings.matches):
@@ -126,6 +127,9 @@ class EDF_PT_masks(SubPanel, bpy.types.Panel):  # noqa: N801
     def draw_rows(self, context: Any, settings: Any, width: float) -> None:
         layout = self.layout
         layout.use_property_split = False
+        if pictures.is_set(settings):
+            layout.enabled = False
+            words(layout, pictures.PAIRS_ONLY, width, NOTE)
         for side, label, _ in mask_painting.SIDES[:2]:
             layout.label(text=f"Ignore in {label}")
             row = layout.row(align=True)

@@ -67,8 +67,8 @@ class EDF_PT_overlays(SubPanel, bpy.types.Panel):  # noqa: N801
         rows(layout, settings, OVERLAYS, width)
         if image is None:
             words(layout, "There is something to see after a stitch", width, NOTE)
-        elif settings.overlay == "DISPLACEMENT":
-            low, high = editor.known(image)["heat_range"]
+        elif settings.overlay == "DISPLACEMENT" and (ends := editor.known(image).get("heat_range")):
+            low, high = ends
             words(layout, f"Blue {low:.0f} px, red {high:.0f} px from where infinity would be", width, NOTE)
         if settings.show_matches:
             words(layout, f"Blue: hit; red: missed by {WORST:.0f} px or more; gray: switched off or new", width, NOTE)

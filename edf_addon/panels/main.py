@@ -1,4 +1,4 @@
-"""The tab itself: the two pictures, the buttons, how far it is and how it went."""
+"""The tab itself: the pictures, the buttons, how far it is and how it went."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from typing import Any
 
 import bpy
 
-from .. import editor, explain, idnames
+from .. import explain, idnames, pictures
 from ..idnames import Operator
 from ..jobs import health, stitching
 from . import presets
+from .picture_list import draw_list
 from .rows import NOTE, WARNING, Sidebar, words
 
 
@@ -24,23 +25,11 @@ class EDF_PT_main(Sidebar, bpy.types.Panel):  # noqa: N801
         layout, job = self.layout, getattr(context.window_manager, idnames.JOB)
         if problem := health.problem():
             words(layout.box(), explain.sentence(problem), width, WARNING)
-        pictures = layout.column()
-        pictures.enabled = not job.running
-        for side in (editor.REFERENCE, editor.TARGET):
-            pictures.use_property_split = False
-            pictures.label(text=f"{side.capitalize()}{_size(getattr(settings, side))}")
-            pictures.template_ID(settings, side, open="image.open")
-        both = pictures.row(align=True)
-        both.operator(Operator.OPEN_PAIR, icon="FILE_FOLDER")
-        swap = both.row(align=True)
-        swap.enabled = settings.reference is not None or settings.target is not None
-        swap.operator(Operator.SWAP, text="Swap", icon="ARROW_LEFTRIGHT")
+        column = layout.column()
+        column.enabled = not job.running
+        draw_list(column, settings, width)
         layout.separator(factor=0.5)
         (_working if job.running else _ready)(layout, settings, job, width)
-
-
-def _size(image: bpy.types.Image | None) -> str:
-    return "" if image is None or not all(image.size) else f"  ·  {image.size[0]} × {image.size[1]}"
 
 
 def _ready(layout: Any, settings: Any, job: Any, width: float) -> None:
@@ -50,13 +39,14 @@ def _ready(layout: Any, settings: Any, job: Any, width: float) -> None:
     column.enabled = not reason
     large = column.row()
     large.scale_y = 1.5
-    large.operator(Operator.STITCH, icon="IMAGE_DATA")
+    large.operator(Operator.STITCH, text="Stitch", icon="IMAGE_DATA")
+    column.operator(Operator.ENVIRONMENT, icon="WORLD")
     quick = column.row(align=True)
     quick.operator(Operator.PREVIEW)
     quick.prop(settings, "preview_scale", text="")
     if reason:
         words(layout, explain.sentence(reason), width, NOTE)
-    elif settings.edited_matches:
+    elif settings.edited_matches and not pictures.is_set(settings):
         words(layout, "With the matches of the list; none are searched for", width, NOTE)
     if job.message:
         words(layout, job.message, width, WARNING if job.failed else "CHECKMARK")
@@ -68,4 +58,4 @@ def _working(layout: Any, _settings: Any, job: Any, width: float) -> None:
     row.scale_y = 1.5
     row.progress(factor=job.share, text=f"{explain.stage(job.stage)}  {job.share:.0%}")
     row.operator(Operator.CANCEL, text="", icon="X")
-    words(layout, "Cancelling…" if job.cancelling else "ESC cancels; Blender can be used meanwhile", width)
+    words(layout, "Cancelling…" if job.cancelling else "ESC over this editor cancels; Blender is free meanwhile", width)

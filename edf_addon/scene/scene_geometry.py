@@ -16,6 +16,7 @@ from ...core.cameras.projective import homogeneous
 from ...core.output.depth.options import MESH
 from ...core.output.depth.surface import DepthGrid, Surface, whole_surface
 from ...core.panorama.projection import Projection
+from ...core.panorama.rig_viewpoint import RigViewpoint
 from ...core.panorama.viewpoint import Viewpoint
 from ...core.raster.arrays import Array
 
@@ -60,11 +61,13 @@ def projection_of(known: dict[str, Any]) -> Projection | None:
     )  # fmt: skip
 
 
-def viewpoint_of(known: dict[str, Any]) -> Viewpoint | None:
+def viewpoint_of(known: dict[str, Any]) -> Viewpoint | RigViewpoint | None:
     """From where a result's panorama is seen; None where that is the reference's place for all of it."""
     told = known["geometry"].get("viewpoint")
     if told is None:
         return None
+    if "places" in told:
+        return RigViewpoint(float(told["s1"]), matrix(told["rotation"]), matrix(told["places"]))
     c, rotation, along = (matrix(told[name]) for name in ("c", "rotation", "along"))
     start, end = told["ends"]
     return Viewpoint(float(told["s1"]), c, rotation, along, (float(start), float(end)))
@@ -77,19 +80,14 @@ def axes(known: dict[str, Any]) -> Array:
 
 
 def placed_cameras(known: dict[str, Any], baseline: float = 1.0) -> list[PlacedCamera]:
-    """The reference's, the target's and the panorama's camera; the target's only where the model knows its place, the
+    """The cameras of the pictures and the panorama's; the target's of two only where the model knows its place, the
     panorama's only where Blender has such a lens. One whose viewpoint slides stands where its middle is seen from.
 
-    known: a result's `geometry` (K, K_prime, R, t, full_sizes, K_canvas, canvas, viewpoint) and `report`; baseline:
-    distance of the cameras, in the scene's units.
+    known: a result's `geometry` (K, K_prime, R, t or `cameras`; full_sizes, K_canvas, canvas, viewpoint) and `report`;
+    baseline: distance of the cameras, of more than two that of the farthest from the first, in the scene's units.
     """
     geometry, world = known["geometry"], axes(known)
-    sizes = [(int(width), int(height)) for width, height in geometry["full_sizes"]]
-    wanted: list[tuple[str, BlenderLens | RoundLens, tuple[Array, Array], str]] = [
-        ("Reference", flat_lens(geometry["K"], sizes[0]), ORIGIN, AT_REFERENCE)
-    ]
-    if (pose := target_pose(geometry, baseline)) is not None:
-        wanted.append(("Target", flat_lens(geometry["K_prime"], sizes[1]), pose, "the target's place"))
+    wanted = (_of_many if "cameras" in geometry else _of_pair)(geometry, baseline)
     canvas, projection = (int(geometry["canvas"][0]), int(geometry["canvas"][1])), projection_of(known)
     if projection is None:
         wanted.append(("Panorama", flat_lens(geometry["K_canvas"], canvas), ORIGIN, AT_REFERENCE))
@@ -100,12 +98,44 @@ def placed_cameras(known: dict[str, Any], baseline: float = 1.0) -> list[PlacedC
     return [PlacedCamera(name, lens, in_world(R, t, world), words) for name, lens, (R, t), words in wanted]
 
 
+# Name, lens, pose relative to the first one, and place in words.
+_Wanted = list[tuple[str, BlenderLens | RoundLens, tuple[Array, Array], str]]
+
+
+def _of_pair(geometry: dict[str, Any], baseline: float) -> _Wanted:
+    sizes = _full_sizes(geometry)
+    wanted: _Wanted = [("Reference", flat_lens(geometry["K"], sizes[0]), ORIGIN, AT_REFERENCE)]
+    if (pose := pose_of(geometry, baseline)) is not None:
+        wanted.append(("Target", flat_lens(geometry["K_prime"], sizes[1]), pose, "the target's place"))
+    return wanted
+
+
+def _of_many(geometry: dict[str, Any], baseline: float) -> _Wanted:
+    wanted: _Wanted = []
+    for camera, size in zip(geometry["cameras"], _full_sizes(geometry), strict=True):
+        if (pose := pose_of(camera, baseline)) is not None:
+            name = camera["name"]
+            wanted.append((called(name), flat_lens(camera["K"], size), pose, f"the place of {name}"))
+    return wanted
+
+
+def called(picture: str) -> str:
+    """The name of the camera that took one of more than two pictures."""
+    return f"Picture {picture}"
+
+
+def _full_sizes(geometry: dict[str, Any]) -> list[tuple[int, int]]:
+    return [(int(width), int(height)) for width, height in geometry["full_sizes"]]
+
+
 def _middle_place(known: dict[str, Any], projection: Projection, canvas: tuple[int, int]) -> tuple[Array, str]:
     """From where the middle of a canvas is seen (3,), in baselines in the reference's frame; and that in words."""
     viewpoint = viewpoint_of(known)
     if viewpoint is None:
         return np.zeros(3), AT_REFERENCE
     ray = projection.rays((np.array(canvas) - 1) / 2)
+    if isinstance(viewpoint, RigViewpoint):
+        return viewpoint.place(ray), "where its middle is seen from; the panorama's viewpoint slides among the pictures"
     share = float(viewpoint.slide_at(ray))
     return viewpoint.place(ray), (
         f"{share:.0%} of the way from the reference's place to the target's, from where the middle is seen; the "
@@ -136,9 +166,9 @@ def round_lens(projection: Projection, size: tuple[int, int]) -> RoundLens:
     return RoundLens(projection.kind, size, (float(left), float(right)), (float(-bottom), float(-top)))
 
 
-def target_pose(geometry: dict[str, Any], baseline: float = 1.0) -> tuple[Array, Array] | None:
-    """R (3, 3), t (3,) of the target camera in the reference camera's frame, or None where it is not known."""
-    R, t = matrix(geometry["R"]), matrix(geometry["t"])
+def pose_of(told: dict[str, Any], baseline: float = 1.0) -> tuple[Array, Array] | None:
+    """R (3, 3), t (3,) of a camera in the reference camera's frame, or None where it is not known."""
+    R, t = matrix(told["R"]), matrix(told["t"])
     if not (np.isfinite(R).all() and np.isfinite(t).all()):
         return None
     return R, t * baseline

@@ -12,7 +12,9 @@ from .. import editor
 from ..bridge import compat, ownership, photo
 
 RIG, MESH = "RIG", "MESH"
-# What an object is to which panorama, as custom properties of it.
+# Roles of the cameras of a pair; those of more pictures have their names.
+ROLES = {"Reference": "REFERENCE", "Target": "TARGET", "Panorama": "PANORAMA"}
+# What an object, or a World, is to which panorama, as custom properties of it.
 OF, ROLE = "edf_stitch_panorama", "edf_stitch_role"
 # How a background has to be shown whose pixels are stored so, by EXIF's orientation: turned (degrees) after being
 # mirrored. Tried in a window: a background turns clockwise.
@@ -72,12 +74,11 @@ def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: flo
     where Blender has no lens like it (see `no_lens`). Raises ValueError."""
     from . import scene_geometry
 
-    reference, target = ownership.pictures(image)
-    pictures = {"REFERENCE": reference, "TARGET": target, "PANORAMA": image}
+    pictures = {**_pictures_by_role(image), "PANORAMA": image}
     rig = _rig(scene, image, baseline)
     made = {}
     for placed in scene_geometry.placed_cameras(editor.known(image), baseline):
-        role, lens = placed.name.upper(), placed.lens
+        role, lens = ROLES.get(placed.name, placed.name), placed.lens
         if role == "PANORAMA" and no_lens(image):
             continue
         camera = find(image, role) or _link(scene, image, role, bpy.data.cameras.new(f"{placed.name} of {image.name}"))
@@ -95,6 +96,36 @@ def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: flo
         camera.matrix_basis = Matrix(placed.matrix_world.tolist())
         made[role] = camera
     return made
+
+
+def _pictures_by_role(image: bpy.types.Image) -> dict[str, bpy.types.Image | None]:
+    from . import scene_geometry
+
+    known, pictures = editor.known(image), ownership.pictures(image)
+    if "cameras" not in known["geometry"]:
+        return dict(zip(("REFERENCE", "TARGET"), pictures, strict=True))
+    names = [scene_geometry.called(one["name"]) for one in known["pictures"]]
+    return dict(zip(names, pictures, strict=True))
+
+
+def select(context: Any, made: list[bpy.types.Object]) -> None:
+    """These objects alone are selected, the last of them active; only in Object Mode, where nothing else is begun."""
+    if context.mode != "OBJECT":
+        return
+    for one in context.selected_objects:
+        one.select_set(False)
+    for one in made:
+        one.select_set(True)
+    context.view_layer.objects.active = made[-1]
+
+
+def image_empty(scene: bpy.types.Scene, image: bpy.types.Image) -> bpy.types.Object:
+    """A new empty that shows an image, upright at the 3D cursor."""
+    empty = bpy.data.objects.new(image.name, None)
+    empty.empty_display_type, empty.data = "IMAGE", image
+    empty.location, empty.rotation_euler = scene.cursor.location, (math.pi / 2, 0.0, 0.0)
+    scene.collection.objects.link(empty)
+    return empty
 
 
 def depth_mesh(
@@ -126,8 +157,14 @@ def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     scene.render.pixel_aspect_x = scene.render.pixel_aspect_y = 1.0
 
 
-def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
-    """Gives the scene a World that shows the panorama where its rig's cameras see it, or those of a new rig would."""
+def replaces_world(scene: bpy.types.Scene) -> bool:
+    """Whether the scene has a World that is none of a panorama's."""
+    return scene.world is not None and scene.world.get(OF) is None
+
+
+def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image, replace: bool = True) -> bpy.types.World:
+    """A World that shows the panorama where its rig's cameras see it, or those of a new rig would: the scene's where it
+    has none of its own, or that is to be replaced. That one is kept in the file."""
     import numpy as np
 
     from ...core.cameras.blender_world import world_rotation
@@ -138,7 +175,8 @@ def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
     stands = _place_of_rig(known) if rig is None else rig.matrix_world
     camera = np.array(stands) @ scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(known))
     turn = world_rotation(camera, scene_geometry.matrix(known["report"]["canvas"]["projection"]["rotation"]))
-    world = bpy.data.worlds.new(image.name)
+    world = next((one for one in bpy.data.worlds if one.get(OF) == image), None) or bpy.data.worlds.new(image.name)
+    world[OF] = image
     tree = compat.node_tree(world)
     nodes, link = tree.nodes, tree.links.new
     nodes.clear()
@@ -152,7 +190,13 @@ def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image) -> None:
     link(mapping.outputs["Vector"], texture.inputs["Vector"])
     link(texture.outputs["Color"], background.inputs["Color"])
     link(background.outputs["Background"], output.inputs["Surface"])
-    scene.world = world
+    if replace or not replaces_world(scene):
+        if scene.world not in (None, world):
+            scene.world.use_fake_user = True
+        scene.world = world
+    else:
+        world.use_fake_user = True
+    return world
 
 
 def emission(image: bpy.types.Image) -> bpy.types.Material:

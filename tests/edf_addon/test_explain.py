@@ -23,11 +23,15 @@ def test_a_report_becomes_facts_in_the_order_of_interest(small_result):
 
 def test_a_verdict_is_told_with_its_places(small_result):
     places = [{"box": [3, 4, 50, 60], "what": "something moved"}]
-    verdict = {"is": "look", "because": "x", "what_to_do": "y", "places": places}
+    verdict = {"is": "look", "because": "x", "what_to_do": "fill holes (--holes inpaint)", "places": places}
     look = {**small_result.report, "verdict": verdict}
-    assert explain.facts(look)[:2] == [
+    assert explain.facts(look)[:3] == [
         ("Verdict", "Look at these places"), ("", "3, 4 (50 × 60 px from the upper left): something moved"),
+        ("", "Fill holes (Holes ▸ Inpaint under Output)."),
     ]  # fmt: skip
+    everywhere = {**look, "verdict": {**verdict, "places": []}}
+    assert explain.facts(everywhere)[:2] == [("Verdict", "Look at it"), ("", "X.")]
+    assert explain.verdict_in_short(everywhere) == "look at it: x"
     assert explain.verdict_in_short(look) == "look at 1 place (see Result)"
     worse = {**look, "verdict": {**verdict, "is": "not usable", "because": "it is mirrored"}}
     assert explain.facts(worse)[:2] == [("Verdict", "Not usable"), ("", "It is mirrored.")]
@@ -82,11 +86,25 @@ def test_two_focal_lengths_are_both_said_and_an_estimate_says_how_sure():
 
 
 def test_every_stage_of_the_engine_has_words():
-    from edf_stitch.core.system.progress import STAGES
+    from edf_stitch.core.system.progress import STAGES, STAGES_OF_MANY
 
-    for name in STAGES:
+    for name in {**STAGES, **STAGES_OF_MANY}:
         assert explain.stage(name) == explain.STAGES[name]
     assert explain.stage("unheard") == "Unheard"
+
+
+def test_of_more_than_two_pictures_those_left_out_are_named_with_the_reason():
+    report = {
+        "verdict": {"is": "good"}, "canvas": {"width": 900, "height": 400}, "matches": {"found": 500, "inliers": 400},
+        "pictures": [{"name": f"{n}.jpg", "camera": {"focal_px": 812.3, "source": "EXIF"}} for n in range(1, 4)],
+        "left_out": [{"name": "x.jpg", "why": "it connects with no other"}], "slide": {"s1": 0.0},
+        "measured": {"alignment_median_px": 0.5, "alignment_p95_px": 1.25},
+    }  # fmt: skip
+    assert explain.facts(report) == [
+        ("Verdict", "Good"), ("Used", "3 of 4 pictures"), ("", "x.jpg is left out: it connects with no other"),
+        ("Size", "900 × 400 px"), ("Matches", "500"), ("Inliers", "400 (80%)"), ("Viewpoint", "the place of 1.jpg"),
+        ("Focal", "812 px"), ("Source", "EXIF"), ("Alignment", "0.50 px (95 %: 1.25)"),
+    ]
 
 
 def test_long_texts_are_broken_and_nothing_is_lost():

@@ -67,7 +67,7 @@ def test_a_target_with_its_own_lens_gives_two_values(blender):
 
 def test_every_property_has_a_tooltip(blender):
     """An artist points at a thing before reading about it."""
-    for group in (properties.EDF_PG_settings, properties.EDF_PG_match):
+    for group in (properties.EDF_PG_settings, properties.EDF_PG_match, properties.EDF_PG_picture):
         for prop in group.bl_rna.properties:
             if prop.identifier not in ("rna_type", "name", "matches", "match_index"):
                 assert len(prop.description) > 8, prop.identifier
@@ -112,10 +112,10 @@ def test_what_goes_on_is_neither_saved_nor_undone(blender, tmp_path):
 
 
 def test_every_option_of_the_engine_is_offered(blender):
-    """Those that come as files or images are added to a job by hand; three are nobody's wish, some are for more than
-    the two pictures that the panel has, and two are the command's: a panel shows its picture, a scene has its unit."""
-    by_hand = {"matches", "ignore", "mask"}
-    of_many = {"viewpoint", "require_all", "ignore_in", "brackets"}
+    """Those that come as files or images are added to a job by hand; three are nobody's wish, some of more than two
+    pictures are right as they are, and two are the command's: a panel shows its picture, a scene has its unit."""
+    by_hand = {"matches", "ignore", "mask", "viewpoint"}
+    of_many = {"require_all", "ignore_in", "brackets"}
     options = {field.name for field in dataclasses.fields(StitchOptions)}
     nobodys, of_command = {"measure", "cache", "memory_gb"}, {"preview", "scale_metres"}
     assert options - nobodys - of_many - of_command == set(engine_options.options_of(blender.settings)) | by_hand

@@ -152,6 +152,53 @@ assert bpy.context.scene.edf_stitch.result != panorama
 """
 
 
+ARTISTS_SET = """
+import bpy
+folder, out = {paths!r}
+assert bpy.ops.edf.add_folder(directory=folder) == {{"FINISHED"}}
+settings, scene = bpy.context.scene.edf_stitch, bpy.context.scene
+settings.dense = False
+world, scene.world = scene.world, None
+assert bpy.ops.edf.stitch_environment() == {{"FINISHED"}}
+assert [entry.state for entry in settings.pictures] == ["USED"] * 3
+assert scene.world is not None and scene.world != world
+before = (scene.camera, scene.render.resolution_x, scene.frame_end)
+assert bpy.ops.edf.create_cameras() == {{"FINISHED"}}
+behind = [one.data.background_images[0].image.name for one in bpy.context.selected_objects]
+assert {{"1.png", "2.png", "3.png"}} <= set(behind)
+assert (scene.camera, scene.render.resolution_x, scene.frame_end) == before
+bpy.ops.wm.save_as_mainfile(filepath=out)
+"""
+SET_AGAIN = """
+import bpy
+settings = bpy.context.scene.edf_stitch
+panorama, world = settings.result, bpy.context.scene.world
+assert panorama.packed_file and panorama.size[0] == 2 * panorama.size[1], tuple(panorama.size)
+assert [entry.image.name for entry in settings.pictures] == ["1.png", "2.png", "3.png"]
+bpy.ops.ed.undo_push(message="before")
+assert bpy.ops.edf.restitch() == {"FINISHED"}
+bpy.ops.ed.undo_push(message="Stitch Again")
+again = settings.result.name
+bpy.ops.ed.undo()
+settings = bpy.context.scene.edf_stitch
+assert settings.result.name != again and again not in bpy.data.images
+"""
+
+
+def test_a_set_becomes_an_environment_with_cameras_and_is_stitched_again_tomorrow(home, tmp_path):
+    from ..sets import make_set
+
+    (tmp_path / "set").mkdir()
+    for picture in make_set(3).pictures:
+        cv2.imwrite(str(tmp_path / "set" / picture.name), picture.view[..., ::-1])
+    code = ARTISTS_SET.format(paths=(str(tmp_path / "set"), str(tmp_path / "set.blend")))
+    done = home.run("--python-exit-code", "9", "--python-expr", code)
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = home.run(tmp_path / "set.blend", "--python-exit-code", "9", "--python-expr", SET_AGAIN)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "rna" not in done.stderr.lower()
+
+
 def test_camera_raw_and_heic_are_opened_and_stitched(home, pair, tmp_path):
     from edf_stitch.core.pictures.picture import load_picture
 

@@ -15,6 +15,7 @@ from edf_stitch.core.raster.colour import decode
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 from ...pairs import ON_REFERENCE
+from ...sets import make_set
 
 
 def start(folder: Path, job: dict) -> subprocess.Popen:
@@ -46,7 +47,7 @@ def job(small_pair: Pair, tmp_path: Path) -> dict:
         np.save(tmp_path / f"{side}.npy", getattr(small_pair, side))
     focal = float(small_pair.reference_camera.K[0, 0])
     return {
-        **{side: {"name": side, "array": str(tmp_path / f"{side}.npy")} for side in ("reference", "target")},
+        "pictures": [{"name": side, "array": str(tmp_path / f"{side}.npy")} for side in ("reference", "target")],
         "options": {"camera": {"focal_px": [focal]}, **ON_PLANE},
     }
 
@@ -67,6 +68,40 @@ def test_a_job_gives_the_panorama_that_the_pipeline_gives(job, tmp_path, small_r
     depth = load_picture(tmp_path / "job" / index["files"]["inverse depth"]).pixels[..., 0]
     assert np.allclose(depth, small_result.warp.inverse_depth)
     assert index["report"] == json.loads(json.dumps(index["report"])) and index["report"]["two_view"]["model"]
+
+
+def test_more_than_two_pictures_give_a_panorama_with_the_cameras_of_all(tmp_path):
+    """One of them has nothing to do with the others, and the third is where all is seen from."""
+    taken = make_set(3)
+    noise = np.random.default_rng(2).integers(0, 256, (240, 320, 3), np.uint8)
+    pictures = {**{picture.name: picture.view for picture in taken.pictures}, "other.png": noise}
+    entries = []
+    for name, pixels in pictures.items():
+        np.save(tmp_path / f"{name}.npy", pixels)
+        entries.append({"name": name, "array": str(tmp_path / f"{name}.npy")})
+    options = {"viewpoint": 3, "dense": False, "projection": "equirectangular"}
+    take = ["layers", "masks", "depth"]
+    status, said, index = run(tmp_path / "job", {"pictures": entries, "options": options, "take": take})
+    assert status == 0, said
+    names = ["3.png", "1.png", "2.png"]
+    cameras, size = index["geometry"]["cameras"], index["geometry"]["canvas"]
+    assert [camera["name"] for camera in cameras] == names
+    places = [-np.array(camera["R"]).T @ camera["t"] for camera in cameras]
+    apart = [np.linalg.norm(place) for place in places]
+    assert apart[0] == 0 and np.isclose(apart[1], 1) and 0.4 < apart[2] < 0.6, "evenly in a row, the first the farthest"
+    assert [one["name"] for one in index["report"]["left_out"]] == ["other.png"]
+    files = {name: load_picture(tmp_path / "job" / file) for name, file in index["files"].items()}
+    assert set(files) == {
+        "panorama", "labels", "confidence", "inverse depth",
+        *(f"{name} {what}" for name in names for what in ("layer", "mask")),
+    }  # fmt: skip
+    assert {picture.light.shape[1::-1] for picture in files.values()} == {tuple(size)}
+    depth = index["depth"]
+    d = np.array(depth["inverse_depth"], float).reshape(depth["rows"], depth["columns"])
+    full = files["inverse depth"].pixels[..., 0]
+    shows = np.array(depth["shows"], bool).reshape(d.shape)
+    at = np.ix_(*(np.rint(np.linspace(0, n - 1, k)).astype(int) for n, k in zip(full.shape, d.shape, strict=True)))
+    assert shows.any() and np.allclose(d[shows], full[at][shows], rtol=1e-3)
 
 
 def test_float_panoramas_are_written_as_the_panel_asks(job, tmp_path, small_pair: Pair):
@@ -110,10 +145,10 @@ def test_masks_are_turned_with_the_picture_that_they_lie_on(tmp_path, small_pair
 @pytest.mark.parametrize(
     ("change", "kind", "exit_code", "words"),
     [
-        ({"target": {"name": "t", "path": "none.png"}}, "UnreadableImage", 4, "no such file"),
+        ({"pictures": [{"name": name, "path": "none.png"} for name in "rt"]}, "UnreadableImage", 4, "no such file"),
         ({"options": {"field": "magic"}}, "BadRequest", 2, "magic"),
         ({"options": {"no_such_option": 1}}, "Bug", 3, "report it"),
-        ({"target": None}, "Bug", 3, "report it"),
+        ({"pictures": None}, "Bug", 3, "report it"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_words(job, tmp_path, change, kind, exit_code, words):

@@ -97,7 +97,7 @@ def test_what_blender_opened_itself_is_refused_with_what_to_do(
     blender: SimpleNamespace, photographs: list[Path], tmp_path: Path
 ) -> None:
     image = bpy.data.images.load(str(photographs[1]))
-    with pytest.raises(images.Unusable, match="open it with Open Pair"):
+    with pytest.raises(images.Unusable, match="open it with Add Pictures"):
         images.describe(image, "target", tmp_path, blender.scene)
 
 

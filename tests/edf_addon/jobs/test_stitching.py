@@ -263,7 +263,7 @@ def test_a_result_that_cannot_be_taken_over_leaves_the_file_as_it_was(working, m
     bring = images.bring
 
     def damaged(path, name, pack, fake_user):
-        if path.stem == "difference":
+        if name.endswith("difference"):
             path.write_bytes(b"no picture")
         return bring(path, name, pack, fake_user)
 
@@ -286,8 +286,11 @@ def test_a_match_that_was_moved_meanwhile_stays_unmeasured(blender):
     assert blender.settings.matches[0].error == 0.5, "the list is another one by now"
 
 
-def test_escape_cancels_and_other_keys_reach_blender(working):
+def test_escape_cancels_and_other_keys_reach_blender(working, monkeypatch):
     assert working.modal(bpy.context, event("A", "PRESS")) == {"PASS_THROUGH"}
+    monkeypatch.setattr(modal, "_is_over_editor", lambda *_: False)
+    assert working.modal(bpy.context, event("ESC", "PRESS")) == {"PASS_THROUGH"}, "it is meant for another editor"
+    monkeypatch.setattr(modal, "_is_over_editor", lambda *_: True)
     assert working.modal(bpy.context, event("ESC", "PRESS")) == {"RUNNING_MODAL"}
     assert working.until(lambda: False) == {"CANCELLED"}
     assert status.now.message == "Cancelled. Nothing was changed."

@@ -66,8 +66,10 @@ def test_blender_sees_a_point_where_the_pictures_show_it(stitched):
 
 
 def test_the_cameras_have_the_pictures_behind_them(stitched):
-    bpy.ops.edf.create_cameras()
     settings, scene = bpy.context.scene.edf_stitch, bpy.context.scene
+    bpy.ops.edf.create_cameras()
+    assert scene.camera is None, "the scene's camera is changed only where that is asked for"
+    bpy.ops.edf.create_cameras(look=True)
     for role, image in (("REFERENCE", settings.reference), ("TARGET", settings.target), ("PANORAMA", settings.result)):
         data = take_along.find(settings.result, role).data
         assert data.show_background_images and [one.image for one in data.background_images] == [image]
@@ -134,8 +136,8 @@ def test_with_the_scenes_own_cameras_the_rig_stands_where_they_stood(stitched):
         camera.matrix_world = Matrix.Translation(place) @ Euler((1, 0.2, 0.4)).to_matrix().to_4x4()
         setattr(settings, f"{name}_camera", camera)
     bpy.context.view_layer.update()
-    described = cameras.describe_both(settings, bpy.context.scene, bpy.context.evaluated_depsgraph_get())
-    stitched["cameras"] = [described[side] for side in ownership.SIDES]
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    stitched["cameras"] = cameras.describe_both(settings, bpy.context.scene, depsgraph)
     stood = np.array(settings.reference_camera.matrix_world)
     settings.reference_camera.location = 9, 9, 9  # moved since, and no longer chosen
     settings.reference_camera = None

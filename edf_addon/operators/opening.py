@@ -1,0 +1,186 @@
+"""Photographs are opened, from files or a folder, and stand in the list of pictures."""
+
+# No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, StringProperty
+
+from .. import idnames, pictures, properties
+from ..bridge import images, stand_ins
+from ..jobs import modal, stitching
+
+
+class _Browsing:
+    """A file dialog for pictures; several can be chosen."""
+
+    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
+    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_glob: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    is_browsed = False
+
+    def invoke(self, context: Any, _event: Any) -> set[str]:
+        """Opens the dialog, unless the files are known: they were dropped."""
+        self.is_browsed = True
+        if self.files:
+            return self.execute(context)  # type: ignore[attr-defined, no-any-return]
+        self.filter_glob = stand_ins.endings()
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def paths(self) -> list[Path]:
+        """The chosen files, sorted as people count."""
+        from ...core.pictures.listing import natural
+
+        names = [file.name for file in self.files if file.name]
+        return sorted((Path(bpy.path.abspath(self.directory), name) for name in names), key=natural)
+
+    @property
+    def how(self) -> str:
+        """How an operator with long work is called: modal from a window, blocking from a script."""
+        return "INVOKE_DEFAULT" if self.is_browsed and not bpy.app.background else "EXEC_DEFAULT"
+
+    def put_into_list(self, context: Any, paths: Sequence[Path], instead: bool = False) -> set[str]:
+        """Puts files into the list, or instead of it."""
+        if any(map(stand_ins.is_needed, paths)):
+            done = bpy.ops.edf.develop_pictures(self.how, paths="\n".join(map(str, paths)), instead=instead)
+            return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+        try:
+            opened = [_loaded(path) for path in paths]
+        except images.Unusable as error:
+            self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
+            return {"CANCELLED"}
+        self.report({"INFO"}, _listed(context, opened, instead))  # type: ignore[attr-defined]
+        return {"FINISHED"}
+
+
+class EDF_OT_add_pictures(_Browsing, bpy.types.Operator):  # noqa: N801
+    """Add photographs to the list; hold Shift or Ctrl to choose several. Files can also be dropped on the sidebar"""
+
+    bl_idname = idnames.Operator.ADD_PICTURES
+    bl_label = "Add Pictures"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: Any) -> set[str]:
+        paths = self.paths()
+        if not paths:
+            self.report({"ERROR"}, "No pictures were chosen: hold Shift or Ctrl to choose several.")
+            return {"CANCELLED"}
+        return self.put_into_list(context, paths)
+
+
+class EDF_OT_add_folder(_Browsing, bpy.types.Operator):  # noqa: N801
+    """Add all photographs of a folder to the list"""
+
+    bl_idname = idnames.Operator.ADD_FOLDER
+    bl_label = "Add Folder"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: Any) -> set[str]:
+        from ...core.pictures.listing import listed
+        from ...core.system.errors import StitchError
+
+        try:
+            paths = listed([Path(bpy.path.abspath(self.directory))])
+        except StitchError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return self.put_into_list(context, paths)
+
+
+class EDF_OT_open_pair(_Browsing, bpy.types.Operator):  # noqa: N801
+    """Open two photographs at once, as reference and target, instead of what is in the list"""
+
+    bl_idname = idnames.Operator.OPEN_PAIR
+    bl_label = "Open Pair"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: Any) -> set[str]:
+        paths = self.paths()
+        if len(paths) != 2:
+            chosen = "1 was" if len(paths) == 1 else f"{len(paths)} were"
+            self.report({"ERROR"}, f"Choose two pictures ({chosen} chosen): hold Ctrl, or Shift, for the second.")
+            return {"CANCELLED"}
+        return self.put_into_list(context, paths, instead=True)
+
+
+class EDF_OT_stitch_files(_Browsing, bpy.types.Operator):  # noqa: N801
+    """Make one panorama of photographs: they are put into the list, instead of what is in it, and stitched"""
+
+    bl_idname = idnames.Operator.STITCH_FILES
+    bl_label = "Stitch Panorama from Files"
+    bl_options = {"REGISTER"}
+
+    as_empty: BoolProperty(
+        name="Add to the Scene", description="As an image empty at the 3D cursor", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, _context: Any) -> bool:
+        return not modal.is_working()
+
+    def execute(self, context: Any) -> set[str]:
+        paths = self.paths()
+        if len(paths) < 2:
+            self.report({"ERROR"}, "Choose two pictures or more: hold Shift or Ctrl to choose several.")
+            return {"CANCELLED"}
+        opened = self.put_into_list(context, paths, instead=True)
+        if opened != {"FINISHED"}:
+            return opened
+        if modal.is_working():
+            self.report({"WARNING"}, "The pictures are being developed: press Stitch when they are in the list.")
+            return {"FINISHED"}
+        done: set[str] = bpy.ops.edf.stitch(self.how, as_empty=self.as_empty)
+        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+
+
+class EDF_OT_develop_pictures(modal.LongWork, bpy.types.Operator):  # noqa: N801
+    """Open photographs some of which Blender cannot open itself (camera RAW, HEIC)"""
+
+    bl_idname = idnames.Operator.DEVELOP
+    bl_label = "Develop Pictures"
+    bl_options = {"INTERNAL", "UNDO"}
+    makes = "the pictures"
+
+    paths: StringProperty(name="Files", description="One path a line", options={"SKIP_SAVE"})
+    instead: BoolProperty(name="Instead", description="Of the list, and not added to it", options={"SKIP_SAVE"})
+
+    def prepare(self, _context: Any, _folder: Path) -> dict[str, Any]:
+        return {"show": [path for path in self.paths.split("\n") if stand_ins.is_needed(Path(path))]}
+
+    def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
+        opened = []
+        for path in self.paths.split("\n"):
+            shown = found["files"].get(path)
+            opened.append(_loaded(Path(path)) if shown is None else stand_ins.bring(folder / shown, Path(path)))
+        return _listed(context, opened, self.instead)
+
+
+def _loaded(path: Path) -> bpy.types.Image:
+    """Raises Unusable."""
+    try:
+        return bpy.data.images.load(str(path), check_existing=True)
+    except RuntimeError as error:
+        raise images.Unusable(f"{path.name} cannot be opened: {error}") from error
+
+
+def _listed(context: Any, opened: list[bpy.types.Image], instead: bool) -> str:
+    """Images stand in the list, or are the list, and the first of them is shown; returns words about it."""
+    settings = properties.settings_of(context.scene)
+    if instead:
+        pictures.choose(settings, opened)
+    count = len(opened) if instead else pictures.add(settings, opened)
+    if opened:
+        stitching.show(context, opened[0])
+    return f"{count} picture{'s' * (count != 1)} added to the list."
+
+
+CLASSES = (EDF_OT_add_pictures, EDF_OT_add_folder, EDF_OT_open_pair, EDF_OT_stitch_files,
+           EDF_OT_develop_pictures)  # fmt: skip
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)
