@@ -22,8 +22,8 @@ _FOREIGN = {
 }  # fmt: skip
 _WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _CMYK, _YCBCR = 0, 1, 2, 3, 5, 6
 _COLOURS = {_WHITE_IS_ZERO: 1, _BLACK_IS_ZERO: 1, _RGB: 3, _PALETTE: 1, _CMYK: 4, _YCBCR: 3}
-# Colours that libtiff turns into RGB with another white than theirs, or cuts at white.
-_FOREIGN_COLOURS = {8: "CIELab", 9: "ICCLab", 10: "ITULab", 32844: "LogL", 32845: "LogLuv"}
+# Colours that libtiff turns into RGB with another white than theirs.
+_FOREIGN_COLOURS = {8: "CIELab", 9: "ICCLab", 10: "ITULab"}
 _UNSIGNED, _SIGNED, _FLOAT, _UNDEFINED = 1, 2, 3, 4
 # Channels that a picture may have: spectral stacks have hundreds, and what they show is no picture.
 _MOST_SAMPLES = 64
@@ -153,7 +153,7 @@ def _refuse_layout(layout: _Layout) -> None:
     """Raises UnreadableImage by name for compressions and colours that are not read, and for what is no picture."""
     if layout.photometric in _FOREIGN_COLOURS:
         name = _FOREIGN_COLOURS[layout.photometric]
-        raise UnreadableImage(f"this TIFF holds {name} colours, which are not read; save it as RGB, or as EXR")
+        raise UnreadableImage(f"this TIFF holds {name} colours, which are not read; save it as RGB")
     if layout.compression in _FOREIGN:
         name = _FOREIGN[layout.compression]
         raise UnreadableImage(f"this TIFF is compressed as {name}, which is not read; save it with LZW or ZIP instead")
