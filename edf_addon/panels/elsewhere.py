@@ -10,8 +10,11 @@ from .. import idnames
 from ..bridge import stand_ins
 from ..idnames import Operator
 
-# What Blender's own images and the photographs that it cannot open end in.
-_USUAL = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".bmp")
+# What pictures usually end in. All that camera RAW may end in is known by the engine, which is not loaded for this.
+_USUAL = (
+    ".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".bmp", *stand_ins.HEIC_SUFFIXES, ".dng",
+    ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2",
+)  # fmt: skip
 
 
 class EDF_FH_pictures(bpy.types.FileHandler):  # noqa: N801
@@ -20,7 +23,7 @@ class EDF_FH_pictures(bpy.types.FileHandler):  # noqa: N801
     bl_idname = idnames.DROPPED
     bl_label = "Add to the Stitch"
     bl_import_operator = Operator.ADD_PICTURES
-    bl_file_extensions = ";".join([*_USUAL, *(ending.removeprefix("*") for ending in stand_ins.endings().split(";"))])
+    bl_file_extensions = ";".join(_USUAL)
 
     @classmethod
     def poll_drop(cls, context: Any) -> bool:
