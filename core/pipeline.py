@@ -90,6 +90,7 @@ def stitch(
     with asking(cancelled), at_most(threads_that_fit(pictures, options)):
         stopwatch("read")
         frame = read_frame(pictures, options)
+        stopwatch.expect(len(frame.pictures))  # exposures are one picture by now, and spheres several
         with at_most(threads_that_fit_merged(frame.full_sizes, options) if frame.brackets else count()):
             geometry = estimate_geometry([frame], options, stopwatch)
             frame = frame.only(geometry.numbers)

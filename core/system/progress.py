@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from .errors import Cancelled
 
@@ -81,6 +81,10 @@ class Stopwatch:
         self.seconds: dict[str, float] = {}
         self._progress = progress
         self._stage, self._since = "", time.perf_counter()
+
+    def expect(self, pictures: int) -> None:
+        """Tells progress as of a stitch of so many pictures from now on."""
+        self._progress = replace(self._progress, stages=stages_of(pictures))
 
     def __call__(self, stage: str, fraction: float = 0.0) -> None:
         now = time.perf_counter()

@@ -133,3 +133,13 @@ def test_a_fisheyes_circle_and_stills_are_placed() -> None:
     for number in (0, 2):  # which share a corner: a wall alone leaves two poses
         R = rig.R[of(f"{number}.png", frame, geometry)]
         assert rotation_angle(R, STILLS[number][1] @ TILTED.T) < 0.3
+
+
+def test_progress_of_a_sphere_and_a_still_is_that_of_many(whole: Picture) -> None:
+    """Two are given, and nine pictures are stitched."""
+    told: list[tuple[str, float]] = []
+    options = StitchOptions(dense=False, blend="feather")
+    stitch([whole, *taken(0)], options, lambda stage, share: told.append((stage, share)))
+    shares = [share for _, share in told]
+    assert shares == sorted(shares) and 0.9 < shares[-1] <= 1
+    assert "matches" in {stage for stage, _ in told}
