@@ -10,6 +10,9 @@ from typing import Any
 
 from ..system.errors import BadRequest, UnreadableImage
 
+# Options that a file cannot give.
+_ON_THE_LINE = ("config", "help", "help-all")
+
 
 def add_config(parser: argparse.ArgumentParser) -> None:
     """Adds the option."""
@@ -50,24 +53,26 @@ def _table(path: Path) -> dict[str, Any]:
 
     try:
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except (OSError, ValueError) as error:
-        if isinstance(error, (tomllib.TOMLDecodeError, UnicodeDecodeError)):
+    except (OSError, ValueError, RecursionError) as error:
+        if isinstance(error, (ValueError, RecursionError)):
             raise BadRequest(f'{path}: not TOML, with lines like crop = "full": {error}') from error
-        raise UnreadableImage(f"the configuration cannot be read: {error}") from error
+        why = "no such file; check the name" if isinstance(error, FileNotFoundError) else f"cannot be read: {error}"
+        raise UnreadableImage(f"{path}: {why}") from error
 
 
 def _words(path: Path, name: str, value: Any, options: Mapping[str, argparse.Action]) -> Iterator[str]:
     """What would be typed for an entry."""
     option = "--" + name.replace("_", "-")
     action = options.get(option)
-    if action is None or option in ("--config", "--help", "--help-all"):
+    if action is None or option[2:] in _ON_THE_LINE:
         known = [one.removeprefix("--") for one in options if one.startswith("--")]
-        near = get_close_matches(option[2:], known, 1)
+        near = get_close_matches(option[2:], [one for one in known if one not in _ON_THE_LINE], 1, 0.7)
         raise BadRequest(f"{path}: {name} is no option here" + (f": is {near[0]} meant?" if near else ""))
     if isinstance(value, bool):
         off = f"--no-{option[2:]}"
         if action.nargs != 0 or not (value or off in action.option_strings or action.const is True):
-            raise BadRequest(f"{path}: {name} takes a value, not true or false")
+            takes = "true, or is left out" if action.nargs == 0 else "a value, not true or false"
+            raise BadRequest(f"{path}: {name} takes {takes}")
         yield from [option] if value else [off] if off in action.option_strings else []
     elif action.nargs == 0:
         raise BadRequest(f"{path}: {name} is true or false, not {value!r}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from ..cameras.sources import CameraRequest
 from ..choices import Brackets, Crop, Exposing, Level, Slide
 from ..frames.reading import Source
 from ..options import StitchOptions
+from ..pictures.listing import listed
+from ..pictures.picture import Picture
 from ..pipeline import stitch as stitch_pictures
 from ..system.cache import default_folder
 from ..system.errors import BadRequest
@@ -43,8 +46,8 @@ def stitch(
     Parameters
     ----------
     pictures : sequence of str, Path or ndarray
-        2 to 60 files or arrays (8 and 16 bit display-encoded, float scene-linear; RGB(A) or gray). Of two the first is
-        the reference; more may come in any order.
+        2 to 60 files, folders of them, or arrays (8 and 16 bit display-encoded, float scene-linear; RGB(A) or gray).
+        Of two the first is the reference; more may come in any order.
     options : StitchOptions, optional
         All that may be chosen in one object, instead of the keywords from `focal_px` on.
     progress : callable, optional
@@ -84,29 +87,75 @@ fov, blend, seam, exposure, holes, preview, seed
         UnreadableImage: a file cannot be read. TooFewMatches, NoOverlap, DegenerateGeometry: the pictures cannot be
         stitched. OutputTooLarge, NotEnoughMemory: the panorama is too large. Cancelled: asked to stop.
     """
+    _check_kinds(locals())
     keep = default_folder() if cache is True else Path(cache) if cache else None
     masks = {} if not isinstance(ignore, Mapping) else {"ignore_in": tuple((k, _file(v)) for k, v in ignore.items())}
     camera = CameraRequest(
-        focal_px=_numbers(focal_px), focal_mm=_numbers(focal_mm), sensor_mm=_numbers(sensor_mm),
-        focal35=_numbers(focal35), principal=tuple(principal), cameras=cameras,
+        focal_px=_numbers("focal_px", focal_px), focal_mm=_numbers("focal_mm", focal_mm),
+        sensor_mm=_numbers("sensor_mm", sensor_mm), focal35=_numbers("focal35", focal35), principal=tuple(principal),
+        cameras=cameras,
     )  # fmt: skip
     chosen = StitchOptions(
         field=field, fade=fade, camera=camera,
         matches=_file(matches), ignore=() if masks else tuple(map(_file, ignore)), viewpoint=viewpoint,
-        require_all=require_all, brackets=brackets, scale_metres=scale_metres, slide=slide, projection=projection,
-        level=level, centre=centre, fov=fov, scale=scale, crop=crop, dense=dense, blend=blend, seam=seam,
-        mask=_file(mask), exposure=exposure, holes=holes, preview=preview, seed=seed, measure=measure,
+        require_all=require_all, brackets=brackets if isinstance(brackets, str) else int(brackets),
+        scale_metres=scale_metres, slide=slide, projection=projection, level=level, centre=centre, fov=fov,
+        scale=scale, crop=crop, dense=dense, blend=blend, seam=seam, mask=_file(mask),
+        exposure=exposure, holes=holes, preview=preview, seed=seed, measure=measure,
         memory_gb=memory, cache=keep, **masks,
     )  # fmt: skip
     if options is not None and (given := _not_default(chosen)):
         raise BadRequest(f"{given[0]} is given beside options: put it into the options, or give keywords only")
-    used = options or chosen
-    result = stitch_pictures(pictures, used, progress, cancelled)
-    return panorama_of(result, [Path(one) for one in pictures if isinstance(one, (str, Path))] + used.files_read)
+    used, each = options or chosen, _each(pictures)
+    result = stitch_pictures(each, used, progress, cancelled)
+    return panorama_of(result, [Path(one) for one in each if isinstance(one, (str, Path))] + used.files_read)
 
 
-def _numbers(values: Numbers) -> tuple[float, ...]:
-    return tuple(values) if isinstance(values, Sequence) else (float(values),)
+_OR_NONE = type(None)
+# What keywords take, of those whose kind is not looked at where they are used; and the same in words.
+_FLAG, _NUMBER, _WHOLE = (bool, np.bool_), (Real,), (Integral,)
+_KINDS: dict[str, tuple[tuple[type, ...], str]] = {
+    **dict.fromkeys(("require_all", "dense", "preview", "measure"), (_FLAG, "True or False")),
+    "scale": (_NUMBER, "a number"), "seed": (_WHOLE, "a whole number"),
+    **dict.fromkeys(("fov", "memory"), ((*_NUMBER, _OR_NONE), "a number")),
+    **dict.fromkeys(("field", "fade", "projection", "blend", "seam", "holes"), ((str,), "a name")),
+    "slide": ((str, *_NUMBER), "a name or a number"), "exposure": ((str, *_NUMBER), "a name or a number"),
+    "brackets": ((str, *_WHOLE), "a name or a whole number"),
+    "crop": ((str, Sequence), "a name, or x, y, width and height"),
+    "level": ((str, Sequence), "a name, or yaw, pitch and roll"), "principal": ((Sequence, np.ndarray), "numbers"),
+    "ignore": ((Mapping, Sequence), "masks by the pictures' names, or one for each picture"),
+    "centre": ((Sequence, np.ndarray, _OR_NONE), "yaw and pitch"),
+    "viewpoint": ((str, *_WHOLE, _OR_NONE), "a picture's name or number"),
+    "scale_metres": ((Sequence, _OR_NONE), "two pictures and a distance"),
+}  # fmt: skip
+
+
+def _check_kinds(given: Mapping[str, Any]) -> None:
+    """Raises BadRequest where a keyword has a value of another kind than it takes."""
+    for name, (kinds, words) in _KINDS.items():
+        value = given[name]
+        if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+            raise BadRequest(f"{name} is {value!r}: it takes {words}")
+    if given["scale_metres"] is not None and len(given["scale_metres"]) != 3:
+        raise BadRequest(f"scale_metres is {given['scale_metres']!r}: it takes two pictures and a distance")
+
+
+def _numbers(name: str, values: Numbers) -> tuple[float, ...]:
+    try:
+        return tuple(np.atleast_1d(np.asarray(values, np.float64)).tolist())
+    except (TypeError, ValueError) as error:
+        raise BadRequest(f"{name} is {values!r}: give a number, or one for each picture") from error
+
+
+def _each(pictures: Sequence[Source]) -> list[Source]:
+    """The pictures, those of a folder in its place."""
+    if isinstance(pictures, (str, Path, np.ndarray, Picture)):
+        raise BadRequest("stitch() takes its pictures as a list: stitch([left, right])")
+    return [
+        one
+        for given in pictures
+        for one in (listed([Path(given)]) if isinstance(given, (str, Path)) and Path(given).is_dir() else [given])
+    ]
 
 
 def _file(given: Any) -> Any:

@@ -30,13 +30,19 @@ def run_info(args: argparse.Namespace) -> int:
     """Says what was understood; returns the exit code."""
     from ..pictures.listing import listed
 
-    entries = [entry_of(path) for path in listed(args.pictures)]
+    entries: list[dict[str, Any]] = []
+    for given in args.pictures:
+        try:
+            entries += [entry_of(path) for path in listed([given])]
+        except UnreadableImage as error:  # there is no such file; the others are wanted all the same
+            entries.append({"file": str(given), "error": str(error).removeprefix(f"{given}: ")})
     if args.json:
         print(json.dumps({"schema": 1, "pictures": entries}, indent=1))
     else:
         for entry in entries:
             print(line_of(entry))
-    sys.stdout.flush()
+    if sys.stdout is not None:  # closed by whoever called
+        sys.stdout.flush()
     return UnreadableImage.exit_code if any(entry["error"] for entry in entries) else 0
 
 

@@ -37,6 +37,8 @@ def what_was_meant(message: str, given: Sequence[str], options: Sequence[str]) -
     if wrong is not None:
         near = get_close_matches(wrong[1].lower(), re.findall(r"[\w.]+", wrong[2]), 1)
         return f"{message}: is {near[0]} meant?" if near else ""
+    if message.startswith("ambiguous option"):
+        return message
     unknown = re.match(r"unrecognized arguments: (--[^\s=]+)", message)
     near = get_close_matches(unknown[1].replace("_", "-"), options, 1, 0.7) if unknown is not None else []
     return f"{message}: is {near[0]} meant?" if near else ""

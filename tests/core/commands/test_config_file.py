@@ -45,7 +45,9 @@ def test_what_is_typed_counts_more(tmp_path: Path) -> None:
     ('projektion = "x"', "projektion is no option here: is projection meant?"),
     ("dense = 3", "dense is true or false, not 3"), ("crop = true", "crop takes a value, not true or false"),
     ("crop = full", "not TOML"), ('config = "other.toml"', "config is no option here"),
-    ('seam = "grphcut"', "is graphcut meant?"),
+    ('seam = "grphcut"', "is graphcut meant?"), ("no-dense = false", "no-dense takes true, or is left out"),
+    pytest.param("focal-px = " + "[" * 5000, "not TOML", id="deep"),
+    pytest.param("seed = " + "9" * 5000, "not TOML", id="long"),
 ])  # fmt: skip
 def test_what_is_wrong_in_it_is_said(
     text: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -57,6 +59,6 @@ def test_what_is_wrong_in_it_is_said(
 
 def test_a_file_that_is_not_there_or_not_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["stitch", "a", "b", "-o", "o.png", "--config", str(tmp_path / "none.toml")]) == 4
-    assert "none.toml" in capsys.readouterr().err
+    assert "none.toml: no such file; check the name" in capsys.readouterr().err
     assert main(["stitch", "a", "b", "-o", "o.png", "--config"]) == 2
     assert "expected one argument" in capsys.readouterr().err

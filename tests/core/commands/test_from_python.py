@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -146,3 +147,35 @@ def test_where_there_is_no_depth_that_is_said(small_pair: object) -> None:
     flat = stitch([small_pair.reference, small_pair.target], field="homography")
     with pytest.raises(DegenerateGeometry, match="no depth"):
         flat.depth  # noqa: B018
+
+
+@pytest.mark.parametrize(("keywords", "told"), [
+    ({"scale": "0.5"}, "scale is '0.5': it takes a number"), ({"dense": "no"}, "dense is 'no': it takes True or False"),
+    ({"seed": 1.5}, "a whole number"), ({"fov": "90"}, "fov"), ({"projection": None}, "projection is None"),
+    ({"ignore": None}, "ignore is None"), ({"scale_metres": (1, 2)}, "two pictures and a distance"),
+    ({"focal_px": "wide"}, "focal_px is 'wide': give a number"), ({"seed": True}, "a whole number"),
+])  # fmt: skip
+def test_a_value_of_another_kind_is_named(
+    keywords: dict[str, object], told: str, chosen: Callable[..., StitchOptions]
+) -> None:
+    with pytest.raises(BadRequest, match=re.escape(told)):
+        chosen(**keywords)
+
+
+def test_numbers_of_numpy_are_numbers(chosen: Callable[..., StitchOptions]) -> None:
+    options = chosen(focal_px=np.array([190.0, 191.0]), brackets=np.int64(2), scale=np.float32(0.5))
+    assert options.camera.focal_px == (190.0, 191.0) and options.brackets == 2 and options.scale == 0.5
+    assert chosen(focal35="28").camera.focal35 == (28.0,)
+
+
+def test_a_folder_stands_for_the_pictures_in_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_result: StitchResult
+) -> None:
+    for name in ("2.png", "10.png"):
+        (tmp_path / name).touch()
+    got: list[list[object]] = []
+    monkeypatch.setattr(from_python, "stitch_pictures", lambda pictures, *_: got.append(pictures) or small_result)
+    found = stitch([tmp_path, "more.png"])
+    assert got == [[tmp_path / "2.png", tmp_path / "10.png", "more.png"]] and len(found.sources) == 3
+    with pytest.raises(BadRequest, match="as a list"):
+        stitch("left.png")

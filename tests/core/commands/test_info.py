@@ -114,5 +114,7 @@ def test_good_files_give_0_and_warnings_are_problems(tmp_path: Path, capsys: pyt
 
 def test_what_stands_for_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", str(tmp_path)]) == 2
-    assert main(["info", str(tmp_path / "none.jpg")]) == 4
-    assert "no such file" in capsys.readouterr().err
+    cv2.imwrite(str(tmp_path / "good.png"), NOISE[..., :3])
+    assert main(["info", str(tmp_path / "none.jpg"), str(tmp_path / "good.png")]) == 4
+    none, good = capsys.readouterr().out.splitlines()
+    assert "none.jpg: cannot be used: no such file or folder; check the name" in none and "good.png: " in good

@@ -23,6 +23,7 @@ from edf_stitch.core.commands.cli import main
     (["stitch", "a", "b", "-o", "o.png", "--projection", "panini:0.3"], "is pannini meant?"),
     (["stitch", "a", "b", "-o", "o.png", "--exposure", "Refrence"], "is reference meant?"),
     (["stitch", "a", "b", "-o", "o.png", "--exr-depth", "hafl"], "is half meant?"),
+    (["stitch", "a", "b", "-o", "o.png", "--focal", "28"], "could match --focal-px, --focal-mm, --focal35"),
 ])  # fmt: skip
 def test_one_line_says_what_to_write(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(words) == 2
