@@ -245,6 +245,29 @@ class SphereOptions:
     least_shown: float = 0.02
     """Share of a view that must show something there for it to be worked with."""
 
+    least_of_own: float = 0.25
+    """The same of a small part of a sphere, as a share of its own px: it fills no view."""
+
+    most_times: float = 1000.0
+    """Times its longer side that the sphere may be wide of which a picture is said to be a part: 0.4°, less than any
+    lens shows."""
+
+    most_empty: float = 8.0
+    """Times as many px as the picture has that a view's box around what it shows may have: of a whole sphere 0.26, of
+    thin rings around a pole many."""
+
+    small_px: int = 10_000_000
+    """px that such a box may always have."""
+
+    grid: int = 256
+    """Points a side by which it is found where a view shows a part of a sphere."""
+
+    grid_margin: float = 6.0
+    """Distances of such points by which that is widened: in the corners views stretch them fourfold."""
+
+    least_ahead: float = 0.1
+    """Cosine of the angle from a view's axis, at least, of such points: its corners have 0.5."""
+
     margin_px: int = 3
     """px beyond the borders that cubic interpolation may take."""
 
