@@ -53,7 +53,8 @@ def kind_of(picture: Picture) -> Kind:
 
 
 def _ends_meet(view: NDArray[np.uint8]) -> bool:
-    """Whether a picture twice as wide as high goes on from its right end at its left one, and has poles for rows."""
+    """Whether a picture twice as wide as high goes on from its right end at its left one, and has poles for rows.
+    Frames, backdrops and skies meet as well: they are plain along the ends, or as much alike further in."""
     height, width = view.shape[:2]
     if abs(width - 2 * height) > FLATNESS.sphere_aspect * width or height < FLATNESS.least_side:
         return False
@@ -64,8 +65,17 @@ def _ends_meet(view: NDArray[np.uint8]) -> bool:
     apart = float(np.abs(small - np.roll(small, size // 2, axis=1)).mean())
     spread = small.std(axis=1).mean(axis=1)
     middle = float(np.median(spread[rows // 4 : -rows // 4]))
+    along = small.std(axis=0).mean(axis=1)
+    in_by = FLATNESS.ends_in
+    further = float(np.abs(small[:, in_by] - small[:, -1 - in_by]).mean())
+    shows = (
+        middle >= FLATNESS.least_spread
+        and min(along[0], along[-1]) >= max(FLATNESS.least_spread, FLATNESS.ends_along * np.median(along))
+        and further >= FLATNESS.ends_further * apart
+    )
     return bool(
-        beside[0] <= FLATNESS.ends_beside * np.median(beside[1:]) + 1
+        shows
+        and beside[0] <= FLATNESS.ends_beside * np.median(beside[1:]) + 1
         and beside[0] <= FLATNESS.ends_apart * apart
         and max(spread[0], spread[-1]) <= FLATNESS.pole_spread * middle
     )

@@ -176,6 +176,21 @@ class FlatnessOptions:
     ends_apart: float = 0.5
     """The same of columns half a turn apart: in fog and at night all are alike."""
 
+    ends_in: int = 2
+    """px of those inwards from each end at which the columns are compared too: a frame is wider."""
+
+    ends_further: float = 0.05
+    """Share of what columns half a turn apart differ by that those differ by, at least: of spheres 0.15 and more, of
+    frames and backdrops next to nothing."""
+
+    ends_along: float = 0.2
+    """Share of how much columns vary that those at the ends vary, at least: of spheres 0.85 and more, of frames
+    nothing."""
+
+    least_spread: float = 0.5
+    """Levels of 255, standard deviation, by which rows in the middle and the columns at the ends vary, at least: what
+    is plain has less, compressed too; a sphere of a dark night may have 1."""
+
     pole_spread: float = 0.5
     """The same of how much the first and the last row vary, which are one point each, and the rows in the middle."""
 
