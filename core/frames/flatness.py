@@ -25,15 +25,20 @@ _ADVICE = {
     "them with the camera maker's program",
     "transparent": "it is entirely transparent: export it without transparency, or with the right one",
 }
+_FOUND = (
+    "taken for a whole sphere because its ends meet, which its file does not say; if it is a flat photograph, crop it "
+    "to another shape than 2:1"
+)
 
 
 def usable(picture: Picture) -> Picture:
-    """The picture; of a sphere with the part of it that it shows, which files need not say. Refuses (UnreadableImage)
-    what shows nothing, what goes around in another way than a sphere, and two circles of fisheyes, with what to do."""
+    """The picture; of a sphere with the part of it that it shows, which files need not say, and with a warning where
+    they do not. Refuses (UnreadableImage) what shows nothing, what goes around in another way than a sphere, and two
+    circles of fisheyes, with what to do."""
     kind = kind_of(picture)
-    if kind == "sphere":
+    if picture.part is None and kind == "sphere":
         height, width = picture.view.shape[:2]
-        return replace(picture, part=picture.part or whole_sphere((width, height)))
+        return replace(picture, part=whole_sphere((width, height)), warnings=(*picture.warnings, _FOUND))
     if kind in _ADVICE:
         raise UnreadableImage(f"{picture.name}: {_ADVICE[kind]}")
     return picture
