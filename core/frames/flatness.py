@@ -25,15 +25,20 @@ _ADVICE = {
     "them with the camera maker's program",
     "transparent": "it is entirely transparent: export it without transparency, or with the right one",
 }
+_FOUND = (
+    "taken for a whole sphere because its ends meet, which its file does not say; if it is a flat photograph, crop it "
+    "to another shape than 2:1"
+)
 
 
 def usable(picture: Picture) -> Picture:
-    """The picture; of a sphere with the part of it that it shows, which files need not say. Refuses (UnreadableImage)
-    what shows nothing, what goes around in another way than a sphere, and two circles of fisheyes, with what to do."""
+    """The picture; of a sphere with the part of it that it shows, which files need not say, and with a warning where
+    they do not. Refuses (UnreadableImage) what shows nothing, what goes around in another way than a sphere, and two
+    circles of fisheyes, with what to do."""
     kind = kind_of(picture)
-    if kind == "sphere":
+    if picture.part is None and kind == "sphere":
         height, width = picture.view.shape[:2]
-        return replace(picture, part=picture.part or whole_sphere((width, height)))
+        return replace(picture, part=whole_sphere((width, height)), warnings=(*picture.warnings, _FOUND))
     if kind in _ADVICE:
         raise UnreadableImage(f"{picture.name}: {_ADVICE[kind]}")
     return picture
@@ -53,7 +58,8 @@ def kind_of(picture: Picture) -> Kind:
 
 
 def _ends_meet(view: NDArray[np.uint8]) -> bool:
-    """Whether a picture twice as wide as high goes on from its right end at its left one, and has poles for rows."""
+    """Whether a picture twice as wide as high goes on from its right end at its left one, and has poles for rows.
+    Frames, backdrops and skies meet as well: they are plain along the ends, or as much alike further in."""
     height, width = view.shape[:2]
     if abs(width - 2 * height) > FLATNESS.sphere_aspect * width or height < FLATNESS.least_side:
         return False
@@ -64,8 +70,17 @@ def _ends_meet(view: NDArray[np.uint8]) -> bool:
     apart = float(np.abs(small - np.roll(small, size // 2, axis=1)).mean())
     spread = small.std(axis=1).mean(axis=1)
     middle = float(np.median(spread[rows // 4 : -rows // 4]))
+    along = small.std(axis=0).mean(axis=1)
+    in_by = FLATNESS.ends_in
+    further = float(np.abs(small[:, in_by] - small[:, -1 - in_by]).mean())
+    shows = (
+        middle >= FLATNESS.least_spread
+        and min(along[0], along[-1]) >= max(FLATNESS.least_spread, FLATNESS.ends_along * np.median(along))
+        and further >= FLATNESS.ends_further * apart
+    )
     return bool(
-        beside[0] <= FLATNESS.ends_beside * np.median(beside[1:]) + 1
+        shows
+        and beside[0] <= FLATNESS.ends_beside * np.median(beside[1:]) + 1
         and beside[0] <= FLATNESS.ends_apart * apart
         and max(spread[0], spread[-1]) <= FLATNESS.pole_spread * middle
     )

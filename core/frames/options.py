@@ -176,6 +176,21 @@ class FlatnessOptions:
     ends_apart: float = 0.5
     """The same of columns half a turn apart: in fog and at night all are alike."""
 
+    ends_in: int = 2
+    """px of those inwards from each end at which the columns are compared too: a frame is wider."""
+
+    ends_further: float = 0.05
+    """Share of what columns half a turn apart differ by that those differ by, at least: of spheres 0.15 and more, of
+    frames and backdrops next to nothing."""
+
+    ends_along: float = 0.2
+    """Share of how much columns vary that those at the ends vary, at least: of spheres 0.85 and more, of frames
+    nothing."""
+
+    least_spread: float = 0.5
+    """Levels of 255, standard deviation, by which rows in the middle and the columns at the ends vary, at least: what
+    is plain has less, compressed too; a sphere of a dark night may have 1."""
+
     pole_spread: float = 0.5
     """The same of how much the first and the last row vary, which are one point each, and the rows in the middle."""
 
@@ -244,6 +259,29 @@ class SphereOptions:
 
     least_shown: float = 0.02
     """Share of a view that must show something there for it to be worked with."""
+
+    least_of_own: float = 0.25
+    """The same of a small part of a sphere, as a share of its own px: it fills no view."""
+
+    most_times: float = 1000.0
+    """Times its longer side that the sphere may be wide of which a picture is said to be a part: 0.4°, less than any
+    lens shows."""
+
+    most_empty: float = 8.0
+    """Times as many px as the picture has that a view's box around what it shows may have: of a whole sphere 0.26, of
+    thin rings around a pole many."""
+
+    small_px: int = 10_000_000
+    """px that such a box may always have."""
+
+    grid: int = 256
+    """Points a side by which it is found where a view shows a part of a sphere."""
+
+    grid_margin: float = 6.0
+    """Distances of such points by which that is widened: in the corners views stretch them fourfold."""
+
+    least_ahead: float = 0.1
+    """Cosine of the angle from a view's axis, at least, of such points: its corners have 0.5."""
 
     margin_px: int = 3
     """px beyond the borders that cubic interpolation may take."""

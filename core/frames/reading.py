@@ -176,6 +176,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     shown: list[Picture] = []
     known: list[Camera | None] = []
     shown_by: list[int] = []
+    of_spheres: list[str] = []
     for number, picture in enumerate(pictures):
         shown_by.append(shown_by[copies[number]] if number in copies else len(shown))
         if number in copies:
@@ -183,6 +184,8 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         mask = masks[number]
         if mask is not None:
             picture = without(picture, read_mask(mask, size_of(picture), called(number, names)))
+        if picture.part is not None:  # its views carry none
+            of_spheres += [f"{picture.name}: {warning}" for warning in picture.warnings]
         for view, camera in _as_flat(picture, number):
             shown.append(view)
             known.append(camera)
@@ -197,7 +200,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         resized(picture if mask is None else replace(without(picture, mask), burnt_in=mask), options.scale)
         for picture, mask in zip(shown, burnt_in, strict=True)
     ]
-    warnings = tuple(
+    warnings = *of_spheres, *(
         f"{names[number]} is given twice: it is used once"
         if names[number] == names[first]
         else f"{names[number]} is the same picture as {names[first]}: it is used once"

@@ -19,10 +19,11 @@ from ..cameras.lens_models import Lens
 from ..pictures.gpano import SpherePart
 from ..pictures.naming import VIEWS, view_name
 from ..pictures.picture import Picture
-from ..raster.arrays import Array, bounds, dilated, larger_parts, small_strips
+from ..raster.arrays import Array, Part, bounds, dilated, larger_parts, small_strips
 from ..raster.lazy import Coded, whole
 from ..raster.log_encoding import log_decode, log_encode
 from ..raster.sampling import fetch
+from ..system.errors import UnreadableImage
 from .options import SPHERES
 
 # Where views look: degrees to the right of the middle of what the sphere shows, and upwards.
@@ -46,8 +47,15 @@ def views_of_sphere(picture: Picture, part: SpherePart, number: int) -> Iterator
         At the sphere's own resolution, transparent where the sphere shows nothing.
     Camera
         Known exactly, but for how the sphere was held.
+
+    Raises
+    ------
+    UnreadableImage
+        The sphere is absurdly larger than the picture, or no view shows anything.
     """
-    sphere = _Sphere.of(picture, part)
+    if part.full[0] > SPHERES.most_times * max(part.box[2:]):
+        raise _too_large(picture, part)
+    sphere, nothing = _Sphere.of(picture, part), True
     middle = 360 * ((part.box[0] + part.box[2] / 2) / part.full[0] - 0.5)
     for name, (heading, pitch) in zip(VIEWS, _LOOKS, strict=True):
         turn = _rotation(middle + heading, pitch)
@@ -55,12 +63,27 @@ def views_of_sphere(picture: Picture, part: SpherePart, number: int) -> Iterator
         found = _cut_out(sphere, turn, across, down)
         if found is None:
             continue
+        nothing = False
         view, K = found
         height, width = view.view.shape[:2]
         camera = Camera(
             K, (width, height), "its sphere", 0.0, lens=Lens(), view_of=ViewOf(number, picture.name, turn)
         )
         yield replace(view, name=view_name(picture.name, name)), camera
+    if nothing:
+        raise UnreadableImage(
+            f"{picture.name}: as a sphere it shows nothing, or next to nothing: it is black, transparent or ignored as "
+            "good as everywhere, or GPano's numbers put it at a pole; leave it out, or export it again"
+        )
+
+
+def _too_large(picture: Picture, part: SpherePart) -> UnreadableImage:
+    (width, height), own = part.full, part.box[2:]
+    return UnreadableImage(
+        f"{picture.name}: it says that its {own[0]}×{own[1]} px are a part of a sphere of {width:.7g}×{height:.7g} px, "
+        "whose views would be too large for what it shows: write GPano's numbers of the right sphere into it, or "
+        "remove them"
+    )
 
 
 def _rotation(heading: float, pitch: float) -> Array:
@@ -126,15 +149,46 @@ def _cut_out(sphere: _Sphere, turn: Array, across: float, down: float) -> tuple[
     focal = sphere.part.full[0] / (2 * np.pi)
     width, height = (2 * int(np.ceil(focal * np.tan(np.radians(degrees) / 2))) for degrees in (across, down))
     K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
-    shown = np.zeros((height, width), bool)
-    for rows in small_strips((height, width)):
-        shown[rows] = fetch(sphere.opaque, *_map(sphere, turn, K, rows, slice(0, width)), cv2.INTER_LINEAR)[..., 0] >= 1
+    around = _around(sphere.part, turn, K, (width, height))
+    if around is None:
+        return None
+    top, left = around[0].start, around[1].start
+    shown = np.zeros((around[0].stop - top, around[1].stop - left), bool)
+    own = sphere.part.box[2] * sphere.part.box[3]
+    if shown.size > max(SPHERES.most_empty * own, SPHERES.small_px):
+        raise _too_large(sphere.picture, sphere.part)
+    K[:2, 2] -= left, top
+    for rows in small_strips(shown.shape):
+        maps = _map(sphere, turn, K, rows, slice(0, shown.shape[1]))
+        shown[rows] = fetch(sphere.opaque, *maps, cv2.INTER_LINEAR)[..., 0] >= 1
     part = bounds(shown)
     aside = round((1 - SPHERES.own_share) / 2 * width)
-    if part is None or shown[:, aside : width - aside].sum() < SPHERES.least_shown * shown.size:
+    alone = shown[:, max(0, aside - left) : max(0, width - aside - left)].sum()
+    if part is None or alone < min(SPHERES.least_shown * width * height, SPHERES.least_of_own * own):
         return None
     K[:2, 2] -= part[1].start, part[0].start
     return _picture_of(sphere, turn, K, shown[part]), K
+
+
+def _around(part: SpherePart, turn: Array, K: Array, size: tuple[int, int]) -> Part | None:
+    """Rows and columns of a view of (W, H) px beyond which it shows nothing of a part of a sphere, by a grid of points
+    of that; None where it shows nothing at all."""
+    (left, top, width, height), full = part.box, part.full
+    u, v = (np.linspace(-0.5, side - 0.5, SPHERES.grid) for side in (width, height))
+    heading = 2 * np.pi * ((u + left + 0.5) / full[0] - 0.5)
+    fall = np.pi * ((v + top + 0.5) / full[1] - 0.5)[:, None]
+    rays = np.stack(np.broadcast_arrays(np.cos(fall) * np.sin(heading), np.sin(fall), np.cos(fall) * np.cos(heading)))
+    x, y, z = turn @ rays.reshape(3, -1)
+    ahead = z > SPHERES.least_ahead
+    points = np.stack([x, y])[:, ahead] / z[ahead] * K[0, 0] + K[:2, 2:]
+    # what lies between the points is not further from one, as a view stretches it
+    margin = SPHERES.grid_margin * max(width, height) / (SPHERES.grid - 1) + SPHERES.margin_px
+    near = np.all((points > -margin) & (points.T < np.array(size) + margin).T, axis=0)
+    if not near.any():
+        return None
+    first = np.maximum(np.floor(points[:, near].min(axis=1) - margin), 0).astype(int)
+    last = np.minimum(np.ceil(points[:, near].max(axis=1) + margin) + 1, size).astype(int)
+    return (slice(first[1], last[1]), slice(first[0], last[0])) if np.all(first < last) else None
 
 
 def _picture_of(sphere: _Sphere, turn: Array, K: Array, shown: NDArray[np.bool_]) -> Picture:

@@ -8,6 +8,7 @@ Google, Photo Sphere XMP Metadata.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -54,17 +55,22 @@ def sphere_part_told(data: bytes, size: tuple[int, int]) -> SpherePart | None:
     if _text(data, "ProjectionType").lower() != "equirectangular":
         return None
     width, height = size
-    left, top, own_width, own_height, full_width, full_height = (
+    numbers = [
         _number(data, name) for name in (
             "CroppedAreaLeftPixels", "CroppedAreaTopPixels", "CroppedAreaImageWidthPixels",
             "CroppedAreaImageHeightPixels", "FullPanoWidthPixels", "FullPanoHeightPixels",
         )
-    )  # fmt: skip
+    ]  # fmt: skip
+    left, top, own_width, own_height, full_width, full_height = numbers
+    if not all(number is None or math.isfinite(number) for number in numbers) or 0 in (own_width, own_height):
+        return None
     if full_width is None or full_height is None:  # only a whole sphere needs no numbers
         return whole_sphere(size) if width == 2 * height else None
     across, down = width / (own_width or width), height / (own_height or height)
-    full = round(full_width * across), round(full_height * down)
-    box = round((left or 0) * across), round((top or 0) * down), width, height
+    scaled = full_width * across, full_height * down, (left or 0) * across, (top or 0) * down
+    if not all(map(math.isfinite, scaled)):  # the picture's own size next to 0
+        return None
+    full, box = (round(scaled[0]), round(scaled[1])), (round(scaled[2]), round(scaled[3]), width, height)
     inside = box[0] >= 0 and box[1] >= 0 and box[0] + width <= full[0] and box[1] + height <= full[1]
     return SpherePart(full, box) if inside and abs(full[0] - 2 * full[1]) <= 2 else None
 
@@ -75,9 +81,12 @@ def _text(data: bytes, name: str) -> str:
 
 
 def _number(data: bytes, name: str) -> float | None:
-    """A property that is a number above or at 0, None where it is none."""
+    """A property that is a number above or at 0; None where it is not there, NaN or infinity where it is something
+    else, or too large for a number."""
     text = _text(data, name)
-    return float(text) if re.fullmatch(r"\d+(\.\d*)?", text) else None
+    if not text:
+        return None
+    return float(text) if re.fullmatch(r"\+?\d+(\.\d*)?", text) else math.nan
 
 
 def xmp_packet(part: SpherePart) -> bytes:

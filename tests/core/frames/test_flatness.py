@@ -71,6 +71,62 @@ def test_a_wide_photograph_is_none(seed: int) -> None:
     assert kind(fog.astype(np.uint8)) == "flat"
 
 
+def framed(levels: np.ndarray, width: int, border: np.ndarray) -> np.ndarray:
+    """A picture under a border of so many px, of one colour or one for each row."""
+    out = np.broadcast_to(border, levels.shape).astype(np.uint8)
+    out[width:-width, width:-width] = levels[width:-width, width:-width]
+    return out
+
+
+def on_backdrop(height: int) -> np.ndarray:
+    """A thing before a backdrop that falls off downwards and alike to both sides."""
+    row, column = np.mgrid[:height, : 2 * height] / height
+    light = 250 - 120 * row - 60 * np.abs(column - 1) * np.sin(np.pi * row)
+    levels = np.repeat(light[..., None], 3, axis=2)
+    quarter = height // 4
+    levels[quarter:-quarter, quarter:-quarter] = texture(height - 2 * quarter, 2 * height - 2 * quarter)
+    return levels.astype(np.uint8)
+
+
+FALLING = np.linspace(230, 40, 300)[:, None, None]
+PLAIN_ENDS = {
+    "gray": np.full((300, 600, 3), 128, np.uint8), "black": np.zeros((300, 600, 3), np.uint8),
+    "falling": np.broadcast_to(FALLING, (300, 600, 3)).astype(np.uint8),
+    "framed": framed(texture(300, 600), 10, np.array(255)),
+    "thinly framed": framed(texture(300, 600), 3, np.array(255)),
+    "framed in black": framed(texture(300, 600), 20, np.array(0)),
+    "framed in what falls off": framed(texture(300, 600), 12, FALLING), "backdrop": on_backdrop(300),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PLAIN_ENDS)
+@pytest.mark.parametrize("quality", [None, 95, 70])
+def test_what_is_plain_along_its_ends_is_no_sphere(name: str, quality: int | None) -> None:
+    levels = PLAIN_ENDS[name]
+    if quality is not None:
+        encoded = cv2.imencode(".jpg", levels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+        levels = cv2.imdecode(encoded, cv2.IMREAD_COLOR)
+    assert kind(levels) == "flat"
+
+
+@pytest.mark.parametrize("height", [100, 300, 700])
+def test_a_sphere_is_known_without_its_poles_and_by_night(height: int) -> None:
+    for level in (0, 255):
+        levels = sphere(height)
+        levels[: height // 5] = levels[-height // 8 :] = level
+        assert kind(levels) == "sphere"
+    assert kind(sphere(height) // 12) == "sphere"
+    clear = np.dstack([levels, np.where(levels.min(axis=2) == 255, 0, 255).astype(np.uint8)])
+    assert kind(clear) == "sphere"
+
+
+def test_a_sphere_that_only_looks_like_one_is_told(tmp_path: Path) -> None:
+    said = read_frame([texture(80, 90), picture_from_array(sphere(100), "found.jpg")], StitchOptions()).warnings
+    assert len(said) == 1 and said[0].startswith("found.jpg: taken for a whole sphere because its ends meet")
+    told = with_xmp(sphere(100), xmp_packet(whole_sphere((200, 100))), tmp_path / "told.jpg")
+    assert read_frame([texture(80, 90), told], StitchOptions()).warnings == ()
+
+
 def with_xmp(levels: np.ndarray, xmp: bytes, path: Path) -> Path:
     """A JPEG file with a packet of XMP."""
     data = cv2.imencode(".jpg", levels)[1].tobytes()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tracemalloc
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -12,7 +15,7 @@ from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.gpano import SpherePart, whole_sphere
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
 from edf_stitch.core.raster.lazy import Coded
-from edf_stitch.core.system.errors import BadRequest
+from edf_stitch.core.system.errors import BadRequest, UnreadableImage
 
 from ..textured_room import sphere_rays
 
@@ -93,6 +96,57 @@ def test_of_a_part_there_are_only_the_views_that_show_something() -> None:
         360 * (left + width / 2) / (2 * HEIGHT) - 180
     )
     assert all(camera.size[1] < 100 for _, camera in found), "rows that show nothing are left out"
+
+
+def little(full: tuple[int, int], box: tuple[int, int, int, int]) -> tuple[Picture, SpherePart]:
+    """A picture of a small part of a sphere."""
+    left, top, width, height = box
+    v, u = np.mgrid[top : top + height, left : left + width] + 0.5
+    heading, fall = 2 * np.pi * (u / full[0] - 0.5), np.pi * (v / full[1] - 0.5)
+    rays = np.stack([np.cos(fall) * np.sin(heading), np.sin(fall), np.cos(fall) * np.cos(heading)], axis=-1)
+    return picture_from_array(np.rint(255 * smooth(rays)).astype(np.uint8), "p.jpg"), SpherePart(full, box)
+
+
+@pytest.mark.parametrize("full, box", [
+    ((2000, 1000), (900, 450, 60, 40)), ((2000, 1000), (300, 130, 60, 40)), ((40000, 20000), (19000, 9000, 60, 40)),
+])  # fmt: skip
+def test_of_a_small_part_only_what_it_shows_is_worked_out(full: tuple[int, int], box: tuple) -> None:
+    part = little(full, box)
+    tracemalloc.start()
+    found = views(*part)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found and peak < 50e6, "a view of 84° of the last one has 208 MB"
+    assert worst(*part) < 0.01
+    assert sum(view.view[..., 0].size for view, _ in found) < 3 * 60 * 40
+
+
+@pytest.mark.parametrize("width", [10**6, 10**10, 10**200])
+def test_a_sphere_that_is_absurdly_large_for_its_part_is_refused(width: int) -> None:
+    picture = picture_from_array(np.full((30, 60, 3), 99, np.uint8), "far.jpg")
+    with pytest.raises(UnreadableImage, match=r"far.jpg: it says that its 60×30 px are a part of a sphere of 1"):
+        views(picture, SpherePart((width, width // 2), (0, 0, 60, 30)))
+
+
+def test_a_thin_ring_of_a_large_sphere_is_refused() -> None:
+    ring = picture_from_array(np.full((1, 24000, 3), 99, np.uint8), "ring.jpg")
+    with pytest.raises(UnreadableImage, match="ring.jpg: .* too large for what it shows"):
+        views(ring, SpherePart((24000, 12000), (0, 2000, 24000, 1)))
+
+
+def test_a_sphere_of_which_nothing_is_left_is_refused() -> None:
+    levels, wide = sphere_and_wide()
+    whole = whole_sphere((2 * HEIGHT, HEIGHT))
+    black = replace(picture_from_array(np.zeros_like(levels), "s.jpg"), part=whole)
+    alpha = np.full(levels.shape[:2], 99, np.uint8)
+    faint = replace(picture_from_array(np.dstack([levels, alpha]), "s.jpg"), part=whole)
+    for nothing in (black, faint):
+        with pytest.raises(UnreadableImage, match="s.jpg: as a sphere it shows nothing, .*; leave it out, or export"):
+            read_frame([wide, nothing], StitchOptions())
+    hidden = np.full(levels.shape[:2], 255, np.uint8)
+    hidden[:3] = 0  # next to nothing around a pole
+    with pytest.raises(UnreadableImage, match="black, transparent or ignored"):
+        read_frame([wide, picture_from_array(levels, "s.jpg")], StitchOptions(ignore=(None, hidden)))
 
 
 def test_poles_that_are_missing_are_not_shown() -> None:

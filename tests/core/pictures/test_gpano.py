@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.pictures.containers import tiff_bytes, tiff_directory
 from edf_stitch.core.pictures.encoding import encode_picture
-from edf_stitch.core.pictures.gpano import SpherePart, xmp_packet
+from edf_stitch.core.pictures.gpano import SpherePart, sphere_part_told, whole_sphere, xmp_packet
 from edf_stitch.core.pictures.metadata import Exif
 from edf_stitch.core.pictures.picture import load_picture
 
@@ -86,3 +86,30 @@ def test_another_program_reads_it(tmp_path: Path, suffix: str) -> None:
     said = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)[0]
     assert {name: str(said[name]) for name in PROPERTIES} == PROPERTIES
     assert "Error" not in said
+
+
+def told(size: tuple[int, int] = (60, 40), **properties: str) -> SpherePart | None:
+    """What is read of the packet of PART with some properties changed, or, where they are "", left out."""
+    said = {name: text for name, text in {**PROPERTIES, **properties}.items() if text}
+    return sphere_part_told(" ".join(f'GPano:{name}="{text}"' for name, text in said.items()).encode(), size)
+
+
+def test_numbers_that_can_be_are_believed() -> None:
+    assert told() == told(FullPanoWidthPixels="+200.0") == SpherePart((200, 100), (30, 20, 60, 40))
+    assert told(CroppedAreaLeftPixels="") == SpherePart((200, 100), (0, 20, 60, 40))
+    assert told((80, 40), FullPanoWidthPixels="") == whole_sphere((80, 40))
+
+
+@pytest.mark.parametrize("text", ["-600", "-30", "nan", "inf", "9" * 400, "1px"])
+@pytest.mark.parametrize("name", [name for name in PROPERTIES if name.endswith("Pixels")])
+def test_of_numbers_that_cannot_be_no_sphere_is_told(name: str, text: str) -> None:
+    """The picture is 2:1, as whole spheres are: it is not taken for one."""
+    sizes = {"CroppedAreaImageWidthPixels": "80", "CroppedAreaImageHeightPixels": "40"}
+    assert told((80, 40), **sizes) is not None
+    assert told((80, 40), **{**sizes, name: text}) is None
+
+
+@pytest.mark.parametrize("tiny", ["0", "0." + "0" * 320 + "1", "0.0000001"])
+def test_a_picture_that_calls_itself_next_to_nothing_is_no_sphere(tiny: str) -> None:
+    assert told(CroppedAreaImageWidthPixels=tiny) is None
+    assert told(CroppedAreaImageWidthPixels=tiny, CroppedAreaImageHeightPixels=tiny) is None
