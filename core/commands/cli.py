@@ -20,7 +20,7 @@ from .arguments import numbered, options_from
 from .file_arguments import exr_form
 from .info import run_info
 from .messages import print_result, print_summary, progress_shown, say, shortened, verdict_line
-from .options import MESSAGES
+from .options import MESSAGES, STOPPING
 from .parser import edf_parser
 
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
@@ -54,17 +54,29 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str] | None) -> int:
     # before NumPy loads: results of BLAS depend on its thread count, and the same call must give the same bytes
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    asked_to_stop = False
+    asked_to_stop = finished = False
 
     def interrupt(_number: int, _frame: object) -> NoReturn:
         nonlocal asked_to_stop
         asked_to_stop = True
         raise KeyboardInterrupt
 
+    def once_more() -> None:
+        if not finished:
+            signal.raise_signal(signal.SIGINT)
+
+    def ignored(what: sys.UnraisableHookArgs) -> None:
+        # where Python ignores what is raised, as while an object goes, the work would go on
+        if asked_to_stop and issubclass(what.exc_type, KeyboardInterrupt):
+            threading.Timer(STOPPING.again_seconds, once_more).start()
+        else:
+            hook(what)
+
     # A render farm ends a job with SIGTERM: that must leave as little behind as Ctrl-C. A shell starts background jobs
     # with SIGINT ignored: here it stops them all the same.
     main_thread = threading.current_thread() is threading.main_thread()
     before = {number: signal.signal(number, interrupt) for number in _STOPPING} if main_thread else {}
+    hook, sys.unraisablehook = sys.unraisablehook, ignored
     try:
         args = edf_parser().parse_args(argv)
         return _COMMANDS[args.command](args)
@@ -76,6 +88,7 @@ def _run(argv: Sequence[str] | None) -> int:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)
+        finished, sys.unraisablehook = True, hook
 
 
 def _report_error(error: BaseException) -> int:

@@ -23,6 +23,14 @@ class MessageOptions:
 
 
 @dataclass(frozen=True)
+class StoppingOptions:
+    """How the command stops when it is asked to (`cli`)."""
+
+    again_seconds: float = 0.02
+    """Seconds after which a signal is raised once more that Python could not act on."""
+
+
+@dataclass(frozen=True)
 class WorkerOptions:
     """What the worker tells the window (`worker`)."""
 
@@ -46,4 +54,5 @@ class NotebookOptions:
 
 MESSAGES = MessageOptions()
 NOTEBOOK = NotebookOptions()
+STOPPING = StoppingOptions()
 WORKER = WorkerOptions()

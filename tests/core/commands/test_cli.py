@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -522,6 +523,29 @@ def test_a_signal_in_the_middle_leaves_nothing(
     assert job.returncode == 130 and out == ""
     assert err.splitlines()[-1] == "edf: interrupted, nothing was written" and "Traceback" not in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_signal_that_comes_while_an_object_goes_is_not_lost(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Python ignores what is raised there, and says so."""
+
+    class Thing:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGTERM)
+            time.sleep(0)
+
+    def work(_: object) -> int:
+        Thing()
+        time.sleep(0.2)
+        for _ in range(200):
+            time.sleep(0.02)
+        return 0
+
+    monkeypatch.setitem(cli._COMMANDS, "demo", work)
+    before = sys.unraisablehook
+    assert main(["demo"]) == 130 and sys.unraisablehook is before
+    assert capfd.readouterr().err == "edf: interrupted, nothing was written\n"
 
 
 def test_the_handler_of_the_terminating_signal_is_put_back(said: Callable) -> None:
