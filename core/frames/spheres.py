@@ -149,7 +149,7 @@ def _cut_out(sphere: _Sphere, turn: Array, across: float, down: float) -> tuple[
     focal = sphere.part.full[0] / (2 * np.pi)
     width, height = (2 * int(np.ceil(focal * np.tan(np.radians(degrees) / 2))) for degrees in (across, down))
     K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
-    around = _around(sphere.part, turn, K, (width, height))
+    around = _with_margin(sphere.part, turn, K, (width, height))
     if around is None:
         return None
     top, left = around[0].start, around[1].start
@@ -170,7 +170,7 @@ def _cut_out(sphere: _Sphere, turn: Array, across: float, down: float) -> tuple[
     return _picture_of(sphere, turn, K, shown[part]), K
 
 
-def _around(part: SpherePart, turn: Array, K: Array, size: tuple[int, int]) -> Part | None:
+def _with_margin(part: SpherePart, turn: Array, K: Array, size: tuple[int, int]) -> Part | None:
     """Rows and columns of a view of (W, H) px beyond which it shows nothing of a part of a sphere, by a grid of points
     of that; None where it shows nothing at all."""
     (left, top, width, height), full = part.box, part.full
