@@ -107,7 +107,7 @@ def container_brand(data: bytes) -> str:
 
 
 # GPano's property of XMP, as an attribute or an element; whatever it says, the picture is not flat
-_SURROUND = re.compile(rb"GPano:ProjectionType\s*(=\s*[\"']|>)\s*(equirectangular|cylindrical)", re.IGNORECASE)
+_SURROUND = re.compile(rb"GPano:ProjectionType\s*(?:=\s*[\"']|>)\s*(?i:equirectangular|cylindrical)")
 
 
 def says_surround(data: bytes) -> bool:
@@ -118,7 +118,7 @@ def says_surround(data: bytes) -> bool:
 # Properties of XMP by which cameras and Adobe's programs say that they removed the lens's distortion; a profile alone
 # is what would be done to camera RAW
 _UNDISTORTED, _PROFILE_USED, _DONE = (
-    re.compile(name + rb"\s*(=\s*[\"']|>)\s*(true|1)\b", re.IGNORECASE)
+    re.compile(name + rb"\s*(?:=\s*[\"']|>)\s*(?i:true|1)\b")
     for name in (rb"aux:DistortionCorrectionAlreadyApplied", rb"crs:LensProfileEnable", rb"crs:AlreadyApplied")
 )
 
