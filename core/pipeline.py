@@ -125,14 +125,24 @@ def _preview(frame: Frame, geometry: Geometry, options: StitchOptions, progress:
     """A small panorama of a geometry that was found on the full pictures: of small ones, which need no drafts."""
     turns = [np.eye(3), geometry.edges[0].two_view.R] if geometry.rig is None else geometry.rig.R
     share = first_share(geometry.cameras, list(turns))
-    for tries_left in range(PREVIEW.tries - 1, -1, -1):
-        small = frame.resized(share)
-        result = _made(small, geometry.of_resized(small.sizes), options, progress)
-        better = next_share(share, result.canvas.width * result.canvas.height)
-        if better == share or not tries_left:
+    for _ in range(PREVIEW.tries):
+        share, guessed = next_share(share, _px_shown(frame.resized(share), geometry, options, progress)), share
+        if share == guessed:
             break
-        share = better
-    return result
+    small = frame.resized(share)
+    return _made(small, geometry.of_resized(small.sizes), options, progress)
+
+
+def _px_shown(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> int:
+    """How many px a panorama of small pictures has, by the smooth field: framed and cropped, but not made."""
+    smooth = replace(options, dense=False)
+    warp = fit_and_warp(geometry.of_resized(frame.sizes), [frame], smooth, progress.untold()).warp
+    if not isinstance(options.kept, str):
+        return warp.canvas.width * warp.canvas.height
+    shows = np.logical_or.reduce([one.inside() for one in warp.maps])
+    reference = box_of(warp.maps[0].inside()) if warp.maps[0].inside().any() else None
+    width, height = crop_box(options.kept, warp.canvas.whole, shows, reference, len(frame.pictures))[2:]
+    return width * height
 
 
 def compose(

@@ -19,7 +19,7 @@ class PreviewOptions:
     """The same above which it is made again, smaller."""
 
     tries: int = 2
-    """Times that it is made at most: the crop may take another part of it at another size."""
+    """Times that its size is looked at: the crop may take another part of it at another size."""
 
     border_points: int = 16
     """Points along each side of a picture that its outline is guessed by."""

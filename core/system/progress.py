@@ -86,6 +86,10 @@ class Stopwatch:
         """Tells progress as of a stitch of so many pictures from now on."""
         self._progress = replace(self._progress, stages=stages_of(pictures))
 
+    def untold(self) -> Stopwatch:
+        """One for work on the side, which is not told of but stopped all the same."""
+        return Stopwatch(replace(self._progress, report=None))
+
     def __call__(self, stage: str, fraction: float = 0.0) -> None:
         now = time.perf_counter()
         if self._stage:

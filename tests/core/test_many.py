@@ -190,6 +190,20 @@ def test_a_preview_is_small_and_the_full_panorama_has_its_geometry(
     assert np.abs(shown[0] - shown[1]).mean() < 0.03 * shown[1].mean() + 0.02, "it shows the same"
 
 
+def test_a_preview_whose_size_was_guessed_wrong_is_made_once(
+    four: PictureSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sizes = replace(PREVIEW, pixels=30_000, least_pixels=20_000, most_pixels=45_000)
+    for number in (preview, pipeline):
+        monkeypatch.setattr(number, "PREVIEW", sizes)
+    guessed, told = pipeline.first_share, list[float]()
+    monkeypatch.setattr(pipeline, "first_share", lambda *known: 1.5 * guessed(*known))
+    options = replace(KNOWN, projection="cylindrical", preview=True)
+    small = stitch(four.pictures[:2], options, lambda _, share: told.append(share))
+    assert 20_000 < small.alpha.size < 45_000
+    assert told == sorted(told), "nothing is told twice"
+
+
 def test_a_picture_that_does_not_belong_is_left_out_and_named(four: PictureSet) -> None:
     noise = np.random.default_rng(0).integers(0, 255, (60, 80, 3)).astype(np.uint8)
     stranger = picture_from_array(cv2.resize(noise, (320, 240), interpolation=cv2.INTER_CUBIC), "stranger.png")
