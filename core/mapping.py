@@ -305,4 +305,4 @@ def _slide(
 
     down = lines.down if lines.down_is_sure else None
     choice = choose_slide(base, views, viewpoint, lines.each, down, seam, progress)
-    return choice, _Sliding(base, viewpoint.sliding(choice.s1)) if choice.s1 else None
+    return choice, _Sliding(base, viewpoint.within(choice.part).sliding(choice.s1)) if choice.s1 else None

@@ -211,7 +211,7 @@ def left_out_entry(left_out: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
 
 def slide_entry(slide: SlideChoice) -> dict[str, Any]:
     """How far the viewpoint slides."""
-    return {"s1": slide.s1, "costs": [asdict(one) for one in slide.costs], "why": slide.why}
+    return {"s1": slide.s1, "part": slide.part, "costs": [asdict(one) for one in slide.costs], "why": slide.why}
 
 
 def depth_entry(scale: Scale) -> dict[str, Any]:

@@ -30,6 +30,8 @@ from .warp import Warp
 
 # The upper left corner of each cell of a grid (rows, columns, …), that to its right, and that below it.
 CORNERS = np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, :-1]
+# The whole way across the overlap.
+ALL = (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -45,12 +47,14 @@ class SlideCost:
         How far upright ones lean, degrees.
     enlarged, folded : float
         Shares of the pictures, on surfaces, that are enlarged or folded.
-    seam_px : float
-        px of a rough seam that is seen.
-    holes : float
-        Share, of what is shown, of holes in it.
+    seam_px : float or None
+        px of a rough seam that is seen; None where none was cut, since without any it would cost too much already.
+    holes : float or None
+        Share, of what is shown, of holes in it; None likewise.
     cost : float
         All of it, in px of bend.
+    part : (float, float)
+        Within which part of the way across the overlap it slides, from and to shares of it.
     """
 
     s1: float
@@ -58,18 +62,21 @@ class SlideCost:
     lean_deg: float
     enlarged: float
     folded: float
-    seam_px: float
-    holes: float
+    seam_px: float | None
+    holes: float | None
     cost: float
+    part: tuple[float, float] = ALL
 
 
 @dataclass(frozen=True)
 class SlideChoice:
-    """How far the viewpoint slides (s1), what each candidate costs, and why it was chosen, in plain words."""
+    """How far the viewpoint slides (s1), what each candidate costs, why it was chosen, in plain words, and within which
+    part of the way across the overlap it slides."""
 
     s1: float
     costs: tuple[SlideCost, ...]
     why: str
+    part: tuple[float, float] = ALL
 
 
 # Where there is nothing to slide along.
@@ -102,22 +109,58 @@ def choose_slide(
     Returns
     -------
     SlideChoice
-        Of candidates that cost about as much, the one that slides least.
+        Of candidates that cost about as much, the one that slides least, within a part of the way only where all others
+        cost more.
     """
     base = replace(base, depth=base.inverse_depth, lazy_confidence=None)  # read more than once
     samples = [
         _samples(OwnDepth.of(base, view, number), one, down)
         for number, (view, one) in enumerate(zip(views, edges, strict=True))
     ]
-    seams: dict[float, tuple[float, float]] = {}
-    for number, s1 in enumerate(CHOICE.seam_candidates):
-        progress(number / len(CHOICE.seam_candidates))
-        seams[s1] = _seam_and_holes(base, views, viewpoint.sliding(s1), rough_seam)
-    costs = []
-    for s1 in CHOICE.candidates:
-        seam_px, holes = (float(np.interp(s1, list(seams), values)) for values in zip(*seams.values(), strict=True))
-        costs.append(_cost(s1, _geometry(samples, viewpoint.sliding(s1), down), seam_px, holes))
-    return _least(tuple(costs))
+    bare = [
+        _cost(s1, _geometry(samples, viewpoint.within(part).sliding(s1), down), part)
+        for s1, part in [*((s1, ALL) for s1 in CHOICE.candidates), *((1.0, part) for part in CHOICE.parts)]
+    ]
+
+    def seamed(one: SlideCost) -> SlideCost:
+        return _with_seam(one, *_seam_and_holes(base, views, viewpoint.within(one.part).sliding(one.s1), rough_seam))
+
+    costs = _seamed([one for one in bare if one.part == ALL], seamed, progress)
+    choice = _least(costs)
+    best = next(one for one in costs if one.s1 == choice.s1)
+    parts = [one for one in bare if one.part != ALL and _possible(one, costs[0])]
+    for one in sorted(parts, key=lambda one: one.cost):
+        if best.cost < CHOICE.least_cost or one.cost + _tie(one.cost) >= best.cost:
+            break
+        progress(1.0)
+        one = seamed(one)
+        choice = replace(choice, costs=(*choice.costs, one))
+        if one.cost + _tie(one.cost) < best.cost:
+            start, end = one.part
+            why = f"costs {one.cost:.3f} px of bend, the least, from {start:.0%} to {end:.0%} of the way across the overlap"
+            best, choice = one, replace(choice, s1=one.s1, why=why, part=one.part)
+    return choice
+
+
+def _seamed(
+    bare: Sequence[SlideCost], seamed: Callable[[SlideCost], SlideCost], progress: Callable[[float], None]
+) -> tuple[SlideCost, ...]:
+    """Candidates that slide further and further with their seams, which take longest: those of CHOICE.seam_candidates
+    are cut, the others' interpolated; none but the first where no other could be chosen even if its seam is unseen."""
+    progress(0.0)
+    first = seamed(bare[0])
+    if all(one.cost + _tie(one.cost) >= first.cost for one in bare if _possible(one, first)):
+        return first, *bare[1:]
+    seams = {first.s1: (first.seam_px, first.holes)}
+    cut = [one for one in bare if one.s1 in CHOICE.seam_candidates and one.s1 != first.s1]
+    for number, one in enumerate(cut, 1):
+        progress(number / (1 + len(cut)))
+        with_seam = seamed(one)
+        seams[one.s1] = (with_seam.seam_px, with_seam.holes)
+    return tuple(
+        _with_seam(one, *(float(np.interp(one.s1, list(seams), values)) for values in zip(*seams.values(), strict=True)))
+        for one in bare
+    )
 
 
 def choose_rig_slide(
@@ -149,7 +192,7 @@ def choose_rig_slide(
         samples.append(_samples(OwnDepth.of(base, view, number), one, down))
     for number, s1 in enumerate(CHOICE.candidates):
         progress(0.5 + number / len(CHOICE.candidates) / 2)
-        costs.append(_cost(s1, _geometry(samples, viewpoint.sliding(s1), down), 0.0, 0.0))
+        costs.append(_cost(s1, _geometry(samples, viewpoint.sliding(s1), down)))
     return _least(tuple(costs))
 
 
@@ -157,13 +200,9 @@ def _least(costs: tuple[SlideCost, ...]) -> SlideChoice:
     """The choice by the costs of candidates, which slide further and further."""
     still = costs[0]
     # what folds or stretches at some slide only does so the more at a longer one
-    possible = list(takewhile(
-        lambda one: one.folded <= still.folded + CHOICE.max_folded
-        and one.enlarged <= still.enlarged + CHOICE.max_stretched, costs,
-    ))  # fmt: skip
+    possible = list(takewhile(lambda one: _possible(one, still), costs))
     least = min(one.cost for one in possible)
-    tie = max(CHOICE.tie_px, CHOICE.tie_share * least)
-    best = next(one for one in possible if one.cost <= least + tie)
+    best = next(one for one in possible if one.cost <= least + _tie(least))
     why = f"costs {best.cost:.3f} px of bend, the least"
     if best.cost > least:
         why = f"costs {best.cost:.3f} px of bend, about as little as any"
@@ -172,14 +211,29 @@ def _least(costs: tuple[SlideCost, ...]) -> SlideChoice:
     return SlideChoice(best.s1, costs, why)
 
 
-def _cost(s1: float, geometry: tuple[float, float, float, float], seam_px: float, holes: float) -> SlideCost:
-    """A candidate's cost by bend (px), lean (degrees), shares enlarged and folded, px of the seam, and holes."""
-    bend, lean, enlarged, folded = geometry
-    cost = (
-        bend + CHOICE.per_lean_deg * lean + CHOICE.per_enlarged * enlarged + CHOICE.per_folded * folded
-        + CHOICE.per_seam_px * min(seam_px, CHOICE.max_seam_px) + CHOICE.per_hole * holes
+def _possible(one: SlideCost, still: SlideCost) -> bool:
+    """Whether a candidate folds and stretches hardly more than what does not slide."""
+    return (
+        one.folded <= still.folded + CHOICE.max_folded and one.enlarged <= still.enlarged + CHOICE.max_stretched
     )  # fmt: skip
-    return SlideCost(s1, bend, lean, enlarged, folded, seam_px, holes, cost)
+
+
+def _tie(least: float) -> float:
+    """By how much what is as good as the least may cost more."""
+    return max(CHOICE.tie_px, CHOICE.tie_share * least)
+
+
+def _cost(s1: float, geometry: tuple[float, float, float, float], part: tuple[float, float] = ALL) -> SlideCost:
+    """A candidate's cost by bend (px), lean (degrees), and shares enlarged and folded."""
+    bend, lean, enlarged, folded = geometry
+    cost = bend + CHOICE.per_lean_deg * lean + CHOICE.per_enlarged * enlarged + CHOICE.per_folded * folded
+    return SlideCost(s1, bend, lean, enlarged, folded, None, None, cost, part)
+
+
+def _with_seam(one: SlideCost, seam_px: float, holes: float) -> SlideCost:
+    """A candidate's cost with that of its seam (px) and holes."""
+    more = CHOICE.per_seam_px * min(seam_px, CHOICE.max_seam_px) + CHOICE.per_hole * holes
+    return replace(one, seam_px=seam_px, holes=holes, cost=one.cost + more)
 
 
 @dataclass(frozen=True)

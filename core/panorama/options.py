@@ -180,6 +180,13 @@ class ChoiceOptions:
     seam_candidates: tuple[float, ...] = (0.0, 0.5, 1.0)
     """Slides at which a seam is cut and holes are counted, which takes longest; interpolated between."""
 
+    parts: tuple[tuple[float, float], ...] = ((0.25, 0.75), (0.0, 0.5), (0.5, 1.0))
+    """Parts of the way across the overlap within which the whole slide is tried as well. Beside them each picture is
+    shown as it was taken, so that near things there stay whole; within them lines bend more."""
+
+    least_cost: float = 0.25
+    """Cost from which these are tried: below it hardly anything is bent or cut."""
+
     base_px_per_radian: float = 250.0
     """Resolution of the coarse map, and of the pictures through which a seam is cut: at 150 what a slide tears is not
     seen, twice as fine it takes three times as long."""

@@ -52,6 +52,11 @@ class Viewpoint:
         """The same viewpoint that slides further or less."""
         return replace(self, s1=s1)
 
+    def within(self, part: tuple[float, float]) -> Viewpoint:
+        """The same viewpoint that slides within a part, from and to shares, of the way that it has."""
+        start, end = self.ends
+        return replace(self, ends=(start + part[0] * (end - start), start + part[1] * (end - start)))
+
     def slide_at(self, rays: NDArray[Any]) -> NDArray[Any]:
         """s (…) of rays (…, 3) of any length, in the reference camera's frame."""
         return self.slide_of(*np.moveaxis(rays @ self.rotation.astype(rays.dtype), -1, 0))

@@ -102,6 +102,19 @@ def test_nothing_slides_by_itself_where_depth_is_not_known_to_the_pixel(
     assert found.slide.s1 == 0 and "smooth" in found.slide.why and found.warp.viewpoint is None
 
 
+def test_it_slides_within_the_part_that_was_chosen(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    options = replace(QUICK, slide="auto", dense=True)
+    ends = []
+    for part in ((0.0, 1.0), (0.25, 0.75)):
+        chosen = mapping.SlideChoice(0.5, (), "chosen", part)
+        monkeypatch.setattr(mapping, "choose_slide", lambda *given, chosen=chosen: chosen)
+        viewpoint = align([frame], options, silent).warp.viewpoint
+        assert viewpoint is not None and viewpoint.s1 == 0.5
+        ends.append(viewpoint.ends)
+    (start, end), within = ends
+    assert within == pytest.approx((start + (end - start) / 4, end - (end - start) / 4))
+
+
 def test_another_slide_set_by_hand_starts_from_what_is_kept(
     frame: Frame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -184,6 +184,40 @@ def test_it_stays_where_sliding_gains_nothing(by_hand: SimpleNamespace) -> None:
     assert choice_for(base, views, NONE, DOWN, better_far(0.1)).s1 == 0, "nor for what nobody sees"
 
 
+def test_no_seam_is_cut_where_no_other_slide_could_be_chosen(by_hand: SimpleNamespace) -> None:
+    base, views = rig(by_hand, wall)
+    edges = lines(*(((1.1, y, 4.0), (1.9, y + 0.5, 4.0)) for y in (-1.3, -0.9, 0.1, 0.6)))
+    cut: list[float] = []
+    choice = choice_for(base, views, edges, DOWN, lambda warp: cut.append(slid(warp)) or 20.0)
+    assert cut == [0.0, 0.5, 1.0], "an unseen one would be worth the bend of the smallest slide"
+    seen = choice.costs[0].cost - choice.costs[0].bend_px
+    cut.clear()
+    choice = choice_for(base, views, edges, DOWN, lambda warp: cut.append(slid(warp)) or 0.0)
+    assert cut == [0.0] and choice.s1 == 0 and seen > 0
+    assert [one.seam_px for one in choice.costs] == [0.0, None, None, None, None]
+
+
+def test_it_slides_within_a_part_of_the_way_where_that_cuts_less(by_hand: SimpleNamespace) -> None:
+    """As where a person beside that part is torn otherwise."""
+    base, views = rig(by_hand, lambda heading, rise: np.full_like(heading, 0.05))
+    whole = viewpoint_between(base, views)
+    assert whole is not None
+
+    def cut_beside(part: tuple[float, float]) -> Callable[[Warp], float]:
+        ends = whole.within(part).ends
+        return lambda warp: 0.0 if warp.viewpoint is not None and warp.viewpoint.ends == ends else 60.0
+
+    for part in CHOICE.parts:
+        choice = choice_for(base, views, NONE, DOWN, cut_beside(part))
+        assert (choice.s1, choice.part) == (1.0, part) and "of the way across" in choice.why
+        assert choice.costs[-1].seam_px == 0 and choice.costs[0].seam_px > 100
+    assert choice_for(base, views, NONE, DOWN, lambda warp: 60.0).part == (0.0, 1.0)
+    # what a part costs more in bend is weighed, and where little is seen nothing is tried
+    calls: list[Warp] = []
+    assert choice_for(base, views, NONE, DOWN, lambda warp: calls.append(warp) or 4.0).part == (0.0, 1.0)
+    assert len(calls) == len(CHOICE.seam_candidates)
+
+
 def test_it_can_be_stopped_between_candidates(by_hand: SimpleNamespace) -> None:
     base, views = rig(by_hand, wall)
     said = []
@@ -194,7 +228,7 @@ def test_it_can_be_stopped_between_candidates(by_hand: SimpleNamespace) -> None:
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        choice_for(base, views, NONE, DOWN, steady, stop)
+        choice_for(base, views, NONE, DOWN, better_far(20), stop)
     assert said == sorted(said) and said[0] == 0
 
 
