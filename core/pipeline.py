@@ -27,7 +27,8 @@ from .frames.frame import Frame
 from .frames.options import PREVIEW
 from .frames.preview import first_share, next_share
 from .frames.reading import Source, read_frame
-from .measure.fallback import first_usable
+from .mapping import map_pictures
+from .measure.fallback import first_usable, least_torn
 from .measure.look import look_at
 from .measure.metrics import appearance
 from .measure.report import make_report
@@ -35,6 +36,7 @@ from .measure.rig_report import make_rig_report
 from .measure.verdict import judge
 from .options import StitchOptions
 from .panorama.canvas import Canvas
+from .panorama.choosing_slide import ALL
 from .panorama.layers import Layer, layer_of
 from .pictures.masks import has_shape, painted_over
 from .pictures.picture import Picture
@@ -103,9 +105,26 @@ def _made(frame: Frame, geometry: Geometry, options: StitchOptions, progress: St
     """The panorama of a geometry, of a pair the first that is usable."""
 
     def made(by: StitchOptions) -> StitchResult:
-        return compose(frame, fit_and_warp(geometry, [frame], by, progress), by, progress)
+        alignment = fit_and_warp(geometry, [frame], by, progress)
+        result = compose(frame, alignment, by, progress)
+        if alignment.slide.part == ALL:
+            return result
+        aside = progress.untold()
+        return least_torn(result, lambda: compose(frame, _slid_all_the_way(alignment, frame, by, aside), by, aside))
 
     return first_usable(made, options) if geometry.rig is None else made(options)
+
+
+def _slid_all_the_way(
+    alignment: Alignment, frame: Frame, options: StitchOptions, progress: Stopwatch
+) -> Alignment:
+    """The alignment of a pair whose viewpoint slides within a part of the overlap, with one that slides all the way."""
+    choice = alignment.slide.all_the_way()
+    refined = None if alignment.dense is None else alignment.dense.refined
+    by = replace(options, slide=choice.s1)
+    mapped = map_pictures(alignment.pair_field, alignment.views, refined, frame.pictures, by, progress)
+    choice = replace(choice, why=f"{choice.why} all the way; within a part of it the picture would be torn")
+    return replace(alignment, warp=mapped.warp, continuation=mapped.continuation, slide=choice)
 
 
 def _of_many(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:

@@ -42,7 +42,7 @@ MAY_IMPORT = {
     "fields": ("cameras", "field", "rivals"),
     "mapping": (*BELOW_MEASURE, "choices", "options"),
     "alignment": (*BELOW_MEASURE, "frames", "options", "fields", "mapping"),
-    "pipeline": (*BELOW_MEASURE, "frames", "measure", "options", "alignment"),
+    "pipeline": (*BELOW_MEASURE, "frames", "measure", "options", "mapping", "alignment"),
 }
 # The same for the add-on. What lies beside its rooms is known to all of them, or to those after it.
 BESIDE = ("idnames", "offered", "pair", "pictures", "properties", "earlier", "engine_options", "status", "editor",

@@ -1,4 +1,5 @@
-"""What is shown where the geometry is too wrong for dense depth: something simpler, which less can go wrong in."""
+"""What is shown where the geometry is too wrong for dense depth, or the picture is torn by how the viewpoint slides:
+something simpler, which less can go wrong in."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import Cancelled, StitchError
-from .verdict import NOT_USABLE
+from .verdict import NOT_USABLE, TORN
 
 if TYPE_CHECKING:
     from ..options import StitchOptions
@@ -52,6 +53,29 @@ def first_usable(made: Callable[[StitchOptions], StitchResult], options: StitchO
             report = {**other.report, "warnings": list(warnings), "fallback": fallback}
             return replace(other, warnings=warnings, report=report)
     return first
+
+
+def least_torn(first: StitchResult, all_the_way: Callable[[], StitchResult]) -> StitchResult:
+    """The stitch whose viewpoint slides within a part of the overlap, or the one in which it slides all the way where
+    that leaves less torn: the choice among them looks at a coarse map only.
+
+    Parameters
+    ----------
+    first : StitchResult
+    all_the_way : callable
+        Makes the other.
+    """
+    torn = _torn_px(first)
+    if not torn:
+        return first
+    other = all_the_way()
+    return other if _is_usable(other) and _torn_px(other) < torn else first
+
+
+def _torn_px(result: StitchResult) -> int:
+    """px of the places where the panorama is torn."""
+    places = result.report["verdict"]["places"]
+    return sum(place["box"][2] * place["box"][3] for place in places if place["what"] == TORN)
 
 
 def _is_usable(result: StitchResult) -> bool:

@@ -21,6 +21,7 @@ from .look import Levels, Look
 from .options import RIG, VERDICT
 
 GOOD, LOOK, NOT_USABLE = "good", "look", "not usable"
+TORN = "the picture is torn or doubled at an outline: depth is doubtful"
 
 PAINT = (
     "paint over these places which picture is shown there (--mask), or leave them out (--ignore-ref, --ignore-target)"
@@ -282,8 +283,7 @@ def _torn_places(look: Look, pairs: Sequence[_Pair], shift: tuple[int, int]) -> 
             if others:
                 torn |= broken & _detailed(look.tones[number]) & np.logical_or.reduce(others)
     for part in _parts(torn, VERDICT.torn_share * look.side * look.side):
-        what = "the picture is torn or doubled at an outline: depth is doubtful"
-        yield Place(look.box(part, shift), what, float(part.sum()))
+        yield Place(look.box(part, shift), TORN, float(part.sum()))
 
 
 def _bent_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:

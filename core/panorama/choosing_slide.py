@@ -70,13 +70,28 @@ class SlideCost:
 
 @dataclass(frozen=True)
 class SlideChoice:
-    """How far the viewpoint slides (s1), what each candidate costs, why it was chosen, in plain words, and within which
-    part of the way across the overlap it slides."""
+    """How far the viewpoint slides.
+
+    Attributes
+    ----------
+    s1 : float
+    costs : tuple of SlideCost
+        What each candidate costs.
+    why : str
+        Why it was chosen, in plain words.
+    part : (float, float)
+        Within which part of the way across the overlap it slides.
+    """
 
     s1: float
     costs: tuple[SlideCost, ...]
     why: str
     part: tuple[float, float] = ALL
+
+    def all_the_way(self) -> SlideChoice:
+        """The choice among those that slide all the way across the overlap."""
+        best = _least(tuple(one for one in self.costs if one.part == ALL))
+        return replace(best, costs=self.costs)
 
 
 # Where there is nothing to slide along.
@@ -122,10 +137,10 @@ def choose_slide(
         for s1, part in [*((s1, ALL) for s1 in CHOICE.candidates), *((1.0, part) for part in CHOICE.parts)]
     ]
 
-    def seamed(one: SlideCost) -> SlideCost:
-        return _with_seam(one, *_seam_and_holes(base, views, viewpoint.within(one.part).sliding(one.s1), rough_seam))
+    def seam_of(one: SlideCost) -> tuple[float, float]:
+        return _seam_and_holes(base, views, viewpoint.within(one.part).sliding(one.s1), rough_seam)
 
-    costs = _seamed([one for one in bare if one.part == ALL], seamed, progress)
+    costs = _seamed([one for one in bare if one.part == ALL], seam_of, progress)
     choice = _least(costs)
     best = next(one for one in costs if one.s1 == choice.s1)
     parts = [one for one in bare if one.part != ALL and _possible(one, costs[0])]
@@ -133,33 +148,32 @@ def choose_slide(
         if best.cost < CHOICE.least_cost or one.cost + _tie(one.cost) >= best.cost:
             break
         progress(1.0)
-        one = seamed(one)
+        one = _with_seam(one, *seam_of(one))
         choice = replace(choice, costs=(*choice.costs, one))
         if one.cost + _tie(one.cost) < best.cost:
-            start, end = one.part
-            why = f"costs {one.cost:.3f} px of bend, the least, from {start:.0%} to {end:.0%} of the way across the overlap"
+            where = "from {:.0%} to {:.0%} of the way across the overlap".format(*one.part)
+            why = f"costs {one.cost:.3f} px of bend, the least, {where}"
             best, choice = one, replace(choice, s1=one.s1, why=why, part=one.part)
     return choice
 
 
 def _seamed(
-    bare: Sequence[SlideCost], seamed: Callable[[SlideCost], SlideCost], progress: Callable[[float], None]
+    bare: Sequence[SlideCost], seam_of: Callable[[SlideCost], tuple[float, float]], progress: Callable[[float], None]
 ) -> tuple[SlideCost, ...]:
     """Candidates that slide further and further with their seams, which take longest: those of CHOICE.seam_candidates
     are cut, the others' interpolated; none but the first where no other could be chosen even if its seam is unseen."""
     progress(0.0)
-    first = seamed(bare[0])
+    seams = {bare[0].s1: seam_of(bare[0])}
+    first = _with_seam(bare[0], *seams[bare[0].s1])
     if all(one.cost + _tie(one.cost) >= first.cost for one in bare if _possible(one, first)):
         return first, *bare[1:]
-    seams = {first.s1: (first.seam_px, first.holes)}
-    cut = [one for one in bare if one.s1 in CHOICE.seam_candidates and one.s1 != first.s1]
+    cut = [one for one in bare[1:] if one.s1 in CHOICE.seam_candidates]
     for number, one in enumerate(cut, 1):
         progress(number / (1 + len(cut)))
-        with_seam = seamed(one)
-        seams[one.s1] = (with_seam.seam_px, with_seam.holes)
+        seams[one.s1] = seam_of(one)
+    at, (seam_px, holes) = list(seams), zip(*seams.values(), strict=True)
     return tuple(
-        _with_seam(one, *(float(np.interp(one.s1, list(seams), values)) for values in zip(*seams.values(), strict=True)))
-        for one in bare
+        _with_seam(one, float(np.interp(one.s1, at, seam_px)), float(np.interp(one.s1, at, holes))) for one in bare
     )
 
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core import pipeline
-from edf_stitch.core.measure.verdict import GOOD, NOT_USABLE, Verdict
+from edf_stitch.core import mapping, pipeline
+from edf_stitch.core.measure.verdict import GOOD, NOT_USABLE, TORN, Place, Verdict
+from edf_stitch.core.panorama.choosing_slide import SlideChoice, SlideCost
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
 from edf_stitch.core.system.errors import Cancelled
 from edf_stitch.synthetic_scenes.two_planes import Pair
@@ -40,6 +41,33 @@ def test_the_first_simpler_stitch_that_is_usable_is_shown(
         assert len(told) == 1 and fallback["to"] in told[0] and "it is torn" in told[0]
         assert result.report["warnings"] == list(result.warnings)
         assert fallback["instead_of"]["options"]["dense"] and fallback["instead_of"]["verdict"]["is"] == NOT_USABLE
+
+
+def costs(s1: float, cost: float, part: tuple[float, float] = (0.0, 1.0)) -> SlideCost:
+    return SlideCost(s1, cost, 0.0, 0.0, 0.0, 0.0, 0.0, cost, part)
+
+
+@pytest.mark.parametrize(("torn", "slides_all_the_way"), [
+    (((4, 4), (2, 4)), True), (((2, 4), (4, 4)), False), (((4, 4), ()), True), (((), (4, 4)), False),
+])  # fmt: skip
+def test_what_tears_within_a_part_of_the_overlap_slides_all_the_way_where_that_tears_less(
+    torn: tuple[tuple[int, ...], ...], slides_all_the_way: bool, monkeypatch: pytest.MonkeyPatch, small_pair: Pair,
+    known: StitchOptions,
+) -> None:  # fmt: skip
+    places = iter([Place((0, 0, *size), TORN, 1.0)] if size else [] for size in torn)
+    monkeypatch.setattr(pipeline, "judge", lambda *_: Verdict("look", "it is torn", "mend it", tuple(next(places))))
+    part = (0.25, 0.75)
+    every = (costs(0.0, 3.0), costs(0.5, 2.0), costs(1.0, 4.0), costs(1.0, 1.0, part))
+    monkeypatch.setattr(mapping, "choose_slide", lambda *given: SlideChoice(1.0, every, "the least", part))
+    told: list[float] = []
+    options = replace(known, projection="auto", slide="auto", dense=True)
+    pictures = small_pair.reference, small_pair.target
+    result = stitch(pictures, options, lambda _, share: told.append(share))
+    slide = result.report["slide"]
+    assert (slide["s1"], tuple(slide["part"])) == ((0.5, (0.0, 1.0)) if slides_all_the_way else (1.0, part))
+    assert len(slide["costs"]) == 4 and ("would be torn" in slide["why"]) == slides_all_the_way
+    assert result.warp.viewpoint is not None and result.warp.viewpoint.s1 == slide["s1"]
+    assert result.report["options"]["slide"] == "auto" and told == sorted(told)
 
 
 def test_what_was_asked_to_be_simple_is_left_alone(
