@@ -20,6 +20,7 @@ from ..panorama.warp import Warp
 from ..raster.arrays import bounds, dilated, with_margin
 from ..raster.lazy import whole
 from ..system.progress import ReportProgress
+from .contradicted import without_contradicted
 from .decided import Decided
 from .growing import Panorama, SetPanorama
 from .inpaint import closed_holes, inpainted
@@ -107,6 +108,8 @@ def composed(
         layers = [layers[0], fetched[0]]
     fetched = [exposures[1].applied(one, warp.maps[1]) for one in fetched]
     exposed = [one.applied(layer, where) for one, layer, where in zip(exposures, layers, warp.maps, strict=True)]
+    if len(layers) > 2 and not decided:
+        unseen = without_contradicted(unseen, exposed, windows)
     found = list(decided) if decided else [
         Decided(here.hidden, here.by_depth, light, folds=here.folds)
         for here, light in zip(unseen, exposures, strict=True)

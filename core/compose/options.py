@@ -176,6 +176,23 @@ class WindowOptions:
     """px around a picture that are looked at in any case: what the seam is held by."""
 
 
+@dataclass(frozen=True)
+class ContradictedOptions:
+    """Places that depth says are hidden, and the picture shows are not (`contradicted`)."""
+
+    smooth_tone: float = 0.05
+    """Step of tones across the border of such a place below which a picture goes on there: texture has that."""
+
+    least_smooth: float = 0.8
+    """Share of the border at which the picture itself goes on, at least."""
+
+    most_smooth_elsewhere: float = 0.4
+    """The same of what the others show there beside what the picture shows around it, at most."""
+
+    least_px: int = 4
+    """px of border, at least: of less there is no telling."""
+
+
 EXPOSURE = ExposureOptions()
 OVERLAP = OverlapOptions()
 MOVING_THINGS = MovingThingsOptions()
@@ -185,3 +202,4 @@ INPAINT = InpaintOptions()
 CROP = CropOptions()
 PLACING = PlacingOptions()
 WINDOW = WindowOptions()
+CONTRADICTED = ContradictedOptions()

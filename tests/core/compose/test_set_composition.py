@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from edf_stitch.core.compose import composition
 from edf_stitch.core.compose.composition import Composition
 from edf_stitch.core.compose.pooling import pooled_decision
 from edf_stitch.core.compose.wraparound import rolled
@@ -282,3 +283,21 @@ def test_what_goes_round_a_pole_has_no_step_where_it_closes(turn: int) -> None:
     assert np.abs(across[0] - across[1]).max() < 0.01
     window = made.decided[6].window
     assert window is not None and window.overhang > 0
+
+
+@pytest.mark.parametrize("taken_over", [False, True])
+def test_what_depth_hides_is_checked_once_exposures_are_known(
+    taken_over: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And not again where what was decided about other frames is taken over."""
+    looked_at: list[Any] = []
+
+    def checked(unseen: Any, layers: Any, windows: Any) -> Any:
+        looked_at.append([float(np.median(one.pixels[EVERYWHERE][one.alpha[EVERYWHERE] > 0])) for one in layers])
+        return unseen
+
+    first = compose(ring(), warp_of(), exposure="auto")
+    monkeypatch.setattr(composition, "without_contradicted", checked)
+    compose(ring(), warp_of(), exposure="auto", decided=first.decided if taken_over else None)
+    assert len(looked_at) == (0 if taken_over else 1)
+    assert all(np.ptp(one) < 0.2 * np.mean(one) for one in looked_at), "of one light"
