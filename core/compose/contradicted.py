@@ -17,6 +17,7 @@ from ..panorama.layers import Layer
 from ..raster.arrays import Plane
 from ..raster.lazy import whole
 from ..raster.log_encoding import log_encode
+from ..system.threads import ask
 from .options import CONTRADICTED
 from .unseen import Unseen
 from .window import Window
@@ -71,6 +72,7 @@ def without_contradicted(
 
 def _tones_of(unseen: Unseen, layer: Layer, window: Window) -> tuple[NDArray[np.bool_], Plane]:
     """What (h, w) a picture shows and can see in its window, and its tones (h, w)."""
+    ask()
     here = window.layer(layer)
     tones: Plane = log_encode(whole(here.light)).mean(axis=2)
     return (here.alpha > 0) & ~window.plane(unseen.hidden), tones
