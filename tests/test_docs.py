@@ -18,11 +18,13 @@ from edf_stitch.core.pictures.picture import load_picture
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [*(ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")),
          *sorted((ROOT / "docs").glob("*.md"))]  # fmt: skip
-WITH_COMMANDS = [ROOT / "README.md", ROOT / "docs" / "tutorial.md", ROOT / "docs" / "how-to.md"]
+WITH_COMMANDS = [ROOT / "README.md", ROOT / "docs" / "tutorial.md", ROOT / "docs" / "how-to.md",
+                 ROOT / "docs" / "farm.md"]  # fmt: skip
 # Scripts have options of their own, and what changed may name what is gone.
 OF_EDF = [page for page in PAGES if page.name not in ("CHANGELOG.md", "CONTRIBUTING.md")]
-# Options of other programs: pip's and Blender's own.
-FOREIGN = {"--command", "--enable", "--python"}
+# Options of other programs: pip's, Blender's own, GNU parallel's and SLURM's.
+FOREIGN = {"--command", "--enable", "--python", "--jobs", "--joblog", "--retries", "--sshlogin", "--array", "--mem",
+           "--cpus-per-task"}  # fmt: skip
 
 
 def named(pages: list[Path]) -> dict[str, list]:
