@@ -86,9 +86,10 @@ lint: setup
 	MYPYPATH=.venv/types $(BIN)/mypy --strict --follow-imports=silent --cache-dir=.mypy_cache/strict -p edf_stitch.core
 	MYPYPATH=.venv/types $(BIN)/mypy -p edf_stitch.edf_addon -p edf_stitch.synthetic_scenes
 
-# docs/reference.md, from the program itself.
+# docs/reference.md and the page of `man edf`, from the program itself.
 reference: setup
 	$(BIN)/python .ci/reference.py
+	$(BIN)/python .ci/man_page.py
 
 # The pages as a site in build/docs. Sphinx, since it is well kept, turns what it warns of into errors, and with MyST takes the
 # pages as they are: with the anchors of where the code is read.
