@@ -290,10 +290,13 @@ def _validate(args: argparse.Namespace) -> int:
 
 
 def _demo(args: argparse.Namespace) -> int:
-    from ...synthetic_scenes.demo import run_demo
+    if args.no_render:
+        from ...synthetic_scenes.shipped_demo import run_shipped_demo as run
+    else:
+        from ...synthetic_scenes.demo import run_demo as run
 
     with progress_shown(args.quiet or not sys.stderr.isatty()) as show:
-        lines = run_demo(args.output, args.overwrite, show)
+        lines = run(args.output, args.overwrite, show)
     print("\n".join(lines))
     return 0
 

@@ -227,6 +227,9 @@ def _add_demo(parser: argparse.ArgumentParser) -> None:
         metavar="OUTDIR",
         help="folder for the files (default: edf_demo)",
     )
+    parser.add_argument(
+        "--no-render", action="store_true", help="stitch pictures that come with the program: nothing need render them"
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     _add_loudness(parser)
 
