@@ -230,6 +230,8 @@ def _plan(args: argparse.Namespace, request: BatchRequest) -> int:
 
     if str(args.list) == "-":
         raise BadRequest("a list on stdin has no plan: every unit would have to read it; put it into a file")
+    if request.unit is not None or request.shard != (1, 1):
+        raise BadRequest("a plan is of the whole list: leave out --unit and --shard")
     command = ["edf", *without_plan(args.given)]
     if not (request.goes_on or request.overwrite):
         command.append("--resume")  # for a unit that is killed and called again

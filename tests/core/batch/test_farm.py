@@ -79,6 +79,8 @@ def test_a_list_that_changed_since_the_plan_is_refused(work: Path, quick: list, 
     assert run(work, "--unit", "0") == 2 and "K from 1 to N" in said()[-1]
     assert run(work, "--unit", "one") == 2 and "12/200" in said()[-1]
     assert run(work, "--unit", "1", "--shard", "1/2") == 2 and "give one of them" in said()[-1]
+    for part in ("--shard=1/2", "--unit=1"):
+        assert run(work, part, "--plan", "-") == 2 and "a plan is of the whole list" in said()[-1]
     assert quick == [] and not (work / "out").exists()
     assert run(work, "--unit", "4", "--quiet") == 0 and quick == ["reference1"]
 

@@ -29,6 +29,7 @@ KILLS = 50
 
 
 @needs_kill
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 @pytest.mark.parametrize("remade", [False, True], ids=["first", "remade"])
 def test_a_kill_between_any_two_files_is_survived(
     work: Path, quick: list, monkeypatch: pytest.MonkeyPatch, remade: bool
