@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest
 export OPENBLAS_NUM_THREADS := 1
 export BLENDER_RUN
 
-.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference docs bench extension clean
+.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference docs bench extension package clean
 
 setup: $(READY)
 
@@ -86,9 +86,10 @@ lint: setup
 	MYPYPATH=.venv/types $(BIN)/mypy --strict --follow-imports=silent --cache-dir=.mypy_cache/strict -p edf_stitch.core
 	MYPYPATH=.venv/types $(BIN)/mypy -p edf_stitch.edf_addon -p edf_stitch.synthetic_scenes
 
-# docs/reference.md, from the program itself.
+# docs/reference.md and the page of `man edf`, from the program itself.
 reference: setup
 	$(BIN)/python .ci/reference.py
+	$(BIN)/python .ci/man_page.py
 
 # The pages as a site in build/docs. Sphinx, since it is well kept, turns what it warns of into errors, and with MyST takes the
 # pages as they are: with the anchors of where the code is read.
@@ -110,6 +111,18 @@ bench: setup
 extension: setup
 	$(BIN)/python .ci/build_extension.py $(if $(PLATFORM),--platform $(PLATFORM)) $(if $(LOCAL),--local) \
 		--blender "$$BLENDER_RUN" --output-dir dist
+
+# What is published: the source, the wheel built from that source alone, and the wheel tried in an environment of its own.
+package:
+	rm -rf dist/package build/fresh
+	$(PYTHON) -m venv build/fresh
+	build/fresh/bin/python -m pip install --quiet 'setuptools>=77'
+	build/fresh/bin/python -c "from setuptools import build_meta; build_meta.build_sdist('dist/package')"
+	build/fresh/bin/python -m pip wheel --quiet --no-deps --wheel-dir dist/package dist/package/*.tar.gz
+	rm -rf build/fresh
+	$(PYTHON) -m venv build/fresh
+	build/fresh/bin/python -m pip install --quiet --constraint .ci/constraints.txt dist/package/*.whl
+	cd build/fresh && bin/edf demo --no-render --quiet -o demo && test -f share/man/man1/edf.1
 
 clean:
 	rm -rf .venv $(OLDEST) $(NEWEST) $(DOCS) build dist wheels demo_output validation_quick validation_full validation_sets *.egg-info

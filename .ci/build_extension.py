@@ -4,8 +4,8 @@
 
 Without --platform, one zip for each. --local: for this machine only, with the wheels of its Blender's Python only (or
 of every Python, where no Blender is named). With a Blender command, Blender builds and validates the zips. Without one,
-Python writes the same files. What goes in is what git knows or would take in, less the manifest's
-paths_exclude_pattern.
+Python writes the same files. What goes in is what git tracks, as it stands in the checkout, less the manifest's
+paths_exclude_pattern; the same files give the same bytes.
 """
 
 from __future__ import annotations
@@ -28,11 +28,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import wheels  # noqa: E402  (beside this file; .ci is no package)
 
 MANIFEST = "blender_manifest.toml"
+# Seconds since 1970 of every file in a zip: the second day that zips know, the first in every time zone.
+FILE_TIME = 315_619_200
 
 
 def tree(root: Path = wheels.ROOT) -> list[str]:
-    """The checkout's files, tracked or not yet, less the ignored ones; as paths with forward slashes."""
-    command = ["git", "-C", str(root), "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    """The checkout's files that git tracks, as paths with forward slashes; what else lies there may be anything."""
+    command = ["git", "-C", str(root), "ls-files", "-z", "--cached"]
     names = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split("\0")
     return sorted({name for name in names if name and (root / name).is_file()})
 
@@ -85,6 +87,8 @@ def _stage(stage: Path, platform: str, carried: Iterable[Path]) -> None:
     text = (stage / MANIFEST).read_text("utf-8")
     text = wheels.with_list(wheels.with_list(text, "platforms", [platform]), "wheels", listed)
     (stage / MANIFEST).write_text(text, "utf-8")
+    for path in stage.rglob("*"):  # Blender's zip has the files' times
+        os.utime(path, (FILE_TIME, FILE_TIME))
 
 
 def _zip(stage: Path, made: Path, patterns: Sequence[str], listed: Iterable[str]) -> None:

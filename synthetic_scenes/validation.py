@@ -21,7 +21,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..core.batch.units import read_json
+from ..core.batch.pieces import read_json
 from ..core.output.json_file import json_bytes
 from ..core.system.errors import BadRequest, UnwritableOutput
 from ..core.system.output_files import OutputFiles

@@ -6,8 +6,10 @@ import importlib.util
 import re
 import shlex
 import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import cv2
 import numpy as np
@@ -18,11 +20,13 @@ from edf_stitch.core.pictures.picture import load_picture
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [*(ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")),
          *sorted((ROOT / "docs").glob("*.md"))]  # fmt: skip
-WITH_COMMANDS = [ROOT / "README.md", ROOT / "docs" / "tutorial.md", ROOT / "docs" / "how-to.md"]
+WITH_COMMANDS = [ROOT / "README.md", ROOT / "docs" / "tutorial.md", ROOT / "docs" / "how-to.md",
+                 ROOT / "docs" / "farm.md"]  # fmt: skip
 # Scripts have options of their own, and what changed may name what is gone.
 OF_EDF = [page for page in PAGES if page.name not in ("CHANGELOG.md", "CONTRIBUTING.md")]
-# Options of other programs: pip's and Blender's own.
-FOREIGN = {"--command", "--enable", "--python"}
+# Options of other programs: pip's, Blender's own, GNU parallel's, SLURM's and shtab's.
+FOREIGN = {"--command", "--enable", "--python", "--jobs", "--joblog", "--retries", "--sshlogin", "--array", "--mem",
+           "--cpus-per-task", "--shell", "--prog"}  # fmt: skip
 
 
 def named(pages: list[Path]) -> dict[str, list]:
@@ -84,11 +88,30 @@ def test_pictures_are_small_and_shown() -> None:
         assert picture.stat().st_size < 250_000 and re.search(rf"!\[.*\]\((docs/)?{picture.name}\)", text), picture.name
 
 
-def test_the_reference_is_what_the_program_says() -> None:
-    spec = importlib.util.spec_from_file_location("ci_reference", ROOT / ".ci" / "reference.py")
+def ci_module(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"ci_{name}", ROOT / ".ci" / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    assert module.FILE.read_text("utf-8") == module.reference(), "run `make reference`"
+    return module
+
+
+@pytest.mark.parametrize("name", ["reference", "man_page"])
+def test_what_is_made_from_the_program_is_current(name: str) -> None:
+    module = ci_module(name)
+    assert module.FILE.read_text("utf-8") == getattr(module, name)(), "run `make reference`"
+
+
+def test_the_man_page_is_one() -> None:
+    """Every option is in it, every line is text or a macro that man(7) has; groff, where it is, has no complaint."""
+    page = (ROOT / "docs" / "edf.1").read_text("utf-8")
+    written = page.replace("\\-", "-")
+    assert {name for name in options() if f"\\fB{name}\\fR" not in written} <= {"--version", "-h"}
+    assert {line.split()[0] for line in page.splitlines() if line[:1] in (".", "'")} <= {
+        ".TH", ".SH", ".SS", ".TP", ".PP", ".B", ".I", ".br"}  # fmt: skip
+    if shutil.which("groff"):
+        command = ["groff", "-man", "-Kutf8", "-Tutf8", "-ww", "-z"]
+        done = subprocess.run(command, input=page.encode(), capture_output=True)
+        assert done.returncode == 0 and not done.stderr, done.stderr.decode()
 
 
 @pytest.mark.parametrize("page", **named(OF_EDF))

@@ -152,6 +152,28 @@ def test_a_zip_is_of_one_platform_and_twice_the_same(tmp_path, monkeypatch):
     assert not [name for name in names if name.startswith((".", "tests/")) or name in ("setup.py", "pyproject.toml")]
 
 
+def test_the_extension_s_page_says_what_the_manifest_says():
+    """Its tagline is short enough for Blender, and its permission is the one that the manifest asks for."""
+    text = " ".join((ROOT / "docs" / "listing.md").read_text("utf-8").split())
+    assert len(MANIFEST["tagline"]) <= 64 and list(MANIFEST["permissions"]) == ["files"]
+    asked = MANIFEST["permissions"]["files"]
+    assert asked[0].lower() + asked[1:] == "read photographs, write panoramas and reports" and "one permission" in text
+
+
+def test_what_lies_about_in_a_checkout_does_not_go_into_a_zip(tmp_path):
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=x", "-c", "user.email=x@x"]
+    try:
+        subprocess.run([*git, "init", "-q"], check=True)
+    except OSError:
+        pytest.skip("git is not here")
+    for name in ("kept.py", "gone.py", "notes.txt", ".gitignore"):
+        (tmp_path / name).write_text("secret.txt\n", "utf-8")
+    subprocess.run([*git, "add", "kept.py", "gone.py", ".gitignore"], check=True)
+    (tmp_path / "secret.txt").touch()
+    (tmp_path / "gone.py").unlink()
+    assert build_extension.tree(tmp_path) == [".gitignore", "kept.py"]
+
+
 def test_a_local_build_takes_no_more_than_this_machines_blender_needs(monkeypatch, tmp_path):
     built = []
     monkeypatch.setattr(build_extension, "build", lambda *call: built.append(call) or tmp_path)

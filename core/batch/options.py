@@ -22,5 +22,35 @@ class ClipOptions:
     frame_weight: float = 0.3
     """What each frame of a clip takes of it, in the same unit."""
 
+    unit_frames: int = 50
+    """Frames of a clip that a farm's task makes, its report counting as one: each task aligns the clip anew, which
+    takes as long as 10 to 15 frames (by the two figures above), a fifth of its time."""
+
+
+@dataclass(frozen=True)
+class UnitOptions:
+    """What the units of a plan are said to take. Figures of pairs: docs/performance.md, upwards of all that was
+    measured from 0.3 to 50 MP."""
+
+    pair_bytes: float = 0.3e9
+    """Bytes of a stitch of two pictures, however small."""
+
+    pair_pixel_bytes: float = 550.0
+    """Bytes for each pixel of its larger picture, of the first `pair_pixels` of them."""
+
+    pair_pixels: float = 2.2e6
+    """Pixels whose features and dense matching take so much: these do not grow beyond."""
+
+    pair_further_bytes: float = 48.0
+    """Bytes for each further pixel."""
+
+    core_bytes: float = 2e9
+    """Bytes of memory that a machine of a farm has for each core, or more: a unit that takes more keeps other cores
+    idle anyway, so it is given these."""
+
+    max_cores: int = 8
+    """Cores that a stitch makes use of at most (`SystemOptions.max_threads`)."""
+
 
 CLIP = ClipOptions()
+UNIT = UnitOptions()

@@ -1,4 +1,4 @@
-"""Runs a batch of pairs and clips of two fixed cameras, resumable and in shards; a failure does not stop it.
+"""Runs a batch of pairs, sets and clips of fixed cameras, resumable and in shards; the first failure stops it, or none.
 
 A clip has one alignment, one exposure and one seam, estimated over frames spread evenly through it: every frame gets
 the same map on the same canvas with the same seam, so that nothing moves or flickers between frames.
@@ -6,9 +6,8 @@ the same map on the same canvas with the same seam, so that nothing moves or fli
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,95 +25,11 @@ from ..system.progress import Progress, Stopwatch, stages_of
 from ..system.threads import asking
 from .list import BatchItem
 from .options import CLIP
-from .units import BatchRequest, Job, Unit, UnitFiles, plan, read_json
+from .outcomes import BatchSummary, Frames, FrameTrouble, Outcome, trouble_of, worst
+from .pieces import BatchRequest, Piece, PieceFiles, read_json
+from .units import Job, plan
 
-SCHEMA = 1
-# Exit codes, the most important first: cannot be stitched, a file, the request.
-_EXIT_CODES = (3, 4, 2)
-# The figures of the report in the line about an item.
-_FIGURES = {
-    "alignment_median_px": "alignment {:.2f} px", "overlap_psnr_db": "PSNR {:.2f} dB", "overlap_ssim": "SSIM {:.3f}",
-}  # fmt: skip
 Tell = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class FrameTrouble:
-    """Why there is no panorama of a frame."""
-
-    frame: int
-    message: str
-    exit_code: int
-
-
-@dataclass(frozen=True)
-class Frames:
-    """The frames of a clip in this shard, by how they ended; missing: numbers that one side or both lack."""
-
-    done: int = 0
-    skipped: int = 0
-    failed: tuple[FrameTrouble, ...] = ()
-    missing: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How an item ended.
-
-    status: "done", "skipped" (it existed) or "failed" (of a clip: any frame); message, exit_code: why, empty and 0
-    if nothing failed; panorama: path relative to the folder, of a clip that of its first frame; size: (W, H) px;
-    measured, verdict: the report's, empty without a report.
-    """
-
-    name: str
-    status: str
-    message: str = ""
-    exit_code: int = 0
-    warnings: tuple[str, ...] = ()
-    panorama: str = ""
-    size: tuple[int, int] | None = None
-    measured: dict[str, Any] = field(default_factory=dict)
-    verdict: dict[str, Any] = field(default_factory=dict)
-    frames: Frames | None = None
-
-    def in_words(self, figures: bool = False) -> str:
-        """A line for the user, with the most important figures if asked for."""
-        words = [self.status if self.status == "skipped" else "×".join(map(str, self.size or ())) or self.status]
-        if self.frames is not None:
-            words.append(f"{self.frames.done} frames done, {self.frames.skipped} skipped")
-        if self.verdict.get("is", "good") != "good":
-            places = f" at {len(self.verdict['places'])} places" if self.verdict["is"] == "look" else ""
-            words.append(self.verdict["is"] + places)
-        for name, form in _FIGURES.items():
-            if figures and self.measured.get(name) is not None:
-                words.append(form.format(self.measured[name]))
-        return f"failed: {self.message}" if self.exit_code else ", ".join(words)
-
-
-@dataclass(frozen=True)
-class BatchSummary:
-    """The outcomes so far, in order, of a batch of `total` items."""
-
-    outcomes: tuple[Outcome, ...]
-    total: int
-    interrupted: bool = False
-
-    @property
-    def exit_code(self) -> int:
-        """0, or that of the most important failure: 3 before 4 before 2."""
-        return _worst(outcome.exit_code for outcome in self.outcomes)
-
-    def count(self, status: str) -> int:
-        """How many items ended with this status."""
-        return sum(outcome.status == status for outcome in self.outcomes)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The content of batch.json; no times and no dates."""
-        counts = {status: self.count(status) for status in ("done", "skipped", "failed")}
-        return {
-            "schema": SCHEMA, "total": self.total, **counts, "interrupted": self.interrupted,
-            "exit_code": self.exit_code, "items": [asdict(outcome) for outcome in self.outcomes],
-        }  # fmt: skip
 
 
 def run_batch(
@@ -125,7 +40,7 @@ def run_batch(
     cancelled: Callable[[], bool] | None = None,
     finished: Callable[[Outcome, int, int], None] | None = None,
 ) -> BatchSummary:
-    """Stitches this shard's items into the request's folder and writes a summary there after each.
+    """Stitches the items of this shard or unit into the request's folder and writes a summary there after each.
 
     Parameters
     ----------
@@ -143,7 +58,8 @@ def run_batch(
     Returns
     -------
     BatchSummary
-        With what went wrong in the outcome of each item.
+        With what went wrong in the outcome of each item; without `request.keep_going` the first failure is the last
+        outcome.
 
     Raises
     ------
@@ -160,9 +76,10 @@ def run_batch(
     outcomes: list[Outcome] = []
 
     def summed_up(interrupted: bool = False) -> BatchSummary:
-        summary = BatchSummary(tuple(outcomes), len(jobs), interrupted)
-        with UnitFiles(overwrite=True) as files:
-            files.add(request.summary, json_bytes(summary.as_dict()))
+        summary = BatchSummary(tuple(outcomes), len(jobs), interrupted, request.keep_going)
+        if request.summary:
+            with PieceFiles(overwrite=True) as files:
+                files.add(request.summary, json_bytes(summary.as_dict()))
         return summary
 
     summary = summed_up()
@@ -174,6 +91,8 @@ def run_batch(
             summary = summed_up()
             if finished is not None:
                 finished(outcomes[-1], number, len(jobs))
+            if outcomes[-1].exit_code and not request.keep_going:
+                break
     except (KeyboardInterrupt, Cancelled):
         summed_up(interrupted=True)
         raise
@@ -224,38 +143,27 @@ def _outcome(job: Job, meter: _Meter) -> Outcome:
     except Cancelled:
         raise
     except Exception as error:
-        code, message = _trouble(error)
+        code, message = trouble_of(error)
+        for piece in job.todo[:1]:
+            piece.record_failure(message, code)
         frames = None if job.item.frames is None else Frames(missing=job.item.missing)
         return Outcome(job.item.name, "failed", message, code, frames=frames)
 
 
-def _trouble(error: Exception) -> tuple[int, str]:
-    """Exit code and message."""
-    if isinstance(error, StitchError):
-        return error.exit_code, str(error)
-    if isinstance(error, MemoryError):
-        return StitchError.exit_code, "not enough memory for pictures of this size; use smaller ones"
-    return StitchError.exit_code, f"internal error, please report it: {type(error).__name__}: {error}"
-
-
-def _worst(codes: Iterable[int]) -> int:
-    found = set(codes)
-    return next((code for code in _EXIT_CODES if code in found), 0)
-
-
 def _pair(job: Job, meter: _Meter) -> Outcome:
-    for unit in job.todo:
-        unit.write(stitch(unit.pictures, unit.options, meter.piece(1.0), meter.cancelled))
-    return _with_report(job, Outcome(job.item.name, "done" if job.todo else "skipped"))
+    due = [piece for piece in job.todo if not piece.is_made()]
+    for piece in due:
+        piece.write(stitch(piece.pictures, piece.options, meter.piece(1.0), meter.cancelled))
+    return _with_report(job, Outcome(job.item.name, "done" if due else "skipped"))
 
 
 def _with_report(job: Job, outcome: Outcome) -> Outcome:
     """The outcome with figures from the item's report, which another shard may not have written yet."""
-    for unit in job.units:
-        if unit.panorama is not None:
-            outcome = replace(outcome, panorama=unit.panorama.relative_to(unit.request.folder).as_posix())
+    for piece in job.pieces:
+        if piece.panorama is not None:
+            outcome = replace(outcome, panorama=piece.panorama.relative_to(piece.request.folder).as_posix())
             break
-    report = next((read_json(unit.report) for unit in job.units if unit.report), {})
+    report = next((read_json(piece.report) for piece in job.pieces if piece.report), {})
     if report:
         canvas, warnings = report["canvas"], dict.fromkeys((*report["warnings"], *outcome.warnings))
         size = canvas["width"], canvas["height"]
@@ -286,28 +194,35 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
     if item.missing:
         warnings[f"frames {_listed(item.missing)} are missing of some cameras and were left out"] = None
     failed: list[FrameTrouble] = []
-    frames = [unit for unit in job.todo if unit.frame is not None]
+    frames = [piece for piece in job.todo if piece.frame is not None]
     if job.todo:
         locked = _lock(job, meter)
-    size = None
-    for unit in frames:
+    count = sum(piece.frame is not None for piece in job.pieces)
+    size, done, skipped = None, 0, count - len(frames)
+    for piece in frames:
         try:
-            size, more = _frame(unit, locked, meter.stopwatch(CLIP.frame_weight))
+            if piece.is_made():
+                skipped += 1
+                continue
+            size, more = _frame(piece, locked, meter.stopwatch(CLIP.frame_weight))
             warnings |= dict.fromkeys(more)
+            done += 1
         except Cancelled:
             raise
         except Exception as error:
-            code, message = _trouble(error)
-            failed.append(FrameTrouble(unit.frame or 0, message, code))
-    count = sum(unit.frame is not None for unit in job.units)
+            code, message = trouble_of(error)
+            failed.append(FrameTrouble(piece.frame or 0, message, code))
+            piece.record_failure(message, code)
+            if not piece.request.keep_going:
+                break
     outcome = Outcome(
         item.name,
         "failed" if failed else "done" if job.todo else "skipped",
         f"{len(failed)} of {count} frames; frame {failed[0].frame}: {failed[0].message}" if failed else "",
-        _worst(trouble.exit_code for trouble in failed),
+        worst(trouble.exit_code for trouble in failed),
         tuple(warnings),
         size=size,
-        frames=Frames(len(frames) - len(failed), count - len(frames), tuple(failed), item.missing),
+        frames=Frames(done, skipped, tuple(failed), item.missing),
     )
     return _with_report(job, outcome)
 
@@ -326,7 +241,7 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
         ).decided
         for number in used
     ])
-    reports = [unit for unit in job.todo if unit.frame is None]
+    reports = [piece for piece in job.todo if piece.frame is None]
     crop = options.crop
     if reports or crop == "inscribed":
         frame = _used(item, first, options, alignment)
@@ -335,8 +250,8 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
             whole, (x, y), (left, top) = alignment.warp.canvas.whole, alignment.warp.canvas.offset, result.canvas.offset
             crop = (x - left - whole[0], y - top - whole[1], result.canvas.width, result.canvas.height)
         about = {"frames": list(item.frames or ()), "aligned_on": list(used), "shown": first}
-        for unit in reports:
-            unit.write(replace(result, report={**result.report, "clip": about}))
+        for piece in reports:
+            piece.write(replace(result, report={**result.report, "clip": about}))
     return _Locked(alignment, decided, sizes, replace(options, crop=crop, measure=False))
 
 
@@ -373,17 +288,17 @@ def _without_light(frame: Frame) -> Frame:
     return replace(frame, pictures=tuple(bare(picture) for picture in frame.pictures))
 
 
-def _frame(unit: Unit, locked: _Locked, progress: Stopwatch) -> tuple[tuple[int, int], list[str]]:
+def _frame(piece: Piece, locked: _Locked, progress: Stopwatch) -> tuple[tuple[int, int], list[str]]:
     """Stitches one frame; returns the panorama's (W, H) and warnings."""
     progress("read")
-    frame = read_frame(unit.pictures, locked.options)
+    frame = read_frame(piece.pictures, locked.options)
     if frame.full_sizes != locked.sizes:
         found, needed = (" and ".join(f"{w}×{h}" for w, h in sizes) for sizes in (frame.full_sizes, locked.sizes))
         raise BadRequest(f"the pictures have {found} pixels, the clip {needed}: one alignment is for one camera each")
     frame = frame.only(locked.alignment.numbers)
     result: StitchResult = compose(frame, locked.alignment, locked.options, progress, locked.decided)
     height, width = result.panorama.alpha.shape
-    return (width, height), unit.write(result)
+    return (width, height), piece.write(result)
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -12,16 +12,19 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
 from .arguments import numbered, options_from
-from .file_arguments import exr_form
+from .file_arguments import exr_form, without_plan
 from .info import run_info
 from .messages import print_result, print_summary, progress_shown, say, shortened, verdict_line
 from .options import MESSAGES, STOPPING
 from .parser import edf_parser
+
+if TYPE_CHECKING:
+    from ..batch.pieces import BatchRequest
 
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
@@ -79,6 +82,7 @@ def _run(argv: Sequence[str] | None) -> int:
     hook, sys.unraisablehook = sys.unraisablehook, ignored
     try:
         args = edf_parser().parse_args(argv)
+        args.given = list(sys.argv[1:] if argv is None else argv)
         return _COMMANDS[args.command](args)
     except SystemExit as leaving:
         return int(leaving.code or 0)
@@ -171,8 +175,9 @@ def _batch(args: argparse.Namespace) -> int:
 
     with undisturbed():  # see _stitch
         from ..batch.list import read_list
-        from ..batch.run import Outcome, run_batch
-        from ..batch.units import BatchRequest
+        from ..batch.outcomes import Outcome
+        from ..batch.pieces import BatchRequest
+        from ..batch.run import run_batch
         from ..measure.report import plain
         from ..system.memory import use_again
 
@@ -180,12 +185,15 @@ def _batch(args: argparse.Namespace) -> int:
     suffix = args.format if args.format.startswith(".") else f".{args.format}"
     request = BatchRequest(
         args.output, suffix, args.warp, args.layers, args.resume, args.overwrite, args.shard, args.depth, args.mesh,
-        exr_form(args),
+        exr_form(args), args.unit, args.keep_going, args.retry_failed,
     )  # fmt: skip
+    if args.plan is not None:
+        return _plan(args, request)
 
     def tell(outcome: Outcome, number: int, count: int) -> None:
+        place = f" in {request.summary}" if request.summary else ""
         more = len(outcome.warnings) - MESSAGES.max_warnings
-        for warning in (*outcome.warnings[:MESSAGES.max_warnings], *[f"{more} more in {request.summary}"] * (more > 0)):
+        for warning in (*outcome.warnings[:MESSAGES.max_warnings], *[f"{more} more{place}"] * (more > 0)):
             say(f"edf: warning: {outcome.name}: {warning}")
         if outcome.exit_code or not args.quiet:
             say(f"edf: [{number}/{count}] {outcome.name}: {outcome.in_words(args.verbose)}")
@@ -201,10 +209,43 @@ def _batch(args: argparse.Namespace) -> int:
         return Cancelled.exit_code
     if not args.quiet:
         counts = ", ".join(f"{summary.count(status)} {status}" for status in ("done", "skipped", "failed"))
-        print(f"edf: {request.summary}: {counts}", file=sys.stderr)
+        left = summary.total - len(summary.outcomes)
+        stopped = f", {left} not begun: --keep-going goes on past a failure" if left else ""
+        print(f"edf: {request.summary or args.output}: {counts}{stopped}", file=sys.stderr)
+    if args.keep_going:
+        for line in summary.failures():
+            print(f"edf: {line}", file=sys.stderr)
     if args.json:
         print(json.dumps(plain(summary.as_dict()), indent=1))
     return summary.exit_code
+
+
+def _plan(args: argparse.Namespace, request: BatchRequest) -> int:
+    """Writes which units there are, instead of making them."""
+    from ..batch.list import read_list
+    from ..batch.plan_file import in_words, plan_document
+    from ..output.json_file import json_bytes
+    from ..system.errors import BadRequest
+    from ..system.output_files import OutputFiles
+
+    if str(args.list) == "-":
+        raise BadRequest("a list on stdin has no plan: every unit would have to read it; put it into a file")
+    if request.unit is not None or request.shard != (1, 1):
+        raise BadRequest("a plan is of the whole list: leave out --unit and --shard")
+    command = ["edf", *without_plan(args.given)]
+    if not (request.goes_on or request.overwrite):
+        command.append("--resume")  # for a unit that is killed and called again
+    document = plan_document(read_list(args.list), options_from(args, measure=True), request, command)
+    data = json_bytes(document)
+    if str(args.plan) == "-":
+        sys.stdout.write(data.decode())
+    else:
+        with OutputFiles(request.overwrite or request.goes_on) as files:
+            files.check(args.plan)
+            files.add(args.plan, data)
+    if not args.quiet:
+        print(f"edf: {in_words(document)}", file=sys.stderr)
+    return 0
 
 
 def _compare(args: argparse.Namespace) -> int:
@@ -251,10 +292,13 @@ def _validate(args: argparse.Namespace) -> int:
 
 
 def _demo(args: argparse.Namespace) -> int:
-    from ...synthetic_scenes.demo import run_demo
+    if args.no_render:
+        from ...synthetic_scenes.shipped_demo import run_shipped_demo as run
+    else:
+        from ...synthetic_scenes.demo import run_demo as run
 
     with progress_shown(args.quiet or not sys.stderr.isatty()) as show:
-        lines = run_demo(args.output, args.overwrite, show)
+        lines = run(args.output, args.overwrite, show)
     print("\n".join(lines))
     return 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,8 +52,31 @@ def add_batch_files(parser: argparse.ArgumentParser) -> None:
     files.add_argument("--mesh", action="store_true", help="NAME.mesh.glb: the panorama as a surface with depth")
     _add_exr(files)
     files.add_argument("--resume", action="store_true", help="make only what is missing, or was made otherwise")
-    files.add_argument("--shard", type=shard, default=(1, 1), metavar="I/N", help="the I-th of N runs that share LIST")
     files.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    _add_farm(parser)
+
+
+def _add_farm(parser: argparse.ArgumentParser) -> None:
+    """What runs of a batch on several machines need."""
+    farm = parser.add_argument_group("farm", "docs/farm.md shows how engines of farms call these.")
+    farm.add_argument(
+        "--keep-going", action="store_true",
+        help="go on past what cannot be made, end with a table of it and exit code 1 (by default the first failure "
+        "stops)",
+    )  # fmt: skip
+    farm.add_argument(
+        "--retry-failed", action="store_true", help="of an earlier run make only what failed, as far as it is due"
+    )
+    farm.add_argument("--shard", type=shard, default=(1, 1), metavar="I/N", help="the I-th of N runs that share LIST")
+    farm.add_argument(
+        "--plan", type=Path, metavar="FILE.json",
+        help="make nothing, but say which units there are (a pair, a set, or some frames of a clip), the memory and "
+        "cores that each takes, and its command; - prints it",
+    )  # fmt: skip
+    farm.add_argument(
+        "--unit", type=unit, metavar="K[/N]",
+        help="make only the K-th unit of a plan; with N, that of all units, only if the list still makes so many",
+    )  # fmt: skip
 
 
 def _add_exr(files: argparse._ArgumentGroup) -> None:
@@ -81,3 +105,26 @@ def shard(text: str) -> tuple[int, int]:
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not like 2/3: which of how many runs") from None
     return index, count
+
+
+def unit(text: str) -> tuple[int, int]:
+    """K and N of K/N, or K and 0."""
+    number, _, count = text.partition("/")
+    if not all(part.isascii() and part.isdigit() for part in (number, count or "0")):
+        raise argparse.ArgumentTypeError(f"{text!r} is not like 12 or 12/200: which unit of how many")
+    return int(number), int(count or 0)
+
+
+def without_plan(given: Sequence[str]) -> list[str]:
+    """Arguments of a batch but for `--plan FILE`, however that is written."""
+    left: list[str] = []
+    skip = False
+    for one in given:
+        name, mark, _ = one.partition("=")
+        if not skip and len(name) > 3 and "--plan".startswith(name):
+            skip = not mark
+        elif skip:
+            skip = False
+        else:
+            left.append(one)
+    return left

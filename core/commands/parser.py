@@ -23,7 +23,7 @@ _COMMON = {
         "--depth", "--overwrite",
     ),
     "batch": (
-        "--output", "--resume", "--shard", "--format", "--projection", "--crop", "--focal35", "--exposure", "--depth",
+        "--output", "--resume", "--keep-going", "--shard", "--format", "--projection", "--crop", "--focal35", "--depth",
         "--overwrite",
     ),
     "compare": ("--output", "--fields", "--overwrite"),
@@ -142,9 +142,9 @@ at it, or why it is not usable. Exit codes: 0 done, 1 not usable (with --strict-
 pictures can't be stitched, 4 a file can't be read or written, 130 interrupted."""
 _BATCH = """Stitch every line of LIST.csv: pictures, a folder of them, or a clip of cameras that stand still
 (a_%04d.png or a_####.png), whose frames share one alignment. A line holds reference,target and, if wanted, a name; a
-header may name picture3 and so on, first, last, step, focal_px and focal35 as well. A bad one is reported and the rest
-goes on; DIR/batch.json says what became of each. Exit codes: 0 all done, 2 the call is wrong, 3 one can't be stitched,
-4 a file can't be read or written, 130 interrupted."""
+header may name picture3 and so on, first, last, step, focal_px and focal35 as well. The first that cannot be made stops
+it, unless --keep-going is given; DIR/batch.json says what became of each. Exit codes: 0 all done, 1 some failed (with
+--keep-going), 2 the call is wrong, 3 one can't be stitched, 4 a file can't be read or written, 130 interrupted."""
 _COMPARE = """Stitch every pair with every field, features and geometry found once, and put the figures side by side:
 OUTDIR gets compare.html, .md, .csv and .json, pictures, and the seconds in timing.md and .json. A PATH is a folder of
 two pictures, a folder of such folders (also OUTDIR/pictures of `edf validate`: then the truth is asked too), or a
@@ -177,7 +177,10 @@ def _add_stitch(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_batch(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("list", metavar="LIST.csv", type=Path, help="the list; relative paths start at its folder")
+    parser.add_argument(
+        "list", metavar="LIST.csv", type=Path,
+        help="the list, or - for one on stdin; relative paths start at its folder",
+    )  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for all outputs")
     add_options(parser)
     add_batch_files(parser)
@@ -223,6 +226,9 @@ def _add_demo(parser: argparse.ArgumentParser) -> None:
         default=Path("edf_demo"),
         metavar="OUTDIR",
         help="folder for the files (default: edf_demo)",
+    )
+    parser.add_argument(
+        "--no-render", action="store_true", help="stitch pictures that come with the program: nothing need render them"
     )
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     _add_loudness(parser)

@@ -12,11 +12,15 @@ from .errors import BadRequest, UnreadableImage
 def read_text(path: Path, what: str, layout: str) -> str:
     """A file in UTF-8, with or without a byte order mark.
 
-    what: of the file, in messages, like "the list"; layout: what it should hold. Raises UnreadableImage where it cannot
-    be read, BadRequest where it is no text.
+    path: - is stdin; what: of the file, in messages, like "the list"; layout: what it should hold. Raises
+    UnreadableImage where it cannot be read, BadRequest where it is no text.
     """
     try:
-        data = path.read_bytes()
+        if path == Path("-"):
+            with open(0, "rb", closefd=False) as stream:
+                data = stream.read()
+        else:
+            data = path.read_bytes()
     except (OSError, ValueError) as error:
         raise UnreadableImage(f"{what} cannot be read: {error}") from error
     try:

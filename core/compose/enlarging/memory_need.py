@@ -68,6 +68,11 @@ def threads_that_fit(sources: Sequence[Any], options: StitchOptions) -> int:
     return count() if limits is None else _threads([_facts(one) for one in sources], options, limits)
 
 
+def need_of(sources: Sequence[Any], options: StitchOptions) -> Need:
+    """What more than two pictures take: files, arrays or Pictures; those that cannot be read count as nothing."""
+    return _need([_facts(one) for one in sources], options, options.scale)
+
+
 def threads_that_fit_merged(sizes: Sequence[Size], options: StitchOptions) -> int:
     """The same once brackets are merged, by the (W, H) px of each view as it came: of those that were looked for, how
     many there are is known only now."""

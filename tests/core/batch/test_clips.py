@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.batch import run as batch
 from edf_stitch.core.batch.list import read_list
-from edf_stitch.core.batch.units import BatchRequest
+from edf_stitch.core.batch.pieces import BatchRequest
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.pipeline import StitchOptions, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
@@ -121,7 +121,7 @@ def test_a_bad_frame_is_reported_and_the_rest_goes_on(
     good = {side: (work / "in" / side).read_bytes() for side in ("a_0007.png", "b_0009.png")}
     (work / "in" / "a_0007.png").write_bytes(b"not a picture")
     save(work / "in" / "b_0009.png", small_pair.target[:-2])
-    assert clip(work) == 4
+    assert clip(work, "--keep-going") == 1
     line = said()[0]
     assert line.startswith("edf: [1/1] shot: failed: 2 of 4 frames; frame 7: ") and "a_0007.png: not a picture" in line
     assert list(panoramas(work / "out")) == ["shot_0008", "shot_0010"]
@@ -141,13 +141,13 @@ def test_a_bad_frame_is_reported_and_the_rest_goes_on(
 
 def test_a_clip_without_frames(work: Path, said: Callable) -> None:
     (work / "clip.csv").write_text("in/c_%04d.png,in/b_%04d.png,shot\nin/a_%04d.png,in/b_%04d.png,other\n", "utf-8")
-    assert clip(work, "--quiet") == 4
-    assert "[1/2] shot: failed: no frame of" in said()[-1] and (work / "out" / "other" / "other_0010.png").exists()
+    assert clip(work, "--quiet", "--keep-going") == 1
+    assert "edf: [1/2] shot: failed: no frame of" in said()[0] and (work / "out" / "other" / "other_0010.png").exists()
     for number in FRAMES:
         (work / "in" / f"a_{number:04d}.png").write_bytes(b"")
-    assert clip(work, "--quiet", out="none") == 4
-    assert "[2/2] other: failed: none of the frames 7–10 can be used to align the clip: " in said()[-1]
-    assert set(files(work / "none")) == {"batch.json"}
+    assert clip(work, "--quiet", "--keep-going", out="none") == 1
+    assert "[2/2] other: failed: none of the frames 7–10 can be used to align the clip: " in said()[1]
+    assert set(files(work / "none")) == {"batch.json", ".edf/.failed/shot.json", ".edf/.failed/other.json"}
 
 
 def test_an_interrupted_clip_goes_on_where_it_was(
