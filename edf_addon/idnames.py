@@ -41,6 +41,8 @@ class Operator(StrEnum):
     POINTER = "edf.pointer"
     CREATE_CAMERAS = "edf.create_cameras"
     DEPTH_MESH = "edf.depth_mesh"
+    BACKPLATE = "edf.set_up_backplate"
+    SET_DISTANCE = "edf.set_distance"
     LOOK_THROUGH = "edf.look_through"
     USE_AS_WORLD = "edf.use_as_world"
 

@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from .. import editor, idnames, offered, pair, pictures, properties
 from ..bridge import images, ownership, result
 from ..jobs import following, modal, stitching
 from ..scene import take_along
+from . import scene_objects
 
 
 class _Stitching(modal.LongWork):
@@ -84,6 +85,7 @@ class EDF_OT_stitch_environment(bpy.types.Operator):  # noqa: N801
 
     holes: EnumProperty(**_HOLES)
     replace: BoolProperty(**_REPLACE)
+    height: FloatProperty(**scene_objects.GROUND)
     is_asked = False
 
     @classmethod
@@ -97,7 +99,7 @@ class EDF_OT_stitch_environment(bpy.types.Operator):  # noqa: N801
 
     def execute(self, _context: Any) -> set[str]:
         how = "INVOKE_DEFAULT" if self.is_asked and not bpy.app.background else "EXEC_DEFAULT"
-        done: set[str] = bpy.ops.edf.stitch_sphere(how, holes=self.holes, replace=self.replace)
+        done: set[str] = bpy.ops.edf.stitch_sphere(how, holes=self.holes, replace=self.replace, height=self.height)
         return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
 
 
@@ -110,6 +112,7 @@ class EDF_OT_stitch_sphere(_Stitching, bpy.types.Operator):  # noqa: N801
 
     holes: EnumProperty(**_HOLES)
     replace: BoolProperty(**_REPLACE)
+    height: FloatProperty(**scene_objects.GROUND)
 
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
         instead = {"projection": "EQUIRECTANGULAR", "crop": "FULL", "holes": self.holes}
@@ -119,7 +122,10 @@ class EDF_OT_stitch_sphere(_Stitching, bpy.types.Operator):  # noqa: N801
     def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
         words = super().finish(context, folder, found)
         image = properties.settings_of(context.scene).result
-        return f"{words} The World “{take_along.use_as_world(context.scene, image, self.replace).name}” shows it."
+        world = take_along.use_as_world(context.scene, image, self.replace)
+        if self.height > 0:
+            take_along.select(context, [take_along.ground(context.scene, image, self.height)])
+        return f"{words} The World “{world.name}” shows it."
 
 
 class EDF_OT_restitch(_Stitching, bpy.types.Operator):  # noqa: N801

@@ -143,6 +143,16 @@ def _middle_place(known: dict[str, Any], projection: Projection, canvas: tuple[i
     )
 
 
+def viewpoint_in_world(known: dict[str, Any], baseline: float = 1.0) -> Array:
+    """From where the middle of a result's panorama is seen (3,), in the world."""
+    projection = projection_of(known)
+    if projection is None:
+        return np.zeros(3)
+    width, height = known["geometry"]["canvas"]
+    place: Array = _middle_place(known, projection, (int(width), int(height)))[0] * baseline @ axes(known).T
+    return place
+
+
 def panorama_lens(projection: Projection, size: tuple[int, int]) -> BlenderLens | RoundLens | None:
     """The lens that sees a canvas of (W, H) px; None where Blender has none like it."""
     if projection.kind == "pannini" and projection.distance > 0:
