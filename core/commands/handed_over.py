@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..output import inspection, inspection_of_many
+from ..output.depth.nodes import depth_nodes
+from ..output.depth.options import MESH
 from ..output.json_file import json_bytes
 from ..output.sphere_part import sphere_part_of
 from ..panorama.layers import Layer
@@ -64,7 +66,7 @@ def hand_over(
     folder: Path, result: StitchResult, rows: NDArray[np.float64] | None, job: dict[str, Any], turns: tuple[int, ...],
     told: Callable[[int], None],
 ) -> None:  # fmt: skip
-    """Writes everything that the window may ask for.
+    """Writes everything that the window may ask for, depth.npz (see `DepthNodes`) among it where there is depth.
 
     Parameters
     ----------
@@ -87,6 +89,8 @@ def hand_over(
         "files": files.names, "report": result.report, "warnings": result.warnings, "bits": result.bits,
         "orientations": turns, "has_depth": inspection.has_depth(result), "seconds": result.seconds, **about,
     }  # fmt: skip
+    if index["has_depth"]:
+        (folder / "depth.npz").write_bytes(depth_nodes(result, MESH.editable_nodes).to_bytes())
     (folder / "result.json").write_bytes(json_bytes(index))
 
 

@@ -27,7 +27,10 @@ def surround(world: bpy.types.World, image: bpy.types.Image, turn: Matrix) -> No
 
 def emission(image: bpy.types.Image) -> bpy.types.Material:
     """A material that shows an image as it is, whatever the lights; transparent where the image is."""
-    return _cut_out(image, "Emission")
+    material = _cut_out(image, "Emission")
+    if hasattr(material, "cycles"):  # every face a lamp: 200 000 of them cost each render ten seconds before it begins
+        material.cycles.emission_sampling = "NONE"
+    return material
 
 
 def receiving(image: bpy.types.Image) -> bpy.types.Material:
@@ -45,8 +48,8 @@ def _cut_out(image: bpy.types.Image, kind: str) -> bpy.types.Material:
     nodes, link = _cleared(compat.node_tree(material))
     kinds = ("TexImage", kind, "BsdfTransparent", "MixShader", "OutputMaterial")
     texture, shader, clear, mix, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
-    for node, place in zip((texture, shader, clear, mix, output), ((-600, 0), (-300, -60), (-300, 60), (0, 0), (200, 0)),
-                           strict=True):  # fmt: skip
+    places = (-600, 0), (-300, -60), (-300, 60), (0, 0), (200, 0)
+    for node, place in zip((texture, shader, clear, mix, output), places, strict=True):
         node.location = place
     texture.image, texture.extension = image, "EXTEND"
     link(texture.outputs["Color"], shader.inputs["Color"])

@@ -11,7 +11,7 @@ import bpy
 from mathutils import Matrix
 
 from .. import editor
-from ..bridge import compat, ownership, photo
+from ..bridge import compat, ownership, photo, result
 from . import placement, shading
 from .placement import Standing
 
@@ -164,9 +164,12 @@ def depth_mesh(
 ) -> bpy.types.Object:
     """The panorama as a surface that shines, or catches light and shadows; one that is there already gets new vertices.
     Raises ValueError."""
+    from ...core.output.depth.nodes import DepthNodes
     from . import scene_geometry
 
-    surface = scene_geometry.depth_mesh(editor.known(image), standing.baseline, farthest)
+    kept = image.get(result.DEPTH)
+    nodes = None if kept is None else DepthNodes.from_bytes(bytes(kept))
+    surface = scene_geometry.depth_mesh(editor.known(image), standing.baseline, farthest, nodes)
     role, what = (CATCHER, "Catcher") if catches else (MESH, "Depth")
     rig, there = _rig(scene, image, standing), find(image, role)
     mesh = bpy.data.meshes.new(f"{what} of {image.name}") if there is None else there.data

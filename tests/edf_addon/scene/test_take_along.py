@@ -6,7 +6,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from edf_stitch.core.cameras.projective import homogeneous, project, rotation_from_vector  # noqa: E402
-from edf_stitch.edf_addon.bridge import cameras, compat  # noqa: E402
+from edf_stitch.core.output.depth.nodes import DepthNodes  # noqa: E402
+from edf_stitch.edf_addon.bridge import cameras, compat, result  # noqa: E402
 from edf_stitch.edf_addon.scene import take_along  # noqa: E402
 
 CANVAS = 560, 360
@@ -64,6 +65,26 @@ def test_the_meshs_vertices_are_seen_at_their_uvs(stitched):
     d = stitched["depth"]["inverse_depth"]
     near = d.max()
     assert min(vertex.co.y for vertex in mesh.vertices) == pytest.approx(2 / near, rel=1e-5)
+
+
+def test_the_mesh_is_cut_where_near_and_far_meet(stitched):
+    """A near thing before a far one, with the nodes that the worker left: no face reaches from one to the other."""
+    columns, rows = 57, 37
+    d = np.full((rows, columns), 0.05)
+    d[10:25, 20:40] = 0.5
+    middles = np.minimum(np.minimum(d[1:, 1:], d[1:, :-1]), np.minimum(d[:-1, 1:], d[:-1, :-1]))
+    x, y = np.linspace(-0.5, 559.5, columns), np.linspace(-0.5, 359.5, rows)
+    panorama = bpy.context.scene.edf_stitch.result
+    panorama[result.DEPTH] = DepthNodes(x, y, d, middles, np.ones(d.shape, bool)).to_bytes()
+    bpy.ops.edf.depth_mesh()
+    mesh = take_along.find(panorama, "MESH").data
+    assert len(mesh.polygons) == (columns - 1) * (rows - 1)
+    away = np.array([vertex.co.y for vertex in mesh.vertices])
+    ends = away[[list(polygon.vertices) for polygon in mesh.polygons]]
+    assert (np.ptp(ends, axis=1) < 0.5).all() and {2, 20} == set(away.round())
+    mesh_normals = np.array([polygon.normal for polygon in mesh.polygons])
+    centres = np.array([polygon.center for polygon in mesh.polygons])
+    assert (np.sum(mesh_normals * centres, axis=1) < 0).all(), "they face the viewpoint"
 
 
 def test_the_mesh_shows_the_panorama_whatever_the_light(stitched):
