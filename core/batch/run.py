@@ -186,11 +186,17 @@ class _Meter:
     def __init__(self, progress: Tell | None, cancelled: Callable[[], bool] | None, total: float) -> None:
         self.cancelled = cancelled
         self._progress, self._total = progress, total
-        self._label, self._done, self._stages = "", 0.0, stages_of(2)
+        self._item = self._label = ""
+        self._done, self._stages = 0.0, stages_of(2)
 
     def begin(self, label: str, done: float, pictures: int) -> None:
         """Begins an item of so many pictures, after `done` of the total weight."""
-        self._label, self._done, self._stages = label, done, stages_of(pictures)
+        self._item = self._label = label
+        self._done, self._stages = done, stages_of(pictures)
+
+    def begin_frame(self, number: int, count: int) -> None:
+        """Begins a frame of the item that is a clip."""
+        self._label = f"{self._item} frame {number} of {count}:"
 
     def piece(self, weight: float) -> Tell:
         """The progress callback of the item's next piece, which has this weight in the total."""
@@ -290,7 +296,8 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
     if job.todo:
         locked = _lock(job, meter)
     size = None
-    for unit in frames:
+    for at, unit in enumerate(frames, 1):
+        meter.begin_frame(at, len(frames))
         try:
             size, more = _frame(unit, locked, meter.stopwatch(CLIP.frame_weight))
             warnings |= dict.fromkeys(more)

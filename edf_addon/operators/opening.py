@@ -13,7 +13,7 @@ from ..bridge import images, stand_ins
 from ..jobs import modal, stitching
 
 
-class _Browsing:
+class Browsing:
     """A file dialog for pictures; several can be chosen."""
 
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
@@ -58,7 +58,7 @@ class _Browsing:
         return {"FINISHED"}
 
 
-class EDF_OT_add_pictures(_Browsing, bpy.types.Operator):  # noqa: N801
+class EDF_OT_add_pictures(Browsing, bpy.types.Operator):  # noqa: N801
     """Add photographs to the list; hold Shift or Ctrl to choose several. Files can also be dropped on the sidebar"""
 
     bl_idname = idnames.Operator.ADD_PICTURES
@@ -73,7 +73,7 @@ class EDF_OT_add_pictures(_Browsing, bpy.types.Operator):  # noqa: N801
         return self.put_into_list(context, paths)
 
 
-class EDF_OT_add_folder(_Browsing, bpy.types.Operator):  # noqa: N801
+class EDF_OT_add_folder(Browsing, bpy.types.Operator):  # noqa: N801
     """Add all photographs of a folder to the list"""
 
     bl_idname = idnames.Operator.ADD_FOLDER
@@ -92,7 +92,7 @@ class EDF_OT_add_folder(_Browsing, bpy.types.Operator):  # noqa: N801
         return self.put_into_list(context, paths)
 
 
-class EDF_OT_open_pair(_Browsing, bpy.types.Operator):  # noqa: N801
+class EDF_OT_open_pair(Browsing, bpy.types.Operator):  # noqa: N801
     """Open two photographs at once, as reference and target, instead of what is in the list"""
 
     bl_idname = idnames.Operator.OPEN_PAIR
@@ -108,7 +108,7 @@ class EDF_OT_open_pair(_Browsing, bpy.types.Operator):  # noqa: N801
         return self.put_into_list(context, paths, instead=True)
 
 
-class EDF_OT_stitch_files(_Browsing, bpy.types.Operator):  # noqa: N801
+class EDF_OT_stitch_files(Browsing, bpy.types.Operator):  # noqa: N801
     """Make one panorama of photographs: they are put into the list, instead of what is in it, and stitched"""
 
     bl_idname = idnames.Operator.STITCH_FILES

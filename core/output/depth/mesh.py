@@ -76,7 +76,8 @@ def depth_grid(result: StitchResult, ranges: RangeImage) -> DepthGrid:
 
     def inverse(rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
         with np.errstate(divide="ignore"):
-            return 1 / ranges.range[np.ix_(rows, columns)].astype(np.float64)
+            d: Array = 1 / ranges.range[np.ix_(rows, columns)].astype(np.float64)
+        return d
 
     known = int(np.isfinite(1 / ranges.range).sum())
     nodes = nodes_of(inverse, result.panorama.alpha, known, MESH.most_nodes, is_sphere)

@@ -1,4 +1,4 @@
-"""Where the nodes of a panorama's surface lie, and the inverse depth there and between: of a mesh file and of Blender's."""
+"""Where the nodes of a panorama's surface lie, and the inverse depth there and between."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ class DepthNodes:
     def from_bytes(cls, data: bytes) -> DepthNodes:
         """What `to_bytes` gave."""
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            return cls(file["x"], file["y"], *(file[name].astype(np.float64) for name in ("inverse_depth", "middles")),
-                       file["shows"])  # fmt: skip
+            d, middles = (file[name].astype(np.float64) for name in ("inverse_depth", "middles"))
+            return cls(file["x"], file["y"], d, middles, file["shows"])
 
 
 def nodes_of(
