@@ -4,8 +4,8 @@ movies as pictures, and stitched as a batch, which goes on where an earlier run 
 `clip` of job.json: `cameras`: of each {"path": a movie, or one frame of a sequence; "start": the number in the program
 of the frame that the path names, or of a movie's first one}; `first`, `last`: numbers of the frames that are wanted;
 `folder`, `name`, `suffix`: of what is made, FOLDER/NAME/NAME_000001.png and so on. result.json: `frames`: their
-numbers; `path`: of the first one; `done`, `skipped`: how many were made and were there; `failed`: a sentence, or nothing;
-`warnings`; `seconds` that it took.
+numbers; `path`: of the first one; `done`, `skipped`: how many were made and were there; `failed`: a sentence, or
+nothing; `warnings`; `seconds` that it took.
 """
 
 from __future__ import annotations

@@ -46,16 +46,21 @@ class Browsing:
 
     def put_into_list(self, context: Any, paths: Sequence[Path], instead: bool = False) -> set[str]:
         """Puts files into the list, or instead of it."""
-        if any(map(stand_ins.is_needed, paths)):
-            done = bpy.ops.edf.develop_pictures(self.how, paths="\n".join(map(str, paths)), instead=instead)
-            return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
-        try:
-            opened = [_loaded(path) for path in paths]
-        except images.Unusable as error:
-            self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
-            return {"CANCELLED"}
-        self.report({"INFO"}, _listed(context, opened, instead))  # type: ignore[attr-defined]
-        return {"FINISHED"}
+        return into_list(self, context, paths, self.how, instead)
+
+
+def into_list(operator: Any, context: Any, paths: Sequence[Path], how: str, instead: bool = False) -> set[str]:
+    """Puts files into the list, or instead of it, for an operator, which reports it. how: see `Browsing.how`."""
+    if any(map(stand_ins.is_needed, paths)):
+        done = bpy.ops.edf.develop_pictures(how, paths="\n".join(map(str, paths)), instead=instead)
+        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+    try:
+        opened = [_loaded(path) for path in paths]
+    except images.Unusable as error:
+        operator.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+    operator.report({"INFO"}, _listed(context, opened, instead))
+    return {"FINISHED"}
 
 
 class EDF_OT_add_pictures(Browsing, bpy.types.Operator):  # noqa: N801

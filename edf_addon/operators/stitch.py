@@ -10,7 +10,7 @@ from .. import editor, idnames, offered, pair, pictures, properties
 from ..bridge import images, ownership, result
 from ..jobs import following, modal, stitching
 from ..scene import take_along
-from . import scene_objects
+from . import opening, scene_objects
 
 
 class _Stitching(modal.LongWork):
@@ -35,12 +35,33 @@ class EDF_OT_stitch(_Stitching, bpy.types.Operator):  # noqa: N801
 
     reference: StringProperty(name="Reference", description="Name of the image to choose first", options={"SKIP_SAVE"})
     target: StringProperty(name="Target", description="Name of the image to choose first", options={"SKIP_SAVE"})
+    filepaths: StringProperty(
+        name="Files", description="Paths of photographs, one a line, that are to be the list first",
+        options={"SKIP_SAVE"},
+    )
+    images: StringProperty(
+        name="Images", description="Names of images, one a line, that are to be the list first", options={"SKIP_SAVE"}
+    )
     as_empty: BoolProperty(
         name="Add to the Scene", description="As an image empty at the 3D cursor", options={"SKIP_SAVE"}
     )
 
+    def execute(self, context: Any) -> set[str]:
+        return super().execute(context) if self._has_opened(context) else {"CANCELLED"}
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        return super().invoke(context, event) if self._has_opened(context) else {"CANCELLED"}
+
+    def _has_opened(self, context: Any) -> bool:
+        """Puts the files that were named into the list; False where that failed, which is reported."""
+        paths = [Path(bpy.path.abspath(line)) for line in self.filepaths.splitlines() if line]
+        self.filepaths = ""  # `invoke` may call `execute`
+        return not paths or opening.into_list(self, context, paths, "EXEC_DEFAULT", instead=True) == {"FINISHED"}
+
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
         settings = properties.settings_of(context.scene)
+        if self.images:
+            pictures.choose(settings, [images.named(name) for name in self.images.splitlines() if name])
         named = {side: images.named(name) for side in ownership.SIDES if (name := getattr(self, side))}
         with pair.choosing(settings):
             for side, image in named.items():
