@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..output import inspection, inspection_of_many
-from ..output.depth.nodes import depth_nodes
+from ..output.depth.nodes import depth_nodes, is_whole_sphere
 from ..output.depth.options import MESH
+from ..output.filled_sphere import filled_sphere
 from ..output.json_file import json_bytes
 from ..output.sphere_part import sphere_part_of
 from ..panorama.layers import Layer
@@ -75,14 +76,15 @@ def hand_over(
     rows : (N, 5) array, optional
         The matches that were given.
     job : dict
-        job.json, of which `take` and `exr` are read.
+        job.json, of which `take`, `exr` and `fill` are read.
     turns : tuple of int
         EXIF's orientation of each picture that was given.
     told : callable
         Called with the number of files that were begun.
     """
     files = Folder(folder, result, ExrForm(**job.get("exr", {})), told)
-    files.add_layer("panorama", result.panorama, is_panorama=True)
+    shown = filled_sphere(result.panorama) if job.get("fill") and is_whole_sphere(result) else result.panorama
+    files.add_layer("panorama", shown, is_panorama=True)
     take = job.get("take", [])
     about = _of_pair(result.spread_out(), rows, take, files) if result.rig is None else _of_many(result, take, files)
     index = {

@@ -11,8 +11,8 @@ their `camera` those of CameraRequest. `cameras` of two pictures: {"lens": field
 "matrix_world"} each. `masks`: for each picture an .npy, rows as shown, or null; `seam`: one over the whole panorama.
 `matches`: .npy (N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as result.json had it in
 matches.file. `take`: which of "layers", "masks", "depth" to leave as pictures. `exr`: fields of ExrForm, for panorama
-and layers. Relative paths start at FOLDER. Or `clip` with `options` (see `clip_job`), or `try`
-alone: load the libraries, and no more.
+and layers. `fill`: whether what no picture shows of a whole sphere is filled. Relative paths start at FOLDER. Or `clip`
+with `options` (see `clip_job`), or `try` alone: load the libraries, and no more.
 """
 
 from __future__ import annotations

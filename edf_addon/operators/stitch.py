@@ -92,7 +92,10 @@ class EDF_OT_preview(_Stitching, bpy.types.Operator):  # noqa: N801
 
 # What the operators of an environment are asked.
 _HOLES = {"name": "Holes", "items": [one for one in offered.HOLES if one[0] != "AUTO"], "default": "INPAINT",
-          "description": "What no picture shows between those that do; above and below them the sphere stays open"}
+          "description": "What no picture shows between those that do"}
+_FILL = {"name": "Fill Above and Below", "default": True,
+         "description": "What no picture shows of the sphere is filled smoothly from its rim, so that it lights the "
+         "scene; off: it stays open, and dark"}
 _REPLACE = {"name": "Replace the Scene's World", "default": True,
             "description": "Let the scene use it at once; the World that it has stays in the file"}
 
@@ -105,6 +108,7 @@ class EDF_OT_stitch_environment(bpy.types.Operator):  # noqa: N801
     bl_options = {"REGISTER"}
 
     holes: EnumProperty(**_HOLES)
+    fill: BoolProperty(**_FILL)
     replace: BoolProperty(**_REPLACE)
     height: FloatProperty(**scene_objects.GROUND)
     is_asked = False
@@ -120,7 +124,9 @@ class EDF_OT_stitch_environment(bpy.types.Operator):  # noqa: N801
 
     def execute(self, _context: Any) -> set[str]:
         how = "INVOKE_DEFAULT" if self.is_asked and not bpy.app.background else "EXEC_DEFAULT"
-        done: set[str] = bpy.ops.edf.stitch_sphere(how, holes=self.holes, replace=self.replace, height=self.height)
+        done: set[str] = bpy.ops.edf.stitch_sphere(
+            how, holes=self.holes, fill=self.fill, replace=self.replace, height=self.height
+        )
         return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
 
 
@@ -132,13 +138,14 @@ class EDF_OT_stitch_sphere(_Stitching, bpy.types.Operator):  # noqa: N801
     bl_options = {"UNDO", "INTERNAL"}
 
     holes: EnumProperty(**_HOLES)
+    fill: BoolProperty(**_FILL)
     replace: BoolProperty(**_REPLACE)
     height: FloatProperty(**scene_objects.GROUND)
 
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
         instead = {"projection": "EQUIRECTANGULAR", "crop": "FULL", "holes": self.holes}
         job, self.memory = stitching.make_job(context, folder, instead=instead)
-        return job
+        return {**job, "fill": self.fill}
 
     def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
         words = super().finish(context, folder, found)

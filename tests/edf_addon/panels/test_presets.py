@@ -72,18 +72,17 @@ def test_a_preset_holds_every_setting_and_no_picture():
 
 
 OURS = {
-    "photo_pair": ("AUTO", "AUTO", "AUTO", True), "handheld_panorama": ("AUTO", "INSCRIBED", "INPAINT", True),
+    "Photo_Pair": ("AUTO", "AUTO", "AUTO", True), "Handheld_Panorama": ("AUTO", "INSCRIBED", "INPAINT", True),
     "HDRI": ("EQUIRECTANGULAR", "FULL", "INPAINT", False),
-    "matte_painting_plate": ("REFERENCE", "FULL", "TRANSPARENT", False),
+    "Matte_Painting_Plate": ("REFERENCE", "FULL", "TRANSPARENT", False),
 }  # fmt: skip
 
 
 def test_blenders_own_mechanism_finds_the_presets_that_come_along(blender):
     found = [path for folder in bpy.utils.preset_paths(presets.SUBFOLDER) for path in Path(folder).glob("*.py")]
     assert {path.stem for path in found} >= set(OURS)
-    assert [bpy.path.display_name(name) for name in OURS] == [
-        "Photo Pair", "Handheld Panorama", "HDRI", "Matte Painting Plate",
-    ]  # fmt: skip
+    shown = [bpy.path.display_name(name, title_case=False) for name in OURS]  # as Blender's menus of presets do
+    assert shown == ["Photo Pair", "Handheld Panorama", "HDRI", "Matte Painting Plate"]
 
 
 @pytest.mark.parametrize("name", OURS)
@@ -96,5 +95,5 @@ def test_each_sets_the_same_whatever_was_set_before(blender, name):
             bpy.ops.script.execute_preset(filepath=str(path.with_stem(other)), menu_idname="EDF_PT_presets")
         bpy.ops.script.execute_preset(filepath=str(path), menu_idname="EDF_PT_presets")
         assert (settings.projection, settings.crop, settings.holes, settings.slide_auto) == OURS[name]
-        assert settings.take_layers == (name == "matte_painting_plate")
-        assert settings.light == ("REFERENCE" if name == "matte_painting_plate" else "AUTO")
+        assert settings.take_layers == (name == "Matte_Painting_Plate")
+        assert settings.light == ("REFERENCE" if name == "Matte_Painting_Plate" else "AUTO")
