@@ -200,14 +200,15 @@ def square_pixels(K: Array) -> Array:
 
 
 def depth_mesh(
-    known: dict[str, Any], baseline: float = 1.0, farthest: float = MESH.farthest, nodes: DepthNodes | None = None
-) -> Surface:
+    known: dict[str, Any], baseline: float = 1.0, farthest: float = MESH.farthest, nodes: DepthNodes | None = None,
+    ends_open: bool = False,
+) -> Surface:  # fmt: skip
     """The panorama as a surface: nodes on their rays from where each is seen, at the depth that was found, cut where
     near and far meet.
 
     known: a result's `geometry`, `report` and `depth`; farthest: × the median depth, where everything beyond ends,
-    infinity (d ≤ 0) too; nodes: None for those of `depth`, as earlier releases left them. Vertices in the world. Raises
-    ValueError where nothing is left.
+    infinity (d ≤ 0) too; nodes: None for those of `depth`, as earlier releases left them; ends_open: leave out what
+    ends there. Vertices in the world. Raises ValueError where nothing is left.
     """
     nodes = nodes or coarse_nodes(known)
     width, height = known["geometry"]["canvas"]
@@ -215,7 +216,8 @@ def depth_mesh(
     viewpoint, seen = viewpoint_of(known), rays(known, pixels)
     uvs = np.stack([(pixels[..., 0] + 0.5) / width, 1 - (pixels[..., 1] + 0.5) / height], axis=-1)
     places = None if viewpoint is None else viewpoint.place(seen)
-    surface = cut_surface(DepthGrid(seen, nodes.inverse_depth, nodes.shows, uvs, places, nodes.middles), farthest)
+    grid = DepthGrid(seen, nodes.inverse_depth, nodes.shows, uvs, places, nodes.middles)
+    surface = cut_surface(grid.nearer(farthest) if ends_open else grid, farthest)
     return replace(surface, vertices=surface.vertices * baseline @ axes(known).T)
 
 

@@ -39,8 +39,9 @@ def receiving(image: bpy.types.Image) -> bpy.types.Material:
 
 
 def catch(surface: bpy.types.Object) -> None:
-    """Cycles shows of an object only the shadows on it; what it reflects falls on other things."""
-    surface.is_shadow_catcher = True
+    """Cycles shows of an object only the shadows that others cast on it, and what it reflects on them. It keeps no light
+    away itself: a room is lit as if it were open."""
+    surface.is_shadow_catcher, surface.visible_shadow = True, False
 
 
 def _cut_out(image: bpy.types.Image, kind: str) -> bpy.types.Material:

@@ -162,14 +162,14 @@ def image_empty(scene: bpy.types.Scene, image: bpy.types.Image) -> bpy.types.Obj
 def depth_mesh(
     scene: bpy.types.Scene, image: bpy.types.Image, standing: Standing, farthest: float, catches: bool = False
 ) -> bpy.types.Object:
-    """The panorama as a surface that shines, or catches light and shadows; one that is there already gets new vertices.
-    Raises ValueError."""
+    """The panorama as a surface that shines, or catches light and shadows and has no sky; one that is there already gets
+    new vertices. Raises ValueError."""
     from ...core.output.depth.nodes import DepthNodes
     from . import scene_geometry
 
     kept = image.get(result.DEPTH)
     nodes = None if kept is None else DepthNodes.from_bytes(bytes(kept))
-    surface = scene_geometry.depth_mesh(editor.known(image), standing.baseline, farthest, nodes)
+    surface = scene_geometry.depth_mesh(editor.known(image), standing.baseline, farthest, nodes, ends_open=catches)
     role, what = (CATCHER, "Catcher") if catches else (MESH, "Depth")
     rig, there = _rig(scene, image, standing), find(image, role)
     mesh = bpy.data.meshes.new(f"{what} of {image.name}") if there is None else there.data

@@ -128,11 +128,22 @@ def test_a_backplate_is_the_picture_behind_a_surface_that_catches_shadows(stitch
     assert [one.image for one in camera.background_images] == [settings.target] and camera.show_background_images
     assert (scene.render.resolution_x, scene.render.resolution_y) == (320, 480)
     catcher = take_along.find(settings.result, "CATCHER")
-    assert catcher.is_shadow_catcher
+    assert catcher.is_shadow_catcher and not catcher.visible_shadow, "lamps outside of a room light what is in it"
     kinds = {node.bl_idname for node in catcher.data.materials[0].node_tree.nodes}
     assert "ShaderNodeBsdfDiffuse" in kinds and "ShaderNodeEmission" not in kinds, "what shines has no shadows"
     with pytest.raises(RuntimeError, match="no picture 3"):
         bpy.ops.edf.set_up_backplate(picture=3)
+
+
+def test_a_sky_catches_nothing_and_hides_no_world(stitched):
+    d = np.array(stitched["depth"]["inverse_depth"]).reshape(10, 15)
+    d[:5] = 0
+    stitched["depth"]["inverse_depth"] = d.ravel()
+    bpy.ops.edf.set_up_backplate()
+    bpy.ops.edf.depth_mesh()
+    panorama = bpy.context.scene.edf_stitch.result
+    catcher, mesh = (take_along.find(panorama, role).data for role in ("CATCHER", "MESH"))
+    assert (len(catcher.polygons), len(mesh.polygons)) == (14 * 5, 14 * 9)
 
 
 def test_the_ground_lies_below_the_viewpoint_and_catches_shadows(stitched):
