@@ -39,8 +39,8 @@ def receiving(image: bpy.types.Image) -> bpy.types.Material:
 
 
 def catch(surface: bpy.types.Object) -> None:
-    """Cycles shows of an object only the shadows that others cast on it, and what it reflects on them. It keeps no light
-    away itself: a room is lit as if it were open."""
+    """Cycles shows of an object only the shadows that others cast on it, and what it reflects on them. It keeps no
+    light away itself: a room is lit as if it were open."""
     surface.is_shadow_catcher, surface.visible_shadow = True, False
 
 

@@ -162,7 +162,7 @@ def image_empty(scene: bpy.types.Scene, image: bpy.types.Image) -> bpy.types.Obj
 def depth_mesh(
     scene: bpy.types.Scene, image: bpy.types.Image, standing: Standing, farthest: float, catches: bool = False
 ) -> bpy.types.Object:
-    """The panorama as a surface that shines, or catches light and shadows and has no sky; one that is there already gets
+    """The panorama as a surface that shines, or catches light and shadows and has no sky; one that is there gets
     new vertices. Raises ValueError."""
     from ...core.output.depth.nodes import DepthNodes
     from . import scene_geometry
