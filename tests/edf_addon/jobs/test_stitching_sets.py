@@ -57,6 +57,8 @@ def test_a_list_becomes_a_panorama_that_is_kept_and_stitched_again(listed, tmp_p
     bpy.ops.wm.open_mainfile(filepath=path)
     settings = bpy.context.scene.edf_stitch
     assert np.array_equal(pixels_of(settings.result), first)
+    assert bpy.ops.edf.depth_mesh() == {"FINISHED"} and bpy.context.object.name.startswith("Depth of ")
+    assert 50_000 < len(bpy.context.object.data.polygons) <= 200_000, "from the nodes that the file keeps"
     assert [entry.state for entry in settings.pictures] == ["USED"] * 3 + ["LEFT_OUT"]
     bpy.ops.edf.clear_pictures()
     bpy.ops.edf.reset()

@@ -135,6 +135,18 @@ def test_a_backplate_is_the_picture_behind_a_surface_that_catches_shadows(stitch
         bpy.ops.edf.set_up_backplate(picture=3)
 
 
+def test_one_undo_takes_a_backplate_back(scenes_own):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="before")
+    before = bpy.context.scene.render.resolution_x
+    bpy.ops.edf.set_up_backplate()
+    bpy.ops.ed.undo_push(message="Set Up Backplate")
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    assert (scene.camera.name, scene.render.film_transparent, scene.render.resolution_x) == ("own", False, before)
+    assert [one.name for one in bpy.data.objects] == ["own"] and not len(bpy.data.meshes)
+
+
 def test_a_sky_catches_nothing_and_hides_no_world(stitched):
     d = np.array(stitched["depth"]["inverse_depth"]).reshape(10, 15)
     d[:5] = 0
