@@ -186,32 +186,26 @@ class _Meter:
     def __init__(self, progress: Tell | None, cancelled: Callable[[], bool] | None, total: float) -> None:
         self.cancelled = cancelled
         self._progress, self._total = progress, total
-        self._item = self._label = ""
-        self._done, self._stages = 0.0, stages_of(2)
+        self._label, self._done, self._stages = "", 0.0, stages_of(2)
 
     def begin(self, label: str, done: float, pictures: int) -> None:
         """Begins an item of so many pictures, after `done` of the total weight."""
-        self._item = self._label = label
-        self._done, self._stages = done, stages_of(pictures)
+        self._label, self._done, self._stages = label, done, stages_of(pictures)
 
-    def begin_frame(self, number: int, count: int) -> None:
-        """Begins a frame of the item that is a clip."""
-        self._label = f"{self._item} frame {number} of {count}:"
-
-    def piece(self, weight: float) -> Tell:
-        """The progress callback of the item's next piece, which has this weight in the total."""
+    def piece(self, weight: float, what: str = "") -> Tell:
+        """The progress callback of the item's next piece, which has this weight in the total; what: it is."""
         start = self._done
         self._done += weight
 
         def tell(stage: str, share: float) -> None:
             if self._progress is not None:
-                self._progress(f"{self._label} {stage}", min(1.0, (start + weight * share) / self._total))
+                self._progress(f"{self._label} {what}{stage}", min(1.0, (start + weight * share) / self._total))
 
         return tell
 
-    def stopwatch(self, weight: float) -> Stopwatch:
+    def stopwatch(self, weight: float, what: str = "") -> Stopwatch:
         """The same for work that has steps of its own."""
-        return Stopwatch(Progress(self.piece(weight), self.cancelled, self._stages))
+        return Stopwatch(Progress(self.piece(weight, what), self.cancelled, self._stages))
 
 
 def _weight(job: Job) -> float:
@@ -297,9 +291,9 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
         locked = _lock(job, meter)
     size = None
     for at, unit in enumerate(frames, 1):
-        meter.begin_frame(at, len(frames))
         try:
-            size, more = _frame(unit, locked, meter.stopwatch(CLIP.frame_weight))
+            what = f"frame {at} of {len(frames)}: "
+            size, more = _frame(unit, locked, meter.stopwatch(CLIP.frame_weight, what))
             warnings |= dict.fromkeys(more)
         except Cancelled:
             raise

@@ -7,8 +7,8 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from .. import explain, idnames, properties
-from ..jobs import clip_stitching, modal
+from .. import idnames, properties
+from ..jobs import clip_stitching, job, modal
 from .opening import Browsing
 
 
@@ -74,7 +74,7 @@ class EDF_OT_stitch_clips(bpy.types.Operator):  # noqa: N801
     def poll(cls, context: Any) -> bool:
         reason = clip_stitching.why_not(properties.settings_of(context.scene))
         if reason:
-            cls.poll_message_set(explain.sentence(reason).rstrip("."))
+            cls.poll_message_set(job.sentence(reason).rstrip("."))
         return not reason and not modal.is_working()
 
     def invoke(self, context: Any, _event: Any) -> set[str]:
