@@ -14,6 +14,7 @@ import bpy
 from . import properties
 from .jobs import command, following, modal
 from .operators import (
+    clips,
     mask_painting,
     match_editing,
     match_pointing,
@@ -28,8 +29,8 @@ from .panels import elsewhere, presets, sidebar
 
 # Registered in this order, unregistered in the opposite one; each has register() and unregister().
 REGISTERED = (
-    properties, modal, following, stitch, opening, picture_list, saving, match_editing, match_pointing, mask_painting,
-    scene_objects, presets, sidebar, elsewhere, drawing,
+    properties, modal, following, stitch, opening, picture_list, clips, saving, match_editing, match_pointing,
+    mask_painting, scene_objects, presets, sidebar, elsewhere, drawing,
 )  # fmt: skip
 _commands: list[Any] = []
 _registered: list[Any] = []

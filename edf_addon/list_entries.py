@@ -53,3 +53,13 @@ class EDF_PG_picture(bpy.types.PropertyGroup):  # noqa: N801
         name="State", description="What the last stitch did with it", items=offered.PICTURE_STATES
     )
     why: StringProperty(name="Why", description="Why the last stitch left it out")
+
+
+class EDF_PG_clip(bpy.types.PropertyGroup):  # noqa: N801
+    """A clip of the list."""
+
+    clip: PointerProperty(
+        name="Clip", type=bpy.types.MovieClip,
+        description="A movie or an image sequence of a camera that stands still; where it starts, in the scene's "
+        "frames, is what its properties say in the Movie Clip Editor",
+    )

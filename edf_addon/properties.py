@@ -20,7 +20,7 @@ from bpy.props import (
 
 from . import earlier, idnames, offered, pictures, status
 from .bridge import compat
-from .list_entries import EDF_PG_match, EDF_PG_picture, look_again
+from .list_entries import EDF_PG_clip, EDF_PG_match, EDF_PG_picture, look_again
 
 # Called with a scene's settings when an artist changes what of the scene the panorama shows, or from where.
 on_reframe: list[Callable[[Any], None]] = []
@@ -51,6 +51,10 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
 
     pictures: CollectionProperty(
         name="Pictures", type=EDF_PG_picture, description="What is stitched: two, or up to 60, in any order",
+    )
+    clips: CollectionProperty(
+        name="Clips", type=EDF_PG_clip,
+        description="Movies or image sequences of cameras that stand still: two or more",
     )
     picture_index: IntProperty(
         name="Active Picture", description="The picture of the list that the editor shows", default=0, min=0,
@@ -284,7 +288,7 @@ class EDF_PG_job(bpy.types.PropertyGroup):  # noqa: N801
 PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ignore_reference", "ignore_target"))
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))
 # What is no setting: what is stitched, what came of it, and how it is looked at.
-NO_SETTINGS = frozenset({"name", "pictures", "picture_index", "result", "matches", "matches_reference",
+NO_SETTINGS = frozenset({"name", "pictures", "clips", "picture_index", "result", "matches", "matches_reference",
                          "matches_target", "match_index", "version", "exposure", "overlay", "overlay_opacity",
                          "show_matches", "show_epipolar", "show_places"})  # fmt: skip
 
@@ -350,7 +354,7 @@ def _handlers() -> list[list[Any]]:
     return [getattr(bpy.app.handlers, name) for name in names if hasattr(bpy.app.handlers, name)]
 
 
-CLASSES = (EDF_PG_match, EDF_PG_picture, EDF_PG_settings, EDF_PG_job)
+CLASSES = (EDF_PG_match, EDF_PG_picture, EDF_PG_clip, EDF_PG_settings, EDF_PG_job)
 
 
 def register() -> None:

@@ -13,6 +13,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "core"
 ADDON = ROOT / "edf_addon"
+# Files that Blender runs when an artist chooses one; nothing imports them.
+PRESETS = ADDON / "presets"
 
 # Which rooms each may import, itself left out. Rooms stand in the order of the data.
 BELOW_POSE = ("system", "raster", "pictures", "cameras")
@@ -85,7 +87,7 @@ Graph = dict[str, set[str]]
 
 def modules(core: Path = CORE) -> dict[str, Path]:
     """Every module by its name: `room/module`, or `module` directly in core (or in the add-on)."""
-    paths = (path for path in core.rglob("*.py") if path.name != "__init__.py")
+    paths = (path for path in core.rglob("*.py") if path.name != "__init__.py" and PRESETS not in path.parents)
     return {path.relative_to(core).with_suffix("").as_posix(): path for path in sorted(paths)}
 
 

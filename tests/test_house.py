@@ -184,7 +184,8 @@ def test_the_wheel_holds_every_package():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]
     listed, data = settings["packages"], settings["package-data"]["edf_stitch"]
     # type checkers look for the mark beside the package that is imported
-    assert set(data) == {"blender_manifest.toml", "py.typed"} and all((ROOT / name).is_file() for name in data)
+    assert set(data) == {"blender_manifest.toml", "py.typed", "edf_addon/presets/edf_stitch/*.py"}
+    assert all(list(ROOT.glob(name)) for name in data)
     folders = {path.parent for package in PACKAGES for path in (ROOT / package).rglob("__init__.py")}
     names = [".".join(("edf_stitch", *folder.relative_to(ROOT).parts)) for folder in folders]
     assert sorted(listed) == sorted(["edf_stitch", *names])

@@ -111,20 +111,20 @@ class _Meter:
         """Begins an item of so many pictures, after `done` of the total weight."""
         self._label, self._done, self._stages = label, done, stages_of(pictures)
 
-    def piece(self, weight: float) -> Tell:
-        """The progress callback of the item's next piece, which has this weight in the total."""
+    def piece(self, weight: float, what: str = "") -> Tell:
+        """The progress callback of the item's next piece, which has this weight in the total; what: it is."""
         start = self._done
         self._done += weight
 
         def tell(stage: str, share: float) -> None:
             if self._progress is not None:
-                self._progress(f"{self._label} {stage}", min(1.0, (start + weight * share) / self._total))
+                self._progress(f"{self._label} {what}{stage}", min(1.0, (start + weight * share) / self._total))
 
         return tell
 
-    def stopwatch(self, weight: float) -> Stopwatch:
+    def stopwatch(self, weight: float, what: str = "") -> Stopwatch:
         """The same for work that has steps of its own."""
-        return Stopwatch(Progress(self.piece(weight), self.cancelled, self._stages))
+        return Stopwatch(Progress(self.piece(weight, what), self.cancelled, self._stages))
 
 
 def _weight(job: Job) -> float:
@@ -199,12 +199,13 @@ def _clip(job: Job, meter: _Meter) -> Outcome:
         locked = _lock(job, meter)
     count = sum(piece.frame is not None for piece in job.pieces)
     size, done, skipped = None, 0, count - len(frames)
-    for piece in frames:
+    for at, piece in enumerate(frames, 1):
         try:
             if piece.is_made():
                 skipped += 1
                 continue
-            size, more = _frame(piece, locked, meter.stopwatch(CLIP.frame_weight))
+            what = f"frame {at} of {len(frames)}: "
+            size, more = _frame(piece, locked, meter.stopwatch(CLIP.frame_weight, what))
             warnings |= dict.fromkeys(more)
             done += 1
         except Cancelled:

@@ -11,6 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..output import inspection, inspection_of_many
+from ..output.depth.nodes import depth_nodes, is_whole_sphere
+from ..output.depth.options import MESH
+from ..output.filled_sphere import filled_sphere
 from ..output.json_file import json_bytes
 from ..output.sphere_part import sphere_part_of
 from ..panorama.layers import Layer
@@ -64,7 +67,7 @@ def hand_over(
     folder: Path, result: StitchResult, rows: NDArray[np.float64] | None, job: dict[str, Any], turns: tuple[int, ...],
     told: Callable[[int], None],
 ) -> None:  # fmt: skip
-    """Writes everything that the window may ask for.
+    """Writes everything that the window may ask for, depth.npz (see `DepthNodes`) among it where there is depth.
 
     Parameters
     ----------
@@ -73,20 +76,23 @@ def hand_over(
     rows : (N, 5) array, optional
         The matches that were given.
     job : dict
-        job.json, of which `take` and `exr` are read.
+        job.json, of which `take`, `exr` and `fill` are read.
     turns : tuple of int
         EXIF's orientation of each picture that was given.
     told : callable
         Called with the number of files that were begun.
     """
     files = Folder(folder, result, ExrForm(**job.get("exr", {})), told)
-    files.add_layer("panorama", result.panorama, is_panorama=True)
+    shown = filled_sphere(result.panorama) if job.get("fill") and is_whole_sphere(result) else result.panorama
+    files.add_layer("panorama", shown, is_panorama=True)
     take = job.get("take", [])
     about = _of_pair(result.spread_out(), rows, take, files) if result.rig is None else _of_many(result, take, files)
     index = {
         "files": files.names, "report": result.report, "warnings": result.warnings, "bits": result.bits,
         "orientations": turns, "has_depth": inspection.has_depth(result), "seconds": result.seconds, **about,
     }  # fmt: skip
+    if index["has_depth"]:
+        (folder / "depth.npz").write_bytes(depth_nodes(result, MESH.editable_nodes).to_bytes())
     (folder / "result.json").write_bytes(json_bytes(index))
 
 

@@ -11,7 +11,8 @@ their `camera` those of CameraRequest. `cameras` of two pictures: {"lens": field
 "matrix_world"} each. `masks`: for each picture an .npy, rows as shown, or null; `seam`: one over the whole panorama.
 `matches`: .npy (N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as result.json had it in
 matches.file. `take`: which of "layers", "masks", "depth" to leave as pictures. `exr`: fields of ExrForm, for panorama
-and layers. Relative paths start at FOLDER. Or `try` alone: load the libraries, and no more.
+and layers. `fill`: whether what no picture shows of a whole sphere is filled. Relative paths start at FOLDER. Or `clip`
+with `options` (see `clip_job`), or `try` alone: load the libraries, and no more.
 """
 
 from __future__ import annotations
@@ -122,27 +123,46 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
     if job.get("show"):
         _show(folder, job["show"])
         return
+    if job.get("clip"):
+        from .clip_job import stitch_clip
+
+        options = StitchOptions(**_plain_options(job["options"]), cache=default_folder())
+        stitch_clip(folder, job["clip"], options, _say_share, lambda: stop.asked)
+        return
     given = job["pictures"]
     exposure = exposure_of_first(folder / entry["path"] for entry in given if "path" in entry)
     pictures, turns = zip(*(_picture(folder, entry, exposure) for entry in given), strict=True)
-    camera = {key: _tuples(value) for key, value in job["options"].pop("camera", {}).items()}
+    plain = _plain_options(job["options"])
     if job.get("cameras"):
-        camera = {"cameras": cameras_of(job["cameras"], pictures)}
+        plain["camera"] = CameraRequest(cameras=cameras_of(job["cameras"], pictures))
     masks = job.get("masks") or [None] * len(given)
     matches = folder / job["matches"] if job.get("matches") else None
     rows = _array(matches) if matches is not None and matches.suffix == ".npy" else None
     options = StitchOptions(
-        **{key: _tuples(value) for key, value in job["options"].items()}, camera=CameraRequest(**camera),
+        **plain,
         matches=matches if rows is None else rows[rows[:, 4] > 0],
         ignore=tuple(_mask(folder, mask, turn) for mask, turn in zip(masks, turns, strict=True)),
         mask=_mask(folder, job.get("seam"), 1),
         cache=default_folder(),
     )  # fmt: skip
     result = stitch(
-        pictures, options, lambda stage, share: _say({"stage": stage, "share": share * WORKER.stitch_share}),
+        pictures, options, lambda stage, share: _say_share(stage, share * WORKER.stitch_share),
         lambda: stop.asked,  # Python swallows a KeyboardInterrupt inside a finalizer
     )  # fmt: skip
     hand_over(folder, result, rows, job, turns, _say_written)
+
+
+def _plain_options(told: dict[str, Any]) -> dict[str, Any]:
+    """Fields of StitchOptions as a job has them, with the request for cameras in its place."""
+    from ..cameras.sources import CameraRequest
+
+    fields = {key: _tuples(value) for key, value in told.items() if key != "camera"}
+    asked = {key: _tuples(value) for key, value in told.get("camera", {}).items()}
+    return {**fields, "camera": CameraRequest(**asked)}
+
+
+def _say_share(stage: str, share: float) -> None:
+    _say({"stage": stage, "share": share})
 
 
 def _say_written(files: int) -> None:

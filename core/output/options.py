@@ -58,5 +58,17 @@ class GraphOptions:
     """px along the longer side of the panorama on the page, at most."""
 
 
+@dataclass(frozen=True)
+class SphereFillOptions:
+    """What fills the holes of a whole sphere (`filled_sphere`)."""
+
+    columns: int = 512
+    """Cells along the sphere: no detail is made up, and light has no more of it than 0.7°."""
+
+    least_shown: float = 1e-6
+    """px that a cell shows at least, so that nothing is divided by 0."""
+
+
 INSPECTION = InspectionOptions()
 GRAPH = GraphOptions()
+SPHERE_FILL = SphereFillOptions()

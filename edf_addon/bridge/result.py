@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 KEY = "edf_stitch"
 VERSION = 2
+# Custom property of the depth of its nodes, as bytes of DepthNodes (core/output/depth/nodes.py).
+DEPTH = "edf_stitch_depth"
 # Images that belong to a panorama hang on it by custom properties too: key, then the worker's name of the file.
 COMPANION = "edf_stitch "
 

@@ -87,6 +87,7 @@ class LongWork:
     follows = False
     # What is taken into the file in the end, in messages.
     makes = "the panorama"
+    when_cancelled = "Cancelled. Nothing was changed."
     _job: job.Job
     _timer: Any = None
 
@@ -189,6 +190,8 @@ class LongWork:
     def _take(self, context: bpy.types.Context, outcome: job.Outcome) -> set[str]:
         """The end of a job, whatever it was; its folder goes in any case."""
         words, failed = outcome.words, outcome.kind not in (job.DONE, job.CANCELLED)
+        if outcome.kind == job.CANCELLED:
+            words = self.when_cancelled
         try:
             if outcome.kind == job.DONE:
                 health.forget()

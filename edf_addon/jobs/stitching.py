@@ -213,6 +213,8 @@ def _bring_all(
     kept = {key: value for key, value in found.items() if key != "files"}
     remembered = {name: memory[name] for name in ("settings", "pictures", "cameras")}
     result.store(panorama, {**kept, "kind": kind, **remembered})
+    if (folder / "depth.npz").exists():
+        panorama[result.DEPTH] = (folder / "depth.npz").read_bytes()
     everything = [*bpy.data.images, *bpy.data.objects]
     chosen = {name: compat.by_uid(everything, uid) for name, uid in memory["chosen"].items()}
     ownership.hold(panorama, [compat.by_uid(bpy.data.images, uid) for uid in memory["held"]], chosen)

@@ -13,7 +13,7 @@ from ..bridge import images, stand_ins
 from ..jobs import modal, stitching
 
 
-class _Browsing:
+class Browsing:
     """A file dialog for pictures; several can be chosen."""
 
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
@@ -46,19 +46,24 @@ class _Browsing:
 
     def put_into_list(self, context: Any, paths: Sequence[Path], instead: bool = False) -> set[str]:
         """Puts files into the list, or instead of it."""
-        if any(map(stand_ins.is_needed, paths)):
-            done = bpy.ops.edf.develop_pictures(self.how, paths="\n".join(map(str, paths)), instead=instead)
-            return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
-        try:
-            opened = [_loaded(path) for path in paths]
-        except images.Unusable as error:
-            self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
-            return {"CANCELLED"}
-        self.report({"INFO"}, _listed(context, opened, instead))  # type: ignore[attr-defined]
-        return {"FINISHED"}
+        return into_list(self, context, paths, self.how, instead)
 
 
-class EDF_OT_add_pictures(_Browsing, bpy.types.Operator):  # noqa: N801
+def into_list(operator: Any, context: Any, paths: Sequence[Path], how: str, instead: bool = False) -> set[str]:
+    """Puts files into the list, or instead of it, for an operator, which reports it. how: see `Browsing.how`."""
+    if any(map(stand_ins.is_needed, paths)):
+        done = bpy.ops.edf.develop_pictures(how, paths="\n".join(map(str, paths)), instead=instead)
+        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+    try:
+        opened = [_loaded(path) for path in paths]
+    except images.Unusable as error:
+        operator.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+    operator.report({"INFO"}, _listed(context, opened, instead))
+    return {"FINISHED"}
+
+
+class EDF_OT_add_pictures(Browsing, bpy.types.Operator):  # noqa: N801
     """Add photographs to the list; hold Shift or Ctrl to choose several. Files can also be dropped on the sidebar"""
 
     bl_idname = idnames.Operator.ADD_PICTURES
@@ -73,7 +78,7 @@ class EDF_OT_add_pictures(_Browsing, bpy.types.Operator):  # noqa: N801
         return self.put_into_list(context, paths)
 
 
-class EDF_OT_add_folder(_Browsing, bpy.types.Operator):  # noqa: N801
+class EDF_OT_add_folder(Browsing, bpy.types.Operator):  # noqa: N801
     """Add all photographs of a folder to the list"""
 
     bl_idname = idnames.Operator.ADD_FOLDER
@@ -92,7 +97,7 @@ class EDF_OT_add_folder(_Browsing, bpy.types.Operator):  # noqa: N801
         return self.put_into_list(context, paths)
 
 
-class EDF_OT_open_pair(_Browsing, bpy.types.Operator):  # noqa: N801
+class EDF_OT_open_pair(Browsing, bpy.types.Operator):  # noqa: N801
     """Open two photographs at once, as reference and target, instead of what is in the list"""
 
     bl_idname = idnames.Operator.OPEN_PAIR
@@ -108,7 +113,7 @@ class EDF_OT_open_pair(_Browsing, bpy.types.Operator):  # noqa: N801
         return self.put_into_list(context, paths, instead=True)
 
 
-class EDF_OT_stitch_files(_Browsing, bpy.types.Operator):  # noqa: N801
+class EDF_OT_stitch_files(Browsing, bpy.types.Operator):  # noqa: N801
     """Make one panorama of photographs: they are put into the list, instead of what is in it, and stitched"""
 
     bl_idname = idnames.Operator.STITCH_FILES

@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from .. import editor, idnames, offered, pair, pictures, properties
 from ..bridge import images, ownership, result
 from ..jobs import following, modal, stitching
 from ..scene import take_along
+from . import opening, scene_objects
 
 
 class _Stitching(modal.LongWork):
@@ -34,12 +35,33 @@ class EDF_OT_stitch(_Stitching, bpy.types.Operator):  # noqa: N801
 
     reference: StringProperty(name="Reference", description="Name of the image to choose first", options={"SKIP_SAVE"})
     target: StringProperty(name="Target", description="Name of the image to choose first", options={"SKIP_SAVE"})
+    filepaths: StringProperty(
+        name="Files", description="Paths of photographs, one a line, that are to be the list first",
+        options={"SKIP_SAVE"},
+    )
+    images: StringProperty(
+        name="Images", description="Names of images, one a line, that are to be the list first", options={"SKIP_SAVE"}
+    )
     as_empty: BoolProperty(
         name="Add to the Scene", description="As an image empty at the 3D cursor", options={"SKIP_SAVE"}
     )
 
+    def execute(self, context: Any) -> set[str]:
+        return super().execute(context) if self._has_opened(context) else {"CANCELLED"}
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        return super().invoke(context, event) if self._has_opened(context) else {"CANCELLED"}
+
+    def _has_opened(self, context: Any) -> bool:
+        """Puts the files that were named into the list; False where that failed, which is reported."""
+        paths = [Path(bpy.path.abspath(line)) for line in self.filepaths.splitlines() if line]
+        self.filepaths = ""  # `invoke` may call `execute`
+        return not paths or opening.into_list(self, context, paths, "EXEC_DEFAULT", instead=True) == {"FINISHED"}
+
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
         settings = properties.settings_of(context.scene)
+        if self.images:
+            pictures.choose(settings, [images.named(name) for name in self.images.splitlines() if name])
         named = {side: images.named(name) for side in ownership.SIDES if (name := getattr(self, side))}
         with pair.choosing(settings):
             for side, image in named.items():
@@ -70,7 +92,10 @@ class EDF_OT_preview(_Stitching, bpy.types.Operator):  # noqa: N801
 
 # What the operators of an environment are asked.
 _HOLES = {"name": "Holes", "items": [one for one in offered.HOLES if one[0] != "AUTO"], "default": "INPAINT",
-          "description": "What no picture shows between those that do; above and below them the sphere stays open"}
+          "description": "What no picture shows between those that do"}
+_FILL = {"name": "Fill Above and Below", "default": True,
+         "description": "What no picture shows of the sphere is filled smoothly from its rim, so that it lights the "
+         "scene; off: it stays open, and dark"}
 _REPLACE = {"name": "Replace the Scene's World", "default": True,
             "description": "Let the scene use it at once; the World that it has stays in the file"}
 
@@ -83,7 +108,9 @@ class EDF_OT_stitch_environment(bpy.types.Operator):  # noqa: N801
     bl_options = {"REGISTER"}
 
     holes: EnumProperty(**_HOLES)
+    fill: BoolProperty(**_FILL)
     replace: BoolProperty(**_REPLACE)
+    height: FloatProperty(**scene_objects.GROUND)
     is_asked = False
 
     @classmethod
@@ -97,7 +124,9 @@ class EDF_OT_stitch_environment(bpy.types.Operator):  # noqa: N801
 
     def execute(self, _context: Any) -> set[str]:
         how = "INVOKE_DEFAULT" if self.is_asked and not bpy.app.background else "EXEC_DEFAULT"
-        done: set[str] = bpy.ops.edf.stitch_sphere(how, holes=self.holes, replace=self.replace)
+        done: set[str] = bpy.ops.edf.stitch_sphere(
+            how, holes=self.holes, fill=self.fill, replace=self.replace, height=self.height
+        )
         return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
 
 
@@ -109,17 +138,22 @@ class EDF_OT_stitch_sphere(_Stitching, bpy.types.Operator):  # noqa: N801
     bl_options = {"UNDO", "INTERNAL"}
 
     holes: EnumProperty(**_HOLES)
+    fill: BoolProperty(**_FILL)
     replace: BoolProperty(**_REPLACE)
+    height: FloatProperty(**scene_objects.GROUND)
 
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
         instead = {"projection": "EQUIRECTANGULAR", "crop": "FULL", "holes": self.holes}
         job, self.memory = stitching.make_job(context, folder, instead=instead)
-        return job
+        return {**job, "fill": self.fill}
 
     def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
         words = super().finish(context, folder, found)
         image = properties.settings_of(context.scene).result
-        return f"{words} The World “{take_along.use_as_world(context.scene, image, self.replace).name}” shows it."
+        world = take_along.use_as_world(context.scene, image, self.replace)
+        if self.height > 0:
+            take_along.select(context, [take_along.ground(context.scene, image, self.height)])
+        return f"{words} The World “{world.name}” shows it."
 
 
 class EDF_OT_restitch(_Stitching, bpy.types.Operator):  # noqa: N801

@@ -83,6 +83,9 @@ class EDF_PT_take_along(SubPanel, bpy.types.Panel):  # noqa: N801
         column = layout.column(align=True)
         column.operator(Operator.CREATE_CAMERAS, icon="OUTLINER_OB_CAMERA")
         column.operator(Operator.DEPTH_MESH, icon="MESH_GRID")
+        column.operator(Operator.BACKPLATE, icon="IMAGE_BACKGROUND")
+        if image is not None and take_along.find(image, take_along.RIG) is not None:
+            column.operator(Operator.SET_DISTANCE, icon="DRIVER_DISTANCE")
         if not take_along.no_world(image):
             column.operator(Operator.USE_AS_WORLD, icon="WORLD")
         if reason := take_along.lacking(image) or take_along.lacking(image, depth=True):

@@ -31,7 +31,10 @@ class EDF_UL_pictures(bpy.types.UIList):  # noqa: N801
         named = row.row(align=True)
         named.active = item.use
         lost = item.image is None
-        named.label(text="No longer in the file" if lost else item.image.name)
+        if lost:
+            named.label(text="No longer in the file")
+        else:  # Blender makes the thumbnail beside the name aside, when the row is seen first
+            named.label(text=item.image.name, icon_value=layout.icon(item.image))
         if role := role_of(data, index):
             side = row.row()
             side.alignment = "RIGHT"

@@ -1,4 +1,5 @@
-"""Named sets of settings, by Blender's own mechanism: files in the user's presets folder."""
+"""Named sets of settings, by Blender's own mechanism: files in the user's presets folder, and those that come with the
+extension, in edf_addon/presets."""
 
 import re
 from pathlib import Path
@@ -71,4 +72,18 @@ def names() -> list[str]:
 CLASSES = (EDF_MT_presets, EDF_PT_presets, EDF_OT_preset_add)
 
 
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+_register, _unregister = bpy.utils.register_classes_factory(CLASSES)
+# The folder whose `presets` Blender looks through.
+_OURS = str(Path(__file__).resolve().parent.parent)
+
+
+def register() -> None:
+    """Make the presets known, ours and the menus that list them."""
+    bpy.utils.register_preset_path(_OURS)
+    _register()
+
+
+def unregister() -> None:
+    """Take them away again."""
+    _unregister()
+    bpy.utils.unregister_preset_path(_OURS)

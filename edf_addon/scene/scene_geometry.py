@@ -13,8 +13,9 @@ import numpy as np
 
 from ...core.cameras.blender_camera import BlenderLens, lens_for, matrix_world_of
 from ...core.cameras.projective import homogeneous
+from ...core.output.depth.nodes import DepthNodes
 from ...core.output.depth.options import MESH
-from ...core.output.depth.surface import DepthGrid, Surface, whole_surface
+from ...core.output.depth.surface import DepthGrid, Surface, cut_surface
 from ...core.panorama.projection import Projection
 from ...core.panorama.rig_viewpoint import RigViewpoint
 from ...core.panorama.viewpoint import Viewpoint
@@ -143,6 +144,16 @@ def _middle_place(known: dict[str, Any], projection: Projection, canvas: tuple[i
     )
 
 
+def viewpoint_in_world(known: dict[str, Any], baseline: float = 1.0) -> Array:
+    """From where the middle of a result's panorama is seen (3,), in the world."""
+    projection = projection_of(known)
+    if projection is None:
+        return np.zeros(3)
+    width, height = known["geometry"]["canvas"]
+    place: Array = _middle_place(known, projection, (int(width), int(height)))[0] * baseline @ axes(known).T
+    return place
+
+
 def panorama_lens(projection: Projection, size: tuple[int, int]) -> BlenderLens | RoundLens | None:
     """The lens that sees a canvas of (W, H) px; None where Blender has none like it."""
     if projection.kind == "pannini" and projection.distance > 0:
@@ -188,24 +199,37 @@ def square_pixels(K: Array) -> Array:
     return out
 
 
-def depth_mesh(known: dict[str, Any], baseline: float = 1.0, farthest: float = MESH.farthest) -> Surface:
-    """The panorama as a surface: nodes on their rays from where each is seen, at the depth that was found.
+def depth_mesh(
+    known: dict[str, Any], baseline: float = 1.0, farthest: float = MESH.farthest, nodes: DepthNodes | None = None,
+    ends_open: bool = False,
+) -> Surface:  # fmt: skip
+    """The panorama as a surface: nodes on their rays from where each is seen, at the depth that was found, cut where
+    near and far meet.
 
-    known: a result's `geometry`, `report` and `depth`: `columns`, `rows`, `inverse_depth` (in 1/baseline) and `shows`,
-    row by row from the top, nodes corner to corner of the canvas; farthest: × the median depth, where everything beyond
-    ends, infinity (d ≤ 0) too. See `whole_surface`; vertices in the world. Raises ValueError where nothing is left.
+    known: a result's `geometry`, `report` and `depth`; farthest: × the median depth, where everything beyond ends,
+    infinity (d ≤ 0) too; nodes: None for those of `depth`, as earlier releases left them; ends_open: leave out what
+    ends there. Vertices in the world. Raises ValueError where nothing is left.
     """
+    nodes = nodes or coarse_nodes(known)
+    width, height = known["geometry"]["canvas"]
+    pixels = np.stack(np.meshgrid(nodes.x, nodes.y), axis=-1)
+    viewpoint, seen = viewpoint_of(known), rays(known, pixels)
+    uvs = np.stack([(pixels[..., 0] + 0.5) / width, 1 - (pixels[..., 1] + 0.5) / height], axis=-1)
+    places = None if viewpoint is None else viewpoint.place(seen)
+    grid = DepthGrid(seen, nodes.inverse_depth, nodes.shows, uvs, places, nodes.middles)
+    surface = cut_surface(grid.nearer(farthest) if ends_open else grid, farthest)
+    return replace(surface, vertices=surface.vertices * baseline @ axes(known).T)
+
+
+def coarse_nodes(known: dict[str, Any]) -> DepthNodes:
+    """The nodes of a result's `depth`: `columns`, `rows`, `inverse_depth` (in 1/baseline) and `shows`, row by row from
+    the top, corner to corner of the canvas. In the middle of a cell is what its farthest corner has."""
     grid, (width, height) = known["depth"], known["geometry"]["canvas"]
     columns, rows = int(grid["columns"]), int(grid["rows"])
     d = matrix(grid["inverse_depth"]).reshape(rows, columns)
     shows = np.asarray(grid["shows"], bool).reshape(rows, columns)
-    x, y = np.linspace(0, width - 1, columns), np.linspace(0, height - 1, rows)
-    pixels = np.stack(np.meshgrid(x, y), axis=-1)
-    viewpoint, seen = viewpoint_of(known), rays(known, pixels)
-    uvs = np.stack([(pixels[..., 0] + 0.5) / width, 1 - (pixels[..., 1] + 0.5) / height], axis=-1)
-    places = None if viewpoint is None else viewpoint.place(seen)
-    surface = whole_surface(DepthGrid(seen, d, shows, uvs, places), farthest)
-    return replace(surface, vertices=surface.vertices * baseline @ axes(known).T)
+    middles = np.minimum(np.minimum(d[1:, 1:], d[1:, :-1]), np.minimum(d[:-1, 1:], d[:-1, :-1]))
+    return DepthNodes(np.linspace(0, width - 1, columns), np.linspace(0, height - 1, rows), d, middles, shows)
 
 
 def rays(known: dict[str, Any], pixels: Array) -> Array:

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
 from mathutils import Matrix
 
 from .. import editor
-from ..bridge import compat, ownership, photo
+from ..bridge import compat, ownership, photo, result
+from . import placement, shading
+from .placement import Standing
 
-RIG, MESH = "RIG", "MESH"
+RIG, MESH, CATCHER, GROUND = "RIG", "MESH", "CATCHER", "GROUND"
 # Roles of the cameras of a pair; those of more pictures have their names.
 ROLES = {"Reference": "REFERENCE", "Target": "TARGET", "Panorama": "PANORAMA"}
 # What an object, or a World, is to which panorama, as custom properties of it.
 OF, ROLE = "edf_stitch_panorama", "edf_stitch_role"
+# How far the ground under an environment reaches to each side, in heights of its viewpoint: the horizon is 3° higher.
+GROUND_HEIGHTS = 20.0
 # How a background has to be shown whose pixels are stored so, by EXIF's orientation: turned (degrees) after being
 # mirrored. Tried in a window: a background turns clockwise.
 TURNS = {
@@ -69,14 +75,16 @@ def usual_baseline(image: bpy.types.Image) -> float:
     return rig["baseline"] if rig is not None else known_baseline(editor.known(image)) or 1.0
 
 
-def create_cameras(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> dict[str, bpy.types.Object]:
+def create_cameras(
+    scene: bpy.types.Scene, image: bpy.types.Image, standing: Standing
+) -> dict[str, bpy.types.Object]:
     """The cameras of a panorama, by role; those that are there already are set anew. The panorama's own is missing
     where Blender has no lens like it (see `no_lens`). Raises ValueError."""
     from . import scene_geometry
 
     pictures = {**_pictures_by_role(image), "PANORAMA": image}
-    rig = _rig(scene, image, baseline)
-    made = {}
+    rig = _rig(scene, image, standing)
+    made, baseline = {}, standing.baseline
     for placed in scene_geometry.placed_cameras(editor.known(image), baseline):
         role, lens = ROLES.get(placed.name, placed.name), placed.lens
         if role == "PANORAMA" and no_lens(image):
@@ -108,6 +116,29 @@ def _pictures_by_role(image: bpy.types.Image) -> dict[str, bpy.types.Image | Non
     return dict(zip(names, pictures, strict=True))
 
 
+def camera_of(made: dict[str, bpy.types.Object], picture: int) -> bpy.types.Object:
+    """The camera of a picture, counted from 1 among those that have one, of those that `create_cameras` made; the
+    panorama's own of 0. Raises ValueError where there is none."""
+    roles = [role for role in made if role != "PANORAMA"]
+    if picture > len(roles):
+        raise ValueError(f"There is no picture {picture}: {len(roles)} have a camera whose place is known")
+    role = roles[picture - 1] if picture else "PANORAMA"
+    if role not in made:
+        raise ValueError("Blender has no lens that sees this panorama: choose the camera of a picture")
+    return made[role]
+
+
+@contextmanager
+def outside_edit_mode(context: Any) -> Iterator[None]:
+    """In Object Mode as long as it lasts: in Edit Mode a mesh has a copy that is written back over it."""
+    was_editing = context.mode == "EDIT_MESH"
+    if was_editing:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    yield
+    if was_editing:
+        bpy.ops.object.mode_set(mode="EDIT")
+
+
 def select(context: Any, made: list[bpy.types.Object]) -> None:
     """These objects alone are selected, the last of them active; only in Object Mode, where nothing else is begun."""
     if context.mode != "OBJECT":
@@ -129,24 +160,46 @@ def image_empty(scene: bpy.types.Scene, image: bpy.types.Image) -> bpy.types.Obj
 
 
 def depth_mesh(
-    scene: bpy.types.Scene, image: bpy.types.Image, baseline: float, farthest: float
+    scene: bpy.types.Scene, image: bpy.types.Image, standing: Standing, farthest: float, catches: bool = False
 ) -> bpy.types.Object:
-    """The panorama as a surface; one that is there already gets new vertices. Raises ValueError."""
+    """The panorama as a surface that shines, or catches light and shadows and has no sky; one that is there gets
+    new vertices. Raises ValueError."""
+    from ...core.output.depth.nodes import DepthNodes
     from . import scene_geometry
 
-    surface = scene_geometry.depth_mesh(editor.known(image), baseline, farthest)
-    rig, there = _rig(scene, image, baseline), find(image, MESH)
-    mesh = bpy.data.meshes.new(f"Depth of {image.name}") if there is None else there.data
-    mesh.clear_geometry()
-    mesh.from_pydata(surface.vertices.tolist(), [], surface.faces.tolist())
-    uvs = mesh.uv_layers.new(name="Panorama")
-    uvs.data.foreach_set("uv", surface.uvs[surface.faces.ravel()].ravel())
-    mesh.validate()
+    kept = image.get(result.DEPTH)
+    nodes = None if kept is None else DepthNodes.from_bytes(bytes(kept))
+    surface = scene_geometry.depth_mesh(editor.known(image), standing.baseline, farthest, nodes, ends_open=catches)
+    role, what = (CATCHER, "Catcher") if catches else (MESH, "Depth")
+    rig, there = _rig(scene, image, standing), find(image, role)
+    mesh = bpy.data.meshes.new(f"{what} of {image.name}") if there is None else there.data
+    _fill(mesh, surface)
     if not mesh.materials:
-        mesh.materials.append(emission(image))
-    object_ = there or _link(scene, image, MESH, mesh)
+        mesh.materials.append(shading.receiving(image) if catches else shading.emission(image))
+    object_ = there or _link(scene, image, role, mesh)
     object_.parent, object_.matrix_parent_inverse, object_.matrix_basis = rig, Matrix(), Matrix()
+    if catches:
+        shading.catch(object_)
+        object_.display_type = "BOUNDS"  # the picture behind it shows the same
     return object_
+
+
+def _fill(mesh: bpy.types.Mesh, surface: Any) -> None:
+    """Gives a mesh the vertices, faces and uvs of a surface instead of its own."""
+    import numpy as np
+
+    mesh.clear_geometry()
+    count = len(surface.faces)
+    mesh.vertices.add(len(surface.vertices))
+    mesh.vertices.foreach_set("co", surface.vertices.astype(np.float32).ravel())
+    mesh.loops.add(4 * count)
+    mesh.loops.foreach_set("vertex_index", surface.faces.ravel())
+    mesh.polygons.add(count)
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 4 * count, 4, dtype=np.int32))
+    uvs = mesh.uv_layers.new(name="Panorama")
+    uvs.data.foreach_set("uv", surface.uvs[surface.faces.ravel()].astype(np.float32).ravel())
+    mesh.validate()
+    mesh.update()
 
 
 def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
@@ -171,25 +224,12 @@ def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image, replace: bool =
     from . import scene_geometry
 
     known = editor.known(image)
-    rig = find(image, RIG)
-    stands = _place_of_rig(known) if rig is None else rig.matrix_world
+    stands = placement.matrix(find(image, RIG), scene, known, Standing(usual_baseline(image)))
     camera = np.array(stands) @ scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(known))
     turn = world_rotation(camera, scene_geometry.matrix(known["report"]["canvas"]["projection"]["rotation"]))
     world = next((one for one in bpy.data.worlds if one.get(OF) == image), None) or bpy.data.worlds.new(image.name)
     world[OF] = image
-    tree = compat.node_tree(world)
-    nodes, link = tree.nodes, tree.links.new
-    nodes.clear()
-    kinds = ("TexCoord", "Mapping", "TexEnvironment", "Background", "OutputWorld")
-    where, mapping, texture, background, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
-    for number, node in enumerate((where, mapping, texture, background, output)):
-        node.location = (220 * number - 800, 0)
-    texture.image = image
-    mapping.inputs["Rotation"].default_value = Matrix(turn.tolist()).to_euler("XYZ")
-    link(where.outputs["Generated"], mapping.inputs["Vector"])
-    link(mapping.outputs["Vector"], texture.inputs["Vector"])
-    link(texture.outputs["Color"], background.inputs["Color"])
-    link(background.outputs["Background"], output.inputs["Surface"])
+    shading.surround(world, image, Matrix(turn.tolist()))
     if replace or not replaces_world(scene):
         if scene.world not in (None, world):
             scene.world.use_fake_user = True
@@ -199,24 +239,18 @@ def use_as_world(scene: bpy.types.Scene, image: bpy.types.Image, replace: bool =
     return world
 
 
-def emission(image: bpy.types.Image) -> bpy.types.Material:
-    """A material that shows an image as it is, whatever the lights; transparent where the image is."""
-    material = bpy.data.materials.new(image.name)
-    tree = compat.node_tree(material)
-    nodes, link = tree.nodes, tree.links.new
-    nodes.clear()
-    kinds = ("TexImage", "Emission", "BsdfTransparent", "MixShader", "OutputMaterial")
-    texture, shine, clear, mix, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
-    for node, place in zip((texture, shine, clear, mix, output), ((-600, 0), (-300, -60), (-300, 60), (0, 0), (200, 0)),
-                           strict=True):  # fmt: skip
-        node.location = place
-    texture.image, texture.extension = image, "EXTEND"
-    link(texture.outputs["Color"], shine.inputs["Color"])
-    link(texture.outputs["Alpha"], mix.inputs[0])
-    link(clear.outputs[0], mix.inputs[1])
-    link(shine.outputs[0], mix.inputs[2])
-    link(mix.outputs[0], output.inputs["Surface"])
-    return material
+def ground(scene: bpy.types.Scene, image: bpy.types.Image, height: float) -> bpy.types.Object:
+    """A level plane at z = 0 that catches shadows, so far below the viewpoint of a panorama's rig, which is put there;
+    one that is there already is set anew."""
+    rig = _rig(scene, image, Standing(usual_baseline(image), height=height))
+    plane = find(image, GROUND) or _link(scene, image, GROUND, bpy.data.meshes.new(f"Ground of {image.name}"))
+    half = GROUND_HEIGHTS * height
+    mesh = plane.data
+    mesh.clear_geometry()
+    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
+    plane.location = rig.matrix_world.translation.x, rig.matrix_world.translation.y, 0.0
+    shading.catch(plane)
+    return plane
 
 
 def find(image: bpy.types.Image | None, role: str) -> bpy.types.Object | None:
@@ -224,25 +258,15 @@ def find(image: bpy.types.Image | None, role: str) -> bpy.types.Object | None:
     return next((one for one in bpy.data.objects if one.get(OF) == image and one.get(ROLE) == role), None)
 
 
-def _rig(scene: bpy.types.Scene, image: bpy.types.Image, baseline: float) -> bpy.types.Object:
+def _rig(scene: bpy.types.Scene, image: bpy.types.Image, standing: Standing) -> bpy.types.Object:
     """The empty that everything of a panorama hangs on: moved, turned or scaled, all goes along and stays right."""
     rig = find(image, RIG)
+    matrix = placement.matrix(rig, scene, editor.known(image), standing)
     if rig is None:
         rig = _link(scene, image, RIG, None)
-        rig.empty_display_size = 0.2 * baseline
-        rig.matrix_world = _place_of_rig(editor.known(image))
-    rig["baseline"] = baseline
+        rig.empty_display_size = 0.2 * standing.baseline
+    rig.matrix_world, rig["baseline"] = matrix, standing.baseline
     return rig
-
-
-def _place_of_rig(known: dict[str, Any]) -> Matrix:
-    """Where a new rig stands: its reference camera where the scene's own stood that took the picture, if one did."""
-    from . import scene_geometry
-
-    if known["cameras"] is None:
-        return Matrix()
-    here = scene_geometry.in_world(*scene_geometry.ORIGIN, scene_geometry.axes(known))
-    return Matrix(known["cameras"][0]["matrix_world"]).normalized() @ Matrix(here.tolist()).inverted()
 
 
 def _link(scene: bpy.types.Scene, image: bpy.types.Image, role: str, data: Any) -> bpy.types.Object:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...panorama.layers import Layer
 from ...panorama.rig_viewpoint import RigViewpoint
@@ -15,6 +15,7 @@ from ...pictures.encoding import encode_picture, in_srgb
 from ...raster.arrays import Array
 from ...raster.lazy import whole
 from .glb import glb_bytes
+from .nodes import is_whole_sphere, nodes_of
 from .options import MESH
 from .range_image import RangeImage
 from .surface import DepthGrid, cut_surface
@@ -71,42 +72,28 @@ def depth_grid(result: StitchResult, ranges: RangeImage) -> DepthGrid:
         In the unit of the ranges.
     """
     canvas, view = result.canvas, result.views[0]
-    width, height = canvas.width, canvas.height
-    step = max(1.0, float(np.sqrt(np.isfinite(1 / ranges.range).sum() / MESH.most_nodes)))
-    x, y = (np.linspace(-0.5, side - 0.5, max(1, int(side / step)) + 1) for side in (width, height))
+    is_sphere = is_whole_sphere(result)
+
+    def inverse(rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
+        with np.errstate(divide="ignore"):
+            d: Array = 1 / ranges.range[np.ix_(rows, columns)].astype(np.float64)
+        return d
+
+    known = int(np.isfinite(1 / ranges.range).sum())
+    nodes = nodes_of(inverse, result.panorama.alpha, known, MESH.most_nodes, is_sphere)
+    x, y = nodes.x, nodes.y
     rays, _ = canvas.rays_at(view.K, x - canvas.offset[0], y - canvas.offset[1], view.camera)
-    at = np.ix_(_nearest(y, height), _nearest(x, width))
-    between = np.ix_(_nearest((y[1:] + y[:-1]) / 2, height), _nearest((x[1:] + x[:-1]) / 2, width))
-    with np.errstate(divide="ignore"):
-        d, middles = (1 / ranges.range[one].astype(np.float64) for one in (at, between))
-    d = _beside_unknown(d, middles)
-    sphere = None if canvas.projection is None else canvas.projection.sphere
-    if sphere is not None and sphere[2:] == (width, height):
-        rays[:, -1], d[:, -1] = rays[:, 0], d[:, 0]
+    if is_sphere:
+        rays[:, -1] = rays[:, 0]
         for pole in (0, -1):
-            if np.isfinite(d[pole]).any():
-                rays[pole], d[pole] = rays[pole].mean(axis=0), np.nanmean(d[pole])
+            rays[pole] = rays[pole].mean(axis=0)
         rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
     turn = np.eye(3) if canvas.projection is None else canvas.projection.rotation
     places = None
     if isinstance(result.warp.viewpoint, Viewpoint | RigViewpoint) and result.warp.viewpoint.s1 > 0:
         places = result.warp.viewpoint.place(rays) @ turn * _TO_GLTF * ranges.scale.factor
-    uvs = np.stack(np.meshgrid((x + 0.5) / width, (y + 0.5) / height), axis=-1)
-    return DepthGrid(rays @ turn * _TO_GLTF, d, result.panorama.alpha[at] > 0, uvs, places, middles)
-
-
-def _nearest(at: Array, side: int) -> Array:
-    """The px nearest to places along a side."""
-    return np.clip(np.rint(at), 0, side - 1).astype(np.intp)
-
-
-def _beside_unknown(d: Array, middles: Array) -> Array:
-    """Inverse range (rows, columns), where a node knows none that of the middle of a cell beside it."""
-    out = d.copy()
-    for rows, columns in product((slice(1, None), slice(0, -1)), repeat=2):
-        here = out[rows, columns]
-        np.copyto(here, middles, where=np.isnan(here))
-    return out
+    uvs = np.stack(np.meshgrid((x + 0.5) / canvas.width, (y + 0.5) / canvas.height), axis=-1)
+    return DepthGrid(rays @ turn * _TO_GLTF, nodes.inverse_depth, nodes.shows, uvs, places, nodes.middles)
 
 
 def _texture(result: StitchResult) -> tuple[bytes, bool, tuple[str, ...]]:

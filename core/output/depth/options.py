@@ -12,6 +12,10 @@ class MeshOptions:
     most_nodes: int = 250_000
     """Nodes of the grid: half a million triangles are still turned and edited without delay."""
 
+    editable_nodes: int = 195_000
+    """The same of a surface in Blender's scene, where it is drawn beside all else; with what the borders add it has no
+    more than 200 000 faces."""
+
     farthest: float = 20.0
     """Medians of range, where everything beyond ends, infinity too: a sky has to stand somewhere."""
 

@@ -48,11 +48,17 @@ class DepthGrid:
 
         Raises ValueError where nothing lies nearer than infinity.
         """
-        d = self.inverse_depth
-        near = d[self.shows & (d > 0)]
+        return replace(self, inverse_depth=np.maximum(self.inverse_depth, self._least(farthest)))
+
+    def nearer(self, farthest: float) -> DepthGrid:
+        """The same that shows nothing of what lies beyond. Raises as `ended`."""
+        return replace(self, shows=self.shows & (self.inverse_depth > self._least(farthest)))
+
+    def _least(self, farthest: float) -> float:
+        near = self.inverse_depth[self.shows & (self.inverse_depth > 0)]
         if not near.size:
             raise ValueError("the panorama has no depth: nothing of it lies nearer than infinity")
-        return replace(self, inverse_depth=np.maximum(d, float(np.median(near)) / farthest))
+        return float(np.median(near)) / farthest
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,8 @@ def test_a_list_becomes_a_panorama_that_is_kept_and_stitched_again(listed, tmp_p
     bpy.ops.wm.open_mainfile(filepath=path)
     settings = bpy.context.scene.edf_stitch
     assert np.array_equal(pixels_of(settings.result), first)
+    assert bpy.ops.edf.depth_mesh() == {"FINISHED"} and bpy.context.object.name.startswith("Depth of ")
+    assert 50_000 < len(bpy.context.object.data.polygons) <= 200_000, "from the nodes that the file keeps"
     assert [entry.state for entry in settings.pictures] == ["USED"] * 3 + ["LEFT_OUT"]
     bpy.ops.edf.clear_pictures()
     bpy.ops.edf.reset()
@@ -84,11 +86,12 @@ def test_cameras_and_mesh_of_a_set_stand_where_its_pictures_were_taken(listed):
     assert len(mesh.polygons) > 100 and 2.0 < np.median(depths) < 60.0
 
 
-def test_an_environment_surrounds_the_scene_and_one_undo_brings_all_back(listed):
+def test_an_environment_surrounds_the_scene_and_one_undo_brings_all_back(listed, pixels_of):
     before = listed.scene.world = bpy.data.worlds.new("mine")
     kept = (listed.settings.projection, listed.settings.holes)
     assert bpy.ops.edf.stitch_environment(holes="INPAINT", replace=True) == {"FINISHED"}
     panorama, world = listed.settings.result, listed.scene.world
+    assert (pixels_of(panorama)[..., 3] == 1).all(), "filled above and below"
     assert panorama.size[0] == 2 * panorama.size[1] and world[take_along.OF] == panorama
     assert before.use_fake_user and (listed.settings.projection, listed.settings.holes) == kept
     told = result.read(panorama)["settings"]

@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy")
 from edf_stitch.edf_addon import properties, status  # noqa: E402
 from edf_stitch.edf_addon.bridge import ownership, result  # noqa: E402
 from edf_stitch.edf_addon.jobs import health  # noqa: E402
-from edf_stitch.edf_addon.panels import choices, finished, main, rows, sidebar  # noqa: E402
+from edf_stitch.edf_addon.panels import choices, clips, finished, main, picture_list, rows, sidebar  # noqa: E402
 
 ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
 FREE = {"enabled", "active", "scale_y", "alignment", "use_property_split", "use_property_decorate"}
@@ -45,15 +45,18 @@ class Layout:
 
     def separator(self, **_: object) -> None: ...
 
-    def label(self, text: str = "", icon: str = "NONE") -> None:
+    def label(self, text: str = "", icon: str = "NONE", icon_value: int = 0) -> None:
         assert icon in ICONS, icon
-        self.notes.said.append(text)
+        self.notes.said.append(f"<{icon_value}> {text}" if icon_value else text)
+
+    def icon(self, data: bpy.types.ID) -> int:
+        return data.session_uid  # in a window, the number of its thumbnail
 
     def prop(self, data: object, name: str, text: str | None = None, **_: object) -> None:
         assert name in data.bl_rna.properties, name
         self.notes.props.append(name)
 
-    def operator(self, idname: str, text: str = "", icon: str = "NONE") -> Button:
+    def operator(self, idname: str, text: str = "", icon: str = "NONE", emboss: bool = True) -> Button:
         assert icon in ICONS, icon
         self.notes.buttons.append((str(idname), self._above and self.enabled))
         return Button(idname)
@@ -109,6 +112,21 @@ def test_with_a_pair_it_can_be_pressed(draw, chosen):
     assert {("edf.stitch", True), ("edf.swap", True)} <= set(draw(main.EDF_PT_main).buttons)
     chosen.settings.edited_matches = True
     assert "none that is switched on" in text(draw(main.EDF_PT_main))
+
+
+def test_each_picture_of_the_list_has_its_thumbnail(chosen):
+    layout, settings = Layout(), chosen.settings
+    for number, entry in enumerate(settings.pictures):
+        picture_list.EDF_UL_pictures.draw_item(None, None, layout, settings, entry, 0, None, "", number)
+    shown = [f"<{entry.image.session_uid}> {entry.image.name}" for entry in settings.pictures]
+    assert len(shown) == 2 and set(shown) <= set(layout.notes.said)
+
+
+def test_the_clips_of_the_list_are_rows_and_what_they_lack_is_said(draw, blender):
+    blender.settings.clips.add()
+    notes = draw(clips.EDF_PT_clips)
+    assert "clip" in notes.props and ("edf.remove_clip", True) in notes.buttons
+    assert "Choose two clips or more" in text(notes)
 
 
 def test_at_work_there_is_the_stage_and_cancel_and_nothing_else_to_press(draw, chosen):
@@ -171,7 +189,7 @@ def test_every_setting_is_in_some_panel(draw, stitched):
         settings.camera = source
         seen |= set(draw().props)
     missing = {one for one in properties.EDF_PG_settings.bl_rna.properties.keys()} - seen
-    of_a_row = {"seen_from"}
+    of_a_row = {"seen_from", "clips"}
     hidden = {"rna_type", "name", "result", "matches_reference", "matches_target", "version", "exposure"}
     assert missing == hidden | of_a_row
 

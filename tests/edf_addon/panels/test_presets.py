@@ -1,5 +1,7 @@
 """Presets: settings under a name, and back; by the files that Blender's own mechanism writes."""
 
+from pathlib import Path
+
 import pytest
 
 bpy = pytest.importorskip("bpy")
@@ -67,3 +69,31 @@ def test_a_preset_holds_every_setting_and_no_picture():
     assert {*engine_options.CHOICES, *engine_options.VALUES, "camera", "crop", "focal", "take_layers", "pack"} <= held
     assert not held & {"reference", "target", "result", "matches", "ignore_reference", "reference_camera",
                        "edited_matches"}  # fmt: skip
+
+
+OURS = {
+    "Photo_Pair": ("AUTO", "AUTO", "AUTO", True), "Handheld_Panorama": ("AUTO", "INSCRIBED", "INPAINT", True),
+    "HDRI": ("EQUIRECTANGULAR", "FULL", "INPAINT", False),
+    "Matte_Painting_Plate": ("REFERENCE", "FULL", "TRANSPARENT", False),
+}  # fmt: skip
+
+
+def test_blenders_own_mechanism_finds_the_presets_that_come_along(blender):
+    found = [path for folder in bpy.utils.preset_paths(presets.SUBFOLDER) for path in Path(folder).glob("*.py")]
+    assert {path.stem for path in found} >= set(OURS)
+    shown = [bpy.path.display_name(name, title_case=False) for name in OURS]  # as Blender's menus of presets do
+    assert shown == ["Photo Pair", "Handheld Panorama", "HDRI", "Matte Painting Plate"]
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_each_sets_the_same_whatever_was_set_before(blender, name):
+    """One after another leaves nothing of the other: all set the same properties."""
+    settings = blender.settings
+    (path,) = [path for folder in bpy.utils.preset_paths(presets.SUBFOLDER) for path in Path(folder).glob(f"{name}.py")]
+    for other in (None, *OURS):
+        if other is not None:
+            bpy.ops.script.execute_preset(filepath=str(path.with_stem(other)), menu_idname="EDF_PT_presets")
+        bpy.ops.script.execute_preset(filepath=str(path), menu_idname="EDF_PT_presets")
+        assert (settings.projection, settings.crop, settings.holes, settings.slide_auto) == OURS[name]
+        assert settings.take_layers == (name == "Matte_Painting_Plate")
+        assert settings.light == ("REFERENCE" if name == "Matte_Painting_Plate" else "AUTO")

@@ -6,37 +6,12 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from edf_stitch.core.cameras.projective import homogeneous, project, rotation_from_vector  # noqa: E402
-from edf_stitch.edf_addon.bridge import cameras, compat, ownership, result  # noqa: E402
+from edf_stitch.core.output.depth.nodes import DepthNodes  # noqa: E402
+from edf_stitch.edf_addon.bridge import cameras, compat, result  # noqa: E402
 from edf_stitch.edf_addon.scene import take_along  # noqa: E402
 
-SIZE, SIZE_PRIME, CANVAS = (400, 300), (320, 480), (560, 360)
+CANVAS = 560, 360
 COLUMNS, ROWS = 15, 10
-
-
-@pytest.fixture
-def stitched(blender, by_hand, monkeypatch):
-    """A scene with a panorama whose geometry and depth are known."""
-    view = by_hand.view(by_hand.camera(SIZE, 350.0), by_hand.camera(SIZE_PRIME, 410.0), (3, -8, 2), (1, 0.1, 0.2))
-    K_canvas = view.K.copy()
-    K_canvas[:2, 2] += 40, 25
-    d = np.random.default_rng(4).uniform(0.05, 0.3, ROWS * COLUMNS)
-    geometry = {
-        "full_sizes": [SIZE, SIZE_PRIME], "K": view.K, "K_prime": view.K_prime, "R": view.R, "t": view.t,
-        "K_canvas": K_canvas, "canvas": CANVAS,
-    }  # fmt: skip
-    depth = {"columns": COLUMNS, "rows": ROWS, "inverse_depth": d, "shows": np.ones(ROWS * COLUMNS, int)}
-    report = {"canvas": {"projection": {"kind": "perspective"}}}
-    pictures = [{"name": name, "fingerprint": ""} for name in ("reference", "target")]
-    known = {
-        "geometry": geometry, "depth": depth, "has_depth": True, "report": report, "pictures": pictures,
-        "cameras": None,
-    }  # fmt: skip
-    settings = blender.settings
-    for side, size in (("reference", SIZE), ("target", SIZE_PRIME), ("result", CANVAS)):
-        setattr(settings, side, bpy.data.images.new(side, *size))
-    ownership.hold(settings.result, [settings.reference, settings.target], {})
-    monkeypatch.setattr(result, "read", lambda image: known if image == settings.result else None)
-    return known
 
 
 def seen(camera, points: np.ndarray) -> np.ndarray:
@@ -92,10 +67,32 @@ def test_the_meshs_vertices_are_seen_at_their_uvs(stitched):
     assert min(vertex.co.y for vertex in mesh.vertices) == pytest.approx(2 / near, rel=1e-5)
 
 
+def test_the_mesh_is_cut_where_near_and_far_meet(stitched):
+    """A near thing before a far one, with the nodes that the worker left: no face reaches from one to the other."""
+    columns, rows = 57, 37
+    d = np.full((rows, columns), 0.05)
+    d[10:25, 20:40] = 0.5
+    middles = np.minimum(np.minimum(d[1:, 1:], d[1:, :-1]), np.minimum(d[:-1, 1:], d[:-1, :-1]))
+    x, y = np.linspace(-0.5, 559.5, columns), np.linspace(-0.5, 359.5, rows)
+    panorama = bpy.context.scene.edf_stitch.result
+    panorama[result.DEPTH] = DepthNodes(x, y, d, middles, np.ones(d.shape, bool)).to_bytes()
+    bpy.ops.edf.depth_mesh()
+    mesh = take_along.find(panorama, "MESH").data
+    assert len(mesh.polygons) == (columns - 1) * (rows - 1)
+    away = np.array([vertex.co.y for vertex in mesh.vertices])
+    ends = away[[list(polygon.vertices) for polygon in mesh.polygons]]
+    assert (np.ptp(ends, axis=1) < 0.5).all() and {2, 20} == set(away.round())
+    mesh_normals = np.array([polygon.normal for polygon in mesh.polygons])
+    centres = np.array([polygon.center for polygon in mesh.polygons])
+    assert (np.sum(mesh_normals * centres, axis=1) < 0).all(), "they face the viewpoint"
+
+
 def test_the_mesh_shows_the_panorama_whatever_the_light(stitched):
     bpy.ops.edf.depth_mesh()
     panorama = bpy.context.scene.edf_stitch.result
     (material,) = take_along.find(panorama, "MESH").data.materials
+    if hasattr(material, "cycles"):
+        assert material.cycles.emission_sampling == "NONE", "200 000 lamps cost each render ten seconds"
     kinds = {node.bl_idname: node for node in material.node_tree.nodes}
     assert kinds["ShaderNodeTexImage"].image == panorama and "ShaderNodeBsdfPrincipled" not in kinds
     source = kinds["ShaderNodeEmission"].inputs["Color"].links[0].from_node

@@ -1,0 +1,91 @@
+"""Clips for a program that watches: frames laid out by its numbers, movies as pictures, gone on with."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from edf_stitch.core.commands.clip_job import lay_out, stitch_clip
+from edf_stitch.core.options import StitchOptions
+from edf_stitch.core.system.errors import BadRequest, UnreadableImage
+from edf_stitch.synthetic_scenes.two_planes import Pair
+
+
+def silent(_what: str, _share: float) -> None:
+    pass
+
+
+def sequence(folder: Path, stem: str, first: int, pictures: list[np.ndarray]) -> Path:
+    """Files STEM0012.png and on; returns the first."""
+    for at, picture in enumerate(pictures):
+        cv2.imwrite(str(folder / f"{stem}{first + at:04d}.png"), picture[..., ::-1])
+    return folder / f"{stem}{first:04d}.png"
+
+
+def movie(path: Path, pictures: list[np.ndarray]) -> Path:
+    height, width = pictures[0].shape[:2]
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25, (width, height))
+    for picture in pictures:
+        writer.write(np.ascontiguousarray(picture[..., ::-1]))
+    writer.release()
+    return path
+
+
+GRAYS = [np.full((32, 48, 3), level, np.uint8) for level in (40, 80, 120, 160)]
+
+
+def test_a_sequence_is_laid_out_by_the_programs_numbers(tmp_path: Path) -> None:
+    path = sequence(tmp_path, "shot_v2.", 12, GRAYS)
+    (tmp_path / "shot_v2.0014.png").unlink()
+    pattern = lay_out({"path": str(path), "start": 1}, range(2, 6), tmp_path / "out", silent)
+    assert pattern.name == "frame_%06d.png"
+    assert sorted(one.name for one in pattern.parent.iterdir()) == ["frame_000002.png", "frame_000004.png"]
+    assert cv2.imread(str(pattern.parent / "frame_000004.png")).mean() == 160
+    ages = [(folder / name).stat().st_mtime_ns for folder, name in (
+        (pattern.parent, "frame_000004.png"), (tmp_path, "shot_v2.0015.png"),
+    )]  # fmt: skip
+    assert ages[0] == ages[1]
+
+
+def test_a_movie_is_laid_out_as_pictures_as_old_as_it(tmp_path: Path) -> None:
+    path = movie(tmp_path / "shot.avi", GRAYS)
+    pattern = lay_out({"path": str(path), "start": 10}, range(11, 13), tmp_path / "out", silent)
+    found = sorted(pattern.parent.iterdir())
+    assert [one.name for one in found] == ["frame_000011.png", "frame_000012.png"]
+    assert [round(cv2.imread(str(one)).mean() / 10) for one in found] == [8, 12]
+    assert {one.stat().st_mtime_ns for one in found} == {path.stat().st_mtime_ns}
+
+
+def test_what_is_no_clip_is_refused_in_words(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "still.png"), GRAYS[0])
+    (tmp_path / "not.mp4").write_bytes(b"no movie")
+    with pytest.raises(BadRequest, match="no number in its name"):
+        lay_out({"path": str(tmp_path / "still.png"), "start": 1}, range(1, 2), tmp_path / "out", silent)
+    with pytest.raises(UnreadableImage, match="is no movie"):
+        lay_out({"path": str(tmp_path / "not.mp4"), "start": 1}, range(1, 2), tmp_path / "out", silent)
+
+
+def test_clips_that_count_differently_become_one_and_are_gone_on_with(tmp_path: Path, small_pair: Pair) -> None:
+    (tmp_path / "in").mkdir()
+    left = sequence(tmp_path / "in", "left_", 1, [small_pair.reference] * 3)
+    right = sequence(tmp_path / "in", "right_", 101, [small_pair.target] * 3)
+    clip = {
+        "cameras": [{"path": str(left), "start": 1}, {"path": str(right), "start": 1}],
+        "first": 1, "last": 2, "folder": str(tmp_path / "out"), "name": "both", "suffix": ".png",
+    }  # fmt: skip
+    said: list[str] = []
+
+    def run(**changed: int) -> dict:
+        options = StitchOptions(dense=False)
+        stitch_clip(tmp_path, {**clip, **changed}, options, lambda what, _: said.append(what), lambda: False)
+        return json.loads((tmp_path / "result.json").read_text("utf-8"))
+
+    found = run()
+    assert (found["frames"], found["done"], found["skipped"], found["failed"]) == ([1, 2], 2, 0, "")
+    assert found["path"] == str(tmp_path / "out" / "both" / "both_000001.png") and Path(found["path"]).is_file()
+    assert any(what.startswith("frame 2 of 2: ") for what in said)
+    assert not (tmp_path / "out" / ".edf_frames").exists(), "what was laid out goes"
+    assert (run()["done"], run()["skipped"]) == (0, 2)
