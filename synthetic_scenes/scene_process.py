@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.choices import RIVALS
-from ..core.measure.report import plain
+from ..core.system.json_values import plain
 from ..core.output.json_file import json_bytes
 from ..core.system.errors import StitchError
 from ..core.system.output_files import OutputFiles

@@ -178,7 +178,7 @@ def _batch(args: argparse.Namespace) -> int:
         from ..batch.outcomes import Outcome
         from ..batch.pieces import BatchRequest
         from ..batch.run import run_batch
-        from ..measure.report import plain
+        from ..system.json_values import plain
         from ..system.memory import use_again
 
     use_again()

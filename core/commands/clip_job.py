@@ -23,7 +23,7 @@ import cv2
 
 from ..batch.list import BatchItem, find_frames
 from ..batch.run import Outcome, run_batch
-from ..batch.units import BatchRequest
+from ..batch.pieces import BatchRequest
 from ..options import StitchOptions
 from ..pictures.listing import SUFFIXES
 from ..system.errors import BadRequest, StitchError, UnreadableImage

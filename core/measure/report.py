@@ -18,6 +18,7 @@ from ..panorama.canvas import Canvas
 from ..panorama.levelling import angles_of
 from ..panorama.warp import build_map
 from ..raster.arrays import Array
+from ..system.json_values import plain
 from .exposure_entry import exposure_entry, exposure_warnings
 from .focal_doubt import focal_doubt
 from .held_out import held_out
@@ -274,16 +275,3 @@ def dense_entry(dense: Dense | DenseSphere | None, told: Sequence[str]) -> dict[
 
 def _median(values: Array) -> float:
     return float(np.median(values)) if values.size else math.nan
-
-
-def plain(value: Any) -> Any:
-    """A value with what JSON lacks replaced: arrays by lists, NumPy's numbers by Python's, NaN and infinity by None."""
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (float, np.floating)):
-        return float(value) if math.isfinite(value) else None
-    return value.item() if isinstance(value, np.generic) else value

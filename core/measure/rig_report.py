@@ -14,6 +14,7 @@ from ..compose.window import goes_round
 from ..field.sphere_field import SphereField
 from ..panorama.canvas import Canvas
 from ..raster.enlarging import enlarged_box
+from ..system.json_values import plain
 from .exposure_entry import exposure_entry, exposure_warnings
 from .options import RIG, WARNING
 from .report import (
@@ -25,7 +26,6 @@ from .report import (
     left_out_entry,
     options_entry,
     picture_entry,
-    plain,
     slide_entry,
 )
 from .rig_figures import focal_spread, map_errors, residuals, scale_kind, shares, weak_links

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from ..measure.report import plain
+from ..system.json_values import plain
 
 
 def json_bytes(value: dict[str, Any]) -> bytes:

@@ -15,7 +15,6 @@ from edf_stitch.core.cameras.projective import distance_to_line, project, rotati
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.frames import preview
 from edf_stitch.core.frames.options import PREVIEW
-from edf_stitch.core.measure.report import plain
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.camera_file import camera_table
 from edf_stitch.core.output.depth.range_image import range_image
@@ -27,6 +26,7 @@ from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.pose import features
 from edf_stitch.core.system.errors import BadRequest, Cancelled, NoOverlap
+from edf_stitch.core.system.json_values import plain
 from edf_stitch.core.system.output_files import OutputFiles
 
 from ..conftest import camera_of

@@ -19,7 +19,7 @@ from edf_stitch.core.choices import FIELDS, RIVALS
 from edf_stitch.core.field.folding import folds, turning
 from edf_stitch.core.field.transfer import target_points
 from edf_stitch.core.fields import fit_field
-from edf_stitch.core.measure.report import make_report, plain
+from edf_stitch.core.measure.report import make_report
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.projection import round_projection
 from edf_stitch.core.panorama.warp import build_warp
@@ -58,15 +58,6 @@ def report_of(
 def strict(small_pair: Pair, known: StitchOptions) -> StitchResult:
     """The small pair by the strict field."""
     return stitch((small_pair.reference, small_pair.target), replace(known, field="strict"))
-
-
-def test_numbers_json_has_no_word_for_become_null() -> None:
-    value = {
-        "nan": float("nan"), "inf": [np.inf, -np.float32("inf")], "array": np.array([[1.5, np.nan], [np.inf, 2]]),
-        "deep": [{"tuple": (np.float64("nan"), 1)}],
-    }  # fmt: skip
-    assert plain(value) == {
-        "nan": None, "inf": [None, None], "array": [[1.5, None], [None, 2.0]], "deep": [{"tuple": [None, 1]}]}
 
 
 def with_holes(result: StitchResult, holes: int) -> StitchResult:
@@ -118,15 +109,6 @@ def test_filled_holes_are_counted_and_said(small_result: StitchResult) -> None:
     report, spoken = report_of(with_holes(small_result, holes), holes="inpaint", inpainted=holes)
     assert report["composition"]["inpainted_px"] == report["composition"]["hole_px"] == holes
     assert any("filled smoothly" in line for line in spoken)
-
-
-def test_numpys_numbers_become_pythons() -> None:
-    value = plain({"i": np.int64(3), "b": np.bool_(True), "f": np.float32(0.5), "a": np.arange(2), "s": "word",
-                   "n": None, "t": True, "flags": np.array([True]), "scalar": np.array(4.0)})  # fmt: skip
-    assert value == {"i": 3, "b": True, "f": 0.5, "a": [0, 1], "s": "word", "n": None, "t": True, "flags": [True],
-                     "scalar": 4.0}  # fmt: skip
-    assert type(value["i"]) is int and type(value["b"]) is bool and type(value["f"]) is float
-    json.dumps(value, allow_nan=False)
 
 
 def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
