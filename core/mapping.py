@@ -58,11 +58,12 @@ class Mapped:
 @dataclass(frozen=True, eq=False)
 class AllEdges:
     """Straight edges (N) of each picture whose orientation is known, in the reference's frame, found when asked for;
-    tick is called before each picture."""
+    tick is called before each picture; cache: where it is kept which way is down."""
 
     pictures: Sequence[Picture]
     views: Sequence[View]
     tick: Tick = unwatched
+    cache: Cache = Cache(None)
 
     @cached_property
     def each(self) -> list[StraightEdges]:
@@ -82,10 +83,10 @@ class AllEdges:
     @cached_property
     def down(self) -> Array:
         """The unit vector (3,) along gravity."""
-        rotations = [view.R for view in self.views if np.isfinite(view.R).all()]
+        rotations = tuple(view.R for view in self.views if np.isfinite(view.R).all())
         edges = self.together
         self.tick()
-        return gravity_by_edges(rotations, *edges)
+        return self.cache.remember("down", (rotations, *edges), lambda: gravity_by_edges(rotations, *edges))
 
     @cached_property
     def down_is_sure(self) -> bool:
@@ -198,7 +199,7 @@ def map_rig(
     if options.surface[0] == "reference":
         still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
         return Mapped(build_rig_warp(surface, tick=tell), None, still)
-    lines = AllEdges(pictures, views, tell)
+    lines = AllEdges(pictures, views, tell, Cache(options.cache))
     slide, viewpoint = _rig_slide(surface, lines, options, lambda share: tell(0.3 * share))
     surface = surface.seen_from(viewpoint)
     tell(0.3)

@@ -61,6 +61,12 @@ class StitchOptions:
         is not named: nothing.
     ignore_in : tuple of (str, Path or ndarray), default empty
         The same by the names of pictures, with or without their suffix.
+    show : tuple of (str, Path or ndarray), default empty
+        By pictures' names, masks of what the panorama is to show of them, white = from this picture, wherever seams are
+        cut; of two masks for one place that of the later picture counts.
+    show : tuple of (int or str, Path or ndarray), default empty
+        By a picture's number, from 1, or name, a mask of what the panorama is to show of it, wherever seams are cut:
+        white = from this picture. Where those of two pictures meet, the later picture counts.
     viewpoint : int, str or None, default None
         The picture from whose place a panorama of more than two is seen: its number, counted from 1, its name, or
         "centre" for the one that is best connected with all others. By default the first that connects with others.
@@ -129,6 +135,7 @@ class StitchOptions:
     matches: Path | NDArray[Any] | None = None
     ignore: tuple[Path | NDArray[Any] | None, ...] = ()
     ignore_in: tuple[tuple[str, Path | NDArray[Any]], ...] = ()
+    show: tuple[tuple[int | str, Path | NDArray[Any]], ...] = ()
     viewpoint: int | str | None = None
     require_all: bool = False
     brackets: Brackets = "auto"
@@ -161,6 +168,13 @@ class StitchOptions:
         masks = [self.ignored(number) for number in range(len(names))]
         for name, mask in self.ignore_in:
             masks[number_of(name, names, "--ignore")] = mask
+        return masks
+
+    def shown_in(self, names: Sequence[str]) -> list[Path | NDArray[Any] | None]:
+        """The mask of what is to be shown of each of the pictures of these names. Raises BadRequest as `ignored_in`."""
+        masks: list[Path | NDArray[Any] | None] = [None] * len(names)
+        for name, mask in self.show:
+            masks[number_of(name, names, "--show") if isinstance(name, str) else name - 1] = mask
         return masks
 
     def check_goes_with(self, count: int) -> None:
@@ -219,7 +233,8 @@ class StitchOptions:
     @property
     def files_read(self) -> list[Path]:
         """The files that these options name."""
-        named = (self.camera.cameras, self.matches, *self.ignore, *(mask for _, mask in self.ignore_in), self.mask)
+        by_name = (mask for _, mask in (*self.ignore_in, *self.show))
+        named = (self.camera.cameras, self.matches, *self.ignore, *by_name, self.mask)
         return [Path(one) for one in named if isinstance(one, (str, Path))]
 
     def __post_init__(self) -> None:

@@ -19,17 +19,19 @@ from .operators import (
     match_pointing,
     opening,
     picture_list,
+    picture_masks,
     saving,
     scene_objects,
     stitch,
+    taking,
 )
-from .overlays import drawing
+from .overlays import drawing, strokes
 from .panels import elsewhere, presets, sidebar
 
 # Registered in this order, unregistered in the opposite one; each has register() and unregister().
 REGISTERED = (
     properties, modal, following, stitch, opening, picture_list, saving, match_editing, match_pointing, mask_painting,
-    scene_objects, presets, sidebar, elsewhere, drawing,
+    picture_masks, taking, scene_objects, presets, sidebar, elsewhere, drawing, strokes,
 )  # fmt: skip
 _commands: list[Any] = []
 _registered: list[Any] = []

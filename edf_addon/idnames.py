@@ -38,6 +38,10 @@ class Operator(StrEnum):
     MATCH_EDIT = "edf.match_edit"
     MASK_PAINT = "edf.mask_paint"
     MASK_DONE = "edf.mask_done"
+    PICTURE_MASK = "edf.picture_mask"
+    PICTURE_MASK_REMOVE = "edf.picture_mask_remove"
+    TAKE_FROM = "edf.take_from"
+    PLACE_REMOVE = "edf.place_remove"
     POINTER = "edf.pointer"
     CREATE_CAMERAS = "edf.create_cameras"
     DEPTH_MESH = "edf.depth_mesh"
@@ -74,6 +78,7 @@ class List(StrEnum):
 
     PICTURES = "EDF_UL_pictures"
     MATCHES = "EDF_UL_matches"
+    PLACES = "EDF_UL_places"
 
 
 # Where the properties hang: bpy.types.Scene.edf_stitch (settings), bpy.types.WindowManager.edf_stitch_job.

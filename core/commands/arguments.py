@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..choices import (
     BLENDS,
@@ -122,6 +122,10 @@ def _add_control(parser: argparse.ArgumentParser) -> None:
     control.add_argument(
         "--ignore", type=_named_mask, action="append", default=[], metavar="NAME=MASK",
         help="the same for the picture of that name; may be given for several",
+    )  # fmt: skip
+    control.add_argument(
+        "--show", type=_named_mask, action="append", default=[], metavar="NAME=MASK",
+        help="a picture, white where the panorama is to come from the one of that name; may be given for several",
     )  # fmt: skip
     control.add_argument(
         "--scale", type=float, default=1.0, metavar="S", help="resize all pictures by S ≤ 1 first, for a fast preview"
@@ -240,6 +244,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         matches=args.matches,
         ignore=(args.ignore_ref, args.ignore_target) if args.ignore_ref or args.ignore_target else (),
         ignore_in=tuple(args.ignore),
+        show=tuple(args.show),
         viewpoint=args.viewpoint,
         require_all=args.require_all,
         brackets=args.brackets,
@@ -283,6 +288,12 @@ def numbered(options: StitchOptions, pictures: Sequence[Path]) -> StitchOptions:
         if masks[number] is not None:
             raise BadRequest(f"--ignore: {name} has another mask already: paint both into one")
         masks[number] = mask
+    shown: dict[int, Any] = {}
+    for one, mask in options.show:
+        number = number_of(str(one), names, "--show")
+        if number in shown:
+            raise BadRequest(f"--show: {one} has another mask already: paint both into one")
+        shown[number] = mask
     viewpoint = options.viewpoint
     if isinstance(viewpoint, int) and viewpoint > count:
         raise BadRequest(f"the viewpoint is picture {viewpoint}, and only {count} are given")
@@ -290,12 +301,13 @@ def numbered(options: StitchOptions, pictures: Sequence[Path]) -> StitchOptions:
         viewpoint = number_of(viewpoint, names, "--viewpoint") + 1
     scale = options.scale_metres
     if scale is not None:
-        one, other = (
+        first, other = (
             number_of(name, names, "--scale-metres") + 1 if isinstance(name, str) else name for name in scale[:2]
         )
-        scale = one, other, scale[2]
+        scale = first, other, scale[2]
     return replace(
-        options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint, scale_metres=scale
+        options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint, scale_metres=scale,
+        show=tuple((number + 1, mask) for number, mask in shown.items()),
     )  # fmt: skip
 
 

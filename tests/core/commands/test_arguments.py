@@ -63,6 +63,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--ignore-target", "b.png"], {"ignore": (None, Path("b.png"))}),
     (["--ignore", "a.jpg=m.png", "--ignore", "b=c=n.png"],
      {"ignore_in": (("a.jpg", Path("m.png")), ("b=c", Path("n.png")))}),
+    (["--show", "a.jpg=m.png", "--show", "b=c=n.png"], {"show": (("a.jpg", Path("m.png")), ("b=c", Path("n.png")))}),
     (["--viewpoint", "3"], {"viewpoint": 3}), (["--viewpoint", "3.png"], {"viewpoint": "3.png"}),
     (["--viewpoint", "centre"], {"viewpoint": "centre"}), (["--require-all"], {"require_all": True}),
     (["--scale", "0.5", "--crop", "inscribed"], {"scale": 0.5, "crop": "inscribed"}),
