@@ -44,14 +44,17 @@ def report_of(context: Any) -> dict[str, Any] | None:
     return None if found is None else found["report"]
 
 
+def is_of_chosen(settings: Any, image: bpy.types.Image | None) -> bool:
+    """Whether an image is a panorama of the pictures that are chosen now."""
+    made_of = ownership.pictures(image)
+    return len(made_of) > 1 and made_of == pictures.images(settings)
+
+
 def settings_then(settings: Any, image: bpy.types.Image | None) -> Any:
     """The settings that an image was made with, as attributes, where it is a panorama of the pictures that are chosen
     now; else None."""
-    found = result.read(image)
-    chosen = pictures.images(settings)
-    if found is None or not chosen or ownership.pictures(image) != chosen:
-        return None
-    return SimpleNamespace(**earlier.kept_now(found["settings"]))
+    found = result.read(image) if is_of_chosen(settings, image) else None
+    return None if found is None else SimpleNamespace(**earlier.kept_now(found["settings"]))
 
 
 def is_behind(settings: Any, image: bpy.types.Image | None) -> bool:

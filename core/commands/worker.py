@@ -6,7 +6,8 @@ the end {"done": true} or {"error", "kind", "exit_code"}. The work ends on SIGIN
 closes, so that it never outlives whoever started it; FOLDER goes then too. Exit status as the command's.
 
 job.json: `pictures`, of two the reference first: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as
-shown; "exif_of": a file whose EXIF (orientation included) belongs to the array. `options`: fields of StitchOptions,
+shown; "exif_of": a file whose EXIF (orientation included) belongs to the array; "digest": whether result.json is to
+tell its content. `options`: fields of StitchOptions,
 their `camera` those of CameraRequest. `cameras` of two pictures: {"lens": fields of BlenderLens but the resolution,
 "matrix_world"} each. `masks`: for each picture an .npy, rows as shown, or null; `shown`: the same of what is to be
 shown of them, and `places`: {"picture": its number, "circles": x, y, radius in px of it upright}; `seam`: an .npy over
@@ -127,7 +128,9 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
 def _stitched(folder: Path, job: dict[str, Any], stop: _Stop) -> tuple[Any, tuple[int, ...], Any]:
     """The result of a job, the orientations of its pictures, and the matches that were given as rows."""
     from ..pipeline import stitch
+    from .digests import digests_of
 
+    job["digests"] = digests_of(folder, job)  # as they are when they are read
     pictures, turns = _pictures(folder, job)
     sizes = {number: picture.view.shape[1::-1] for number, picture in enumerate(pictures)}
     options, rows = _options(folder, job, pictures, turns, sizes)

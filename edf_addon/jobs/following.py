@@ -40,9 +40,9 @@ def changed(settings: Any) -> None:
 
 
 def ask(settings: Any) -> None:
-    """A mask or a place was changed: begin soon."""
+    """An operator changed a mask or a place: begin soon. One undo takes back both that and what follows."""
     global _asked
-    _asked = True
+    _asked = not bpy.app.background
     changed(settings)
 
 
@@ -56,6 +56,8 @@ def make_job(context: bpy.types.Context, folder: Path) -> tuple[dict[str, Any], 
         kept = (found or {}).get("kept") or job["kept"]
         job |= {"kept": kept, "small": True, "take": []}
         memory["kept"] = kept
+        if found is not None:
+            memory["pictures"] = found["pictures"]
     else:
         job, memory = stitching.make_job(context, folder, _scale_of_pair(settings), found)
     job["options"]["measure"] = False
@@ -116,14 +118,14 @@ def _begin() -> float | None:
     global _asked
     for window in bpy.context.window_manager.windows:
         settings = properties.settings_of(window.scene)
-        is_known = editor.settings_then(settings, settings.result) is not None
+        is_known = editor.is_of_chosen(settings, settings.result)
         if not (editor.is_behind(settings, settings.result) or (_asked and is_known)):
             continue
         if modal.is_working():
             return AGAIN
-        _asked = False
+        joins, _asked = _asked, False
         with bpy.context.temp_override(window=window):
-            getattr(bpy.ops.edf, idnames.Operator.FOLLOW.partition(".")[2])("INVOKE_DEFAULT")
+            getattr(bpy.ops.edf, idnames.Operator.FOLLOW.partition(".")[2])("INVOKE_DEFAULT", joins=joins)
         return None
     _asked = False
     modal.end_ahead()

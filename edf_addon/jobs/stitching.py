@@ -70,7 +70,10 @@ def make_job(
     wanted = [name for name in ("layers", "masks", "depth") if getattr(settings, f"take_{name}")]
     job: dict[str, Any] = {
         "pictures": [
-            images.describe(image, f"picture_{number}", folder, scene, user) for number, image in enumerate(chosen)
+            # neither a render nor a sequence, which is many pictures, has a content that it is known by
+            {**images.describe(image, f"picture_{number}", folder, scene, user),
+             "digest": image.type != "RENDER_RESULT" and image.source != "SEQUENCE"}
+            for number, image in enumerate(chosen)
         ],
         "options": engine_options.options_of(SimpleNamespace(**kept), scale, is_set),
         "take": wanted if scale is None else [],
@@ -84,7 +87,7 @@ def make_job(
         _add_what_a_pair_has(job, context, folder, found)
     memory = {
         "scene": scene.session_uid, "settings": kept,
-        "pictures": ownership.describe(chosen), "cameras": job.get("cameras"), "kept": job.get("kept"),
+        "pictures": job["pictures"], "cameras": job.get("cameras"), "kept": job.get("kept"),
         # a reference to any of these would not survive an undo while the work goes on
         "held": [image.session_uid for image in chosen],
         "chosen": {
@@ -229,9 +232,11 @@ def _bring_all(
     }  # fmt: skip
     for what, one in others.items():
         result.attach(panorama, what, one)
-    kept = {key: value for key, value in found.items() if key != "files"}
-    remembered = {name: memory[name] for name in ("settings", "pictures", "cameras", "kept", "places")}
-    result.store(panorama, {**kept, "kind": kind, **remembered})
+    kept = {key: value for key, value in found.items() if key not in ("files", "digests")}
+    remembered = {name: memory[name] for name in ("settings", "cameras", "kept", "places")}
+    digests = found.get("digests") or [""] * len(memory["pictures"])
+    described = ownership.describe(memory["pictures"], digests)
+    result.store(panorama, {**kept, "kind": kind, "pictures": described, **remembered})
     everything = [*bpy.data.images, *bpy.data.objects]
     chosen = {name: compat.by_uid(everything, uid) for name, uid in memory["chosen"].items()}
     ownership.hold(panorama, [compat.by_uid(bpy.data.images, uid) for uid in memory["held"]], chosen)

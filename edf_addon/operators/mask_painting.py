@@ -67,7 +67,7 @@ class EDF_OT_mask_done(bpy.types.Operator):  # noqa: N801
         settings = properties.settings_of(context.scene)
         of_row = pictures.mask_of(settings, context.space_data.image)
         picture = picture_of(context, painted_for(context) or "reference") if of_row is None else of_row[0].image
-        if of_row is not None and editor.settings_then(settings, settings.result) is not None:
+        if of_row is not None and editor.is_of_chosen(settings, settings.result):
             picture = settings.result  # which follows the mask
         context.space_data.image, context.space_data.ui_mode = picture, "VIEW"
         following.ask(settings)

@@ -153,7 +153,7 @@ def why_not(context: Any) -> str:
     settings, panorama = properties.settings_of(context.scene), editor.panorama(context)
     if panorama is None:
         return "Stitch first: places are drawn over the panorama"
-    if editor.settings_then(settings, panorama) is None:
+    if not editor.is_of_chosen(settings, panorama):
         return "Other pictures are in the list than this panorama was made of: stitch again, or Restore Settings"
     return ""
 

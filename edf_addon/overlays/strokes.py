@@ -36,15 +36,18 @@ def draw() -> None:
 
     context = bpy.context
     space, settings = context.space_data, properties.settings_of(context.scene)
-    circles = circles_on(settings, space.image) if space.overlay.show_overlays else []
-    if not circles or not all(space.image.size):
+    image = space.image
+    if image is None or not space.overlay.show_overlays or not all(image.size):
+        return
+    circles = circles_on(settings, image)
+    if not circles:
         return
     import gpu
 
     from . import overlay_geometry
 
     gpu.state.blend_set("ALPHA")
-    view = drawing.View(context, settings, space.image)
+    view = drawing.View(context, settings, image)
     ends = np.concatenate([overlay_geometry.rings(np.array([[x, y]]), radius) for x, y, radius in circles])
     ends = view.at(ends.astype(np.float64))
     drawing.lines(ends, drawing.SHADE, view, 2 * drawing.LINE_WIDTH)
