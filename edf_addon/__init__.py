@@ -14,6 +14,7 @@ import bpy
 from . import properties
 from .jobs import command, following, modal
 from .operators import (
+    guiding,
     mask_painting,
     match_editing,
     match_pointing,
@@ -31,7 +32,7 @@ from .panels import elsewhere, presets, sidebar
 # Registered in this order, unregistered in the opposite one; each has register() and unregister().
 REGISTERED = (
     properties, modal, following, stitch, opening, picture_list, saving, match_editing, match_pointing, mask_painting,
-    picture_masks, taking, scene_objects, presets, sidebar, elsewhere, drawing, strokes,
+    picture_masks, taking, guiding, scene_objects, presets, sidebar, elsewhere, drawing, strokes,
 )  # fmt: skip
 _commands: list[Any] = []
 _registered: list[Any] = []

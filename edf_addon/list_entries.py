@@ -4,7 +4,7 @@
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
 
 from . import offered, pictures
 
@@ -60,6 +60,18 @@ class EDF_PG_picture(bpy.types.PropertyGroup):  # noqa: N801
     show: PointerProperty(
         name="Use Here", type=bpy.types.Image,
         description="An image of the picture's shape: what is white in it comes from this picture",
+    )
+
+
+class EDF_PG_guide(bpy.types.PropertyGroup):  # noqa: N801
+    """A line in a picture that is upright or level."""
+
+    picture: PointerProperty(name="Picture", type=bpy.types.Image, description="The picture that it lies in")
+    kind: EnumProperty(name="Kind", items=offered.GUIDES, update=look_again)
+    use: BoolProperty(name="Use", description="Whether level holds to it", default=True, update=look_again)
+    ends: FloatVectorProperty(
+        name="Ends", description="Column and row of both ends, in pixels of the upright picture", size=4,
+        update=look_again,
     )
 
 

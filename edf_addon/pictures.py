@@ -88,6 +88,15 @@ def places(settings: Any) -> list[dict[str, Any]]:
     ]
 
 
+def guides(settings: Any) -> list[list[Any]]:
+    """The guides in pictures that are used: the number of the picture, the kind by the engine's name, and both ends."""
+    chosen = images(settings)
+    return [
+        [chosen.index(guide.picture), guide.kind.lower(), list(guide.ends)]
+        for guide in settings.guides if guide.use and guide.picture is not None and guide.picture in chosen
+    ]
+
+
 def add_place(settings: Any, picture: Any, circles: Sequence[Sequence[float]]) -> None:
     """A place comes from a picture from now on: circles of column, row and radius, px of it upright."""
     place = settings.places.add()
@@ -95,15 +104,19 @@ def add_place(settings: Any, picture: Any, circles: Sequence[Sequence[float]]) -
     settings.place_index = len(settings.places) - 1
 
 
-def bring_back(settings: Any, held: Mapping[str, Any], told: Sequence[Mapping[str, Any]]) -> None:
-    """The masks of the pictures, which are all used, and the places, as a panorama has them: held by `masks`' keys,
-    told as `places` gave them."""
+def bring_back(settings: Any, held: Mapping[str, Any], known: Mapping[str, Any]) -> None:
+    """The masks of the pictures, which are all used, places and guides as a panorama has them: held by `masks`' keys,
+    known as `places` and `guides` gave them."""
     for number, entry in enumerate(used(settings)):
         for kind in MASKS:
             setattr(entry, kind, held.get(f"{number} {kind}"))
     settings.places.clear()
-    for place in told:
+    for place in known.get("places", ()):
         add_place(settings, images(settings)[place["picture"]], place["circles"])
+    settings.guides.clear()
+    for number, kind, ends in known.get("guides", ()):
+        guide = settings.guides.add()
+        guide.picture, guide.kind, guide.ends = images(settings)[number], kind.upper(), ends
 
 
 def mask_of(settings: Any, image: Any) -> tuple[Any, str] | None:

@@ -20,7 +20,7 @@ from bpy.props import (
 
 from . import earlier, idnames, offered, pictures, status
 from .bridge import compat
-from .list_entries import EDF_PG_match, EDF_PG_picture, EDF_PG_place, look_again
+from .list_entries import EDF_PG_guide, EDF_PG_match, EDF_PG_picture, EDF_PG_place, look_again
 
 # Called with a scene's settings when an artist changes what of the scene the panorama shows, from where, or its look.
 on_reframe: list[Callable[[Any], None]] = []
@@ -215,6 +215,10 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         name="Ignore in Target", type=bpy.types.Image,
         description="An image of the target's shape: what is white in it is kept out of everything",
     )
+    guides: CollectionProperty(
+        name="Guides", type=EDF_PG_guide, description="Upright and level lines that Level ▸ Automatic holds to",
+    )
+    guide_index: IntProperty(name="Active Guide", default=0, min=0, options={"SKIP_SAVE"})
     places: CollectionProperty(
         name="Places", type=EDF_PG_place, description="Places of the panorama that come from a certain picture",
     )
@@ -294,9 +298,9 @@ PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ig
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))
 # What is no setting: what is stitched, what came of it, and how it is looked at.
 NO_SETTINGS = frozenset({"name", "pictures", "picture_index", "result", "matches", "matches_reference",
-                         "matches_target", "match_index", "places", "place_index", "version", "exposure", "overlay",
-                         "overlay_opacity",
-                         "show_matches", "show_epipolar", "show_places"})  # fmt: skip
+                         "matches_target", "match_index", "places", "place_index", "guides", "guide_index", "version",
+                         "exposure", "overlay", "overlay_opacity", "show_matches",
+                         "show_epipolar", "show_places"})  # fmt: skip
 
 
 def names_of_settings(settings: Any) -> list[str]:
@@ -360,7 +364,7 @@ def _handlers() -> list[list[Any]]:
     return [getattr(bpy.app.handlers, name) for name in names if hasattr(bpy.app.handlers, name)]
 
 
-CLASSES = (EDF_PG_match, EDF_PG_picture, EDF_PG_place, EDF_PG_settings, EDF_PG_job)
+CLASSES = (EDF_PG_match, EDF_PG_picture, EDF_PG_place, EDF_PG_guide, EDF_PG_settings, EDF_PG_job)
 
 
 def register() -> None:

@@ -15,6 +15,7 @@ from ..choices import (
     EXPOSURES,
     FADES,
     FIELDS,
+    GUIDES,
     HOLES,
     PROJECTIONS,
     SEAMS,
@@ -159,6 +160,11 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
         "pixel of it kept), perspective (a plane), pannini[:D] (D from 0, a plane, to 1), cylindrical, or "
         "equirectangular (the whole sphere)",
     )  # fmt: skip
+    for kind, where in zip(GUIDES, ("upright", "level"), strict=True):
+        how.add_argument(
+            f"--{kind}", type=_line, action="append", default=[], metavar="NAME=X,Y,X2,Y2",
+            help=f"a line in the picture of that name, px, that is {where}, which auto holds to; may be repeated",
+        )
     how.add_argument(
         "--level", default="auto", metavar="LEVEL",
         help="how all but reference are turned: auto (default: upright), none (as REF), or YAW,PITCH,ROLL of "
@@ -245,6 +251,7 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         ignore=(args.ignore_ref, args.ignore_target) if args.ignore_ref or args.ignore_target else (),
         ignore_in=tuple(args.ignore),
         show=tuple(args.show),
+        guides=tuple((name, kind, ends) for kind in GUIDES for name, ends in getattr(args, kind)),
         viewpoint=args.viewpoint,
         require_all=args.require_all,
         brackets=args.brackets,
@@ -308,6 +315,7 @@ def numbered(options: StitchOptions, pictures: Sequence[Path]) -> StitchOptions:
     return replace(
         options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint, scale_metres=scale,
         show=tuple((number + 1, mask) for number, mask in shown.items()),
+        guides=tuple((number_of(str(one), names, f"--{kind}") + 1, kind, ends) for one, kind, ends in options.guides),
     )  # fmt: skip
 
 
@@ -352,6 +360,14 @@ def _named_mask(text: str) -> tuple[str, Path]:
     if not name or not mask:
         raise argparse.ArgumentTypeError(f"{text!r} is not like NAME=MASK: a picture's name and the mask's file")
     return name, Path(mask)
+
+
+def _line(text: str) -> tuple[str, tuple[float, ...]]:
+    name, _, numbers = text.rpartition("=")
+    ends = _numbers(numbers) if name else ()
+    if len(ends) != 4:
+        raise argparse.ArgumentTypeError(f"{text!r} is not like NAME=X,Y,X2,Y2: a picture's name and two points in px")
+    return name, ends
 
 
 def _projection(text: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from ..alignment import Geometry, estimate_geometry, fit_and_warp
 from ..frames.frame import Frame, size_of
 from ..frames.preview import first_share
-from ..frames.reading import read_frame
+from ..frames.reading import guides_of, read_frame
 from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_wanted, without
 from ..pictures.picture import Picture
@@ -69,6 +69,15 @@ class Kept:
             shown.append(picture)
         return replace(self.frame, pictures=tuple(shown))
 
+    def guided(self, options: StitchOptions) -> Frame:
+        """The frame with the lines that options hold its level to."""
+        lines = dict(zip(self.given, options.guides_in(self.given), strict=True))
+        shown = tuple(
+            replace(picture, guides=guides_of(lines.get(picture.name, ()), full))
+            for picture, full in zip(self.frame.pictures, self.frame.full_sizes, strict=True)
+        )
+        return replace(self.frame, pictures=shown)
+
 
 def kept_of(
     result: StitchResult, originals: Sequence[Picture], options: StitchOptions, turns: tuple[int, ...]
@@ -84,7 +93,7 @@ def kept_of(
         if picture.name in numbers else picture
         for picture in result.pictures
     ]  # fmt: skip
-    pictures = [replace(picture, wanted=None) for picture in pictures]
+    pictures = [replace(picture, wanted=None, guides=()) for picture in pictures]
     return _small(Frame(tuple(pictures), result.full_sizes), geometry, tuple(numbers), turns)
 
 
@@ -124,7 +133,7 @@ def recomposed(
     stopwatch = Stopwatch(Progress(told, cancelled, stages_of(len(kept.frame.pictures))))
     with asking(cancelled), at_most(RECOMPOSING.threads):
         # depth is that of the pictures without masks: a stroke more changes nothing of it
-        alignment = fit_and_warp(kept.geometry, [kept.frame], options, stopwatch)
+        alignment = fit_and_warp(kept.geometry, [kept.guided(options)], options, stopwatch)
         return compose(kept.masked(options), alignment, options, stopwatch)
 
 

@@ -7,14 +7,14 @@ closes, so that it never outlives whoever started it; FOLDER goes then too. Exit
 
 job.json: `pictures`, of two the reference first: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as
 shown; "exif_of": a file whose EXIF (orientation included) belongs to the array; "digest": whether result.json is to
-tell its content. `options`: fields of StitchOptions,
-their `camera` those of CameraRequest. `cameras` of two pictures: {"lens": fields of BlenderLens but the resolution,
-"matrix_world"} each. `masks`: for each picture an .npy, rows as shown, or null; `shown`: the same of what is to be
-shown of them, and `places`: {"picture": its number, "circles": x, y, radius in px of it upright}; `seam`: an .npy over
-the whole panorama. `matches`: .npy (N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as result.json
-had it in matches.file. `take`: which of "layers", "masks", "depth" to leave as pictures. `exr`: fields of ExrForm, for
-panorama and layers. `kept`: under which name what a set's stitch found is kept for small panoramas; with `small`, make
-such a one of it. Relative paths start at FOLDER. Or `try` alone: load the libraries, and no more.
+tell its content. `options`: fields of StitchOptions, their `camera` those of CameraRequest. `cameras` of two pictures:
+{"lens": fields of BlenderLens but the resolution, "matrix_world"} each. `masks`: for each picture an .npy, rows as
+shown, or null; `shown`: the same of what is to be shown of them, and `places`: {"picture": its number, "circles": x, y,
+radius in px of it upright}; `guides`: [number of a picture, one of GUIDES, [x, y, x', y'] in px of it upright]; `seam`:
+an .npy over the whole panorama. `matches`: .npy (N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as
+result.json had it in matches.file. `take`: which of "layers", "masks", "depth" to leave as pictures. `exr`: fields of
+ExrForm, for panorama and layers. `kept`: under which name what a set's stitch found is kept for small panoramas; with
+`small`, make such a one of it. Relative paths start at FOLDER. Or `try` alone: load the libraries, and no more.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ def _small(folder: Path, job: dict[str, Any], stop: _Stop) -> tuple[Any, tuple[i
 
     def anew() -> Kept:
         pictures, turns = _pictures(folder, job)
-        without = {**job, "masks": None, "shown": None, "places": ()}
+        without = {**job, "masks": None, "shown": None, "places": (), "guides": ()}
         options, _ = _options(folder, without, pictures, turns, {})
         return kept_anew(pictures, options, turns, _say_share)
 
@@ -202,6 +202,7 @@ def _options(
         matches=matches if rows is None else rows[rows[:, 4] > 0],
         ignore=tuple(_mask(folder, mask, turn) for mask, turn in zip(masks, turns, strict=True)),
         show=tuple((number + 1, shown[number]) for number in sorted(shown)),
+        guides=tuple((number + 1, kind, tuple(ends)) for number, kind, ends in job.get("guides", ())),
         mask=_mask(folder, job.get("seam"), 1),
         cache=default_folder(),
     )  # fmt: skip

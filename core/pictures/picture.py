@@ -56,7 +56,6 @@ class Picture:
     name : str
         File name, or "array".
     warnings : tuple of str
-        For the user.
     clips_at : float
         Light from which a float picture is clipped: camera RAW has such, others have infinity.
     surround : bool
@@ -67,6 +66,8 @@ class Picture:
         Where a date or a logo was found, which alpha hides.
     wanted : (H, W) bool, optional
         Where the panorama is to come from this picture.
+    guides : tuple of (str, (4,) floats)
+        Upright and level lines in it, by their names in GUIDES: x, y, x', y' as shares of its sides.
     """
 
     light: AnyImage
@@ -82,6 +83,7 @@ class Picture:
     part: SpherePart | None = None
     burnt_in: NDArray[np.bool_] | None = None
     wanted: NDArray[np.bool_] | None = None
+    guides: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     @property
     def pixels(self) -> NDArray[Any]:

@@ -96,12 +96,13 @@ def make_job(
         },
         "space": chosen[0].colorspace_settings.name, "edited": settings.edited_matches,
         "pack": settings.pack, "fake_user": settings.fake_user, "places": job["places"],
+        "guides": job["guides"],
     }  # fmt: skip
     return job, memory
 
 
 def _add_masks(job: dict[str, Any], settings: Any, folder: Path) -> None:
-    """What of each picture is never used, and what is to be shown."""
+    """What of each picture is never used, what is to be shown, and the lines that level holds to."""
     import numpy as np
 
     entries = pictures.used(settings)
@@ -114,7 +115,7 @@ def _add_masks(job: dict[str, Any], settings: Any, folder: Path) -> None:
         for name, mask in zip(job[key], masks[kind], strict=True):
             if mask is not None:
                 np.save(folder / name, images.read(mask))
-    job["places"] = pictures.places(settings)
+    job |= {"places": pictures.places(settings), "guides": pictures.guides(settings)}
 
 
 def _add_what_a_pair_has(
@@ -233,7 +234,7 @@ def _bring_all(
     for what, one in others.items():
         result.attach(panorama, what, one)
     kept = {key: value for key, value in found.items() if key not in ("files", "digests")}
-    remembered = {name: memory[name] for name in ("settings", "cameras", "kept", "places")}
+    remembered = {name: memory[name] for name in ("settings", "cameras", "kept", "places", "guides")}
     digests = found.get("digests") or [""] * len(memory["pictures"])
     described = ownership.describe(memory["pictures"], digests)
     result.store(panorama, {**kept, "kind": kind, "pictures": described, **remembered})

@@ -248,7 +248,7 @@ def bring_back(context: Any, image: bpy.types.Image | None) -> list[str]:
     with pair.choosing(settings):
         pictures.choose(settings, ownership.pictures(image))
         properties.restore(settings, found["settings"], ownership.chosen(image))
-        pictures.bring_back(settings, ownership.chosen(image), found.get("places", ()))
+        pictures.bring_back(settings, ownership.chosen(image), found)
         if "matches" in found:
             stitching.fill_matches(settings, found["matches"], edited=False)
     return ownership.changes(image) + ownership.camera_changes(image, context)

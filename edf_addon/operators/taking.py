@@ -167,7 +167,7 @@ def circles_in(
     from ..overlays import picture_points
 
     known: Any = result.read(panorama)
-    number = _number(known, panorama, picture)
+    number = number_in(known, panorama, picture)
     if number is None or not drawn:
         return []
     size = known["geometry"]["full_sizes"][number]
@@ -181,7 +181,7 @@ def circles_in(
     return [[float(x), float(y), float(r)] for (x, y), r in zip(at[shown], there[shown], strict=True)]
 
 
-def _number(known: dict[str, Any], panorama: bpy.types.Image, picture: bpy.types.Image) -> int | None:
+def number_in(known: dict[str, Any], panorama: bpy.types.Image, picture: bpy.types.Image) -> int | None:
     """The number of a picture among those whose cameras a result knows; None where it has no part in it."""
     given = ownership.pictures(panorama)
     if picture not in given:

@@ -1,4 +1,4 @@
-"""Circles over places that come from a certain picture, on that picture, and over those that are being drawn."""
+"""Circles over places that come from a certain picture, and guides, on that picture and while they are drawn."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from . import drawing
 
 # What is being drawn: px of the panorama (column, row, radius).
 pending: list[tuple[float, float, float]] = []
+# The guide that is being set: session_uid of the image, and both ends in px of it upright.
+line: dict[str, Any] = {}
 _handlers: list[Any] = []
 
 
@@ -22,12 +24,22 @@ def circles_on(settings: Any, image: bpy.types.Image | None) -> list[tuple[float
     if editor.side_of(settings, image) == editor.PANORAMA:
         return list(pending)
     picture = editor.beneath(settings, image)
+    if picture is None:
+        return []
     share = image.size[0] / max(1, picture.size[0])  # a mask may be smaller
     return [
         (x * share, y * share, radius * share)
         for place in settings.places if place.use and place.picture == picture
         for x, y, radius in json.loads(place.circles)
     ]  # fmt: skip
+
+
+def lines_on(settings: Any, image: bpy.types.Image | None) -> list[list[float]]:
+    """The guides, both ends in px of the upright picture, that are drawn over an image."""
+    if image is None:
+        return []
+    own = [line["ends"]] if line.get("image") == image.session_uid else []
+    return own + [list(guide.ends) for guide in settings.guides if guide.use and guide.picture == image]
 
 
 def draw() -> None:
@@ -39,8 +51,8 @@ def draw() -> None:
     image = space.image
     if image is None or not space.overlay.show_overlays or not all(image.size):
         return
-    circles = circles_on(settings, image)
-    if not circles:
+    circles, lines = circles_on(settings, image), lines_on(settings, image)
+    if not circles and not lines:
         return
     import gpu
 
@@ -48,8 +60,8 @@ def draw() -> None:
 
     gpu.state.blend_set("ALPHA")
     view = drawing.View(context, settings, image)
-    ends = np.concatenate([overlay_geometry.rings(np.array([[x, y]]), radius) for x, y, radius in circles])
-    ends = view.at(ends.astype(np.float64))
+    rings = [overlay_geometry.rings(np.array([[x, y]]), radius) for x, y, radius in circles]
+    ends = view.at(np.concatenate([*rings, np.reshape(lines, (-1, 2))]).astype(np.float64))
     drawing.lines(ends, drawing.SHADE, view, 2 * drawing.LINE_WIDTH)
     drawing.lines(ends, drawing.WAITING, view)
     gpu.state.blend_set("NONE")

@@ -20,7 +20,7 @@ import bpy
 from mathutils import Euler
 
 sys.path.insert(0, str(Path(__file__).parent))
-from in_window import image_editor, in_area, in_editor, point_at, show, sidebar  # noqa: E402
+from in_window import image_editor, in_area, in_editor, point_at, show, sidebar, window_region  # noqa: E402
 
 ARCHIVE, LEFT, RIGHT, OUT = (Path(argument) for argument in sys.argv[sys.argv.index("--") + 1 :])
 TAB, ADD_ON = "EDF Stitch", "bl_ext.user_default.edf_stitch"

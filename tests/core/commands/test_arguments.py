@@ -64,6 +64,8 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--ignore", "a.jpg=m.png", "--ignore", "b=c=n.png"],
      {"ignore_in": (("a.jpg", Path("m.png")), ("b=c", Path("n.png")))}),
     (["--show", "a.jpg=m.png", "--show", "b=c=n.png"], {"show": (("a.jpg", Path("m.png")), ("b=c", Path("n.png")))}),
+    (["--horizontal", "b=c=5,6,7,8", "--vertical", "a.jpg=1,2,3,4.5"],
+     {"guides": (("a.jpg", "vertical", (1.0, 2.0, 3.0, 4.5)), ("b=c", "horizontal", (5.0, 6.0, 7.0, 8.0)))}),
     (["--viewpoint", "3"], {"viewpoint": 3}), (["--viewpoint", "3.png"], {"viewpoint": "3.png"}),
     (["--viewpoint", "centre"], {"viewpoint": "centre"}), (["--require-all"], {"require_all": True}),
     (["--scale", "0.5", "--crop", "inscribed"], {"scale": 0.5, "crop": "inscribed"}),

@@ -168,6 +168,7 @@ def test_every_setting_is_in_some_panel(draw, stitched):
     settings.overlay = "DISPLACEMENT"
     seen |= set(draw().props)
     settings.projection, settings.slide_auto = "PANNINI", False
+    settings.guides.add()
     for source in settings.bl_rna.properties["camera"].enum_items.keys():
         settings.camera = source
         seen |= set(draw().props)
