@@ -38,15 +38,17 @@ class Kept:
         What all pictures were called that were given, used or not.
     turns : tuple of int
         EXIF's orientation of each of these.
-    share : float
-        Of the sides of the pictures that were worked on, how long the sides of the small ones are.
     """
 
     frame: Frame
     geometry: Geometry
     given: tuple[str, ...]
     turns: tuple[int, ...]
-    share: float
+
+    @property
+    def share(self) -> float:
+        """Of the sides of the full pictures, how long those of the small ones are."""
+        return max(self.frame.sizes[0]) / max(self.frame.full_sizes[0])
 
     @property
     def sizes(self) -> dict[int, tuple[int, int]]:
@@ -118,8 +120,8 @@ def recomposed(
     ----------
     kept : Kept
     options : StitchOptions
-        Those that need no new geometry: frame, viewpoint, light, blend and masks; a crop in px is one of the panorama
-        of the full pictures.
+        Those that need no new geometry: frame, viewpoint, light, blend, masks and guides; a crop in px is one of the
+        panorama of the pictures at their scale.
     told, cancelled : callable
         See `pipeline.stitch`.
 
@@ -128,7 +130,7 @@ def recomposed(
     StitchResult
     """
     if not isinstance(options.crop, str):
-        left, top, width, height = (round(side * kept.share) for side in options.crop)
+        left, top, width, height = (round(side * kept.share / options.scale) for side in options.crop)
         options = replace(options, crop=(left, top, max(1, width), max(1, height)))
     stopwatch = Stopwatch(Progress(told, cancelled, stages_of(len(kept.frame.pictures))))
     with asking(cancelled), at_most(RECOMPOSING.threads):
@@ -141,7 +143,7 @@ def _small(frame: Frame, geometry: Geometry, given: tuple[str, ...], turns: tupl
     rotations = [np.eye(3), geometry.edges[0].two_view.R] if geometry.rig is None else geometry.rig.R
     share = first_share(geometry.cameras, list(rotations), RECOMPOSING.pixels)
     small = frame.resized(share)
-    return Kept(small, geometry.of_resized(small.sizes), given, turns, share)
+    return Kept(small, geometry.of_resized(small.sizes), given, turns)
 
 
 def _unmasked(picture: Picture, original: Picture, mask: object) -> Picture:

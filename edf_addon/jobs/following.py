@@ -35,14 +35,14 @@ def changed(settings: Any) -> None:
     if bpy.app.timers.is_registered(_begin):
         bpy.app.timers.unregister(_begin)
     bpy.app.timers.register(_begin, first_interval=REST)
-    if editor.is_behind(settings, settings.result):
+    if _asked or editor.is_behind(settings, settings.result):
         modal.start_ahead()
 
 
 def ask(settings: Any) -> None:
     """An operator changed a mask or a place: begin soon. One undo takes back both that and what follows."""
     global _asked
-    _asked = not bpy.app.background
+    _asked = not bpy.app.background and settings.result is not None
     changed(settings)
 
 

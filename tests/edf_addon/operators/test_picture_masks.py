@@ -43,6 +43,7 @@ def test_a_mask_is_made_for_a_row_small_enough_and_used_by_its_number(blender, m
     assert request["masks"] == [None, "ignore_1.npy"] and request["shown"] == ["show_0.npy", None]
     assert (folder / "show_0.npy").is_file()
     job.remove(folder)
+    assert bpy.ops.edf.add_images(which="FILE") == {"CANCELLED"}, "masks are no pictures to add"
     assert bpy.ops.edf.picture_mask_remove(row=1, kind="show") == {"FINISHED"}
     assert settings.pictures[1].show is None and mask.name in bpy.data.images
     with pytest.raises(RuntimeError, match="no picture to paint"):
