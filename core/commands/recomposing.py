@@ -130,7 +130,7 @@ def recomposed(
     StitchResult
     """
     if not isinstance(options.crop, str):
-        left, top, width, height = (round(side * kept.share / options.scale) for side in options.crop)
+        left, top, width, height = (int(side * kept.share / options.scale) for side in options.crop)
         options = replace(options, crop=(left, top, max(1, width), max(1, height)))
     stopwatch = Stopwatch(Progress(told, cancelled, stages_of(len(kept.frame.pictures))))
     with asking(cancelled), at_most(RECOMPOSING.threads):

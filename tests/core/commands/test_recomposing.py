@@ -42,7 +42,7 @@ def test_it_shows_the_same_smaller_without_masks_and_in_px_of_the_full_pictures(
     assert small.canvas.width == pytest.approx(kept.share * result.canvas.width, abs=3)
     assert small.full_sizes == result.full_sizes and small.rig is not None
     box = (20, 10, 200, 100)
-    assert again(kept, crop=box).panorama.alpha.shape == (round(100 * kept.share), round(200 * kept.share))
+    assert again(kept, crop=box).panorama.alpha.shape == (int(100 * kept.share), int(200 * kept.share))
 
 
 def test_masks_and_guides_of_now_count(stitched: tuple[StitchResult, recomposing.Kept]) -> None:
