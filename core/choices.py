@@ -24,6 +24,8 @@ CENTRE = "centre"
 # How a panorama that is not on the reference's plane is turned: one of LEVELS, or yaw, pitch, roll in degrees.
 LEVELS = ("auto", "none")
 Level = str | tuple[float, float, float]
+# Lines that a user says are upright or level.
+GUIDES = ("vertical", "horizontal")
 # What of the panorama is kept: the inscribed rectangle where that holds most of it, else all that is shown, or what a
 # name says; or a box (left, top, width, height) in px.
 CROPS = ("auto", "full", "inscribed", "reference")

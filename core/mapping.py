@@ -28,6 +28,7 @@ from .field.strict import StrictField
 from .options import StitchOptions
 from .panorama.choosing_slide import NO_WAY, SlideChoice, choose_rig_slide, choose_slide
 from .panorama.framing import FrameRequest, frame_for
+from .panorama.guides import constraints, guided
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
@@ -58,11 +59,12 @@ class Mapped:
 @dataclass(frozen=True, eq=False)
 class AllEdges:
     """Straight edges (N) of each picture whose orientation is known, in the reference's frame, found when asked for;
-    tick is called before each picture."""
+    tick is called before each picture; cache: where it is kept which way is down."""
 
     pictures: Sequence[Picture]
     views: Sequence[View]
     tick: Tick = unwatched
+    cache: Cache = Cache(None)
 
     @cached_property
     def each(self) -> list[StraightEdges]:
@@ -82,15 +84,24 @@ class AllEdges:
     @cached_property
     def down(self) -> Array:
         """The unit vector (3,) along gravity."""
-        rotations = [view.R for view in self.views if np.isfinite(view.R).all()]
+        return guided(self._down_by_edges, self.guides) if len(self.guides) else self._down_by_edges
+
+    @cached_property
+    def guides(self) -> Array:
+        """What a user's lines (N, 3) say of it (see `guides.constraints`)."""
+        return constraints(self.pictures, self.views)
+
+    @cached_property
+    def _down_by_edges(self) -> Array:
+        rotations = tuple(view.R for view in self.views if np.isfinite(view.R).all())
         edges = self.together
         self.tick()
-        return gravity_by_edges(rotations, *edges)
+        return self.cache.remember("down", (rotations, *edges), lambda: gravity_by_edges(rotations, *edges))
 
     @cached_property
     def down_is_sure(self) -> bool:
-        """Whether upright edges confirm which way is down."""
-        return confirmed(self.down, *self.together)
+        """Whether a user's lines or upright edges confirm which way is down."""
+        return len(self.guides) > 0 or confirmed(self.down, *self.together)
 
 
 def map_pictures(
@@ -198,7 +209,7 @@ def map_rig(
     if options.surface[0] == "reference":
         still = SlideChoice(0.0, (), "the first picture's own plane has one viewpoint")
         return Mapped(build_rig_warp(surface, tick=tell), None, still)
-    lines = AllEdges(pictures, views, tell)
+    lines = AllEdges(pictures, views, tell, Cache(options.cache))
     slide, viewpoint = _rig_slide(surface, lines, options, lambda share: tell(0.3 * share))
     surface = surface.seen_from(viewpoint)
     tell(0.3)
@@ -231,7 +242,7 @@ def _rig_slide(
 def _frame(lines: AllEdges, options: StitchOptions, warp_on: Callable[[Projection], Warp]) -> Projection:
     """The frame that is asked for; warp_on: coarse maps of all pictures on a projection."""
     kind, distance = options.surface
-    asked = FrameRequest(kind, distance, options.level, options.centre, options.fov)
+    asked = FrameRequest(kind, distance, options.level, options.centre, options.fov, len(lines.guides) > 0)
     edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
     return frame_for(asked, lines.views, edges, down, warp_on)
 

@@ -21,6 +21,7 @@ from .choices import (
     EXPOSURES,
     FADES,
     FIELDS,
+    GUIDES,
     HOLES,
     LEVELS,
     PROJECTIONS,
@@ -61,6 +62,15 @@ class StitchOptions:
         is not named: nothing.
     ignore_in : tuple of (str, Path or ndarray), default empty
         The same by the names of pictures, with or without their suffix.
+    show : tuple of (str, Path or ndarray), default empty
+        By pictures' names, masks of what the panorama is to show of them, white = from this picture, wherever seams are
+        cut; of two masks for one place that of the later picture counts.
+    show : tuple of (int or str, Path or ndarray), default empty
+        By a picture's number, from 1, or name, a mask of what the panorama is to show of it, wherever seams are cut:
+        white = from this picture. Where those of two pictures meet, the later picture counts.
+    guides : tuple of (int or str, str, (4,) floats), default empty
+        Lines that level "auto" holds to: a picture's number, from 1, or name; one of GUIDES; x, y, x', y' in px of the
+        full picture.
     viewpoint : int, str or None, default None
         The picture from whose place a panorama of more than two is seen: its number, counted from 1, its name, or
         "centre" for the one that is best connected with all others. By default the first that connects with others.
@@ -129,6 +139,8 @@ class StitchOptions:
     matches: Path | NDArray[Any] | None = None
     ignore: tuple[Path | NDArray[Any] | None, ...] = ()
     ignore_in: tuple[tuple[str, Path | NDArray[Any]], ...] = ()
+    show: tuple[tuple[int | str, Path | NDArray[Any]], ...] = ()
+    guides: tuple[tuple[int | str, str, tuple[float, ...]], ...] = ()
     viewpoint: int | str | None = None
     require_all: bool = False
     brackets: Brackets = "auto"
@@ -162,6 +174,21 @@ class StitchOptions:
         for name, mask in self.ignore_in:
             masks[number_of(name, names, "--ignore")] = mask
         return masks
+
+    def shown_in(self, names: Sequence[str]) -> list[Path | NDArray[Any] | None]:
+        """The mask of what is to be shown of each of the pictures of these names. Raises BadRequest as `ignored_in`."""
+        masks: list[Path | NDArray[Any] | None] = [None] * len(names)
+        for name, mask in self.show:
+            masks[number_of(name, names, "--show") if isinstance(name, str) else name - 1] = mask
+        return masks
+
+    def guides_in(self, names: Sequence[str]) -> list[list[tuple[str, tuple[float, ...]]]]:
+        """The guides of each of the pictures of these names. Raises BadRequest as `ignored_in`."""
+        found: list[list[tuple[str, tuple[float, ...]]]] = [[] for _ in names]
+        for name, kind, ends in self.guides:
+            number = number_of(name, names, f"--{kind}") if isinstance(name, str) else name - 1
+            found[number].append((kind, ends))
+        return found
 
     def check_goes_with(self, count: int) -> None:
         """Raises BadRequest where an option makes no sense for so many pictures."""
@@ -219,7 +246,8 @@ class StitchOptions:
     @property
     def files_read(self) -> list[Path]:
         """The files that these options name."""
-        named = (self.camera.cameras, self.matches, *self.ignore, *(mask for _, mask in self.ignore_in), self.mask)
+        by_name = (mask for _, mask in (*self.ignore_in, *self.show))
+        named = (self.camera.cameras, self.matches, *self.ignore, *by_name, self.mask)
         return [Path(one) for one in named if isinstance(one, (str, Path))]
 
     def __post_init__(self) -> None:
@@ -255,6 +283,7 @@ class StitchOptions:
         self._check_projection()
         self._check_level()
         self._check_frame()
+        self._check_guides()
         if isinstance(self.crop, str) and self.crop not in CROPS:
             raise BadRequest(f"the crop {self.crop!r} is not known; choose from: {', '.join(CROPS)}, or X, Y, W, H")
         if not isinstance(self.crop, str) and (len(self.crop) != 4 or min(self.crop[:2]) < 0 or min(self.crop[2:]) < 1):
@@ -302,6 +331,11 @@ class StitchOptions:
                 raise BadRequest(f"the level {self.level!r} is not known; choose from: {known}, or yaw, pitch, roll")
         elif len(self.level) != 3 or not np.isfinite(self.level).all():
             raise BadRequest(f"the level {self.level} is not yaw, pitch, roll in degrees")
+
+    def _check_guides(self) -> None:
+        for name, kind, ends in self.guides:
+            if kind not in GUIDES or len(ends) != 4 or not np.isfinite(ends).all() or ends[:2] == ends[2:]:
+                raise BadRequest(f"the guide {kind} of {name} needs two different points: X,Y,X2,Y2 in px")
 
     def _check_frame(self) -> None:
         if self.centre is not None and (len(self.centre) != 2 or not np.abs(self.centre).max() <= 180):  # NaN too

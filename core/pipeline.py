@@ -23,6 +23,7 @@ from .compose.enlarging.enlarged import EnlargedPanorama
 from .compose.enlarging.full_set import FullSet
 from .compose.enlarging.memory_need import threads_that_fit, threads_that_fit_merged
 from .compose.stitch_result import StitchResult
+from .compose.wanted import wanted_on
 from .frames.frame import Frame
 from .frames.options import PREVIEW
 from .frames.preview import first_share, next_share
@@ -202,10 +203,11 @@ def compose(
     shown = shown_where_alone(pictures, whole.maps) if full is None else pictures
     layers = tuple(layer_of(picture, one, by_root, hold) for picture, one in zip(shown, whole.maps, strict=True))
 
+    wanted = wanted_on(pictures, whole.maps)
     floats = [picture.bits == 32 for picture in pictures]
 
     def composed_with(painted: NDArray[np.int8] | None) -> tuple[Composition, EnlargedPanorama | None, Layer, Box]:
-        made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep)
+        made = composed(layers, whole, alignment.views, options, floats, painted, progress, decided, keep, wanted)
         ask()
         enlarged = None if full is None else full.enlarged(made, whole)
         panorama = made.panorama if enlarged is None else Layer(enlarged, enlarged.alpha())

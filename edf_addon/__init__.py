@@ -15,22 +15,25 @@ from . import properties
 from .jobs import command, following, modal
 from .operators import (
     clips,
+    guiding,
     mask_painting,
     match_editing,
     match_pointing,
     opening,
     picture_list,
+    picture_masks,
     saving,
     scene_objects,
     stitch,
+    taking,
 )
-from .overlays import drawing
+from .overlays import drawing, strokes
 from .panels import elsewhere, presets, sidebar
 
 # Registered in this order, unregistered in the opposite one; each has register() and unregister().
 REGISTERED = (
     properties, modal, following, stitch, opening, picture_list, clips, saving, match_editing, match_pointing,
-    mask_painting, scene_objects, presets, sidebar, elsewhere, drawing,
+    mask_painting, picture_masks, taking, guiding, scene_objects, presets, sidebar, elsewhere, drawing, strokes,
 )  # fmt: skip
 _commands: list[Any] = []
 _registered: list[Any] = []

@@ -44,20 +44,24 @@ def report_of(context: Any) -> dict[str, Any] | None:
     return None if found is None else found["report"]
 
 
-def frame_then(settings: Any, image: bpy.types.Image | None) -> dict[str, Any] | None:
-    """The frame and viewpoint (see `engine_options.frame_of`) that an image was made for, where it is a panorama of the
-    two pictures that are chosen now."""
-    found, chosen = result.read(image), pictures.images(settings)
-    if found is None or len(chosen) != len(ownership.SIDES) or ownership.pictures(image) != chosen:
-        return None
-    return engine_options.frame_of(SimpleNamespace(**earlier.kept_now(found["settings"])))
+def is_of_chosen(settings: Any, image: bpy.types.Image | None) -> bool:
+    """Whether an image is a panorama of the pictures that are chosen now."""
+    made_of = ownership.pictures(image)
+    return len(made_of) > 1 and made_of == pictures.images(settings)
+
+
+def settings_then(settings: Any, image: bpy.types.Image | None) -> Any:
+    """The settings that an image was made with, as attributes, where it is a panorama of the pictures that are chosen
+    now; else None."""
+    found = result.read(image) if is_of_chosen(settings, image) else None
+    return None if found is None else SimpleNamespace(**earlier.kept_now(found["settings"]))
 
 
 def is_behind(settings: Any, image: bpy.types.Image | None) -> bool:
-    """Whether an image is a panorama of the chosen pictures that was made for another frame or viewpoint than is chosen
-    now."""
-    then = frame_then(settings, image)
-    return then is not None and then != engine_options.frame_of(settings)
+    """Whether an image is a panorama of the chosen pictures that was made for another frame, viewpoint, light or blend
+    than is chosen now."""
+    then = settings_then(settings, image)
+    return then is not None and engine_options.look_of(then) != engine_options.look_of(settings)
 
 
 def side_of(settings: Any, image: bpy.types.Image | None) -> str | None:
@@ -78,7 +82,8 @@ def beneath(settings: Any, image: bpy.types.Image | None) -> bpy.types.Image | N
     for side in (REFERENCE, TARGET):
         if image is not None and image == getattr(settings, f"ignore_{side}"):
             return getattr(settings, side)
-    return image
+    found = pictures.mask_of(settings, image)
+    return image if found is None else found[0].image
 
 
 def side_in(panorama: bpy.types.Image | None, picture: bpy.types.Image | None) -> str | None:

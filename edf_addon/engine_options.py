@@ -27,6 +27,13 @@ def options_of(settings: Any, scale: float | None = None, is_set: bool = False) 
     return options
 
 
+def look_of(settings: Any) -> dict[str, Any]:
+    """All that decides how a panorama looks once matches, field and depth are known: the frame and how it is composed.
+    """
+    composed = {name: getattr(settings, name).lower() for name in ("blend", "seam", "holes")}
+    return {**frame_of(settings), **composed, "exposure": _exposure_of(settings)}
+
+
 def frame_of(settings: Any, scale: float = 1.0) -> dict[str, Any]:
     """What of the scene the panorama shows, and from where: the options of the engine that need no new matches, field
     or depth. scale: of the pictures, for a box in px."""

@@ -42,6 +42,12 @@ class Operator(StrEnum):
     MATCH_EDIT = "edf.match_edit"
     MASK_PAINT = "edf.mask_paint"
     MASK_DONE = "edf.mask_done"
+    PICTURE_MASK = "edf.picture_mask"
+    PICTURE_MASK_REMOVE = "edf.picture_mask_remove"
+    TAKE_FROM = "edf.take_from"
+    PLACE_REMOVE = "edf.place_remove"
+    GUIDE_ADD = "edf.guide_add"
+    GUIDE_REMOVE = "edf.guide_remove"
     POINTER = "edf.pointer"
     CREATE_CAMERAS = "edf.create_cameras"
     DEPTH_MESH = "edf.depth_mesh"
@@ -81,6 +87,8 @@ class List(StrEnum):
 
     PICTURES = "EDF_UL_pictures"
     MATCHES = "EDF_UL_matches"
+    PLACES = "EDF_UL_places"
+    GUIDES = "EDF_UL_guides"
 
 
 # Where the properties hang: bpy.types.Scene.edf_stitch (settings), bpy.types.WindowManager.edf_stitch_job.

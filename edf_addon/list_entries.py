@@ -1,10 +1,10 @@
-"""What the lists of the panel hold: pictures, and matches of two of them."""
+"""What the lists of the panel hold: pictures, places that come from one of them, and matches of two."""
 
 # No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
 
 from . import offered, pictures
 
@@ -53,6 +53,36 @@ class EDF_PG_picture(bpy.types.PropertyGroup):  # noqa: N801
         name="State", description="What the last stitch did with it", items=offered.PICTURE_STATES
     )
     why: StringProperty(name="Why", description="Why the last stitch left it out")
+    ignore: PointerProperty(
+        name="Never Use", type=bpy.types.Image,
+        description="An image of the picture's shape: what is white in it is kept out of the panorama",
+    )
+    show: PointerProperty(
+        name="Use Here", type=bpy.types.Image,
+        description="An image of the picture's shape: what is white in it comes from this picture",
+    )
+
+
+class EDF_PG_guide(bpy.types.PropertyGroup):  # noqa: N801
+    """A line in a picture that is upright or level."""
+
+    picture: PointerProperty(name="Picture", type=bpy.types.Image, description="The picture that it lies in")
+    kind: EnumProperty(name="Kind", items=offered.GUIDES, update=look_again)
+    use: BoolProperty(name="Use", description="Whether level holds to it", default=True, update=look_again)
+    ends: FloatVectorProperty(
+        name="Ends", description="Column and row of both ends, in pixels of the upright picture", size=4,
+        update=look_again,
+    )
+
+
+class EDF_PG_place(bpy.types.PropertyGroup):  # noqa: N801
+    """A place of the panorama that comes from a certain picture."""
+
+    picture: PointerProperty(name="Picture", type=bpy.types.Image, description="The picture that it comes from")
+    use: BoolProperty(name="Use", description="Whether the next stitch takes it from there", default=True)
+    circles: StringProperty(
+        name="Circles", description="Where, as JSON: column, row and radius in pixels of the upright picture, of each"
+    )
 
 
 class EDF_PG_clip(bpy.types.PropertyGroup):  # noqa: N801

@@ -21,6 +21,10 @@ FIELDS = (
     ("APAP", "As-Projective-As-Possible", "For comparison: a homography for each cell of a grid; no depth, no cameras"),
     ("HOMOGRAPHY", "Homography", "For comparison: what every other stitcher starts from; no depth, no cameras"),
 )
+GUIDES = (
+    ("VERTICAL", "Vertical", "The line is upright, as the edge of a house"),
+    ("HORIZONTAL", "Horizontal", "Both ends of the line are equally high, as on the horizon"),
+)
 # Those that round panoramas can be made of.
 ROUND_FIELDS = ("SLACK", "STRICT")
 FADES = (

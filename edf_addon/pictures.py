@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -9,6 +10,9 @@ from . import idnames, pair
 
 # What is said where something needs two pictures, and the list has more.
 PAIRS_ONLY = "This is for two pictures: switch all but two of the list off"
+
+# The masks of a row.
+MASKS = ("ignore", "show")
 
 
 def used(settings: Any) -> list[Any]:
@@ -66,6 +70,59 @@ def viewpoint(settings: Any) -> int | None:
     used."""
     chosen = images(settings)
     return chosen.index(settings.seen_from) + 1 if settings.seen_from in chosen and settings.seen_from else None
+
+
+def masks(settings: Any) -> dict[str, Any]:
+    """The masks of the pictures that are used, by "NUMBER KIND", as a panorama holds them."""
+    return {
+        f"{number} {kind}": getattr(entry, kind) for number, entry in enumerate(used(settings)) for kind in MASKS
+    }
+
+
+def places(settings: Any) -> list[dict[str, Any]]:
+    """The places that come from pictures that are used: the number of the picture, and circles in px of it upright."""
+    chosen = images(settings)
+    return [
+        {"picture": chosen.index(place.picture), "circles": json.loads(place.circles)}
+        for place in settings.places if place.use and place.picture is not None and place.picture in chosen
+    ]
+
+
+def guides(settings: Any) -> list[list[Any]]:
+    """The guides in pictures that are used: the number of the picture, the kind by the engine's name, and both ends."""
+    chosen = images(settings)
+    return [
+        [chosen.index(guide.picture), guide.kind.lower(), list(guide.ends)]
+        for guide in settings.guides if guide.use and guide.picture is not None and guide.picture in chosen
+    ]
+
+
+def add_place(settings: Any, picture: Any, circles: Sequence[Sequence[float]]) -> None:
+    """A place comes from a picture from now on: circles of column, row and radius, px of it upright."""
+    place = settings.places.add()
+    place.picture, place.circles = picture, json.dumps([[round(one, 1) for one in circle] for circle in circles])
+    settings.place_index = len(settings.places) - 1
+
+
+def bring_back(settings: Any, held: Mapping[str, Any], known: Mapping[str, Any]) -> None:
+    """The masks of the pictures, which are all used, places and guides as a panorama has them: held by `masks`' keys,
+    known as `places` and `guides` gave them."""
+    for number, entry in enumerate(used(settings)):
+        for kind in MASKS:
+            setattr(entry, kind, held.get(f"{number} {kind}"))
+    settings.places.clear()
+    for place in known.get("places", ()):
+        add_place(settings, images(settings)[place["picture"]], place["circles"])
+    settings.guides.clear()
+    for number, kind, ends in known.get("guides", ()):
+        guide = settings.guides.add()
+        guide.picture, guide.kind, guide.ends = images(settings)[number], kind.upper(), ends
+
+
+def mask_of(settings: Any, image: Any) -> tuple[Any, str] | None:
+    """The row whose mask an image is, and which one: "ignore" or "show"; None for any other image."""
+    found = ((entry, kind) for entry in settings.pictures for kind in MASKS if getattr(entry, kind) == image)
+    return None if image is None else next(found, None)
 
 
 def changed(entry: Any, context: Any) -> None:

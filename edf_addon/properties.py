@@ -20,14 +20,14 @@ from bpy.props import (
 
 from . import earlier, idnames, offered, pictures, status
 from .bridge import compat
-from .list_entries import EDF_PG_clip, EDF_PG_match, EDF_PG_picture, look_again
+from .list_entries import EDF_PG_clip, EDF_PG_guide, EDF_PG_match, EDF_PG_picture, EDF_PG_place, look_again
 
-# Called with a scene's settings when an artist changes what of the scene the panorama shows, or from where.
+# Called with a scene's settings when an artist changes what of the scene the panorama shows, from where, or its look.
 on_reframe: list[Callable[[Any], None]] = []
 
 
 def reframe(settings: Any, _context: Any) -> None:
-    """The frame or the viewpoint was changed: the outline is drawn anew, and whoever follows it is told."""
+    """Frame, viewpoint, light or blend was changed: the outline is drawn anew, and whoever follows it is told."""
     look_again(settings, _context)
     for follow in on_reframe:
         follow(settings)
@@ -157,8 +157,11 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         name="Yaw, Pitch, Roll", description="Where the reference looks in the panorama: to the right, above the "
         "horizon, clockwise", size=3, unit="ROTATION", precision=2, update=reframe,
     )
-    blend: EnumProperty(name="Blend", description="How the two pictures go over into each other", items=offered.BLENDS)
-    seam: EnumProperty(name="Seam", description="Where one picture goes over into the other", items=offered.SEAMS)
+    blend: EnumProperty(name="Blend", description="How the two pictures go over into each other", items=offered.BLENDS,
+                        update=reframe)
+    seam: EnumProperty(
+        name="Seam", description="Where one picture goes over into the other", items=offered.SEAMS, update=reframe,
+    )
     seam_mask: PointerProperty(
         name="Painted Seam", type=bpy.types.Image,
         description="An image of the whole panorama's shape: black comes from the reference, white "
@@ -166,6 +169,7 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
     )
     light: EnumProperty(
         name="Exposure", description="What becomes of the pictures' light", items=offered.EXPOSURES, default="AUTO",
+        update=reframe,
     )
     exposure: BoolProperty(
         name="Match Exposure", description="As earlier releases asked it: on is Reference, off is As Taken",
@@ -173,11 +177,12 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
     )
     light_stops: FloatProperty(
         name="Brighter", description="Stops by which the panorama is brighter than by itself; no light is blown",
-        default=0.0, min=-10.0, max=10.0, soft_min=-3.0, soft_max=3.0, precision=2,
+        default=0.0, min=-10.0, max=10.0, soft_min=-3.0, soft_max=3.0, precision=2, update=reframe,
     )
     holes: EnumProperty(
         name="Holes", description="What neither camera saw, because something near hid it from the only one that "
         "looked there", items=offered.HOLES, default="AUTO",
+        update=reframe,
     )
     crop: EnumProperty(
         name="Crop", description="What of the panorama is kept", items=offered.CROPS, default="AUTO", update=reframe
@@ -214,6 +219,14 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         name="Ignore in Target", type=bpy.types.Image,
         description="An image of the target's shape: what is white in it is kept out of everything",
     )
+    guides: CollectionProperty(
+        name="Guides", type=EDF_PG_guide, description="Upright and level lines that Level ▸ Automatic holds to",
+    )
+    guide_index: IntProperty(name="Active Guide", default=0, min=0, options={"SKIP_SAVE"})
+    places: CollectionProperty(
+        name="Places", type=EDF_PG_place, description="Places of the panorama that come from a certain picture",
+    )
+    place_index: IntProperty(name="Active Place", default=0, min=0, options={"SKIP_SAVE"})
     edited_matches: BoolProperty(
         name="Use These Matches", description="Stitch with the matches of the list, as they were edited, instead of "
         "searching for new ones",
@@ -289,8 +302,9 @@ PICTURES = (("reference", "target"), ("reference_camera", "target_camera"), ("ig
 LENSES = tuple((name, f"target_{name}") for name in ("focal", "sensor", "focal35", "focal_px"))
 # What is no setting: what is stitched, what came of it, and how it is looked at.
 NO_SETTINGS = frozenset({"name", "pictures", "clips", "picture_index", "result", "matches", "matches_reference",
-                         "matches_target", "match_index", "version", "exposure", "overlay", "overlay_opacity",
-                         "show_matches", "show_epipolar", "show_places"})  # fmt: skip
+                         "matches_target", "match_index", "places", "place_index", "guides", "guide_index", "version",
+                         "exposure", "overlay", "overlay_opacity", "show_matches", "show_epipolar",
+                         "show_places"})  # fmt: skip
 
 
 def names_of_settings(settings: Any) -> list[str]:
@@ -354,7 +368,7 @@ def _handlers() -> list[list[Any]]:
     return [getattr(bpy.app.handlers, name) for name in names if hasattr(bpy.app.handlers, name)]
 
 
-CLASSES = (EDF_PG_match, EDF_PG_picture, EDF_PG_clip, EDF_PG_settings, EDF_PG_job)
+CLASSES = (EDF_PG_match, EDF_PG_picture, EDF_PG_clip, EDF_PG_place, EDF_PG_guide, EDF_PG_settings, EDF_PG_job)
 
 
 def register() -> None:

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from ..core.choices import RIVALS
-from ..core.system.json_values import plain
 from ..core.output.json_file import json_bytes
 from ..core.system.errors import StitchError
+from ..core.system.json_values import plain
 from ..core.system.output_files import OutputFiles
 from .finished import finished, target_only
 from .measures import Truth, composition, figures, meeting, on_the_wide_canvas, truth_of, whole_picture

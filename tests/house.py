@@ -66,7 +66,7 @@ ADDON_MAY_IMPORT = {
     "jobs": ("bridge", "idnames", "offered", "pair", "pictures", "properties", "engine_options", "editor",
              "status", "explain"),  # fmt: skip
     "scene": ("bridge", "properties", "editor"),
-    "overlays": ("bridge", "scene", "idnames", "properties", "engine_options", "editor"),
+    "overlays": ("bridge", "scene", "idnames", "pictures", "properties", "engine_options", "editor"),
     "operators": ("bridge", "jobs", "scene", "overlays", "idnames", "offered", "pair", "pictures",
                   "properties", "editor", "switches"),  # fmt: skip
     "panels": ("bridge", "jobs", "scene", "overlays", "operators", *BESIDE),

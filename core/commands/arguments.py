@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..choices import (
     BLENDS,
@@ -15,6 +15,7 @@ from ..choices import (
     EXPOSURES,
     FADES,
     FIELDS,
+    GUIDES,
     HOLES,
     PROJECTIONS,
     SEAMS,
@@ -124,6 +125,10 @@ def _add_control(parser: argparse.ArgumentParser) -> None:
         help="the same for the picture of that name; may be given for several",
     )  # fmt: skip
     control.add_argument(
+        "--show", type=_named_mask, action="append", default=[], metavar="NAME=MASK",
+        help="a picture, white where the panorama is to come from the one of that name; may be given for several",
+    )  # fmt: skip
+    control.add_argument(
         "--scale", type=float, default=1.0, metavar="S", help="resize all pictures by S ≤ 1 first, for a fast preview"
     )
     control.add_argument(
@@ -155,6 +160,11 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
         "pixel of it kept), perspective (a plane), pannini[:D] (D from 0, a plane, to 1), cylindrical, or "
         "equirectangular (the whole sphere)",
     )  # fmt: skip
+    for kind, where in zip(GUIDES, ("upright", "level"), strict=True):
+        how.add_argument(
+            f"--{kind}", type=_line, action="append", default=[], metavar="NAME=X,Y,X2,Y2",
+            help=f"a line in the picture of that name, px, that is {where}, which auto holds to; may be repeated",
+        )
     how.add_argument(
         "--level", default="auto", metavar="LEVEL",
         help="how all but reference are turned: auto (default: upright), none (as REF), or YAW,PITCH,ROLL of "
@@ -240,6 +250,8 @@ def options_from(args: argparse.Namespace, measure: bool) -> StitchOptions:
         matches=args.matches,
         ignore=(args.ignore_ref, args.ignore_target) if args.ignore_ref or args.ignore_target else (),
         ignore_in=tuple(args.ignore),
+        show=tuple(args.show),
+        guides=tuple((name, kind, ends) for kind in GUIDES for name, ends in getattr(args, kind)),
         viewpoint=args.viewpoint,
         require_all=args.require_all,
         brackets=args.brackets,
@@ -283,6 +295,12 @@ def numbered(options: StitchOptions, pictures: Sequence[Path]) -> StitchOptions:
         if masks[number] is not None:
             raise BadRequest(f"--ignore: {name} has another mask already: paint both into one")
         masks[number] = mask
+    shown: dict[int, Any] = {}
+    for one, mask in options.show:
+        number = number_of(str(one), names, "--show")
+        if number in shown:
+            raise BadRequest(f"--show: {one} has another mask already: paint both into one")
+        shown[number] = mask
     viewpoint = options.viewpoint
     if isinstance(viewpoint, int) and viewpoint > count:
         raise BadRequest(f"the viewpoint is picture {viewpoint}, and only {count} are given")
@@ -290,12 +308,14 @@ def numbered(options: StitchOptions, pictures: Sequence[Path]) -> StitchOptions:
         viewpoint = number_of(viewpoint, names, "--viewpoint") + 1
     scale = options.scale_metres
     if scale is not None:
-        one, other = (
+        first, other = (
             number_of(name, names, "--scale-metres") + 1 if isinstance(name, str) else name for name in scale[:2]
         )
-        scale = one, other, scale[2]
+        scale = first, other, scale[2]
     return replace(
-        options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint, scale_metres=scale
+        options, ignore=tuple(masks) if any(masks) else (), ignore_in=(), viewpoint=viewpoint, scale_metres=scale,
+        show=tuple((number + 1, mask) for number, mask in shown.items()),
+        guides=tuple((number_of(str(one), names, f"--{kind}") + 1, kind, ends) for one, kind, ends in options.guides),
     )  # fmt: skip
 
 
@@ -340,6 +360,14 @@ def _named_mask(text: str) -> tuple[str, Path]:
     if not name or not mask:
         raise argparse.ArgumentTypeError(f"{text!r} is not like NAME=MASK: a picture's name and the mask's file")
     return name, Path(mask)
+
+
+def _line(text: str) -> tuple[str, tuple[float, ...]]:
+    name, _, numbers = text.rpartition("=")
+    ends = _numbers(numbers) if name else ()
+    if len(ends) != 4:
+        raise argparse.ArgumentTypeError(f"{text!r} is not like NAME=X,Y,X2,Y2: a picture's name and two points in px")
+    return name, ends
 
 
 def _projection(text: str) -> str:

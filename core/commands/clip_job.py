@@ -22,8 +22,8 @@ from typing import Any
 import cv2
 
 from ..batch.list import BatchItem, find_frames
-from ..batch.run import Outcome, run_batch
 from ..batch.pieces import BatchRequest
+from ..batch.run import Outcome, run_batch
 from ..options import StitchOptions
 from ..pictures.listing import SUFFIXES
 from ..system.errors import BadRequest, StitchError, UnreadableImage

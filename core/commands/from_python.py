@@ -24,6 +24,7 @@ from ..system.errors import BadRequest
 from .python_result import Panorama, panorama_of
 
 Numbers = float | Sequence[float]
+Lines = Sequence[tuple[str, Sequence[float]]]
 Mask = str | Path | NDArray[Any]
 
 
@@ -33,13 +34,14 @@ def stitch(
     focal_px: Numbers = (), focal_mm: Numbers = (), sensor_mm: Numbers = (), focal35: Numbers = (),
     principal: Sequence[float] = (), cameras: str | Path | dict[str, Any] | None = None,
     scale_metres: ScaleMetres | None = None, matches: str | Path | NDArray[Any] | None = None,
-    ignore: Mapping[str, Mask] | Sequence[Mask | None] = (), viewpoint: int | str | None = None,
-    require_all: bool = False, brackets: Brackets = "auto", scale: float = 1.0, crop: Crop = "auto",
-    field: str = "slack", fade: str = "continue", dense: bool = True, slide: Slide = "auto", projection: str = "auto",
-    level: Level = "auto", centre: tuple[float, float] | None = None, fov: float | None = None,
-    blend: str = "multiband", seam: str = "graphcut", mask: Mask | None = None, exposure: Exposing = "auto",
-    holes: str = "auto", preview: bool = False, cache: bool | str | Path = False, memory: float | None = None,
-    seed: int = 0, measure: bool = True,
+    ignore: Mapping[str, Mask] | Sequence[Mask | None] = (), show: Mapping[str, Mask] | None = None,
+    viewpoint: int | str | None = None, require_all: bool = False, brackets: Brackets = "auto", scale: float = 1.0,
+    crop: Crop = "auto", field: str = "slack", fade: str = "continue", dense: bool = True, slide: Slide = "auto",
+    projection: str = "auto", level: Level = "auto", vertical: Lines = (), horizontal: Lines = (),
+    centre: tuple[float, float] | None = None, fov: float | None = None, blend: str = "multiband",
+    seam: str = "graphcut", mask: Mask | None = None, exposure: Exposing = "auto", holes: str = "auto",
+    preview: bool = False, cache: bool | str | Path = False, memory: float | None = None, seed: int = 0,
+    measure: bool = True,
 ) -> Panorama:  # fmt: skip
     """Stitch pictures into one panorama.
 
@@ -64,8 +66,12 @@ def stitch(
         Matches instead of those that are found.
     ignore : dict or sequence of mask
         Masks of what is kept out of everything, white = ignored: by picture's name, or one for each picture, or None.
+    show : dict of mask, optional
+        By pictures' names, masks of what the panorama is to show of them, white = from this picture.
     mask : str, Path or ndarray, optional
         Painted over the panorama of a pair: black = from the reference, white = from the target.
+    vertical, horizontal : sequence of (str, (4,) floats)
+        Lines in pictures that level "auto" holds to: a picture's name, and x, y, x', y' px.
     cache : bool, str or Path
         Whether features, geometry and field are kept for the next stitch of the same pictures, or in which folder.
     memory : float, optional
@@ -90,6 +96,11 @@ fov, blend, seam, exposure, holes, preview, seed
     _check_kinds(locals())
     keep = default_folder() if cache is True else Path(cache) if cache else None
     masks = {} if not isinstance(ignore, Mapping) else {"ignore_in": tuple((k, _file(v)) for k, v in ignore.items())}
+    guides = tuple(
+        (name, kind, tuple(ends)) for kind, lines in (("vertical", vertical), ("horizontal", horizontal))
+        for name, ends in lines
+    )
+    shown = tuple((name, _file(one)) for name, one in (show or {}).items())
     camera = CameraRequest(
         focal_px=_numbers("focal_px", focal_px), focal_mm=_numbers("focal_mm", focal_mm),
         sensor_mm=_numbers("sensor_mm", sensor_mm), focal35=_numbers("focal35", focal35), principal=tuple(principal),
@@ -97,7 +108,8 @@ fov, blend, seam, exposure, holes, preview, seed
     )  # fmt: skip
     chosen = StitchOptions(
         field=field, fade=fade, camera=camera,
-        matches=_file(matches), ignore=() if masks else tuple(map(_file, ignore)), viewpoint=viewpoint,
+        matches=_file(matches), ignore=() if masks else tuple(map(_file, ignore)), show=shown, guides=guides,
+        viewpoint=viewpoint,
         require_all=require_all, brackets=brackets if isinstance(brackets, str) else int(brackets),
         scale_metres=scale_metres, slide=slide, projection=projection, level=level, centre=centre, fov=fov,
         scale=scale, crop=crop, dense=dense, blend=blend, seam=seam, mask=_file(mask),
@@ -124,6 +136,8 @@ _KINDS: dict[str, tuple[tuple[type, ...], str]] = {
     "crop": ((str, Sequence), "a name, or x, y, width and height"),
     "level": ((str, Sequence), "a name, or yaw, pitch and roll"), "principal": ((Sequence, np.ndarray), "numbers"),
     "ignore": ((Mapping, Sequence), "masks by the pictures' names, or one for each picture"),
+    **dict.fromkeys(("vertical", "horizontal"), ((Sequence,), "lines, each a picture's name and four numbers")),
+    "show": ((Mapping, _OR_NONE), "masks by the pictures' names"),
     "centre": ((Sequence, np.ndarray, _OR_NONE), "yaw and pitch"),
     "viewpoint": ((str, *_WHOLE, _OR_NONE), "a picture's name or number"),
     "scale_metres": ((Sequence, _OR_NONE), "two pictures and a distance"),

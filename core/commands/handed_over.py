@@ -76,7 +76,7 @@ def hand_over(
     rows : (N, 5) array, optional
         The matches that were given.
     job : dict
-        job.json, of which `take`, `exr` and `fill` are read.
+        job.json, of which `take`, `exr`, `fill` and `digests` (see there) are read.
     turns : tuple of int
         EXIF's orientation of each picture that was given.
     told : callable
@@ -89,7 +89,8 @@ def hand_over(
     about = _of_pair(result.spread_out(), rows, take, files) if result.rig is None else _of_many(result, take, files)
     index = {
         "files": files.names, "report": result.report, "warnings": result.warnings, "bits": result.bits,
-        "orientations": turns, "has_depth": inspection.has_depth(result), "seconds": result.seconds, **about,
+        "digests": job.get("digests"), "orientations": turns,
+        "has_depth": inspection.has_depth(result), "seconds": result.seconds, **about,
     }  # fmt: skip
     if index["has_depth"]:
         (folder / "depth.npz").write_bytes(depth_nodes(result, MESH.editable_nodes).to_bytes())

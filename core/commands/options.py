@@ -45,6 +45,25 @@ class WorkerOptions:
 
 
 @dataclass(frozen=True)
+class RecomposingOptions:
+    """The small panorama of a set that follows what is changed in the window (`recomposing`)."""
+
+    pixels: float = 1.5e5
+    """px of the panorama: 18 pictures take 2.2 s of one processor's time, 5 take 1.2 s."""
+
+    threads: int = 1
+    """That work on it: so little is to be done that handing it out takes more time than doing it."""
+
+
+@dataclass(frozen=True)
+class DrawnOptions:
+    """Places that were drawn in the window (`drawn_places`)."""
+
+    side: int = 2048
+    """Longest side of what is drawn on, px: finer than a hand draws, and a quarter of a second for 60 pictures."""
+
+
+@dataclass(frozen=True)
 class NotebookOptions:
     """What a notebook shows of a panorama (`python_result`)."""
 
@@ -53,6 +72,8 @@ class NotebookOptions:
 
 
 MESSAGES = MessageOptions()
+DRAWN = DrawnOptions()
 NOTEBOOK = NotebookOptions()
+RECOMPOSING = RecomposingOptions()
 STOPPING = StoppingOptions()
 WORKER = WorkerOptions()

@@ -6,13 +6,16 @@ the end {"done": true} or {"error", "kind", "exit_code"}. The work ends on SIGIN
 closes, so that it never outlives whoever started it; FOLDER goes then too. Exit status as the command's.
 
 job.json: `pictures`, of two the reference first: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as
-shown; "exif_of": a file whose EXIF (orientation included) belongs to the array. `options`: fields of StitchOptions,
-their `camera` those of CameraRequest. `cameras` of two pictures: {"lens": fields of BlenderLens but the resolution,
-"matrix_world"} each. `masks`: for each picture an .npy, rows as shown, or null; `seam`: one over the whole panorama.
-`matches`: .npy (N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as result.json had it in
-matches.file. `take`: which of "layers", "masks", "depth" to leave as pictures. `exr`: fields of ExrForm, for panorama
-and layers. `fill`: whether what no picture shows of a whole sphere is filled. Relative paths start at FOLDER. Or `clip`
-with `options` (see `clip_job`), or `try` alone: load the libraries, and no more.
+shown; "exif_of": a file whose EXIF (orientation included) belongs to the array; "digest": whether result.json is to
+tell its content. `options`: fields of StitchOptions, their `camera` those of CameraRequest. `cameras` of two pictures:
+{"lens": fields of BlenderLens but the resolution, "matrix_world"} each. `masks`: for each picture an .npy, rows as
+shown, or null; `shown`: the same of what is to be shown of them, and `places`: {"picture": its number, "circles": x, y,
+radius in px of it upright}; `guides`: [number of a picture, one of GUIDES, [x, y, x', y'] in px of it upright]; `seam`:
+an .npy over the whole panorama. `matches`: .npy (N, 5) x, y, x2, y2, weight; weight 0 leaves a match out; or .csv, as
+result.json had it in matches.file. `take`: which of "layers", "masks", "depth" to leave as pictures. `exr`: fields of
+ExrForm, for panorama and layers. `fill`: whether what no picture shows of a whole sphere is filled. `kept`: under which
+name what a set's stitch found is kept for small panoramas; with `small`, make such a one of it. Relative paths start at
+FOLDER. Or `clip` with `options` (see `clip_job`), or `try` alone: load the libraries, and no more.
 """
 
 from __future__ import annotations
@@ -102,11 +105,7 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
     from ..system.output_files import undisturbed
 
     with undisturbed():  # interrupted while it loads, NumPy prints a traceback
-        from ..cameras.sources import CameraRequest
-        from ..options import StitchOptions
-        from ..pictures.raw_development import exposure_of_first
-        from ..pipeline import stitch
-        from ..system.cache import default_folder
+        from ..pipeline import stitch  # noqa: F401 (so that all is loaded here)
         from ..system.memory import use_again
         from .handed_over import hand_over
 
@@ -124,32 +123,107 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
         _show(folder, job["show"])
         return
     if job.get("clip"):
+        from ..options import StitchOptions
+        from ..system.cache import default_folder
         from .clip_job import stitch_clip
 
         options = StitchOptions(**_plain_options(job["options"]), cache=default_folder())
-        stitch_clip(folder, job["clip"], options, _say_share, lambda: stop.asked)
+        stitch_clip(folder, job["clip"], options, _say_of_clip, lambda: stop.asked)
         return
+    result, turns, rows = _small(folder, job, stop) if job.get("small") else _stitched(folder, job, stop)
+    hand_over(folder, result, rows, job, turns, _say_written)
+
+
+def _stitched(folder: Path, job: dict[str, Any], stop: _Stop) -> tuple[Any, tuple[int, ...], Any]:
+    """The result of a job, the orientations of its pictures, and the matches that were given as rows."""
+    from ..pipeline import stitch
+    from .digests import digests_of
+
+    job["digests"] = digests_of(folder, job)  # as they are when they are read
+    pictures, turns = _pictures(folder, job)
+    sizes = {number: picture.view.shape[1::-1] for number, picture in enumerate(pictures)}
+    options, rows = _options(folder, job, pictures, turns, sizes)
+    # asked for too, since Python swallows a KeyboardInterrupt inside a finalizer
+    result = stitch(pictures, options, _say_share, lambda: stop.asked)
+    if job.get("kept") and result.rig is not None:
+        from ..system.cache import Cache
+        from .recomposing import kept_of, recomposed
+
+        _say({"stage": "write", "share": WORKER.stitch_share})
+        kept = Cache(options.cache).remember(
+            "kept", (job["kept"],), lambda: kept_of(result, pictures, options, turns)
+        )
+        recomposed(kept, options, _say_nothing, lambda: stop.asked)  # which keeps its field and depth
+    return result, turns, rows
+
+
+def _small(folder: Path, job: dict[str, Any], stop: _Stop) -> tuple[Any, tuple[int, ...], None]:
+    """The same of a small panorama, of what is kept of a set."""
+    from ..system.cache import Cache, default_folder
+    from .recomposing import Kept, kept_anew, recomposed
+
+    def anew() -> Kept:
+        pictures, turns = _pictures(folder, job)
+        without = {**job, "masks": None, "shown": None, "places": (), "guides": ()}
+        options, _ = _options(folder, without, pictures, turns, {})
+        return kept_anew(pictures, options, turns, _say_share)
+
+    kept = Cache(default_folder()).remember("kept", (job["kept"],), anew)
+    options, _ = _options(folder, job, (), kept.turns, kept.sizes)
+    return recomposed(kept, options, _say_share, lambda: stop.asked), kept.turns, None
+
+
+def _pictures(folder: Path, job: dict[str, Any]) -> tuple[tuple[Any, ...], tuple[int, ...]]:
+    """The pictures of a job, and the orientations that their arrays and masks are turned by."""
+    from ..pictures.raw_development import exposure_of_first
+
     given = job["pictures"]
     exposure = exposure_of_first(folder / entry["path"] for entry in given if "path" in entry)
     pictures, turns = zip(*(_picture(folder, entry, exposure) for entry in given), strict=True)
+    return pictures, turns
+
+
+def _options(
+    folder: Path, job: dict[str, Any], pictures: tuple[Any, ...], turns: tuple[int, ...],
+    sizes: dict[int, tuple[int, int]],
+) -> tuple[Any, Any]:  # fmt: skip
+    """The StitchOptions of a job, and the matches that are given as rows; sizes: (W, H) of the pictures by number."""
+    from ..cameras.sources import CameraRequest
+    from ..options import StitchOptions
+    from ..system.cache import default_folder
+    from .drawn_places import with_circles
+
     plain = _plain_options(job["options"])
     if job.get("cameras"):
         plain["camera"] = CameraRequest(cameras=cameras_of(job["cameras"], pictures))
-    masks = job.get("masks") or [None] * len(given)
+    masks = job.get("masks") or [None] * len(turns)
+    files = job.get("shown") or [None] * len(turns)
+    shown = {number: _mask(folder, file, turns[number]) for number, file in enumerate(files) if file is not None}
+    for place in job.get("places", ()):
+        if (number := place["picture"]) in sizes:
+            name = job["pictures"][number]["name"]
+            shown[number] = with_circles(shown.get(number), place["circles"], sizes[number], name)
     matches = folder / job["matches"] if job.get("matches") else None
     rows = _array(matches) if matches is not None and matches.suffix == ".npy" else None
     options = StitchOptions(
         **plain,
         matches=matches if rows is None else rows[rows[:, 4] > 0],
         ignore=tuple(_mask(folder, mask, turn) for mask, turn in zip(masks, turns, strict=True)),
+        show=tuple((number + 1, shown[number]) for number in sorted(shown)),
+        guides=tuple((number + 1, kind, tuple(ends)) for number, kind, ends in job.get("guides", ())),
         mask=_mask(folder, job.get("seam"), 1),
         cache=default_folder(),
     )  # fmt: skip
-    result = stitch(
-        pictures, options, lambda stage, share: _say_share(stage, share * WORKER.stitch_share),
-        lambda: stop.asked,  # Python swallows a KeyboardInterrupt inside a finalizer
-    )  # fmt: skip
-    hand_over(folder, result, rows, job, turns, _say_written)
+    return options, rows
+
+
+def _say_share(stage: str, share: float) -> None:
+    """How far a stitch is."""
+    _say({"stage": stage, "share": share * WORKER.stitch_share})
+
+
+def _say_nothing(_stage: str, _share: float) -> None:
+    """Of work that is done beside."""
 
 
 def _plain_options(told: dict[str, Any]) -> dict[str, Any]:
@@ -161,7 +235,7 @@ def _plain_options(told: dict[str, Any]) -> dict[str, Any]:
     return {**fields, "camera": CameraRequest(**asked)}
 
 
-def _say_share(stage: str, share: float) -> None:
+def _say_of_clip(stage: str, share: float) -> None:
     _say({"stage": stage, "share": share})
 
 
@@ -188,7 +262,7 @@ def _show(folder: Path, paths: list[str]) -> None:
 
 def _await(job: Path, stop: _Stop) -> None:
     """Loads what a stitch loads sooner or later, and returns when the job is there."""
-    for name in (*LIBRARIES, f"{__package__}.handed_over"):
+    for name in (*LIBRARIES, f"{__package__}.handed_over", f"{__package__}.recomposing"):
         import_module(name)
     while not job.exists():
         if stop.asked:

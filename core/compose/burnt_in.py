@@ -31,13 +31,13 @@ def shown_where_alone(pictures: Sequence[Picture], maps: Sequence[CanvasMap]) ->
     """
     if all(picture.burnt_in is None for picture in pictures):
         return tuple(pictures)
-    shown = [_at(picture, one, _opaque(picture)) for picture, one in zip(pictures, maps, strict=True)]
+    shown = [part_on_canvas(one, _opaque(picture)) for picture, one in zip(pictures, maps, strict=True)]
     found = []
     for picture, one in zip(pictures, maps, strict=True):
         if picture.burnt_in is None or picture.alpha is None:
             found.append(picture)
             continue
-        alone = _at(picture, one, picture.burnt_in) & ~np.logical_or.reduce(shown)
+        alone = part_on_canvas(one, picture.burnt_in) & ~np.logical_or.reduce(shown)
         again = _in_picture(alone, one, picture.burnt_in)
         found.append(replace(picture, alpha=np.where(again, np.float32(1), picture.alpha)))
     return tuple(found)
@@ -47,7 +47,7 @@ def _opaque(picture: Picture) -> NDArray[np.bool_] | None:
     return None if picture.alpha is None else picture.alpha > 0
 
 
-def _at(picture: Picture, one: CanvasMap, mask: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+def part_on_canvas(one: CanvasMap, mask: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
     """Where (H, W) the canvas shows a part of a picture; None: all of it."""
     inside = one.inside()
     if mask is None:

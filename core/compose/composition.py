@@ -61,7 +61,7 @@ class Composition:
 def composed(
     layers: Sequence[Layer], warp: Warp, views: Sequence[View], options: StitchOptions, floats: Sequence[bool],
     painted: NDArray[np.int8] | None, progress: ReportProgress, decided: Sequence[Decided] | None = None,
-    keep: bool = False,
+    keep: bool = False, wanted: NDArray[np.int16] | None = None,
 ) -> Composition:  # fmt: skip
     """Compose layers into a panorama.
 
@@ -88,6 +88,8 @@ def composed(
         Taken over instead of decided anew: from other frames of the same cameras.
     keep : bool
         Keep what the seams were cut by, for `pooled_decision`.
+    wanted : (H, W) int16 array, optional
+        Which picture is to be shown, if it shows anything there; −1 where the seams decide (see `wanted_on`).
 
     Returns
     -------
@@ -115,10 +117,11 @@ def composed(
         for here, light in zip(unseen, exposures, strict=True)
     ]  # fmt: skip
     if len(layers) == 2:
-        order, panorama = [0, 1], Panorama(warp, exposed, options)
+        order, panorama = [0, 1], Panorama(warp, exposed, options, wanted)
     else:
         placing = Placing(warp, views)
-        order, panorama = adding_order(placing, layers, windows), SetPanorama(warp, exposed, options, placing, windows)
+        order = adding_order(placing, layers, windows)
+        panorama = SetPanorama(warp, exposed, options, placing, windows, wanted)
     if order:
         panorama.begin(order[0], found[order[0]])
     for step, number in enumerate(order[1:]):

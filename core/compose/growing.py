@@ -20,6 +20,7 @@ from .inpaint import closed_holes
 from .multiband import bands_for
 from .options import BANDS, PLACING, WINDOW
 from .placing import Placing
+from .seams.min_cut import FIRST, SECOND
 from .window import Window, goes_round
 
 if TYPE_CHECKING:
@@ -29,7 +30,10 @@ if TYPE_CHECKING:
 class Panorama:
     """Of a pair: the second picture is added on the whole canvas, and all is worked out where it is read."""
 
-    def __init__(self, warp: Warp, layers: Sequence[Layer], options: StitchOptions) -> None:
+    def __init__(
+        self, warp: Warp, layers: Sequence[Layer], options: StitchOptions, wanted: NDArray[np.int16] | None = None
+    ) -> None:
+        self._wanted = wanted
         self._warp, self._layers, self._options = warp, layers, options
         self._open: list[NDArray[np.bool_]] = []
         self._first = 0
@@ -67,7 +71,8 @@ class Panorama:
         window = Window.whole(warp.canvas)
         added = Added(
             self._layers[number], fetched, warp.maps[number].arrays(), window, warp.canvas, found.hidden,
-            found.hidden_by_depth, warp.behind, warp.lazy_confidence, warp.slide, painted, None, count, self._options,
+            found.hidden_by_depth, warp.behind, warp.lazy_confidence, warp.slide,
+            _with_wanted(painted, self._wanted, number, np.int16(self._first)), None, count, self._options,
         )  # fmt: skip
         step = add(self.layer, added, found, *taken_over, progress)
         self.layer = step.panorama
@@ -96,9 +101,9 @@ class SetPanorama(Panorama):
 
     def __init__(
         self, warp: Warp, layers: Sequence[Layer], options: StitchOptions, placing: Placing,
-        windows: Sequence[Window | None],
+        windows: Sequence[Window | None], wanted: NDArray[np.int16] | None = None,
     ) -> None:  # fmt: skip
-        super().__init__(warp, layers, options)
+        super().__init__(warp, layers, options, wanted)
         shape = layers[0].alpha.shape
         kind = np.result_type(*(one.alpha.dtype for one in layers))
         self._light = np.zeros(layers[0].light.shape, np.float32)
@@ -171,11 +176,13 @@ class SetPanorama(Panorama):
         return out
 
     def _painted(self, number: int, window: Window, painted: NDArray[np.int8] | None) -> NDArray[np.int8] | None:
-        """What was painted between the reference and the others, as it concerns this picture and those before."""
-        if painted is None:
-            return None
-        here = window.plane(painted)
-        return -here if number == 0 else np.where(window.plane(self._labels) == 0, here, np.int8(0))
+        """What was painted between the reference and the others, and which is wanted, as it concerns this picture and
+        those before."""
+        labels, decided = window.plane(self._labels), None
+        if painted is not None:
+            here = window.plane(painted)
+            decided = -here if number == 0 else np.where(labels == 0, here, np.int8(0))
+        return _with_wanted(decided, None if self._wanted is None else window.plane(self._wanted), number, labels)
 
     def _mark(self, number: int, window: Window, chosen: NDArray[np.bool_] | None) -> None:
         """Remembers what (h, w) a picture shows."""
@@ -184,3 +191,17 @@ class SetPanorama(Panorama):
                 self._labels[there][chosen[here]] = number
             if self._count.size:
                 self._count[there] += self._layers[number].alpha[there] > 0
+
+
+def _with_wanted(
+    painted: NDArray[np.int8] | None, wanted: NDArray[np.int16] | None, number: int,
+    before: NDArray[np.int16] | np.int16,
+) -> NDArray[np.int8] | None:  # fmt: skip
+    """What was painted (h, w), see `known_labels`, and over it the picture that is wanted (see `wanted_on`), where it
+    is the one that is added, or what the panorama before comes from."""
+    if wanted is None:
+        return painted
+    out = np.zeros(wanted.shape, np.int8) if painted is None else painted.copy()
+    out[(wanted >= 0) & (wanted == before)] = FIRST
+    out[wanted == number] = SECOND
+    return out

@@ -16,7 +16,7 @@ from ..cameras.camera import Camera
 from ..cameras.from_circle import camera_of_circle
 from ..cameras.sources import called
 from ..options import StitchOptions
-from ..pictures.masks import read_mask, read_painted, without
+from ..pictures.masks import read_mask, read_painted, read_wanted, without
 from ..pictures.naming import in_words, told_apart
 from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
 from ..pictures.raw_clipping import clipping_warnings
@@ -108,7 +108,15 @@ def read_frame(sources: Sequence[Source], options: StitchOptions) -> Frame:
         return prepare(pictures, options, copies)
     masks = options.ignored_in(names)
     of_views = tuple(next((masks[number] for number in one if masks[number] is not None), None) for one in members)
-    frame = prepare(pictures, replace(options, ignore=of_views, ignore_in=()), copies)
+    wanted, lines = options.shown_in(names), options.guides_in(names)
+    guides = tuple(
+        (view + 1, *line) for view, one in enumerate(members) for number in one for line in lines[number]
+    )
+    of_shown = tuple(
+        (view + 1, mask) for view, one in enumerate(members)
+        for mask in [wanted[number] for number in one if wanted[number] is not None][:1] if mask is not None
+    )
+    frame = prepare(pictures, replace(options, ignore=of_views, ignore_in=(), show=of_shown, guides=guides), copies)
     view_of = {number: view for view, numbers in enumerate(members) for number in numbers}
     return replace(
         frame, shown_by=tuple(frame.shown_by[view_of[number]] for number in range(len(names))),
@@ -172,7 +180,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         About a mask or the camera file.
     """
     copies, names = copies or {}, [picture.name for picture in pictures]
-    masks = options.ignored_in(names)
+    masks, wanted, guides = options.ignored_in(names), options.shown_in(names), options.guides_in(names)
     shown: list[Picture] = []
     known: list[Camera | None] = []
     shown_by: list[int] = []
@@ -181,11 +189,17 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         shown_by.append(shown_by[copies[number]] if number in copies else len(shown))
         if number in copies:
             continue
+        if guides[number]:
+            picture = replace(picture, guides=guides_of(guides[number], size_of(picture)))
         mask = masks[number]
         if mask is not None:
             picture = without(picture, read_mask(mask, size_of(picture), called(number, names)))
         if picture.part is not None:  # its views carry none
+            if wanted[number] is not None:
+                raise BadRequest(f"{picture.name} is a sphere, of which no part can be asked for: leave its mask out")
             of_spheres += [f"{picture.name}: {warning}" for warning in picture.warnings]
+        elif (drawn := wanted[number]) is not None:
+            picture = replace(picture, wanted=read_wanted(drawn, size_of(picture), called(number, names)))
         for view, camera in _as_flat(picture, number):
             shown.append(view)
             known.append(camera)
@@ -222,6 +236,16 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     cameras = tuple(known) if any(known) else ()
     frame = Frame(tuple(worked_on), sizes, painted, warnings, tuple(shown_by), known=cameras)
     return within_lenses(frame, options.camera)
+
+
+def guides_of(
+    lines: Sequence[tuple[str, tuple[float, ...]]], size: tuple[int, int]
+) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    """Lines in px of a picture of `size` (W, H) as `Picture.guides` has them."""
+    return tuple(
+        (kind, tuple((end + 0.5) / side for end, side in zip(ends, (*size, *size), strict=True)))
+        for kind, ends in lines
+    )  # fmt: skip
 
 
 def _as_flat(picture: Picture, number: int) -> Iterator[tuple[Picture, Camera | None]]:

@@ -52,6 +52,7 @@ class FrameRequest:
     level: Level = "auto"
     centre: tuple[float, float] | None = None
     fov: float | None = None
+    guided: bool = False
 
     @property
     def needs_edges(self) -> bool:
@@ -165,6 +166,8 @@ def _levelled(
     def frame(down: Array, more: float = 0.0) -> Projection:
         return _surface(asked, _centred(down, covered, more), edges, covered, K)
 
+    if asked.guided and down is not None:
+        return frame(down, -np.inf)
     # where there are many pictures, they know better than the first alone how it was held
     believed = down is not None and (_believed(down) or (len(views) > 2 and _agree(down, best)))
     if down is not None and believed and not np.allclose(down, best):
@@ -188,7 +191,7 @@ def _agree(down: Array, other: Array) -> bool:
 
 def _centred(down: Array, covered: Coverage, more: float) -> Array:
     """The rotation (3, 3) of a panorama that looks at the middle of what is shown, `down` (3,) being down; more:
-    degrees of tilt that are kept beside what is always kept."""
+    degrees of tilt that are kept beside what is always kept, −∞ for none at all."""
     base = upright(down)
     mean = covered.solid_angle @ covered.rays @ base
     ahead = np.arctan2(mean[0], mean[2])
@@ -201,7 +204,7 @@ def _centred(down: Array, covered: Coverage, more: float) -> Array:
         return level  # what goes round has no side to be tilted to
     mean = covered.solid_angle @ covered.rays @ level
     pitch = np.degrees(np.arctan2(-mean[1], np.hypot(mean[0], mean[2])))
-    kept = np.sign(pitch) * min(abs(pitch), max(0.0, abs(pitch) - FRAMING.full_pitch_deg) + more)
+    kept = np.sign(pitch) * max(0.0, min(abs(pitch), max(0.0, abs(pitch) - FRAMING.full_pitch_deg) + more))
     rotation: Array = level @ turned(0, -kept, 0)
     return rotation
 

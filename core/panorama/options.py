@@ -85,6 +85,9 @@ class LevellingOptions:
     iterations: int = 50
     """Reweighted eigenvectors for what the cameras' poses alone say: far more than it takes to settle."""
 
+    guided_share: float = 1e-4
+    """Weight of down as it is found otherwise beside one given line: it decides only what the lines leave open."""
+
     pitch_reach_deg: float = 45.0
     """Degrees of pitch to either side of a camera's own axes within which down is looked for by edges: most of what is
     photographed, with 2 σ to spare."""

@@ -46,9 +46,7 @@ def read_mask(source: str | Path | NDArray[Any], size: tuple[int, int], name: st
         The mask has another shape, holds labels instead of white, or leaves nothing.
     """
     label = f"the mask of {name}" if isinstance(source, np.ndarray) else f"{source}: the mask of {name}"
-    picture = _picture(source, label)
-    _refuse_labels(picture, label)
-    mask = _stretched(_white(picture), size, label)
+    mask = _drawn(source, size, label)
     left = 1 - float(mask.mean())
     if left < MASKS.least_left:
         raise BadRequest(
@@ -56,6 +54,12 @@ def read_mask(source: str | Path | NDArray[Any], size: tuple[int, int], name: st
             "black is kept; invert the mask if it was painted the other way round"
         )
     return mask
+
+
+def read_wanted(source: str | Path | NDArray[Any], size: tuple[int, int], name: str) -> NDArray[np.bool_]:
+    """Read a mask of what is wanted of a picture: as `read_mask`, but all of it may be white."""
+    label = "the mask of what is to be shown of"
+    return _drawn(source, size, f"{label} {name}" if isinstance(source, np.ndarray) else f"{source}: {label} {name}")
 
 
 def read_painted(source: str | Path | NDArray[Any]) -> NDArray[np.int8]:
@@ -109,6 +113,14 @@ def without(picture: Picture, mask: NDArray[np.bool_]) -> Picture:
         return picture
     alpha = np.ones(mask.shape, np.float32) if picture.alpha is None else picture.alpha
     return replace(picture, alpha=np.where(mask, np.float32(0), alpha))
+
+
+def _drawn(source: str | Path | NDArray[Any], size: tuple[int, int], label: str) -> NDArray[np.bool_]:
+    """Where (H, W) a mask is white, at the size of its picture."""
+    picture = _picture(source, label)
+    _refuse_labels(picture, label)
+    drawn: NDArray[np.bool_] = _stretched(_white(picture), size, label)
+    return drawn
 
 
 def _picture(source: str | Path | NDArray[Any], label: str) -> Picture:

@@ -56,7 +56,6 @@ class Picture:
     name : str
         File name, or "array".
     warnings : tuple of str
-        For the user.
     clips_at : float
         Light from which a float picture is clipped: camera RAW has such, others have infinity.
     surround : bool
@@ -65,6 +64,10 @@ class Picture:
         Which part of a sphere it shows, where the file says that.
     burnt_in : (H, W) bool, optional
         Where a date or a logo was found, which alpha hides.
+    wanted : (H, W) bool, optional
+        Where the panorama is to come from this picture.
+    guides : tuple of (str, (4,) floats)
+        Upright and level lines in it, by their names in GUIDES: x, y, x', y' as shares of its sides.
     """
 
     light: AnyImage
@@ -79,6 +82,8 @@ class Picture:
     surround: bool = False
     part: SpherePart | None = None
     burnt_in: NDArray[np.bool_] | None = None
+    wanted: NDArray[np.bool_] | None = None
+    guides: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     @property
     def pixels(self) -> NDArray[Any]:
@@ -327,6 +332,8 @@ def resized(picture: Picture, scale: float) -> Picture:
         small: NDArray[Any] = cv2.resize(array, size, interpolation=cv2.INTER_AREA)
         return small.reshape(size[1], size[0], *array.shape[2:])
 
+    if picture.wanted is not None:
+        picture = replace(picture, wanted=shrink(picture.wanted.astype(np.float32)) >= 0.5)
     if picture.alpha is None:
         return replace(picture, light=shrink(picture.pixels), view=shrink(picture.view))
     weight, alpha = picture.alpha[..., None], shrink(picture.alpha)

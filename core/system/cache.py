@@ -179,6 +179,9 @@ def _plan(value: Any, arrays: list[NDArray[Any]]) -> Any:
         return {"tuple": [_plan(part, arrays) for part in value]}
     if isinstance(value, Path):
         return {"path": str(value)}
+    if isinstance(value, bytes):
+        arrays.append(np.frombuffer(value, np.uint8))
+        return {"bytes": len(arrays) - 1}
     module = type(value).__module__
     if not is_dataclass(value) or not module.startswith(f"{_PACKAGE}."):
         raise _Unknown(type(value).__name__)
@@ -196,6 +199,8 @@ def _value(plan: Any, arrays: list[NDArray[Any]]) -> Any:
         return tuple(_value(part, arrays) for part in plan["tuple"])
     if "path" in plan:
         return Path(plan["path"])
+    if "bytes" in plan:
+        return arrays[plan["bytes"]].tobytes()
     module, name = plan["class"]
     kind: Any = getattr(import_module(module, _PACKAGE), name)
     ours = is_dataclass(kind) and kind.__module__.startswith(f"{_PACKAGE}.")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,22 +77,16 @@ def describe(
             f"“{image.name}”: its file {path} is not there; find it with File ▸ External Data ▸ Find Missing Files"
         )
     np.save(folder / f"{stem}.npy", read(image))
-    entry = {"name": image.name, "array": f"{stem}.npy"}
+    entry: dict[str, Any] = {"name": image.name, "array": f"{stem}.npy"}
     if path is not None and path.is_file():
         entry["exif_of"] = str(path) if packed is None else path.name
     return entry
 
 
-def fingerprint(image: bpy.types.Image) -> str:
-    """What tells the content of a picture from any other: a digest of what the worker gets of it, its file or its
-    pixels. "" for a Render Result, whose pixels Blender does not give, and for a sequence, which is many pictures.
-    Raises Unusable, OSError."""
-    if image.type == "RENDER_RESULT" or image.source == "SEQUENCE":
-        return ""
-    path = file_of(image)
-    if path is not None and _goes_as_file(image, path):
-        return FILE + _digest_of_file(path)
-    return FILE + _digest(image.packed_file.data) if _goes_as_packed(image) else PIXELS + _digest_of_pixels(image)
+def fingerprint(entry: Mapping[str, Any], digest: str) -> str:
+    """What tells the content of a picture from any other, by its entry (see `describe`) and the digest that the worker
+    told of what it got, a file or pixels; "" where there is none."""
+    return (FILE if "path" in entry else PIXELS) + digest if digest else ""
 
 
 def has_changed(image: bpy.types.Image, known: str) -> bool:

@@ -24,9 +24,13 @@ def called(number: int, count: int) -> str:
     return f"the {SIDES[number]}" if count == len(SIDES) else f"picture {number + 1}"
 
 
-def describe(pictures: Sequence[bpy.types.Image]) -> list[dict[str, str]]:
-    """Name and content of pictures, the reference first, as a result keeps them. Raises Unusable, OSError."""
-    return [{"name": image.name, "fingerprint": images.fingerprint(image)} for image in pictures]
+def describe(entries: Sequence[Mapping[str, Any]], digests: Sequence[str]) -> list[dict[str, str]]:
+    """Name and content of pictures, the reference first, as a result keeps them, by their entries in a job and what the
+    worker told of them; what a result keeps of them already stays."""
+    return [
+        {"name": entry["name"], "fingerprint": entry.get("fingerprint") or images.fingerprint(entry, digest)}
+        for entry, digest in zip(entries, digests, strict=True)
+    ]
 
 
 def hold(

@@ -1,8 +1,9 @@
-"""The picture follows the frame: whenever an artist changes what of the scene the panorama shows, or from where, a
-small one takes the place of the one that is shown.
+"""The picture follows the settings: whenever an artist changes what of the scene the panorama shows, from where, or how
+it is composed, a small one takes the place of the one that is shown.
 
-It is made of the matches that the last panorama stands on, so nothing is searched for; the engine keeps geometry, field
-and depth of that size, so that only the first one has to find them. Each change ends what was begun for the one before.
+A pair's is made of the matches that the last panorama stands on, so nothing is searched for; the engine keeps geometry,
+field and depth of that size, so that only the first one has to find them. Of a set the stitch itself keeps small
+pictures, geometry and depth (`kept`). Each change ends what was begun for the one before.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from typing import Any
 
 import bpy
 
-from .. import editor, idnames, properties
+from .. import editor, idnames, pictures, properties
 from ..bridge import compat, result
 from . import modal, stitching
 
 # Editors in which such a picture was shown, and px of the screen across all of it.
 _shown_in: dict[int, float] = {}
+# Whether something was changed that the settings do not tell, like a mask.
+_asked = False
 # Seconds without another change before it begins, and before it looks again where other work is going on.
 REST, AGAIN = 0.25, 1.0
 # Pixels of the larger picture at most: so many are composed in about a second on two cores.
@@ -26,29 +29,48 @@ MOST_PIXELS = 200_000
 
 
 def changed(settings: Any) -> None:
-    """The frame was changed: begin soon, unless it is changed again. Nothing follows under `-b`."""
+    """What is followed was changed: begin soon, unless it is changed again. Nothing follows under `-b`."""
     if bpy.app.background or settings.result is None:
         return
     if bpy.app.timers.is_registered(_begin):
         bpy.app.timers.unregister(_begin)
     bpy.app.timers.register(_begin, first_interval=REST)
-    if editor.is_behind(settings, settings.result):
+    if _asked or editor.is_behind(settings, settings.result):
         modal.start_ahead()
+
+
+def ask(settings: Any) -> None:
+    """An operator changed a mask or a place: begin soon. One undo takes back both that and what follows."""
+    global _asked
+    _asked = not bpy.app.background and settings.result is not None
+    changed(settings)
 
 
 def make_job(context: bpy.types.Context, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """As `stitching.make_job`, small, without what is only measured, and without a seam that was painted over another
     frame."""
-    from ...core.options import LEAST_SCALE
-
     settings = properties.settings_of(context.scene)
-    pixels = max(image.size[0] * image.size[1] for image in (settings.reference, settings.target))
-    scale = min(settings.scale, math.sqrt(MOST_PIXELS / max(pixels, 1)))
-    job, memory = stitching.make_job(context, folder, max(scale, LEAST_SCALE), result.read(settings.result))
+    found = result.read(settings.result)
+    if pictures.is_set(settings):
+        job, memory = stitching.make_job(context, folder)
+        kept = (found or {}).get("kept") or job["kept"]
+        job |= {"kept": kept, "small": True, "take": []}
+        memory["kept"] = kept
+        if found is not None:
+            memory["pictures"] = found["pictures"]
+    else:
+        job, memory = stitching.make_job(context, folder, _scale_of_pair(settings), found)
     job["options"]["measure"] = False
     job.pop("seam", None)
     memory["shown"] = settings.result.session_uid
     return job, memory
+
+
+def _scale_of_pair(settings: Any) -> float:
+    from ...core.options import LEAST_SCALE
+
+    pixels = max(image.size[0] * image.size[1] for image in (settings.reference, settings.target))
+    return max(min(settings.scale, math.sqrt(MOST_PIXELS / max(pixels, 1))), LEAST_SCALE)
 
 
 def take_over(context: bpy.types.Context, folder: Path, found: dict[str, Any], memory: dict[str, Any]) -> str:
@@ -93,15 +115,19 @@ def _as_wide_again() -> None:
 
 def _begin() -> float | None:
     """Starts the work, where there is something to follow; returns when to look again."""
+    global _asked
     for window in bpy.context.window_manager.windows:
         settings = properties.settings_of(window.scene)
-        if not editor.is_behind(settings, settings.result):
+        is_known = editor.is_of_chosen(settings, settings.result)
+        if not (editor.is_behind(settings, settings.result) or (_asked and is_known)):
             continue
         if modal.is_working():
             return AGAIN
+        joins, _asked = _asked, False
         with bpy.context.temp_override(window=window):
-            getattr(bpy.ops.edf, idnames.Operator.FOLLOW.partition(".")[2])("INVOKE_DEFAULT")
+            getattr(bpy.ops.edf, idnames.Operator.FOLLOW.partition(".")[2])("INVOKE_DEFAULT", joins=joins)
         return None
+    _asked = False
     modal.end_ahead()
     return None
 

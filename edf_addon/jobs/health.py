@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import job
+from . import ahead, job
 
 # Kind of the worker's message about a library that cannot be loaded.
 BROKEN = "Broken"
@@ -21,8 +21,10 @@ _asked = False
 
 
 def problem() -> str:
-    """What is wrong, in words for the panel; "" where nothing is known to be. Starts the trial; never waits."""
+    """What is wrong, in words for the panel; "" where nothing is known to be. Starts the trial, and loads what
+    the first click needs; never waits."""
     if not _asked and not bpy.app.background:
+        ahead.load()
         begin_trial()
     return _said[-1] if _said else ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Mapping
 from pathlib import Path, PurePath
 from types import SimpleNamespace
@@ -69,40 +70,61 @@ def make_job(
     wanted = [name for name in ("layers", "masks", "depth") if getattr(settings, f"take_{name}")]
     job: dict[str, Any] = {
         "pictures": [
-            images.describe(image, f"picture_{number}", folder, scene, user) for number, image in enumerate(chosen)
+            # neither a render nor a sequence, which is many pictures, has a content that it is known by
+            {**images.describe(image, f"picture_{number}", folder, scene, user),
+             "digest": image.type != "RENDER_RESULT" and image.source != "SEQUENCE"}
+            for number, image in enumerate(chosen)
         ],
         "options": engine_options.options_of(SimpleNamespace(**kept), scale, is_set),
         "take": wanted if scale is None else [],
         "exr": engine_options.exr_form_of(settings),
     }  # fmt: skip
+    _add_masks(job, settings, folder)
     if is_set:
         job["options"]["viewpoint"] = pictures.viewpoint(settings)
+        job["kept"] = secrets.token_hex(8)
     else:
         _add_what_a_pair_has(job, context, folder, found)
     memory = {
         "scene": scene.session_uid, "settings": kept,
-        "pictures": ownership.describe(chosen), "cameras": job.get("cameras"),
+        "pictures": job["pictures"], "cameras": job.get("cameras"), "kept": job.get("kept"),
         # a reference to any of these would not survive an undo while the work goes on
         "held": [image.session_uid for image in chosen],
-        "chosen": {name: one.session_uid for name, one in properties.pointers(settings).items() if one is not None},
+        "chosen": {
+            name: one.session_uid
+            for name, one in (properties.pointers(settings) | pictures.masks(settings)).items() if one is not None
+        },
         "space": chosen[0].colorspace_settings.name, "edited": settings.edited_matches,
-        "pack": settings.pack, "fake_user": settings.fake_user,
+        "pack": settings.pack, "fake_user": settings.fake_user, "places": job["places"],
+        "guides": job["guides"],
     }  # fmt: skip
     return job, memory
+
+
+def _add_masks(job: dict[str, Any], settings: Any, folder: Path) -> None:
+    """What of each picture is never used, what is to be shown, and the lines that level holds to."""
+    import numpy as np
+
+    entries = pictures.used(settings)
+    masks = {kind: [getattr(entry, kind) for entry in entries] for kind in pictures.MASKS}
+    if not pictures.is_set(settings):
+        of_pair = [getattr(settings, f"ignore_{side}") for side in ownership.SIDES]
+        masks["ignore"] = [one or other for one, other in zip(of_pair, masks["ignore"], strict=True)]
+    for key, kind in (("masks", "ignore"), ("shown", "show")):
+        job[key] = [None if mask is None else f"{kind}_{number}.npy" for number, mask in enumerate(masks[kind])]
+        for name, mask in zip(job[key], masks[kind], strict=True):
+            if mask is not None:
+                np.save(folder / name, images.read(mask))
+    job |= {"places": pictures.places(settings), "guides": pictures.guides(settings)}
 
 
 def _add_what_a_pair_has(
     job: dict[str, Any], context: bpy.types.Context, folder: Path, found: dict[str, Any] | None
 ) -> None:
-    """Masks, scene cameras and matches; found: see `make_job`."""
+    """The painted seam, scene cameras and matches; found: see `make_job`."""
     import numpy as np
 
     settings = properties.settings_of(context.scene)
-    masks = [getattr(settings, f"ignore_{side}") for side in ownership.SIDES]
-    job["masks"] = [None if mask is None else f"ignore_{number}.npy" for number, mask in enumerate(masks)]
-    for name, mask in zip(job["masks"], masks, strict=True):
-        if mask is not None:
-            np.save(folder / name, images.read(mask))
     if settings.seam_mask is not None:
         job["seam"] = "seam.npy"
         np.save(folder / job["seam"], images.read(settings.seam_mask))
@@ -169,7 +191,8 @@ def take_over(
         settings = properties.settings_of(scene)
         settings.result = image
         if [one and one.session_uid for one in pictures.images(settings)] == memory["held"]:
-            pictures.mark(settings, pictures.fates([one["name"] for one in memory["pictures"]], found["report"]))
+            if spaces is None:  # else that was done before, by the stitch that it follows
+                pictures.mark(settings, pictures.fates([one["name"] for one in memory["pictures"]], found["report"]))
             if "matches" in found:
                 fill_matches(settings, found["matches"], memory["edited"])
         else:
@@ -210,9 +233,11 @@ def _bring_all(
     }  # fmt: skip
     for what, one in others.items():
         result.attach(panorama, what, one)
-    kept = {key: value for key, value in found.items() if key != "files"}
-    remembered = {name: memory[name] for name in ("settings", "pictures", "cameras")}
-    result.store(panorama, {**kept, "kind": kind, **remembered})
+    kept = {key: value for key, value in found.items() if key not in ("files", "digests")}
+    remembered = {name: memory[name] for name in ("settings", "cameras", "kept", "places", "guides")}
+    digests = found.get("digests") or [""] * len(memory["pictures"])
+    described = ownership.describe(memory["pictures"], digests)
+    result.store(panorama, {**kept, "kind": kind, "pictures": described, **remembered})
     if (folder / "depth.npz").exists():
         panorama[result.DEPTH] = (folder / "depth.npz").read_bytes()
     everything = [*bpy.data.images, *bpy.data.objects]

@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, EnumProperty
 
 from .. import editor, idnames, pictures, properties
 from ..bridge import compat
+from ..jobs import following
 
 SIDES = (
     ("reference", "Reference", "Paint out parts of the reference"),
@@ -47,26 +48,29 @@ class EDF_OT_mask_paint(bpy.types.Operator):  # noqa: N801
         if mask is None:
             mask = new_mask(picture_of(context, self.side), see_through=self.side == "seam")
             setattr(settings, MASKS[self.side], mask)
-        space = context.space_data
-        if space is not None and space.type == "IMAGE_EDITOR":
-            space.image, space.ui_mode = mask, "PAINT"
-            _set_brush(context, 0.0 if self.black else 1.0)
+        begin_painting(context, mask, 0.0 if self.black else 1.0)
         return {"FINISHED"}
 
 
 class EDF_OT_mask_done(bpy.types.Operator):  # noqa: N801
-    """Back to the picture"""
+    """Back to the picture, or to the panorama, which follows the masks of its pictures"""
 
     bl_idname = idnames.Operator.MASK_DONE
     bl_label = "Done Painting"
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        return painted_for(context) is not None
+        settings, image = properties.settings_of(context.scene), editor.shown(context)
+        return painted_for(context) is not None or pictures.mask_of(settings, image) is not None
 
     def execute(self, context: Any) -> set[str]:
-        picture = picture_of(context, painted_for(context) or "reference")
+        settings = properties.settings_of(context.scene)
+        of_row = pictures.mask_of(settings, context.space_data.image)
+        picture = picture_of(context, painted_for(context) or "reference") if of_row is None else of_row[0].image
+        if of_row is not None and editor.is_of_chosen(settings, settings.result):
+            picture = settings.result  # which follows the mask
         context.space_data.image, context.space_data.ui_mode = picture, "VIEW"
+        following.ask(settings)
         return {"FINISHED"}
 
 
@@ -93,9 +97,10 @@ def why_not(context: Any, side: str) -> str:
     return ""
 
 
-def new_mask(picture: bpy.types.Image, see_through: bool = False) -> bpy.types.Image:
-    """An image of a picture's size, kept in the file: black, or transparent."""
-    width, height = picture.size
+def new_mask(picture: bpy.types.Image, see_through: bool = False, longest: int = 0) -> bpy.types.Image:
+    """An image of a picture's size, kept in the file: black, or transparent. longest: px of its longer side at most."""
+    share = min(1.0, longest / max(picture.size)) if longest else 1.0
+    width, height = (max(1, round(side * share)) for side in picture.size)
     mask = bpy.data.images.new(f"{picture.name} mask", width, height, alpha=see_through)
     if see_through:
         mask.generated_color = (0.0, 0.0, 0.0, 0.0)
@@ -103,6 +108,14 @@ def new_mask(picture: bpy.types.Image, see_through: bool = False) -> bpy.types.I
     mask.use_fake_user = True
     mask.pack()
     return mask
+
+
+def begin_painting(context: Any, mask: bpy.types.Image, gray: float = 1.0) -> None:
+    """The editor shows a mask, and paints in a gray."""
+    space = context.space_data
+    if space is not None and space.type == "IMAGE_EDITOR":
+        space.image, space.ui_mode = mask, "PAINT"
+        _set_brush(context, gray)
 
 
 def _set_brush(context: Any, gray: float) -> None:

@@ -65,7 +65,7 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
             return self._click(context, settings, event)
         if event.type == "MOUSEMOVE":
             return self._move(context, settings, event)
-        if event.value == "PRESS" and event.type in {"X", "DEL", "D", "TAB"} and _under(context, event) is not None:
+        if event.value == "PRESS" and event.type in {"X", "DEL", "D", "TAB"} and under(context, event) is not None:
             self._key(context, settings, event)
             return {"RUNNING_MODAL"}
         return {"PASS_THROUGH"}
@@ -77,14 +77,14 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
                 bpy.ops.ed.undo_push(message="Move Match")
                 return {"RUNNING_MODAL"}
             return {"PASS_THROUGH"}
-        place = _under(context, event)
+        place = under(context, event)
         if place is None:
             return {"PASS_THROUGH"}  # the sidebar's buttons, other editors
         space, region, position = place
         side = editor.side_of(settings, space.image)
         if side not in (editor.REFERENCE, editor.TARGET):
             return {"PASS_THROUGH"}
-        point, scale = _to_picture(settings, space, region, position)
+        point, scale = to_picture(settings, space, region, position)
         reach = REACH * context.preferences.system.ui_scale / scale
         there = None if drawing.pending else at(settings, side, point, reach)
         if there is not None:
@@ -112,10 +112,10 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
     def _move(self, context: Any, settings: Any, event: Any) -> set[str]:
         if self._dragged is None:
             return {"PASS_THROUGH"}
-        place = _under(context, event)
+        place = under(context, event)
         index, side = self._dragged
         if place is not None and editor.side_of(settings, place[0].image) == side:
-            point, _ = _to_picture(settings, *place)
+            point, _ = to_picture(settings, *place)
             if match_editing.inside(point, getattr(settings, side)):
                 match_editing.move(settings.matches[index], side, point)
                 match_editing.edited(settings)
@@ -124,7 +124,7 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
 
     def _key(self, context: Any, settings: Any, event: Any) -> None:
         if event.type == "TAB":
-            place = _under(context, event)
+            place = under(context, event)
             side = editor.side_of(settings, place[0].image) if place else None
             if place:
                 place[0].image = settings.reference if side == editor.TARGET else settings.target
@@ -197,7 +197,7 @@ def _brightness(image: bpy.types.Image) -> Any:
     return values.reshape(height, width, 4)[::-1, :, :3].mean(axis=2)
 
 
-def _under(context: Any, event: Any) -> tuple[Any, Any, tuple[float, float]] | None:
+def under(context: Any, event: Any) -> tuple[Any, Any, tuple[float, float]] | None:
     """The Image Editor under the pointer: its space, the region that shows the picture, and where in it (px)."""
     for area, space in editor.all_spaces(context):
         for region in area.regions:
@@ -215,7 +215,7 @@ def _under(context: Any, event: Any) -> tuple[Any, Any, tuple[float, float]] | N
     return None
 
 
-def _to_picture(
+def to_picture(
     settings: Any, space: Any, region: Any, position: tuple[float, float]
 ) -> tuple[tuple[float, float], float]:
     """The px of the upright picture under a position of the region, and how many px of the screen one of them takes."""

@@ -38,7 +38,8 @@ class EDF_OT_add_images(bpy.types.Operator):  # noqa: N801
     def execute(self, context: Any) -> set[str]:
         settings = properties.settings_of(context.scene)
         found = [editor.shown(context)] if self.which == "SHOWN" else bpy.data.images
-        not_wanted = {*properties.pointers(settings).values(), *_made_by_stitches()} - {settings.seen_from}
+        masks = {getattr(entry, kind) for entry in settings.pictures for kind in pictures.MASKS}
+        not_wanted = {*properties.pointers(settings).values(), *_made_by_stitches(), *masks} - {settings.seen_from}
         photographs = [one for one in found if one and one not in not_wanted and one.source in SOURCES]
         count = pictures.add(settings, photographs)
         if not count:

@@ -186,12 +186,20 @@ class EDF_OT_follow(_Stitching, bpy.types.Operator):  # noqa: N801
     kind = "preview"
     follows = True
 
+    joins: BoolProperty(
+        name="Join", description="Be undone with the step before, instead of being one", options={"SKIP_SAVE"}
+    )
+
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
         job, self.memory = following.make_job(context, folder)
         return job
 
     def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
         return following.take_over(context, folder, found, self.memory)
+
+    def _take(self, context: Any, outcome: Any) -> set[str]:
+        done = super()._take(context, outcome)
+        return {"CANCELLED"} if self.joins else done  # of which Blender makes no step
 
 
 class EDF_OT_restore(bpy.types.Operator):  # noqa: N801
@@ -274,6 +282,7 @@ def bring_back(context: Any, image: bpy.types.Image | None) -> list[str]:
     with pair.choosing(settings):
         pictures.choose(settings, ownership.pictures(image))
         properties.restore(settings, found["settings"], ownership.chosen(image))
+        pictures.bring_back(settings, ownership.chosen(image), found)
         if "matches" in found:
             stitching.fill_matches(settings, found["matches"], edited=False)
     return ownership.changes(image) + ownership.camera_changes(image, context)

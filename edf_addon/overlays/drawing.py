@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from .. import editor, engine_options, idnames, properties
+from .. import editor, engine_options, idnames, pictures, properties
 from ..bridge import compat, ownership, result
 
 MATCH_RADIUS, LINE_WIDTH = 3.5, 1.6
@@ -17,7 +17,7 @@ LINE, POINTER = (1.0, 0.85, 0.2, 0.95), (1.0, 1.0, 1.0, 0.9)
 FRAME, PLACE = (1.0, 0.45, 0.1, 1.0), (1.0, 0.1, 0.5, 1.0)
 CHOSEN, WAITING = (1.0, 1.0, 1.0, 1.0), (0.2, 1.0, 0.9, 1.0)
 SHADE = (0.0, 0.0, 0.0, 0.55)
-PAINTED_OUT, FROM_TARGET = (0.9, 0.08, 0.05, 0.6), (1.0, 0.55, 0.1, 0.6)
+PAINTED_OUT, WANTED, FROM_TARGET = (0.9, 0.08, 0.05, 0.6), (0.05, 0.7, 0.2, 0.6), (1.0, 0.55, 0.1, 0.6)
 LONGEST_SIDE = 2048  # of a picture that lies under its mask
 
 # The draw handler, and the keymap items of the pointer.
@@ -101,17 +101,18 @@ def draw() -> None:
     import gpu
 
     gpu.state.blend_set("ALPHA")
-    view = _View(context, settings, image)
+    view = View(context, settings, image)
     if image == settings.seam_mask:
         _draw_under_mask(view, editor.panorama(context), image, FROM_TARGET)
     elif side == editor.PANORAMA:
         _draw_cover(view, settings, image)
     elif view.picture != image:
-        _draw_under_mask(view, view.picture, image, PAINTED_OUT)
+        is_wanted = (pictures.mask_of(settings, image) or (None, ""))[1] == "show"
+        _draw_under_mask(view, view.picture, image, WANTED if is_wanted else PAINTED_OUT)
     if side == editor.PANORAMA and settings.show_places:
         from . import overlay_geometry
 
-        _lines(view.at(overlay_geometry.places(editor.known(image)["report"])), PLACE, view)
+        lines(view.at(overlay_geometry.places(editor.known(image)["report"])), PLACE, view)
     if side is not None:
         _draw_frame(view, settings, image if side == editor.PANORAMA else settings.result, side)
     if settings.show_matches and side is not None:
@@ -122,7 +123,7 @@ def draw() -> None:
     gpu.state.blend_set("NONE")
 
 
-class _View:
+class View:
     """One editor's window region and the picture in it."""
 
     def __init__(self, context: Any, settings: Any, image: bpy.types.Image) -> None:
@@ -153,7 +154,7 @@ class _View:
         return overlay_geometry.to_region(corners, self.size, self.seen, self.region)
 
 
-def _draw_matches(view: _View, settings: Any, side: str) -> None:
+def _draw_matches(view: View, settings: Any, side: str) -> None:
     import numpy as np
 
     from . import overlay_geometry as geometry_of
@@ -174,7 +175,7 @@ def _draw_matches(view: _View, settings: Any, side: str) -> None:
     _triangles(*geometry_of.discs(places[order], radius + view.unit, shade))
     _triangles(*geometry_of.discs(places[order], radius, colours[order]))
     if 0 <= settings.match_index < len(places):
-        _lines(geometry_of.rings(places[[settings.match_index]], 2.2 * radius), CHOSEN, view)
+        lines(geometry_of.rings(places[[settings.match_index]], 2.2 * radius), CHOSEN, view)
 
 
 def points_on(settings: Any, matches: dict[str, Any], side: str, picture: bpy.types.Image | None) -> Any:
@@ -189,7 +190,7 @@ def points_on(settings: Any, matches: dict[str, Any], side: str, picture: bpy.ty
     return overlay_geometry.on_panorama(known, matches[editor.REFERENCE], matches[editor.TARGET])
 
 
-def _draw_lines(view: _View) -> None:
+def _draw_lines(view: View) -> None:
     from . import overlay_geometry as geometry_of
 
     panorama = compat.by_uid(bpy.data.images, _pointer["panorama"])
@@ -209,35 +210,37 @@ def _draw_lines(view: _View) -> None:
         else:
             ends = geometry_of.segments(line)
         ends = view.at(ends)
-        _lines(ends, SHADE, view, 2 * LINE_WIDTH)
-        _lines(ends, LINE, view)
+        lines(ends, SHADE, view, 2 * LINE_WIDTH)
+        lines(ends, LINE, view)
     if here == side:
         at = point
         if shows == editor.PANORAMA:
             at = geometry_of.on_panorama(known, point) if pointed is None else pointed
-        _lines(geometry_of.rings(view.at(at), 6 * view.unit), POINTER, view)
+        lines(geometry_of.rings(view.at(at), 6 * view.unit), POINTER, view)
 
 
-def _draw_frame(view: _View, settings: Any, panorama: bpy.types.Image | None, side: str) -> None:
+def _draw_frame(view: View, settings: Any, panorama: bpy.types.Image | None, side: str) -> None:
     """The outline of the frame that is chosen now, where the panorama was made for another."""
-    known = result.read(panorama) if editor.is_behind(settings, panorama) else None
-    rays = None if known is None else _frame_rays(settings, panorama, known)
-    if known is None or rays is None:
+    known: Any = result.read(panorama) if editor.is_behind(settings, panorama) else None
+    rays = None if known is None or "cameras" in known["geometry"] else _frame_rays(settings, panorama, known)
+    if rays is None:
         return
     from . import frame_geometry
 
     on_panorama = side == editor.PANORAMA
     points = frame_geometry.on_panorama(known, rays) if on_panorama else frame_geometry.on_picture(known, rays, side)
     ends = view.at(frame_geometry.closed_pieces(points, view.size[0] / 2 if on_panorama else 1e6))
-    _lines(ends, SHADE, view, 2 * LINE_WIDTH)
-    _lines(ends, FRAME, view)
+    lines(ends, SHADE, view, 2 * LINE_WIDTH)
+    lines(ends, FRAME, view)
 
 
 def _frame_rays(settings: Any, panorama: Any, known: dict[str, Any]) -> Any:
     """Rays around the frame that is chosen now; worked out once for each choice."""
     from . import frame_geometry
 
-    frame, then = engine_options.frame_of(settings), editor.frame_then(settings, panorama) or {}
+    frame, then = map(engine_options.frame_of, (settings, editor.settings_then(settings, panorama)))
+    if frame == then:  # other light, or another blend
+        return None
     key = (panorama.session_uid, repr(frame), repr(then))
     if key not in _frames:
         _frames.clear()
@@ -245,7 +248,7 @@ def _frame_rays(settings: Any, panorama: Any, known: dict[str, Any]) -> Any:
     return _frames[key]
 
 
-def _draw_waiting(view: _View, shown: str | None) -> None:
+def _draw_waiting(view: View, shown: str | None) -> None:
     """The point that was clicked and has no counterpart yet."""
     import numpy as np
 
@@ -254,11 +257,11 @@ def _draw_waiting(view: _View, shown: str | None) -> None:
     for side, point in pending.items():
         if side == shown:
             place = view.at(np.array([point]))
-            _lines(geometry_of.rings(place, 7 * view.unit), SHADE, view, 2.5 * LINE_WIDTH)
-            _lines(geometry_of.rings(place, 7 * view.unit), WAITING, view)
+            lines(geometry_of.rings(place, 7 * view.unit), SHADE, view, 2.5 * LINE_WIDTH)
+            lines(geometry_of.rings(place, 7 * view.unit), WAITING, view)
 
 
-def _draw_cover(view: _View, settings: Any, image: bpy.types.Image) -> None:
+def _draw_cover(view: View, settings: Any, image: bpy.types.Image) -> None:
     """The difference or the displacement over the panorama; a difference means something only alone."""
     if settings.overlay == "NONE":
         return
@@ -269,16 +272,16 @@ def _draw_cover(view: _View, settings: Any, image: bpy.types.Image) -> None:
 
 
 def _draw_under_mask(
-    view: _View, picture: bpy.types.Image | None, mask: bpy.types.Image, colour: tuple[float, ...]
+    view: View, picture: bpy.types.Image | None, mask: bpy.types.Image, colour: tuple[float, ...]
 ) -> None:
-    """The picture that a mask is painted over, and on it in red what is painted out; of a seam what comes from the
-    target in orange, darkened what comes from the reference."""
+    """The picture that a mask is painted over, and on it what is painted: out in red, wanted in green; of a seam in
+    orange what comes from the target, darkened what comes from the reference."""
     import gpu
 
     if picture is None:
         return
     _textured(_texture_of_picture(picture), view.corners(), (1.0, 1.0, 1.0, 1.0))
-    gpu.state.blend_set("ADDITIVE" if colour == PAINTED_OUT else "ALPHA")  # black adds nothing
+    gpu.state.blend_set("ALPHA" if colour == FROM_TARGET else "ADDITIVE")  # black adds nothing
     _textured(gpu.texture.from_image(mask), view.corners(), colour)
     gpu.state.blend_set("ALPHA")
 
@@ -343,7 +346,7 @@ def _triangles(corners: Any, colours: Any) -> None:
         batch_for_shader(shader, "TRIS", {"pos": _flat(corners), "color": colours}).draw(shader)
 
 
-def _lines(ends: Any, colour: tuple[float, ...], view: _View, width: float = LINE_WIDTH) -> None:
+def lines(ends: Any, colour: tuple[float, ...], view: View, width: float = LINE_WIDTH) -> None:
     """Separate segments (2·N, 2), start and end alternating, of one colour."""
     import gpu
     from gpu_extras.batch import batch_for_shader

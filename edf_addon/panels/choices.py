@@ -10,6 +10,7 @@ import bpy
 from .. import editor, engine_options, explain, idnames, offered, pictures
 from ..bridge import photo
 from ..idnames import Operator
+from .guides import draw_guides
 from .rows import NOTE, Row, SubPanel, rows, words
 
 
@@ -110,6 +111,8 @@ class EDF_PT_frame(SubPanel, bpy.types.Panel):  # noqa: N801
             words(self.layout, explain.viewpoint(editor.report_of(context)), width, NOTE)
         elif not _is_framed(settings):
             words(self.layout, "Seen from the reference's own place, with every pixel of it", width, NOTE)
+        if _is_framed(settings):
+            draw_guides(self.layout, settings)
         self.layout.operator(Operator.REFERENCE_FRAME, icon="IMAGE_REFERENCE")
 
 

@@ -1,4 +1,4 @@
-"""What is done by hand: the list of matches, and the masks."""
+"""What is done by hand: the list of matches."""
 
 # No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
 from typing import Any
@@ -8,7 +8,7 @@ from bpy.props import BoolProperty
 
 from .. import idnames, pictures
 from ..idnames import Operator
-from ..operators import mask_painting, match_editing
+from ..operators import match_editing
 from .rows import NOTE, SubPanel, words
 
 
@@ -118,37 +118,3 @@ class EDF_PT_matches(SubPanel, bpy.types.Panel):  # noqa: N801
             layout.label(text=f"{on} of {len(settings.matches)} switched on")
         layout.operator(Operator.MATCH_EDIT, icon="CURSOR")
         layout.prop(settings, "edited_matches")
-
-
-class EDF_PT_masks(SubPanel, bpy.types.Panel):  # noqa: N801
-    bl_idname = idnames.Panel.MASKS
-    bl_label = "Masks"
-
-    def draw_rows(self, context: Any, settings: Any, width: float) -> None:
-        layout = self.layout
-        layout.use_property_split = False
-        if pictures.is_set(settings):
-            layout.enabled = False
-            words(layout, pictures.PAIRS_ONLY, width, NOTE)
-        for side, label, _ in mask_painting.SIDES[:2]:
-            layout.label(text=f"Ignore in {label}")
-            row = layout.row(align=True)
-            row.template_ID(settings, mask_painting.MASKS[side], open="image.open")
-            row.operator(Operator.MASK_PAINT, text="", icon="BRUSH_DATA").side = side
-        layout.label(text="Painted Seam")
-        layout.template_ID(settings, "seam_mask", open="image.open")
-        reason = mask_painting.why_not(context, "seam")
-        row = layout.row(align=True)
-        row.enabled = not reason
-        for text, black in (("From Reference", True), ("From Target", False)):
-            button = row.operator(Operator.MASK_PAINT, text=text)
-            button.side, button.black = "seam", black
-        if reason:
-            words(layout, reason, width, NOTE)
-        if painted := mask_painting.painted_for(context):
-            said = (
-                "Orange comes from the target, dark from the reference" if painted == "seam"
-                else f"White is kept out of the {painted}; it is shown in red"
-            )  # fmt: skip
-            words(layout, said, width, NOTE)
-            layout.operator(Operator.MASK_DONE, icon="CHECKMARK")

@@ -47,3 +47,17 @@ def pixels_of():
         return flat.reshape(image.size[1], image.size[0], 4)[::-1]
 
     return pixels
+
+
+@pytest.fixture(scope="session")
+def fingerprint(tmp_path_factory):
+    """What a panorama would know a picture's content by."""
+    from edf_stitch.core.commands.digests import digests_of
+    from edf_stitch.edf_addon.bridge import images
+
+    def known_by(image) -> str:
+        folder = tmp_path_factory.mktemp("described")
+        entry = images.describe(image, "picture", folder, bpy.context.scene)
+        return images.fingerprint(entry, digests_of(folder, {"pictures": [{**entry, "digest": True}]})[0])
+
+    return known_by

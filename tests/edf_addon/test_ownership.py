@@ -147,11 +147,11 @@ def test_another_file_under_the_same_picture_is_a_change(settings, folder):
     assert len(ownership.changes(settings.result)) == 1
 
 
-def test_another_content_of_the_same_file_is_a_change(chosen, tmp_path):
+def test_another_content_of_the_same_file_is_a_change(chosen, tmp_path, fingerprint):
     path = tmp_path / "reference.png"
     path.write_bytes(Path(bpy.path.abspath(chosen.settings.reference.filepath)).read_bytes())
     image = bpy.data.images.load(str(path))
-    known = images.fingerprint(image)
+    known = fingerprint(image)
     assert not images.has_changed(image, known)
     path.write_bytes(Path(bpy.path.abspath(chosen.settings.target.filepath)).read_bytes())
     assert images.has_changed(image, known)

@@ -52,7 +52,7 @@ def test_every_option_of_the_command_line_is_a_keyword_with_its_default() -> Non
     command = edf_parser().commands["stitch"]
     options = {one.dest for one in command._actions if one.option_strings} - OF_THE_COMMAND
     assert options == {name for name, one in keywords.items() if one.kind is one.KEYWORD_ONLY} - {"measure"}
-    for name in options - {"ignore", "cache"}:
+    for name in options - {"ignore", "show", "vertical", "horizontal", "cache"}:
         assert keywords[name].default == command.get_default(name), name
 
 
@@ -76,6 +76,8 @@ def test_keywords_become_options(chosen: Callable[..., StitchOptions], tmp_path:
     assert chosen(focal_px=1200).camera == CameraRequest(focal_px=(1200.0,))
     assert chosen(focal_mm=(4, 5), sensor_mm=6).camera == CameraRequest(focal_mm=(4, 5), sensor_mm=(6.0,))
     assert chosen(ignore={"left.jpg": "m.png"}).ignore_in == (("left.jpg", Path("m.png")),)
+    assert chosen(horizontal=[("a.jpg", [1, 2, 3, 4])]).guides == (("a.jpg", "horizontal", (1, 2, 3, 4)),)
+    assert chosen(show={"left.jpg": "m.png"}).show == (("left.jpg", Path("m.png")),)
     assert chosen(ignore=[None, "m.png"]).ignore == (None, Path("m.png"))
     assert chosen(matches="m.csv", mask="p.png").files_read == [Path("m.csv"), Path("p.png")]
     kept = chosen(cache=tmp_path, memory=2.5)

@@ -81,11 +81,11 @@ def warp_of(places: Sequence[tuple[int, int]] = RING, depth: float = 0.0, deviat
 
 def compose(
     layers: Sequence[Layer], warp: Warp, centres: Sequence[Any] | None = None, decided: Any = None, keep: bool = False,
-    painted: np.ndarray | None = None, floats: bool = True, **options: Any,
+    painted: np.ndarray | None = None, floats: bool = True, shown_from: np.ndarray | None = None, **options: Any,
 ) -> Composition:  # fmt: skip
     """A panorama of float pictures, taken from one place unless told."""
     views = views_at(centres or [np.zeros(3)] * len(layers), RING)
     wanted = replace(ON_REFERENCE, **options)
     return composed(
-        layers, warp, views, wanted, [floats] * len(layers), painted, lambda *_: None, decided, keep
+        layers, warp, views, wanted, [floats] * len(layers), painted, lambda *_: None, decided, keep, shown_from
     )

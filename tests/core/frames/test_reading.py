@@ -93,6 +93,18 @@ def test_masks_go_by_number_and_by_name_whatever_is_left_out() -> None:
         read_frame([a, b, c], StitchOptions(ignore_in=(("1.png", np.ones((30, 40), bool)),)))
 
 
+def test_what_is_to_be_shown_goes_by_number_and_by_name_and_may_be_all_of_a_picture() -> None:
+    a, b, c = (picture(seed, f"{seed}.png") for seed in range(3))
+    left, everything = np.zeros((30, 40), bool), np.ones((30, 40), bool)
+    left[:, :10] = True
+    frame = read_frame([a, b, c], StitchOptions(show=((1, left), ("2", everything))))
+    wanted = [one.wanted for one in frame.pictures]
+    assert wanted[1] is None and wanted[0] is not None and wanted[2] is not None and wanted[2].all()
+    np.testing.assert_array_equal(wanted[0], left)
+    with pytest.raises(BadRequest, match="--show"):
+        read_frame([a, b, c], StitchOptions(show=(("7.png", left),)))
+
+
 def test_sizes_and_kinds_may_differ() -> None:
     gray, wide = picture(1, "gray.png", (50, 20, 1)), picture(2, "wide.png", (20, 90, 3))
     floats = picture_from_array(np.random.default_rng(3).random((25, 25, 3), np.float32), "f.exr")
@@ -128,7 +140,10 @@ def test_exposures_of_one_view_become_one_picture() -> None:
     mask = np.zeros((HEIGHT, WIDTH), bool)
     mask[:, :50] = True
     # the second by one exposure alone, the first masked by the name of its darkest
-    frame = read_frame([left[0], middle[0], left[1], *right, left[2]], StitchOptions(ignore_in=(("a-2.png", mask),)))
+    frame = read_frame([left[0], middle[0], left[1], *right, left[2]], StitchOptions(
+        ignore_in=(("a-2.png", mask),), show=(("c+2.png", mask),)
+    ))  # fmt: skip
+    assert frame.pictures[0].wanted is None and np.array_equal(frame.pictures[2].wanted, mask)
     assert frame.names == ["a+0.png", "b+0.png", "c+0.png"]
     assert [one.bits for one in frame.pictures] == [32, 8, 32]
     assert frame.shown_by == (0, 1, 0, 2, 2, 2, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -67,10 +68,10 @@ def test_a_stitch_of_them_is_float(blender: SimpleNamespace, photographs: list[P
 
 
 def test_a_photograph_that_changed_or_is_gone_is_noticed(
-    blender: SimpleNamespace, photographs: list[Path], tmp_path: Path
+    blender: SimpleNamespace, photographs: list[Path], tmp_path: Path, fingerprint: Callable[[object], str]
 ) -> None:
     image = blender.settings.reference
-    known = images.fingerprint(image)
+    known = fingerprint(image)
     assert not images.has_changed(image, known)
     photographs[0].write_bytes(photographs[0].read_bytes() + b"\0")
     assert images.has_changed(image, known)

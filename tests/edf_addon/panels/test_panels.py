@@ -151,13 +151,14 @@ def test_a_failure_and_a_broken_library_are_said_in_words(draw, monkeypatch):
 
 
 @pytest.fixture
-def stitched(chosen, small_result):
+def stitched(chosen, small_result, fingerprint):
     """A panorama whose report warns."""
     report = json.loads(json.dumps({**small_result.report, "warnings": ["the focal length is doubtful"]}))
     image = chosen.settings.result = bpy.data.images.new("panorama", 60, 40)
+    both = [chosen.settings.reference, chosen.settings.target]
     result.store(image, {"report": report, "has_depth": False, "heat_range": [3.0, 40.0], "geometry": {},
-                         "pictures": ownership.describe([chosen.settings.reference, chosen.settings.target])})
-    ownership.hold(image, [chosen.settings.reference, chosen.settings.target], {})
+                         "pictures": [{"name": one.name, "fingerprint": fingerprint(one)} for one in both]})
+    ownership.hold(image, both, {})
     return chosen
 
 
@@ -185,6 +186,7 @@ def test_every_setting_is_in_some_panel(draw, stitched):
     settings.overlay = "DISPLACEMENT"
     seen |= set(draw().props)
     settings.projection, settings.slide_auto = "PANNINI", False
+    settings.guides.add()
     for source in settings.bl_rna.properties["camera"].enum_items.keys():
         settings.camera = source
         seen |= set(draw().props)

@@ -1,0 +1,60 @@
+"""The small panorama of more than two pictures that follows the settings, of what their stitch has kept."""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from edf_stitch.edf_addon import editor  # noqa: E402
+from edf_stitch.edf_addon.bridge import result  # noqa: E402
+from edf_stitch.edf_addon.jobs import job  # noqa: E402
+
+from .test_stitching_sets import listed, set_folder  # noqa: E402, F401 (fixtures)
+
+start = job.start
+
+
+@pytest.fixture
+def stitched(listed, monkeypatch, tmp_path):  # noqa: F811
+    """A set that was stitched, with a cache."""
+    monkeypatch.setenv("EDF_CACHE", str(tmp_path / "cache"))
+    assert bpy.ops.edf.stitch() == {"FINISHED"}
+    return listed
+
+
+def test_a_set_is_composed_again_of_what_its_stitch_kept(stitched, monkeypatch):
+    settings = stitched.settings
+    panorama = settings.result
+    jobs = []
+
+    def begin(request, folder):
+        for entry in request["pictures"]:
+            entry["path"] = "is not read again"
+        jobs.append(request)
+        return start(request, folder)
+
+    monkeypatch.setattr(job, "start", begin)
+    assert not editor.is_behind(settings, panorama)
+    for name, value in (("slide", 0.5), ("light", "NONE"), ("blend", "FEATHER"), ("projection", "CYLINDRICAL")):
+        settings.slide_auto = False
+        setattr(settings, name, value)
+        assert editor.is_behind(settings, settings.result), name
+        assert bpy.ops.edf.follow() == {"FINISHED"}, name
+        assert not editor.is_behind(settings, settings.result), name
+    small = result.read(settings.result)
+    assert small["kind"] == "preview" and not {"features", "geometry"} & set(small["seconds"])
+    assert small["kept"] == result.read(panorama)["kept"] and len(jobs) == 4
+    assert small["report"]["canvas"]["projection"]["kind"] == "cylindrical"
+    assert [entry.state for entry in settings.pictures][:3] == ["USED"] * 3
+    assert panorama.name in bpy.data.images, "the large one stays"
+    cameras = [np.array(one["K"]) for one in small["geometry"]["cameras"]]
+    full = [np.array(one["K"]) for one in result.read(panorama)["geometry"]["cameras"]]
+    assert np.allclose(cameras, full, rtol=1e-6), "in px of the full pictures"
+
+
+def test_what_is_no_longer_kept_is_found_again(stitched, monkeypatch, tmp_path):
+    settings = stitched.settings
+    monkeypatch.setenv("EDF_CACHE", str(tmp_path / "empty"))
+    settings.crop = "FULL"
+    assert bpy.ops.edf.follow() == {"FINISHED"}
+    assert settings.result.name.endswith("preview") and not editor.is_behind(settings, settings.result)
