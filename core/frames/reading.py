@@ -28,6 +28,7 @@ from .flatness import circle_in, usable
 from .frame import Frame, size_of
 from .merging import MergedBracket, merged
 from .overlays import overlays_in
+from .own_panoramas import own_panorama_warnings
 from .spheres import views_of_sphere
 from .used_parts import within_lenses
 
@@ -206,6 +207,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         else f"{names[number]} is the same picture as {names[first]}: it is used once"
         for number, first in copies.items()
     )
+    warnings += *own_panorama_warnings(pictures),
     finished = [picture.name for picture in pictures if picture.bits < 32]
     if finished and any(picture.is_raw for picture in pictures):
         warnings += (
