@@ -223,7 +223,8 @@ def _picture(
     alpha = None
     if stored_alpha is not None:
         full = 1.0 if raw.dtype == np.float32 else float(np.iinfo(raw.dtype).max)
-        alpha = np.clip(stored_alpha.astype(np.float32) / np.float32(full), 0.0, 1.0)  # NaN stays
+        with np.errstate(invalid="ignore"):  # NaN stays, the kind that signals too
+            alpha = np.clip(stored_alpha.astype(np.float32) / np.float32(full), 0.0, 1.0)
     if associated and alpha is not None:
         colour = _straight(colour, alpha)
     colour = np.ascontiguousarray(colour)
