@@ -33,8 +33,8 @@ def own_panorama_warnings(pictures: Sequence[Picture]) -> list[str]:
         source = next((one.name for one in photographs if _of_one_moment(one.exif, picture.exif)), None)
         if source is not None:
             out.append(
-                f"{picture.name} is a panorama that EDF Stitch made of {source}, which is given beside it: {_WHY}; leave "
-                "it out"
+                f"{picture.name} is a panorama that EDF Stitch made of {source}, which is given beside it: {_WHY}; "
+                "leave it out"
             )
         elif not picture.exif.text(_TAKEN[0]) and len(pictures) > 2:
             out.append(

@@ -312,7 +312,8 @@ def _width_of_pixels(look: Look, shift: tuple[int, int], report: dict[str, Any])
     if projection.get("kind") != "equirectangular":
         return np.ones((rows, 1), np.float32)
     fall = (np.arange(rows) * look.step + shift[1] - projection["centre"][1]) / projection["focal_px"]
-    return np.maximum(np.cos(fall), 1e-3).astype(np.float32)[:, None]
+    wide: NDArray[np.float32] = np.maximum(np.cos(fall), 1e-3).astype(np.float32)[:, None]
+    return wide
 
 
 def _detailed(tones: Levels) -> NDArray[np.bool_]:

@@ -43,9 +43,9 @@ class Exif:
 
     orientation: 1..8 as stored in the file. width, height (ExifImageWidth/Height) in pixels and focal_plane_*_per_mm in
     sensor pixels per mm belong to the picture as the sensor held it, unless `upright` turned them. heading: degrees
-    from true north to the east at which the camera looked. software: the program that wrote it. undistorted: whether the file says that its lens's
-    distortion was removed, which XMP does. kept: (tag number, value) of the tags that are written
-    again; a value is a text, an integer, or (numerator, denominator).
+    from true north to the east at which the camera looked. software: the program that wrote it. undistorted: whether
+    the file says that its lens's distortion was removed, which XMP does. kept: (tag number, value) of the tags that are
+    written again; a value is a text, an integer, or (numerator, denominator).
     """
 
     orientation: int = 1

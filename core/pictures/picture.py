@@ -63,6 +63,8 @@ class Picture:
         Whether the file says that it is a map of many directions (a sphere, a cylinder), no flat picture.
     part : SpherePart, optional
         Which part of a sphere it shows, where the file says that.
+    circle : (float, float, float), optional
+        Middle x, y and radius, px, of the fisheye's circle on black that is all that it shows, where that was found.
     burnt_in : (H, W) bool, optional
         Where a date or a logo was found, which alpha hides.
     """
@@ -78,6 +80,7 @@ class Picture:
     clips_at: float = float("inf")
     surround: bool = False
     part: SpherePart | None = None
+    circle: tuple[float, float, float] | None = None
     burnt_in: NDArray[np.bool_] | None = None
 
     @property
