@@ -248,7 +248,7 @@ def _of_many(
     progress: ReportProgress,
 ) -> Geometry:  # fmt: skip
     """The geometry of more than two pictures; of two of them, if no more connect."""
-    from .rig.exif_doubt import without_wrong_exif, wrong_exif
+    from .rig.exif_doubt import exif_warnings, without_wrong_exif, wrong_exif
     from .rig.from_pictures import content_order, matched_pictures, registered  # a pair starts sooner without it
 
     pictures, cache = frame.pictures, Cache(options.cache)
@@ -256,16 +256,16 @@ def _of_many(
     if options.matches is None:
         matched = matched_pictures(pictures, order, frame.bodies, options.few_features, cache, progress)
     else:
-        worked = [camera.size for camera in cameras]
-        matched = given_matches(options.matches, pictures, frame.full_sizes, worked)
+        matched = given_matches(options.matches, pictures, frame.full_sizes, [camera.size for camera in cameras])
     doubted = cache.remember(
         "exif", (cameras, matched, options.seed), lambda: wrong_exif(cameras, matched, options.seed)
     )
-    cameras, overruled = without_wrong_exif(cameras, doubted, frame.names)
+    by_exif, cameras = cameras, without_wrong_exif(cameras, doubted, frame.names)
     found = registered(pictures, order, cameras, matched, options.seed, cache, progress)
     check_connected(found, frame.called, options.require_all)
     left_out = tuple((frame.called[number], why) for number, why in found.left_out.items())
-    warnings = (*warnings, *overruled, *left_out_warnings(found, cameras, frame.called))
+    warnings = (*warnings, *exif_warnings(by_exif, doubted, frame.names, found.focals),
+                *left_out_warnings(found, cameras, frame.called))  # fmt: skip
     found = seen_from(found, options.viewpoint, frame.called, frame.shown_by)
     if len(found.numbers) == 2:
         pair_options = replace(options, viewpoint=None, scale_metres=None)

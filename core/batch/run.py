@@ -105,11 +105,11 @@ class _Meter:
     def __init__(self, progress: Tell | None, cancelled: Callable[[], bool] | None, total: float) -> None:
         self.cancelled = cancelled
         self._progress, self._total = progress, total
-        self._label, self._done, self._stages = "", 0.0, stages_of(2)
+        self._label, self._done, self.pictures = "", 0.0, 2
 
     def begin(self, label: str, done: float, pictures: int) -> None:
         """Begins an item of so many pictures, after `done` of the total weight."""
-        self._label, self._done, self._stages = label, done, stages_of(pictures)
+        self._label, self._done, self.pictures = label, done, pictures
 
     def piece(self, weight: float, what: str = "") -> Tell:
         """The progress callback of the item's next piece, which has this weight in the total; what: it is."""
@@ -124,7 +124,7 @@ class _Meter:
 
     def stopwatch(self, weight: float, what: str = "") -> Stopwatch:
         """The same for work that has steps of its own."""
-        return Stopwatch(Progress(self.piece(weight, what), self.cancelled, self._stages))
+        return Stopwatch(Progress(self.piece(weight, what), self.cancelled, stages_of(self.pictures)))
 
 
 def _weight(job: Job) -> float:
@@ -233,7 +233,8 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
     item, options, progress = job.item, job.options, meter.stopwatch(CLIP.alignment_weight)
     used = _readable(item, options, progress)
     first = next(iter(used))
-    sizes = used[first].full_sizes
+    meter.pictures = len(used[first].pictures)  # a sphere is several
+    progress.expect(meter.pictures)
     alignment = align(list(used.values()), options, progress)
     quick = replace(options, crop="full", measure=False)
     decided = pooled_decision([
@@ -253,7 +254,7 @@ def _lock(job: Job, meter: _Meter) -> _Locked:
         about = {"frames": list(item.frames or ()), "aligned_on": list(used), "shown": first}
         for piece in reports:
             piece.write(replace(result, report={**result.report, "clip": about}))
-    return _Locked(alignment, decided, sizes, replace(options, crop=crop, measure=False))
+    return _Locked(alignment, decided, used[first].full_sizes, replace(options, crop=crop, measure=False))
 
 
 def _used(item: BatchItem, number: int, options: StitchOptions, alignment: Alignment) -> Frame:

@@ -61,3 +61,13 @@ def bodies_of(cameras: Sequence[Camera | None]) -> Bodies:
     ]
     R = [np.eye(3) if view is None else view.R for view in views]
     return Bodies(np.array(of, np.intp), np.array(R).reshape(-1, 3, 3))
+
+
+def called_of_bodies(names: Sequence[str], cameras: Sequence[Camera | None]) -> dict[int, str]:
+    """By the number of the first picture of each body what a user calls it: a sphere by its own name, not its view's;
+    names: of all pictures, cameras: as for `bodies_of`."""
+    called = {}
+    for number in sorted(set(bodies_of(cameras).of.tolist())):
+        camera = cameras[number]
+        called[number] = names[number] if camera is None or camera.view_of is None else camera.view_of.name
+    return called

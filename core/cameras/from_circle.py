@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..raster.arrays import Array
 from .camera import Camera
 from .lens_models import Lens, LensProjection
 from .options import INTRINSICS
 
 
-def camera_of_circle(centre: Array, radius: float, size: tuple[int, int]) -> Camera:
+def camera_of_circle(circle: tuple[float, float, float], size: tuple[int, int]) -> Camera:
     """A camera that shows as many degrees as most fisheyes in a circle.
 
     Parameters
     ----------
-    centre : (2,) array
-        px of the circle's middle.
-    radius : float
-        px.
+    circle : (float, float, float)
+        Its middle x, y and its radius, px.
     size : (int, int)
         (W, H) px of the picture.
 
@@ -27,8 +24,9 @@ def camera_of_circle(centre: Array, radius: float, size: tuple[int, int]) -> Cam
     Camera
         Of an equidistant lens.
     """
+    x, y, radius = circle
     focal = radius / np.radians(INTRINSICS.circle_deg / 2)
-    K = np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1]])
+    K = np.array([[focal, 0, x], [0, focal, y], [0, 0, 1]])
     return Camera(K, size, "its circle", 0.0, lens=Lens(LensProjection.EQUIDISTANT))
 
 

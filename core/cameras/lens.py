@@ -152,8 +152,9 @@ def _radial(camera: Camera) -> tuple[Array, Array, Array]:
     # while the slope is at least a half, twice the reach is as far as it takes
     r = np.linspace(0, 3 * LENS.reach * _corner_radius(camera), LENS.radius_samples)
     k1, k2, _, _, k3 = camera.distortion
-    slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
-    return r, slope, r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+    with np.errstate(over="ignore", invalid="ignore"):  # coefficients of no lens fold at once, however large
+        slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
+        return r, slope, r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
 
 
 def _distorted(ideal: Array, distortion: Array, limit: float) -> Array:

@@ -70,7 +70,7 @@ def _numbers(entry: dict[str, Any], key: str, count: int, place: str) -> tuple[f
     given = entry.get(key) or []
     try:
         values = np.asarray(given, np.float64).ravel()
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         values = np.full(1, np.nan)
     if len(values) > count or not np.isfinite(values).all():
         raise BadRequest(f"{place}: {key} must be {count} number{'s' if count > 1 else ''}")

@@ -114,7 +114,8 @@ class Lens:
         s, slope = _projected(self, angle)
         a, b, c = self.ptlens
         q = s / self.radius
-        return slope * (((4 * a * q + 3 * b) * q + 2 * c) * q + 1 - a - b - c)
+        with np.errstate(over="ignore", invalid="ignore"):  # coefficients of no lens fold at once, however large
+            return slope * (((4 * a * q + 3 * b) * q + 2 * c) * q + 1 - a - b - c)
 
     def angle_at(self, radius: Array) -> Array:
         """Angles (…) from the axis, rad, at which rays shown at such radii (…) stand: by Newton's method, kept between
@@ -159,12 +160,12 @@ def _limit(lens: Lens) -> float:
     whole = np.radians(LENS.widest_flat if narrow else LENS.widest_round)
     angles = np.linspace(0, whole, LENS.radius_samples)
     least = LENS.least_angular_slope
-    folded = lens.slope_at(angles) < least
+    folded = ~(lens.slope_at(angles) >= least)  # not a number: of coefficients of no lens
     if not folded.any():
         return float(whole)
     first = int(np.argmax(folded))
     low, high = angles[max(first - 1, 0)], angles[first]
     for _ in range(LENS.iterations):
         middle = (low + high) / 2
-        low, high = (low, middle) if lens.slope_at(middle) < least else (middle, high)
+        low, high = (middle, high) if lens.slope_at(middle) >= least else (low, middle)
     return float(low)

@@ -144,3 +144,8 @@ class Registration:
     rig: Rig
     numbers: tuple[int, ...]
     left_out: dict[int, str]
+
+    @property
+    def focals(self) -> dict[int, float]:
+        """Focal lengths, px, of those that were registered, by their numbers among the given pictures."""
+        return {number: camera.focal for number, camera in zip(self.numbers, self.rig.cameras, strict=True)}

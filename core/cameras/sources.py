@@ -289,7 +289,7 @@ def _camera_from_entry(entry: dict[str, Any], name: str, size: tuple[int, int]) 
     if entry.get("distortion") is not None:
         try:
             values = np.asarray(entry["distortion"], np.float64).ravel()
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             values = np.full(1, np.nan)
         if len(values) > 5 or not np.isfinite(values).all():
             raise BadRequest(f"the camera of {name}: distortion is at most k1, k2, p1, p2, k3")
@@ -316,7 +316,8 @@ def _size_of(entry: dict[str, Any], name: str, size: tuple[int, int]) -> tuple[i
     told = entry.get("size")
     if told is None:
         return size
-    if not (isinstance(told, list) and len(told) == 2 and all(isinstance(one, int) and one > 0 for one in told)):
+    whole = isinstance(told, list) and all(isinstance(one, int) and 0 < one < 2**31 for one in told)
+    if not (whole and len(told) == 2):
         raise BadRequest(f"the camera of {name}: size must be [width, height], px")
     if abs(told[0] * size[1] - told[1] * size[0]) > max(*told, *size):
         turned = "; it is about the picture as it is stored, and EXIF turns it" if told[::-1] == list(size) else ""
@@ -339,7 +340,7 @@ def _rotation(entry: dict[str, Any], key: str, name: str) -> NDArray[np.float64]
 def _matrix(entry: dict[str, Any], key: str, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
     try:
         value = np.asarray(entry[key], np.float64)
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         value = np.empty(0)
     if value.shape != shape or not np.isfinite(value).all():
         raise BadRequest(f"the camera of {name}: {key} must be {'×'.join(map(str, shape))} numbers")

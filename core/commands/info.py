@@ -48,7 +48,9 @@ def run_info(args: argparse.Namespace) -> int:
 
 def entry_of(path: Path) -> dict[str, Any]:
     """What was understood of a file; `error` says why it cannot be used, "" if it can."""
+    from ..cameras.from_circle import camera_of_circle
     from ..cameras.sources import CameraRequest, cameras_for
+    from ..frames.flatness import usable
     from ..frames.frame import size_of
     from ..pictures.picture import load_picture
 
@@ -56,32 +58,32 @@ def entry_of(path: Path) -> dict[str, Any]:
         picture = load_picture(path)
     except StitchError as error:
         return {"file": str(path), "error": str(error).removeprefix(f"{path}: ")}
-    size = size_of(picture)
-    shows, why_not = _shown(picture)
-    (camera,), problems = cameras_for(CameraRequest(), [path.name], [size], [picture.exif])
-    exif = picture.exif
+    try:
+        picture, why_not = usable(picture), ""
+    except UnreadableImage as why:
+        why_not = str(why).removeprefix(f"{picture.name}: ")
+    size, exif = size_of(picture), picture.exif
+    known = None if picture.circle is None else camera_of_circle(picture.circle, size)
+    (camera,), problems = cameras_for(CameraRequest(), [path.name], [size], [exif], [known])
+    round_all = picture.part is not None
+    focal = None if camera.assumed or round_all else round(camera.focal, 2)
     return {
-        "file": str(path), "error": why_not, "shows": shows, "kind": _kind(path, picture), "width": size[0],
-        "height": size[1], "bits": picture.bits, "channels": picture.light.shape[2], "alpha": picture.alpha is not None,
-        "colours": _colours(picture), "make": exif.make, "model": exif.model, "lens": exif.lens,
-        "taken": exif.text(36867) or exif.text(306), "focal_px": None if camera.assumed else round(camera.focal, 2),
-        "focal_source": camera.source, "focal_mm": exif.focal_mm, "focal35_mm": exif.focal35_mm,
-        "undistorted": exif.undistorted,
+        "file": str(path), "error": why_not, "shows": "" if why_not else _shown(picture),
+        "kind": _kind(path, picture), "width": size[0], "height": size[1], "bits": picture.bits,
+        "channels": picture.light.shape[2], "alpha": picture.alpha is not None, "colours": _colours(picture),
+        "make": exif.make, "model": exif.model, "lens": exif.lens, "taken": exif.text(36867) or exif.text(306),
+        "focal_px": focal, "focal_source": "none: it is a sphere" if round_all else camera.source,
+        "focal_mm": exif.focal_mm, "focal35_mm": exif.focal35_mm, "undistorted": exif.undistorted,
         "orientation": exif.orientation, "problems": [*picture.warnings, *problems],
     }  # fmt: skip
 
 
-def _shown(picture: Picture) -> tuple[str, str]:
-    """What kind of picture it is, in words, and why it cannot be used, "" if it can."""
-    from ..frames.flatness import circle_in, usable
-
-    try:
-        part = usable(picture).part
-    except UnreadableImage as why:
-        return "", str(why).removeprefix(f"{picture.name}: ")
+def _shown(picture: Picture) -> str:
+    """What kind of picture it is, in words."""
+    part = picture.part
     if part is not None:
-        return "whole sphere" if part.is_whole else f"part of a sphere of {part.full[0]}×{part.full[1]}", ""
-    return "flat picture" if circle_in(picture) is None else "circle of a fisheye", ""
+        return "whole sphere" if part.is_whole else f"part of a sphere of {part.full[0]}×{part.full[1]}"
+    return "flat picture" if picture.circle is None else "circle of a fisheye"
 
 
 def _kind(path: Path, picture: Picture) -> str:
@@ -111,6 +113,7 @@ def line_of(entry: dict[str, Any]) -> str:
     camera = model if make and model.startswith(make) else " ".join(filter(None, (make, model))) or "camera unknown"
     lens = f", {entry['lens']}" if entry["lens"] else ""
     focal = f"f {entry['focal_px']:.0f} px ({entry['focal_source']})" if entry["focal_px"] else "f unknown"
+    focal = "no f" if "sphere" in entry["shows"] else focal
     turned = "upright" if entry["orientation"] == 1 else f"turned upright (orientation {entry['orientation']})"
     parts = [f"{entry['width']}×{entry['height']} {entry['kind']}, {depth}, {channels}, {entry['colours']}"]
     parts += [entry["shows"]] if entry["shows"] not in ("", "flat picture") else []

@@ -33,28 +33,33 @@ _FOUND = (
 
 def usable(picture: Picture) -> Picture:
     """The picture; of a sphere with the part of it that it shows, which files need not say, and with a warning where
-    they do not. Refuses (UnreadableImage) what shows nothing, what goes around in another way than a sphere, and two
-    circles of fisheyes, with what to do."""
-    kind = kind_of(picture)
+    they do not; of a fisheye with its circle. Refuses (UnreadableImage) what shows nothing, what goes around in another
+    way than a sphere, and two circles of fisheyes, with what to do."""
+    kind, circle = _kind_and_circle(picture)
     if picture.part is None and kind == "sphere":
         height, width = picture.view.shape[:2]
         return replace(picture, part=whole_sphere((width, height)), warnings=(*picture.warnings, _FOUND))
     if kind in _ADVICE:
         raise UnreadableImage(f"{picture.name}: {_ADVICE[kind]}")
-    return picture
+    return picture if circle is None else replace(picture, circle=circle)
 
 
 def kind_of(picture: Picture) -> Kind:
     """What a picture is: a flat photograph, or one of those that need another projection, or none."""
+    return _kind_and_circle(picture)[0]
+
+
+def _kind_and_circle(picture: Picture) -> tuple[Kind, tuple[float, float, float] | None]:
+    """The same, and the circle where it is one (see `Picture.circle`)."""
     if picture.alpha is not None and not picture.alpha.any():
-        return "transparent"
+        return "transparent", None
     if not picture.surround:  # first: black ends meet as well
         circles = _circles_in(picture.view)
         if circles:
-            return "circle" if len(circles) == 1 else "circles"
+            return ("circle", circles[0]) if len(circles) == 1 else ("circles", None)
     if picture.part is not None or (not picture.surround and _ends_meet(picture.view)):
-        return "sphere"
-    return "surround" if picture.surround else "flat"
+        return "sphere", None
+    return "surround" if picture.surround else "flat", None
 
 
 def _ends_meet(view: NDArray[np.uint8]) -> bool:
@@ -86,14 +91,8 @@ def _ends_meet(view: NDArray[np.uint8]) -> bool:
     )
 
 
-def circle_in(picture: Picture) -> tuple[Array, float] | None:
-    """Centre (2,) and radius, px, of the circle on black that is all that a picture shows; None where it is none."""
-    circles = [] if picture.surround else _circles_in(picture.view)
-    return circles[0] if len(circles) == 1 else None
-
-
-def _circles_in(view: NDArray[np.uint8]) -> list[tuple[Array, float]]:
-    """The circle on black that is all that a picture shows, or two beside each other: centres (2,) and radii, px."""
+def _circles_in(view: NDArray[np.uint8]) -> list[tuple[float, float, float]]:
+    """The circle on black that is all that a picture shows, or two beside each other: middles x, y and radii, px."""
     if min(view.shape[:2]) < FLATNESS.least_side:
         return []
     height, width = view.shape[:2]
@@ -106,7 +105,8 @@ def _circles_in(view: NDArray[np.uint8]) -> list[tuple[Array, float]]:
         circle = _circle_of(part)
         if circle is None:
             return []
-        found.append(((circle[0] + 0.5) / share - 0.5, circle[1] / share))
+        x, y = ((circle[0] + 0.5) / share - 0.5).tolist()
+        found.append((x, y, circle[1] / share))
     return found
 
 

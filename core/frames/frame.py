@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cameras.bodies import Bodies, bodies_of
+from ..cameras.bodies import Bodies, bodies_of, called_of_bodies
 from ..pictures.picture import Picture, resized
 
 if TYPE_CHECKING:
@@ -58,12 +58,9 @@ class Frame:
     @property
     def called(self) -> list[str]:
         """The same as a user names them: the first view of a sphere stands for it."""
-        names, spheres = self.names, set[int]()
-        for number, camera in enumerate(self.known):
-            if camera is not None and camera.view_of is not None and camera.view_of.sphere not in spheres:
-                spheres.add(camera.view_of.sphere)
-                names[number] = camera.view_of.name
-        return names
+        names = self.names
+        called = called_of_bodies(names, self.known or [None] * len(names))
+        return [called.get(number, name) for number, name in enumerate(names)]
 
     @property
     def exifs(self) -> list[Exif]:

@@ -100,7 +100,15 @@ def merged(pictures: Sequence[Picture], bracket: Bracket) -> tuple[Picture, Merg
     each(lambda rows: np.multiply(light[rows], (to_scale / weights[rows])[..., None], out=light[rows]),
          strips(light.shape))  # fmt: skip
     warnings = tuple(dict.fromkeys(warning for one in taken for warning in one.warnings))
-    made = replace(picture_from_array(light, middle.name), exif=middle.exif, icc=middle.icc, warnings=warnings)
+    # the middle one best shows what it is, where no file says it
+    part, circle = (
+        next((found for one in (middle, *taken) if (found := getattr(one, name)) is not None), None)
+        for name in ("part", "circle")
+    )
+    made = replace(
+        picture_from_array(light, middle.name), exif=middle.exif, icc=middle.icc, warnings=warnings, part=part,
+        circle=circle,
+    )  # fmt: skip
     if middle.is_raw:
         made = replace(made, clips_at=middle.clips_at / gains[0])
     is_still = all(_is_still(homography) for homography in bracket.homographies)

@@ -24,10 +24,11 @@ from ..pictures.raw_development import RawExposure, exposure_of_first
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
 from .brackets import brackets_in
-from .flatness import circle_in, usable
+from .flatness import usable
 from .frame import Frame, size_of
 from .merging import MergedBracket, merged
 from .overlays import overlays_in
+from .own_panoramas import own_panorama_warnings
 from .spheres import views_of_sphere
 from .used_parts import within_lenses
 
@@ -220,6 +221,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         else f"{names[number]} is the same picture as {names[first]}: it is used once"
         for number, first in copies.items()
     )
+    warnings += *own_panorama_warnings(pictures),
     finished = [picture.name for picture in pictures if picture.bits < 32]
     if finished and any(picture.is_raw for picture in pictures):
         warnings += (
@@ -254,8 +256,7 @@ def _as_flat(picture: Picture, number: int) -> Iterator[tuple[Picture, Camera | 
     if picture.part is not None:
         yield from views_of_sphere(picture, picture.part, number)
         return
-    circle = circle_in(picture)
-    yield picture, None if circle is None else camera_of_circle(*circle, size_of(picture))
+    yield picture, None if picture.circle is None else camera_of_circle(picture.circle, size_of(picture))
 
 
 def _all_read(sources: Sequence[Source]) -> list[Picture]:

@@ -67,7 +67,7 @@ def _masked(entry: dict[str, Any], picture: Picture, full: tuple[int, int]) -> N
     about, size = np.array(entry.get("size", full), float), size_of(picture)
     try:
         polygons = [np.asarray(one, np.float64).reshape(-1, 2) for one in entry["ignore"]]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         polygons = [np.full((1, 2), np.nan)]
     if not all(len(one) > 2 and np.isfinite(one).all() for one in polygons):
         raise BadRequest(f"the camera of {picture.name}: ignore must be polygons [[x, y], …], px")

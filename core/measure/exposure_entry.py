@@ -33,16 +33,17 @@ def exposure_entry(pictures: Sequence[Picture], decided: Sequence[Decided]) -> d
     }
 
 
-def exposure_warnings(pictures: Sequence[Picture], exposures: Sequence[Exposure]) -> list[str]:
-    """What of the light could not be matched, and which picture is over-exposed beside the other."""
+def exposure_warnings(names: Sequence[str], exposures: Sequence[Exposure]) -> list[str]:
+    """What of the light could not be matched, and which picture is over-exposed beside the other; names: what
+    the pictures are called, with a sphere in place of its views."""
     out = []
-    other, both = ("other", "both") if len(pictures) == 2 else ("others", "others too")
-    for picture, one in zip(pictures, exposures, strict=True):
+    other, both = ("other", "both") if len(exposures) == 2 else ("others", "others too")
+    for name, one in zip(names, exposures, strict=True):
         if one.why_not:
-            out.append(f"the exposure of {picture.name} could not be matched: {one.why_not}; its border may show")
+            out.append(f"the exposure of {name} could not be matched: {one.why_not}; its border may show")
         if one.overexposed > WARNING.overexposed_share:
             out.append(
-                f"{picture.name} is over-exposed beside the {other}: {one.overexposed:.0%} of what {both} show is "
+                f"{name} is over-exposed beside the {other}: {one.overexposed:.0%} of what {both} show is "
                 "clipped in it alone; there, colours are guessed and detail is missing"
             )
     return out

@@ -185,6 +185,9 @@ class VerdictOptions:
     squeeze: float = 1.8
     """Ratio of a map's singular values from which a picture is bent or stretched."""
 
+    least_width: float = 0.1
+    """Of a sphere's pixels beside their height, 6° from a pole: closer to it a map is smoothed over the pole."""
+
     bent_share: float = 0.01
     """Of the panorama, squeezed so: pictures that are right have up to 0.006, those that are bent 0.03 and more."""
 

@@ -113,7 +113,7 @@ def make_report(
         "measured": measured,
     }  # fmt: skip
     warnings = doubt.warnings(alignment.cameras, edge) + _warnings(alignment, measured["folds"])
-    warnings += exposure_warnings(pictures, [one.exposure for one in decided])
+    warnings += exposure_warnings([picture.name for picture in pictures], [one.exposure for one in decided])
     if alignment.left_out:
         report["left_out"] = left_out_entry(alignment.left_out)
     if options.projection == "auto" and canvas.projection is None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cameras.bodies import called_of_bodies
 from ..cameras.rig import Rig
 from ..compose.inpaint import closed_holes
 from ..compose.window import goes_round
@@ -115,7 +116,8 @@ def make_rig_report(
         },
     }  # fmt: skip
     warnings = [*rig_warnings(rig, names), *_about_given(contradicting, found)]
-    warnings += exposure_warnings(pictures, [one.exposure for one in decided])
+    bodies = called_of_bodies(names, rig.cameras)
+    warnings += exposure_warnings(list(bodies.values()), [decided[number].exposure for number in bodies])
     if canvas.cropped and canvas.projection is not None:
         warnings.append(
             f"the pictures reach too far for a {canvas.projection.kind} panorama and were cropped there; "

@@ -100,7 +100,7 @@ def judge(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Verdict
         (*(place for pair in pairs for place in _seam_places(look, pair, names, shift)),
          *_torn_places(look, pairs, shift), *_light_places(look, shift),
          # in a frame that was asked for, pictures are squeezed as that has it
-         *(_bent_places(look, shift) if report["options"]["projection"] == "auto" else ()),
+         *(_bent_places(look, shift, report) if report["options"]["projection"] == "auto" else ()),
          *(Place(tuple(box), "no picture shows this: a hole", box[2] * box[3] / look.step**2, FILL)
            for box in report["composition"]["holes"])),
         key=lambda place: -place.size,
@@ -286,13 +286,15 @@ def _torn_places(look: Look, pairs: Sequence[_Pair], shift: tuple[int, int]) -> 
         yield Place(look.box(part, shift), TORN, float(part.sum()))
 
 
-def _bent_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
+def _bent_places(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> Iterator[Place]:
     """Where a picture is sheared or squeezed over a larger part: what is straight bends, what is upright leans."""
+    wide = _width_of_pixels(look, shift, report)
     side = 2 * max(4, round(VERDICT.smooth_share * look.side)) + 1
     for number, one in enumerate(look.maps):
-        known = look.shown(number) & np.isfinite(one.x) & np.isfinite(one.y)
+        known = look.shown(number) & np.isfinite(one.x) & np.isfinite(one.y) & (wide > VERDICT.least_width)
         x, y = (cv2.blur(np.where(known, values, np.float32(0)), (side, side)) for values in (one.x, one.y))
         (x_y, x_x), (y_y, y_x) = np.gradient(x), np.gradient(y)
+        x_x, y_x = x_x / wide, y_x / wide
         # half the sum and half the difference of the singular values of the Jacobian
         alike, unlike = np.hypot(x_x + y_y, y_x - x_y) / 2, np.hypot(x_x - y_y, y_x + x_y) / 2
         bent = alike + unlike > VERDICT.squeeze * np.abs(alike - unlike)
@@ -302,6 +304,16 @@ def _bent_places(look: Look, shift: tuple[int, int]) -> Iterator[Place]:
         for part in _parts(opened, VERDICT.bent_share * opened.size):
             what = "the picture is bent or stretched: depth or the focal length is doubtful"
             yield Place(look.box(part, shift), what, float(part.sum()), FOCAL_OR_STAY)
+
+
+def _width_of_pixels(look: Look, shift: tuple[int, int], report: dict[str, Any]) -> NDArray[np.float32]:
+    """How wide pixels (h, 1) are for one of their height: on a sphere they narrow towards the poles, by nature."""
+    rows, projection = look.hidden.shape[0], report.get("canvas", {}).get("projection", {})
+    if projection.get("kind") != "equirectangular":
+        return np.ones((rows, 1), np.float32)
+    fall = (np.arange(rows) * look.step + shift[1] - projection["centre"][1]) / projection["focal_px"]
+    wide: NDArray[np.float32] = np.maximum(np.cos(fall), 1e-3).astype(np.float32)[:, None]
+    return wide
 
 
 def _detailed(tones: Levels) -> NDArray[np.bool_]:

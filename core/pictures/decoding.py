@@ -125,7 +125,9 @@ def decode_exr(data: bytes, pixels_per_byte: int = READING.photograph_pixels_per
         raise
     except Exception as error:  # OpenEXR raises whatever its C++ side threw
         raise UnreadableImage("the EXR file is damaged or cut off; copy or render it again") from error
-    if alpha is not None and not alpha.any() and pixels.any():
+    with np.errstate(invalid="ignore"):  # of damaged files some are NaN that signal
+        nothing = alpha is not None and not alpha.any() and pixels.any()
+    if nothing:
         alpha, warnings = None, (*warnings, "its alpha is 0 everywhere, though it shows something: taken as opaque")
     return Decoded(pixels if alpha is None else np.dstack([pixels, alpha]), True, warnings, surround)
 

@@ -43,9 +43,9 @@ class Exif:
 
     orientation: 1..8 as stored in the file. width, height (ExifImageWidth/Height) in pixels and focal_plane_*_per_mm in
     sensor pixels per mm belong to the picture as the sensor held it, unless `upright` turned them. heading: degrees
-    from true north to the east at which the camera looked. undistorted: whether the file says that its lens's
-    distortion was removed, which XMP does. kept: (tag number, value) of the tags that are written
-    again; a value is a text, an integer, or (numerator, denominator).
+    from true north to the east at which the camera looked. software: the program that wrote it. undistorted: whether
+    the file says that its lens's distortion was removed, which XMP does. kept: (tag number, value) of the tags that are
+    written again; a value is a text, an integer, or (numerator, denominator).
     """
 
     orientation: int = 1
@@ -60,6 +60,7 @@ class Exif:
     width: int | None = None
     height: int | None = None
     heading: float | None = None
+    software: str = ""
     undistorted: bool = False
     kept: tuple[tuple[int, str | int | tuple[int, int]], ...] = ()
 
@@ -106,7 +107,7 @@ def read_exif(block: bytes | None) -> Exif:
     return Exif(
         orientation=int(_number(tags.get("Image Orientation"), 1, 8) or 1),
         make=_text(tags.get("Image Make")), model=_text(tags.get("Image Model")),
-        lens=_text(tags.get("EXIF LensModel")),
+        lens=_text(tags.get("EXIF LensModel")), software=_text(tags.get("Image Software")),
         focal_mm=_number(tags.get("EXIF FocalLength"), 0.1, 10000),
         focal35_mm=_number(tags.get("EXIF FocalLengthIn35mmFilm"), 1, 10000),
         digital_zoom=_zoom(tags.get("EXIF DigitalZoomRatio")),

@@ -62,6 +62,8 @@ class Picture:
         Whether the file says that it is a map of many directions (a sphere, a cylinder), no flat picture.
     part : SpherePart, optional
         Which part of a sphere it shows, where the file says that.
+    circle : (float, float, float), optional
+        Middle x, y and radius, px, of the fisheye's circle on black that is all that it shows, where that was found.
     burnt_in : (H, W) bool, optional
         Where a date or a logo was found, which alpha hides.
     wanted : (H, W) bool, optional
@@ -81,6 +83,7 @@ class Picture:
     clips_at: float = float("inf")
     surround: bool = False
     part: SpherePart | None = None
+    circle: tuple[float, float, float] | None = None
     burnt_in: NDArray[np.bool_] | None = None
     wanted: NDArray[np.bool_] | None = None
     guides: tuple[tuple[str, tuple[float, ...]], ...] = ()
@@ -228,7 +231,8 @@ def _picture(
     alpha = None
     if stored_alpha is not None:
         full = 1.0 if raw.dtype == np.float32 else float(np.iinfo(raw.dtype).max)
-        alpha = np.clip(stored_alpha.astype(np.float32) / np.float32(full), 0.0, 1.0)  # NaN stays
+        with np.errstate(invalid="ignore"):  # NaN stays, the kind that signals too
+            alpha = np.clip(stored_alpha.astype(np.float32) / np.float32(full), 0.0, 1.0)
     if associated and alpha is not None:
         colour = _straight(colour, alpha)
     colour = np.ascontiguousarray(colour)

@@ -63,6 +63,34 @@ def by_exif_or_without(
     return replace(without, warnings=(told, *without.warnings)), free
 
 
+def preferred(
+    matches: Matches, cameras: Sequence[Camera], instead: Sequence[Camera], seed: int, estimate: Estimate
+) -> bool:
+    """Whether the matches of a pair clearly prefer other cameras, of which as much is known, to those by EXIF.
+
+    Parameters
+    ----------
+    matches : Matches
+        Ideal px.
+    cameras, instead : sequence of two Cameras
+        As EXIF has them, and the others.
+    seed, estimate
+        As for `by_exif_or_without`; errors of the first cameras count for the others, errors of the others pass.
+
+    Returns
+    -------
+    bool
+    """
+    other = estimate(matches, instead)
+    try:
+        by_exif = estimate(matches, cameras)
+    except StitchError:
+        return other.model == "general"
+    if by_exif.model != "general" or other.model != "general" or not _doubtful(matches, by_exif, seed):
+        return False
+    return _costs_more(matches, by_exif, other)
+
+
 def exif_warning(names: str, camera: Camera, focal: float) -> str:
     """What is said where EXIF was not believed; names: of the pictures; focal: what was taken, px."""
     return (
@@ -89,10 +117,14 @@ def _clearly_better(matches: Matches, without: TwoView, by_exif: TwoView) -> boo
     apart = max(abs(np.log(K[0, 0] / other[0, 0])) for K, other in (
         (without.K, by_exif.K), (without.K_prime, by_exif.K_prime)
     ))  # fmt: skip
-    sigma = min(without.sigma, by_exif.sigma)
-    cost, cost_by_exif = (_cost(matches, one, sigma) for one in (without, by_exif))
-    enough = cost_by_exif > EXIF_DOUBT.cost_factor * cost and cost_by_exif - cost > EXIF_DOUBT.least_gain
-    return bool(apart > EXIF_DOUBT.apart and enough)
+    return bool(apart > EXIF_DOUBT.apart) and _costs_more(matches, by_exif, without)
+
+
+def _costs_more(matches: Matches, by_exif: TwoView, other: TwoView) -> bool:
+    """Whether the matches clearly contradict one geometry beside another one."""
+    sigma = min(other.sigma, by_exif.sigma)
+    cost, cost_by_exif = (_cost(matches, one, sigma) for one in (other, by_exif))
+    return cost_by_exif > EXIF_DOUBT.cost_factor * cost and cost_by_exif - cost > EXIF_DOUBT.least_gain
 
 
 def _cost(matches: Matches, view: TwoView, sigma: float) -> float:

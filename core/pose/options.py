@@ -263,8 +263,8 @@ class ExifDoubtOptions:
     apart: float = 0.12
     # Pairs of a set that are asked: those with the most matches.
     pairs_asked: int = 3
-    # Difference of log f within which what they say is one answer.
-    agreeing: float = 0.15
+    # Difference of the logarithms of two pictures' width / height, at most, for one to be a copy of the other's size.
+    same_shape: float = 0.01
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ def _pose(frame: dict[str, Any], place: str) -> dict[str, Any]:
     """R and t, world to camera, of a frame's camera to world."""
     try:
         matrix = np.asarray(frame.get("transform_matrix"), np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         matrix = np.empty(0)
     if matrix.shape not in ((4, 4), (3, 4)) or not np.isfinite(matrix).all():
         raise BadRequest(f"{place}: transform_matrix must be 4×4 numbers, camera to world")

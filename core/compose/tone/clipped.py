@@ -10,6 +10,7 @@ has most of it unclipped; else it is white.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
@@ -80,43 +81,67 @@ class ClippedLight:
         return told
 
 
-def clipped_light(
-    own: AnyImage, light: AnyImage, other: AnyImage, shown: NDArray[np.bool_]
-) -> ClippedLight | None:
-    """Learn what clipped light was.
+@dataclass(frozen=True, eq=False)
+class ToldLight:
+    """What another picture tells of one's clipped light.
 
-    Parameters
+    Attributes
     ----------
     own : (H, W, C) image
-        A picture's own light.
+        The picture's own light.
     light : (H, W, C) image
         The same with its exposure matched to the other's.
     other : (H, W, C) image
         What the other picture shows there, with its exposure matched.
     shown : (H, W) bool array
         Where both show the same.
+    """
+
+    own: AnyImage
+    light: AnyImage
+    other: AnyImage
+    shown: NDArray[np.bool_]
+
+
+def clipped_light(told: Iterable[ToldLight]) -> ClippedLight | None:
+    """Learn what clipped light was.
+
+    Parameters
+    ----------
+    told : iterable of ToldLight
+        All on one canvas: of a picture one, of a sphere one for each of its views.
 
     Returns
     -------
     ClippedLight or None
         None where nothing is known.
     """
-    box, channels = bounds(shown), own.shape[2]
-    if box is None:
+    learned: tuple[_Table, _White] | None = None
+    for one in told:
+        if one.shown.any():
+            channels = one.own.shape[2]
+            learned = learned or (_Table(channels), _White(one.shown.shape, channels))
+            _learn(one, *learned)
+    if learned is None:
         return None
-    table, white = _Table(channels), _White(shown.shape, channels)
+    found = ClippedLight(learned[0].factors(), learned[1].field())
+    return found if found.white is not None or any(one is not None for one in found.factors) else None
+
+
+def _learn(told: ToldLight, table: _Table, white: _White) -> None:
+    """Gather what another picture tells."""
+    box, channels = bounds(told.shown), told.own.shape[2]
+    assert box is not None
     rows, columns = box
     for top in range(rows.start, rows.stop, CLIPPED.cell_px):
         part = slice(top, min(rows.stop, top + CLIPPED.band_rows)), columns
-        before, after, told, both = own[part], light[part], other[part], shown[part]
+        before, after, other, both = told.own[part], told.light[part], told.other[part], told.shown[part]
         clipped = before >= EXPOSURE.clipped_light
         if channels == 3:
             colour = both & (before.min(axis=2) < CLIPPED.begins)
             for k in range(channels):
-                table.learn(k, before, after, told, colour & clipped[..., k])
-        white.learn(part, told, both & clipped.all(axis=2))
-    found = ClippedLight(table.factors(), white.field())
-    return found if found.white is not None or any(one is not None for one in found.factors) else None
+                table.learn(k, before, after, other, colour & clipped[..., k])
+        white.learn(part, other, both & clipped.all(axis=2))
 
 
 class _Table:

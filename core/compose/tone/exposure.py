@@ -18,7 +18,7 @@ from ...panorama.layers import Layer
 from ...raster.arrays import Array
 from ...raster.picture_map import CanvasMap
 from ..options import EXPOSURE, OVERLAP
-from .clipped import ClippedLight, clipped_light
+from .clipped import ClippedLight, ToldLight, clipped_light
 from .tone_blocks import block_weights, bright_blocks, log_ratios, shared_blocks, weighted_median
 from .tone_fit import fit_tone
 from .tone_options import CLIPPED, TONE
@@ -197,7 +197,7 @@ def _with_clipped(
     shown = (layers[0].alpha > OVERLAP.opaque_alpha) & (layers[1].alpha > OVERLAP.opaque_alpha) & ~hidden
     toned = [one.applied(layer, at).light for one, layer, at in zip(exposures, layers, maps, strict=True)]
     first, second = (
-        replace(one, clipped=clipped_light(layer.light, toned[k], toned[1 - k], shown))
+        replace(one, clipped=clipped_light([ToldLight(layer.light, toned[k], toned[1 - k], shown)]))
         if one.overexposed >= CLIPPED.least_share else one
         for k, (one, layer) in enumerate(zip(exposures, layers, strict=True))
     )  # fmt: skip

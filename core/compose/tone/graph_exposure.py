@@ -6,6 +6,7 @@ first. Here the logarithms of all gains are solved for at once:
     g = argmin Σ n_ij / σ_ij² (g_i − g_j + q_ij)²
 
 over all overlaps, with n_ij blocks whose log ratio is q_ij in the median and spreads by σ_ij, channel by channel.
+Views of one sphere are one picture: they have one gain, and what they share tells nothing.
 """
 
 from __future__ import annotations
@@ -18,13 +19,14 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ...cameras.bodies import bodies_of
 from ...cameras.camera import Camera
 from ...choices import Exposing
 from ...panorama.layers import Layer
 from ...raster.arrays import Array
 from ...raster.picture_map import CanvasMap
 from ..options import OVERLAP
-from .clipped import clipped_light
+from .clipped import ClippedLight, ToldLight, clipped_light
 from .exposure import TOO_LITTLE, Exposure, too_different, unchanged
 from .graph_options import GRAPH_EXPOSURE
 from .graph_vignetting import fit_vignetting
@@ -44,6 +46,10 @@ class _Ratio:
     spread: Array
     blocks: int
 
+    def between(self, body: NDArray[np.intp]) -> _Ratio:
+        """The same of the bodies (numbers of all, N) that the two pictures are views of."""
+        return replace(self, i=int(body[self.i]), j=int(body[self.j]))
+
 
 def graph_exposures(
     layers: Sequence[Layer], maps: Sequence[CanvasMap], cameras: Sequence[Camera],
@@ -58,7 +64,8 @@ def graph_exposures(
     maps : sequence of CanvasMap
         Where the canvas shows each picture.
     cameras : sequence of Camera
-        Those with the same intrinsics share a lens, and its vignetting.
+        Those with the same intrinsics share a lens, and its vignetting; views of one sphere have neither, and one
+        exposure.
     hidden : sequence of (H, W) bool arrays
         What each picture cannot see, and so shows something else.
     floats : sequence of bool
@@ -81,35 +88,45 @@ def graph_exposures(
     for number, about_one in enumerate(zip(layers, maps, hidden, floats, strict=True)):
         progress(number / len(layers))
         blocks.append(picture_blocks(*about_one))
-    overlaps = overlaps_of(blocks)
+    body = _body_of(cameras)
+    overlaps = [one for one in overlaps_of(blocks) if body[one.i] != body[one.j]]
     kept = radiance or wanted == "reference"
     lenses = fit_vignetting(overlaps, lenses_of(cameras)) if wanted != "reference" else (NO_VIGNETTING,) * len(layers)
     ratios = [_ratio(one, lenses) for one in overlaps]
     usable = [one for one in ratios if np.abs(one.middle).max() <= np.log(GRAPH_EXPOSURE.max_gain)]
-    gains = _solved(usable, len(layers), channels, kept)
+    gains = _solved([one.between(body) for one in usable], body.max() + 1, channels, kept)
     gains += np.log(2) * (0.0 if isinstance(wanted, str) else wanted)
     exposures = []
     for number in range(len(layers)):
-        own, all_own = ([one for one in some if number in (one.i, one.j)] for some in (usable, ratios))
+        views = np.flatnonzero(body == body[number]).tolist()
+        own, all_own = ([one for one in some if one.i in views or one.j in views] for some in (usable, ratios))
+        others = [one for k, one in enumerate(blocks) if k not in views]
         why_not = ""
-        if not own and any(blocks_meet(blocks[number], one) for k, one in enumerate(blocks) if k != number):
+        if not own and any(blocks_meet(blocks[view], one) for view in views for one in others):
             why_not = too_different(np.exp(all_own[0].middle)) if all_own else TOO_LITTLE
         counts = [one.blocks for one in own]
         spread = np.average([one.spread for one in own], axis=0, weights=counts) if own else np.full(channels, np.nan)
         exposures.append(Exposure(
-            np.exp(gains[number]).astype(np.float32), spread.astype(np.float32), sum(counts), lenses[number],
+            np.exp(gains[body[number]]).astype(np.float32), spread.astype(np.float32), sum(counts), lenses[number],
             keeps_white=not kept, why_not=why_not,
         ))  # fmt: skip
-    return tuple(exposures) if kept else _with_clipped(exposures, blocks, layers, maps, hidden)
+    return tuple(exposures) if kept else _with_clipped(exposures, body, blocks, layers, maps, hidden)
 
 
-def lenses_of(cameras: Sequence[Camera]) -> list[int]:
-    """The number of each camera's lens: those of one size and the same intrinsics share one."""
+def lenses_of(cameras: Sequence[Camera]) -> list[int | None]:
+    """The number of each camera's lens: those of one size and the same intrinsics share one; views of a sphere, whose
+    program has done away with what lenses did, have none."""
     numbers: dict[tuple[object, ...], int] = {}
     return [
-        numbers.setdefault((one.size, one.K.tobytes(), one.distortion.tobytes(), one.lens), len(numbers))
+        None if one.view_of is not None
+        else numbers.setdefault((one.size, one.K.tobytes(), one.distortion.tobytes(), one.lens), len(numbers))
         for one in cameras
-    ]
+    ]  # fmt: skip
+
+
+def _body_of(cameras: Sequence[Camera]) -> NDArray[np.intp]:
+    """Of each picture (N,) the number of its body; 0 is the reference's."""
+    return np.unique(bodies_of(cameras).of, return_inverse=True)[1].astype(np.intp)
 
 
 def _ratio(shared: SharedBlocks, lenses: Sequence[Vignetting]) -> _Ratio:
@@ -148,40 +165,49 @@ def _solved(ratios: Sequence[_Ratio], count: int, channels: int, to_reference: b
 
 
 def _with_clipped(
-    exposures: Sequence[Exposure], blocks: Sequence[PictureBlocks | None], layers: Sequence[Layer],
-    maps: Sequence[CanvasMap], hidden: Sequence[NDArray[np.bool_]],
+    exposures: Sequence[Exposure], body: NDArray[np.intp], blocks: Sequence[PictureBlocks | None],
+    layers: Sequence[Layer], maps: Sequence[CanvasMap], hidden: Sequence[NDArray[np.bool_]],
 ) -> tuple[Exposure, ...]:  # fmt: skip
-    """The same with how much of each picture is over-exposed, and what another tells of its clipped light."""
-    out = []
-    for number, one in enumerate(exposures):
-        share, other = _overexposed(blocks, number)
-        told = None
-        if share >= CLIPPED.least_share:
-            shown = np.logical_and.reduce([
-                (layers[k].alpha > OVERLAP.opaque_alpha) & ~hidden[k] for k in (number, other)
-            ])  # fmt: skip
-            toned, reference = (exposures[k].applied(layers[k], maps[k]).light for k in (number, other))
-            told = clipped_light(layers[number].light, toned, reference, shown)
-        out.append(replace(one, overexposed=share, clipped=told))
-    return tuple(out)
+    """The same with how much of each picture is over-exposed, and what others tell of its clipped light."""
+
+    def told_of(number: int, other: int) -> ToldLight:
+        shown = [(layers[k].alpha > OVERLAP.opaque_alpha) & ~hidden[k] for k in (number, other)]
+        toned, reference = (exposures[k].applied(layers[k], maps[k]).light for k in (number, other))
+        return ToldLight(layers[number].light, toned, reference, shown[0] & shown[1])
+
+    found: dict[int, tuple[float, ClippedLight | None]] = {}
+    for number in range(body.max() + 1):
+        share, tellers = _overexposed(blocks, body, number)
+        told = clipped_light(told_of(*both) for both in tellers) if share >= CLIPPED.least_share else None
+        found[number] = share, told
+    return tuple(
+        replace(one, overexposed=found[number][0], clipped=found[number][1])
+        for one, number in zip(exposures, body.tolist(), strict=True)
+    )
 
 
-def _overexposed(blocks: Sequence[PictureBlocks | None], number: int) -> tuple[float, int]:
-    """Share of what a picture and others show that is clipped in this one alone, and the other that tells most of it.
-    """
-    own = blocks[number]
-    if own is None:
-        return 0.0, number
-    alone, shown = (np.zeros(own.known.shape, np.float32) for _ in range(2))
-    most, teller = 0.0, number
-    for k, other in enumerate(blocks):
-        meeting = None if other is None or k == number else own.meeting(other)
-        if other is None or meeting is None:
+def _overexposed(
+    blocks: Sequence[PictureBlocks | None], body: NDArray[np.intp], which: int
+) -> tuple[float, list[tuple[int, int]]]:
+    """Share of what a body and other pictures show that is clipped in it alone; of each of its views that is, with the
+    other that tells most of it."""
+    clipped_alone, shown_by_both, tellers = 0.0, 0.0, []
+    for number in np.flatnonzero(body == which).tolist():
+        own = blocks[number]
+        if own is None:
             continue
-        here, there = meeting
-        both = np.minimum(own.shown[here], other.shown[there])
-        unclipped = np.clip(own.clipped[here] - other.clipped[there], 0, both)
-        alone[here], shown[here] = np.maximum(alone[here], unclipped), np.maximum(shown[here], both)
-        if unclipped.sum() > most:
-            most, teller = float(unclipped.sum()), k
-    return float(alone.sum() / max(shown.sum(), 1.0)), teller
+        alone, shown = (np.zeros(own.known.shape, np.float32) for _ in range(2))
+        most, teller = 0.0, number
+        for k, other in enumerate(blocks):
+            meeting = None if other is None or body[k] == which else own.meeting(other)
+            if other is None or meeting is None:
+                continue
+            here, there = meeting
+            both = np.minimum(own.shown[here], other.shown[there])
+            unclipped = np.clip(own.clipped[here] - other.clipped[there], 0, both)
+            alone[here], shown[here] = np.maximum(alone[here], unclipped), np.maximum(shown[here], both)
+            if unclipped.sum() > most:
+                most, teller = float(unclipped.sum()), k
+        clipped_alone, shown_by_both = clipped_alone + float(alone.sum()), shown_by_both + float(shown.sum())
+        tellers += [(number, teller)] if teller != number else []
+    return clipped_alone / max(shown_by_both, 1.0), tellers

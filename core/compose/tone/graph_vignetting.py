@@ -55,14 +55,14 @@ class _Rows:
         return weighted_median(left, self.weights)
 
 
-def fit_vignetting(overlaps: Sequence[SharedBlocks], lenses: Sequence[int]) -> tuple[Vignetting, ...]:
+def fit_vignetting(overlaps: Sequence[SharedBlocks], lenses: Sequence[int | None]) -> tuple[Vignetting, ...]:
     """Fit the vignetting of each picture's lens.
 
     Parameters
     ----------
     overlaps : sequence of SharedBlocks
-    lenses : sequence of int
-        For each picture the number of its lens.
+    lenses : sequence of (int or None)
+        For each picture the number of its lens; None where none took off light.
 
     Returns
     -------
@@ -79,16 +79,17 @@ def fit_vignetting(overlaps: Sequence[SharedBlocks], lenses: Sequence[int]) -> t
     fitted = [Vignetting(float(a / 2 + b / 4), float(a + b)) for a, b in found]
     if not all(is_lens(one) for number, one in enumerate(fitted) if number in lenses):
         return nothing
-    return tuple(fitted[lens] for lens in lenses)
+    return tuple(NO_VIGNETTING if lens is None else fitted[lens] for lens in lenses)
 
 
-def _rows(overlaps: Sequence[SharedBlocks], lenses: Sequence[int]) -> _Rows | None:
-    """The equations of all overlaps, None if there are too few."""
+def _rows(overlaps: Sequence[SharedBlocks], lenses: Sequence[int | None]) -> _Rows | None:
+    """The equations of all overlaps, None if there are too few, or no lens."""
     parts = [one.thinned(GRAPH_EXPOSURE.blocks_of_overlap) for one in overlaps]
     total = sum(len(one.blocks) for one in parts)
-    if total < GRAPH_EXPOSURE.min_blocks:
+    count = 1 + max((lens for lens in lenses if lens is not None), default=-1)
+    if total < GRAPH_EXPOSURE.min_blocks or not count:
         return None
-    gains, taken_off = np.zeros((total, len(lenses))), np.zeros((total, 2 * (max(lenses) + 1)))
+    gains, taken_off = np.zeros((total, len(lenses))), np.zeros((total, 2 * count))
     start = 0
     for one in parts:
         rows = slice(start, start + len(one.blocks))
@@ -96,8 +97,9 @@ def _rows(overlaps: Sequence[SharedBlocks], lenses: Sequence[int]) -> _Rows | No
         gains[rows, one.j] += 1
         gains[rows, one.i] -= 1
         for picture, radii, sign in ((one.i, one.radii[0], 1), (one.j, one.radii[1], -1)):
-            first = 2 * lenses[picture]
-            taken_off[rows, first : first + 2] += sign * np.column_stack([radii, radii**2])
+            lens = lenses[picture]
+            if lens is not None:
+                taken_off[rows, 2 * lens : 2 * lens + 2] += sign * np.column_stack([radii, radii**2])
     values = np.concatenate([log_ratios(one.blocks.means).mean(axis=1) for one in parts])
     weights = np.concatenate([block_weights(one.blocks) for one in parts])
     black = np.concatenate([(one.blocks.at // TONE.tile_blocks).sum(axis=1) % 2 == 0 for one in parts])

@@ -6,6 +6,8 @@ panorama.
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -35,6 +37,8 @@ def chan_file(found: list[FoundCamera], panorama: tuple[Array, float]) -> bytes:
 
 def _line(number: int, rotation: Array, place: Array, angle: float) -> str:
     """A frame's line, by the rotation from a camera's axes to the world's and its place there."""
-    y, x, z = Rotation.from_matrix(FLIPPED @ rotation @ FLIPPED).as_euler("YXZ", degrees=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # straight up or down many angles say the same, and any of them does
+        y, x, z = Rotation.from_matrix(FLIPPED @ rotation @ FLIPPED).as_euler("YXZ", degrees=True)
     values = (*(FLIPPED @ place), x, y, z, np.degrees(angle))
     return "\t".join([str(number), *(f"{value:.9f}" for value in values)]) + "\n"

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ...cameras.camera import Camera
-from ...cameras.lens import undistort
+from ...cameras.lens import undistort, used_angle
 from ...cameras.lens_models import Lens, LensProjection
 from ...cameras.programs.hugin import PROJECTIONS
 from ...cameras.projective import homogeneous, project
@@ -54,7 +54,7 @@ def hugin_lens(camera: Camera, name: str) -> HuginLens:
     (width, height), K = camera.size, camera.K
     half, lens = min(width, height) / 2, camera.lens or Lens()
     base = Lens(lens.projection)
-    corners = np.array([[0.0, 0], [width - 1, 0], [0, height - 1], [width - 1, height - 1]])
+    corners = _within_use(np.array([[0.0, 0], [width - 1, 0], [0, height - 1], [width - 1, height - 1]]), camera)
     along = np.linspace(0, 1, RADII)[1:, None] * (corners[np.argmax(np.hypot(*(corners - K[:2, 2]).T))] - K[:2, 2])
     rays = homogeneous(undistort(K[:2, 2] + along, camera)) @ np.linalg.inv(K).T
     s = base.shown_at(np.arctan(np.hypot(*project(rays).T)))
@@ -75,6 +75,16 @@ def hugin_lens(camera: Camera, name: str) -> HuginLens:
     return HuginLens(_NUMBERS[LensProjection(lens.projection)], float(np.degrees(2 * angle)), abc, middle, off)
 
 
+def _within_use(points: Array, camera: Camera) -> Array:
+    """px (N, 2) of a picture, those further from the axis than the lens is used (see `used_angle`) moved in so far."""
+    if camera.lens is None:
+        return points
+    away = points - camera.K[:2, 2]
+    reach = float(camera.lens.shown_at(np.array(used_angle(camera.lens)))) * camera.focal
+    within: Array = camera.K[:2, 2] + away * np.minimum(1, reach / np.maximum(np.hypot(*away.T), 1e-9))[:, None]
+    return within
+
+
 def _unit(half: float, polynomial: tuple[float, ...]) -> float:
     """Focal lengths a half of the shorter side of Hugin's lens: there D = f (1 − a − b − c)."""
     A, B, C, D = polynomial
@@ -90,8 +100,9 @@ def _unit(half: float, polynomial: tuple[float, ...]) -> float:
 
 
 def _off(camera: Camera, other: Camera) -> float:
-    """px by which two cameras see the border of a picture in different directions, at most."""
-    seen = [homogeneous(undistort(border(one.size), one)) @ np.linalg.inv(one.K).T for one in (camera, other)]
+    """px by which two cameras see the border of what is used of a picture in different directions, at most."""
+    points = _within_use(border(camera.size), camera)
+    seen = [homogeneous(undistort(points, one)) @ np.linalg.inv(one.K).T for one in (camera, other)]
     first, second = (rays / np.linalg.norm(rays, axis=1, keepdims=True) for rays in seen)
     return float(np.linalg.norm(first - second, axis=1).max() * camera.focal)
 

@@ -17,6 +17,7 @@ from edf_stitch.core.pipeline import StitchOptions, stitch
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 from ...sets import FOCAL, make_set
+from ..textured_room import flat, sphere, turned
 from . import batch_work
 from .batch_work import files, lasting, raw, run, save, summary
 
@@ -236,3 +237,21 @@ def test_a_clip_of_three_cameras_has_one_alignment(tmp_path: Path) -> None:
     changed = [(one != made[0]).any(axis=-1) for one in made[1:]]
     for mask in changed:
         assert 0 < mask.mean() < 0.02, "what moves, and nothing else"
+
+
+@pytest.mark.slow
+def test_a_clip_of_a_sphere_and_a_camera_tells_its_progress_as_that_of_many(tmp_path: Path) -> None:
+    """Two files a frame, and nine pictures: stages that a pair does not have."""
+    at = np.array([0.1, 0.0, -0.2])
+    for number in (1, 2):
+        save(tmp_path / f"s_{number}.png", np.rint(sphere(at, turned(20), 400)).astype(np.uint8))
+        save(tmp_path / f"a_{number}.png", flat(np.array([0.4, 0.1, 0.1]), turned(25), 190.0, (320, 240)))
+    (tmp_path / "clip.csv").write_text("s_%d.png,a_%d.png,shot\n", "utf-8")
+    told: list[float] = []
+    summed_up = batch.run_batch(
+        read_list(tmp_path / "clip.csv"), StitchOptions(dense=False, blend="feather"), BatchRequest(tmp_path / "out"),
+        lambda stage, share: told.append(share),
+    )  # fmt: skip
+    (outcome,) = summed_up.outcomes
+    assert outcome.status == "done", outcome.message
+    assert np.diff(told).min() > -0.01 and 0.9 < told[-1] <= 1

@@ -12,7 +12,7 @@ from edf_stitch.core.pictures.metadata import Exif
 NAMES, SIZES = ("s (front).jpg", "eye.jpg", "still.jpg"), [(200, 300), (500, 400), (640, 480)]
 VIEW = Camera(np.array([[120.0, 0, 99.5], [0, 120, 149.5], [0, 0, 1]]), SIZES[0], "its sphere", 0.0, lens=Lens(),
               view_of=ViewOf(0, "s.jpg", np.eye(3)))  # fmt: skip
-CIRCLE = camera_of_circle(np.array([250.0, 199.0]), 180.0, SIZES[1])
+CIRCLE = camera_of_circle((250.0, 199.0, 180.0), SIZES[1])
 
 
 def known(request: CameraRequest, exif: Exif | None = None) -> tuple[list[Camera], list[str]]:

@@ -126,3 +126,9 @@ def test_a_lens_without_distortion_touches_nothing() -> None:
     cam, points = camera(Lens()), np.array([[1.0, 2.0]])
     assert distort(points, cam) is points and undistort(points, cam) is points
     assert not cam.bent and cam.lens_known and cam.without_lens().lens == Lens()
+
+
+@pytest.mark.parametrize("ptlens", [(1e308, 0.0, 0.0), (0.0, -1e308, 1e308), (1e308, 1e308, 1e308)])
+def test_coefficients_of_no_lens_fold_on_the_axis_without_a_word(ptlens: tuple[float, ...]) -> None:
+    """As damaged files have them: NumPy would warn of what overflows, which pytest makes an error of."""
+    assert Lens(ptlens=ptlens, radius=1.0).limit == 0

@@ -15,6 +15,7 @@ from edf_stitch.core.pictures.picture import picture_from_array
 from PIL import Image, TiffImagePlugin
 
 from ..pictures.raw_and_heic import dng, mosaic
+from ..textured_room import circle, sphere
 
 NOISE = cv2.GaussianBlur(np.random.default_rng(1).integers(0, 256, (90, 120, 4), np.uint8), (0, 0), 2)
 
@@ -118,3 +119,17 @@ def test_what_stands_for_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(["info", str(tmp_path / "none.jpg"), str(tmp_path / "good.png")]) == 4
     none, good = capsys.readouterr().out.splitlines()
     assert "none.jpg: cannot be used: no such file or folder; check the name" in none and "good.png: " in good
+
+
+def test_what_is_taken_for_a_sphere_or_a_circle_is_said_with_its_focal_length(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), np.rint(sphere(np.zeros(3), np.eye(3), 200)))
+    cv2.imwrite(str(tmp_path / "b.png"), circle(np.zeros(3), np.eye(3), 140, (320, 300)))
+    assert main(["info", str(tmp_path)]) == 0
+    whole, eye = capsys.readouterr().out.splitlines()
+    assert "whole sphere; camera unknown; no f; " in whole and "problem: taken for a whole sphere" in whole
+    assert "circle of a fisheye; camera unknown; f 89 px (its circle)" in eye and "which shows 180°" in eye
+    assert main(["info", str(tmp_path / "a.png"), "--json"]) == 0
+    (entry,) = json.loads(capsys.readouterr().out)["pictures"]
+    assert entry["focal_px"] is None and entry["focal_source"] == "none: it is a sphere"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from edf_stitch.core.compose.tone.clipped import ClippedLight, clipped_light
+from edf_stitch.core.compose.tone.clipped import ClippedLight, ToldLight, clipped_light
 from edf_stitch.core.compose.tone.tone_options import CLIPPED, TONE
 
 H, W = 200, 160
@@ -29,7 +29,7 @@ def test_a_sky_that_clips_in_blue_gets_its_blue_back_where_the_other_does_not_sh
     matched = own / np.float32(STOP)
     assert np.abs(matched - light)[:150].max() > 0.2, "blue is missing"
     told = np.where(shown[..., None], light, 0.0).astype(np.float32)  # what is not shown has no say
-    table = clipped_light(own, matched, told, shown)
+    table = clipped_light([ToldLight(own, matched, told, shown)])
     assert table is not None and table.factors[0] is table.factors[1] is None
     restored = matched.copy()
     table.restore(own, restored)
@@ -43,7 +43,7 @@ def test_no_clipped_light_gets_darker_and_none_white() -> None:
     light = scene()
     own, matched = over(light), over(light) / np.float32(STOP)
     for told in (0 * light, 50 * light):
-        table = clipped_light(own, matched, told, np.ones((H, W), bool))
+        table = clipped_light([ToldLight(own, matched, told, np.ones((H, W), bool))])
         assert table is not None
         restored = matched.copy()
         table.restore(own, restored)
@@ -58,14 +58,14 @@ def test_too_little_that_is_clipped_tells_nothing() -> None:
     few = np.zeros((H, W), bool)
     few[:2, :4] = True
     matched = over(light) / np.float32(STOP)
-    assert clipped_light(over(light), matched, light, few) is None
-    assert clipped_light(0.5 * light, light, light, np.ones((H, W), bool)) is None
-    assert clipped_light(over(light), matched, light, np.zeros((H, W), bool)) is None
+    assert clipped_light([ToldLight(over(light), matched, light, few)]) is None
+    assert clipped_light([ToldLight(0.5 * light, light, light, np.ones((H, W), bool))]) is None
+    assert clipped_light([ToldLight(over(light), matched, light, np.zeros((H, W), bool))]) is None
 
 
 def test_gray_pictures_have_no_colour_to_tell_by() -> None:
     gray = over(scene())[..., :1]
-    assert clipped_light(gray, gray, gray, np.ones((H, W), bool)) is None
+    assert clipped_light([ToldLight(gray, gray, gray, np.ones((H, W), bool))]) is None
 
 
 def test_white_becomes_what_the_other_shows_around_there_if_that_has_it_unclipped() -> None:
@@ -73,7 +73,7 @@ def test_white_becomes_what_the_other_shows_around_there_if_that_has_it_unclippe
     own, shown = np.ones_like(light), np.zeros((H, W), bool)
     shown[:, : 2 * W // 3] = True
     matched = own / np.float32(STOP)
-    found = clipped_light(own, matched, light, shown)
+    found = clipped_light([ToldLight(own, matched, light, shown)])
     assert found is not None and found.white is not None
     rows, columns = slice(0, H), slice(0, W)
     white = found.white_at(own, (rows, columns))
@@ -86,12 +86,12 @@ def test_white_becomes_what_the_other_shows_around_there_if_that_has_it_unclippe
     assert np.array_equal(restored, matched), "no channel is left to tell a colour by"
     most = light.copy()
     most[:, : W // 2] = 1
-    assert clipped_light(own, matched, most, shown) is None, "white for both of them is white"
+    assert clipped_light([ToldLight(own, matched, most, shown)]) is None, "white for both of them is white"
     assert np.array_equal(ClippedLight((None,)).white_at(own, (rows, columns)), own)
 
 
 def test_white_of_gray_pictures_too() -> None:
     own, told = np.ones((H, W, 1), np.float32), np.full((H, W, 1), 0.6, np.float32)
-    found = clipped_light(own, own / 2, told, np.ones((H, W), bool))
+    found = clipped_light([ToldLight(own, own / 2, told, np.ones((H, W), bool))])
     assert found is not None and found.factors == (None,)
     assert np.allclose(found.white_at(own, (slice(0, H), slice(0, W))), 0.6, atol=1e-3)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.camera import Camera
+from edf_stitch.core.cameras.camera import Camera, ViewOf
 from edf_stitch.core.cameras.lens_models import Lens, LensProjection
 from edf_stitch.core.compose.tone.exposure import Exposure
 from edf_stitch.core.compose.tone.graph_exposure import graph_exposures, lenses_of
@@ -184,3 +184,58 @@ def test_blocks_hold_what_a_picture_shows() -> None:
     assert 5 < len(thinned.blocks) <= 10 and len(thinned.radii[0]) == len(thinned.blocks)
     empty = Layer(layers[0].light, np.zeros((HEIGHT, WIDTH), bool))
     assert picture_blocks(empty, maps[0], NOTHING, False) is None
+
+
+def of_a_sphere(numbers: Any) -> list[Camera]:
+    """The ring's cameras, of which some (numbers) are views of one sphere."""
+    cameras = [view.camera for view in views_at([np.zeros(3)] * 7)]
+    return [
+        replace(one, view_of=ViewOf(9, "drone.jpg", np.eye(3))) if number in numbers else one
+        for number, one in enumerate(cameras)
+    ]
+
+
+def test_views_of_one_sphere_have_one_exposure() -> None:
+    """Each alone would be matched to the neighbours that it meets, which contradict each other here."""
+    gains = np.ones((7, 3))
+    gains[[1, 2]], gains[3] = 1.4, 0.6
+    cameras = of_a_sphere((0, 4, 5, 6))
+    found = graph_exposures(lit(gains), maps_of(), cameras, [NOTHING] * 7, [False] * 7, "auto", lambda share: None)
+    stops = stops_of(found)
+    assert np.ptp(stops[[0, 4, 5, 6]], axis=0).max() == 0
+    assert len({one.blocks for one in found[4:]}) == 1 and found[5].blocks > 0, "known though 5 meets no other picture"
+    assert np.allclose(stops[[1, 2]] - stops[0], -np.log2(1.4), atol=0.01)
+    # the median is that of four pictures, not of seven: between the sphere and one of the two brighter
+    assert np.allclose(stops[0], np.log2(1.4) / 2, atol=0.01)
+
+
+def test_a_sphere_that_cannot_be_matched_is_one_picture_that_cannot() -> None:
+    lights = [wall() / 100 if number in (3, 4) else wall() for number in range(7)]
+    cameras = of_a_sphere((3, 4))
+    found = graph_exposures(layers_of(lights), maps_of(), cameras, [NOTHING] * 7, [False] * 7, "auto", lambda _: None)
+    assert found[3].why_not == found[4].why_not != "" and not any(found[k].why_not for k in (0, 1, 2, 5, 6))
+
+
+def test_views_of_a_sphere_share_what_is_over_exposed_and_what_is_told() -> None:
+    light = wall()
+    light[ROWS.start : 180] = [0.3, 0.42, 0.6]
+    lights = [light * (2 if number in (4, 5) else 1) for number in range(7)]
+    layers = [Layer(np.minimum(one.pixels, 1), one.alpha) for one in layers_of(lights)]
+    found = graph_exposures(
+        layers, maps_of(), of_a_sphere((4, 5)), [NOTHING] * 7, [False] * 7, "auto", lambda _: None
+    )
+    assert found[4].overexposed == found[5].overexposed > 0.2 and found[4].clipped is found[5].clipped is not None
+
+
+def test_views_of_a_sphere_have_no_vignetting() -> None:
+    known = Vignetting(-0.12, -0.45)
+    layers = with_lens(known, np.ones((7, 3)))
+    found = graph_exposures(
+        layers, maps_of(), of_a_sphere((6,)), [NOTHING] * 7, [False] * 7, "auto", lambda share: None
+    )
+    assert found[6].vignetting is NO_VIGNETTING and found[0].vignetting.corner == pytest.approx(known.corner, abs=0.15)
+    assert lenses_of(of_a_sphere((0, 6)))[:2] == [None, 0]
+    every = graph_exposures(
+        lit(np.ones((7, 3))), maps_of(), of_a_sphere(range(7)), [NOTHING] * 7, [False] * 7, "auto", lambda share: None
+    )
+    assert all((one.gain == 1).all() and not one.why_not for one in every)

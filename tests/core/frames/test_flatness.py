@@ -7,7 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from edf_stitch.core.frames.flatness import circle_in, kind_of, usable
+from edf_stitch.core.frames import flatness
+from edf_stitch.core.frames.flatness import kind_of, usable
 from edf_stitch.core.frames.reading import read_frame
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.gpano import SpherePart, whole_sphere, xmp_packet
@@ -171,7 +172,6 @@ def test_the_circle_of_a_fisheye_is_known(levels: np.ndarray, quality: int | Non
     two = levels.shape[1] == 2 * levels.shape[0]
     assert kind_of(picture) == ("circles" if two else "circle")
     if two:
-        assert circle_in(picture) is None
         with pytest.raises(UnreadableImage, match="two circles of fisheye lenses on black: cut them apart"):
             usable(picture)
 
@@ -187,9 +187,18 @@ def test_dark_corners_and_lamps_are_no_circles() -> None:
 
 
 def test_a_circle_is_found_to_a_pixel() -> None:
-    centre, radius = circle_in(picture_from_array(circle(900, 1200, 0.42, (0.47, 0.53))))
-    assert centre == pytest.approx([0.47 * 1200, 0.53 * 900], abs=1.5) and radius == pytest.approx(378, abs=2)
-    assert circle_in(picture_from_array(texture(300, 450))) is None
+    found = usable(picture_from_array(circle(900, 1200, 0.42, (0.47, 0.53)))).circle
+    assert found == pytest.approx([0.47 * 1200, 0.53 * 900, 378], abs=2)
+    assert usable(picture_from_array(texture(300, 450))).circle is None
+
+
+def test_a_circle_is_searched_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    searched = []
+    found = flatness._circles_in
+    monkeypatch.setattr(flatness, "_circles_in", lambda view: searched.append(view.shape) or found(view))
+    pictures = [picture_from_array(circle(300, 300, 0.45), "a.png"), picture_from_array(texture(300, 450), "b.png")]
+    frame = read_frame(pictures, StitchOptions())
+    assert len(searched) == 2 and [camera is not None for camera in frame.known] == [True, False]
 
 
 def test_whatever_is_to_be_stitched_is_looked_at() -> None:

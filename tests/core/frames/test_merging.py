@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 from edf_stitch.core.frames.brackets import Bracket, brackets_in
 from edf_stitch.core.frames.merging import MergedBracket, _resampled, merged
+from edf_stitch.core.frames.reading import read_frame
+from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.metadata import Exif
-from edf_stitch.core.pictures.picture import Picture
+from edf_stitch.core.pictures.picture import Picture, picture_from_array
 
+from ..textured_room import circle, flat, sphere, turned
 from .exposed_views import HEIGHT, WIDTH, bracket_of, painted_world, shot, view_of
 
 WORLD = painted_world()
@@ -167,3 +170,18 @@ def test_rows_are_resampled_as_the_whole_is(move: tuple[float, float, float]) ->
         # positions are rounded to 1/32 px
         assert np.abs(np.dstack([shown, mass]) - whole[rows]).max() < 0.1
     assert max(asked, default=0) < 60
+
+
+@pytest.mark.parametrize(("kind", "views"), [("sphere", 8), ("circle", 1)])
+def test_a_bracket_of_a_sphere_is_a_sphere_and_one_of_a_circle_a_circle(kind: str, views: int) -> None:
+    """No file says it; exposures that are too dark for it to be seen take part."""
+    at = np.zeros(3)
+    levels = sphere(at, np.eye(3), 200) if kind == "sphere" else circle(at, np.eye(3), 140, (320, 300))
+    exposures = [
+        picture_from_array(np.rint(levels * gain ** (1 / 2.2)).clip(0, 255).astype(np.uint8), f"{gain}.png")
+        for gain in (0.25, 1.0, 4.0)
+    ]
+    still = picture_from_array(flat(at, turned(25), 190.0, (320, 240)), "still.png")
+    frame = read_frame([*exposures, still], StitchOptions(brackets="auto"))
+    assert [one.names for one in frame.brackets] == [("0.25.png", "1.0.png", "4.0.png")]
+    assert sum(camera is not None for camera in frame.known) == views and len(frame.pictures) == views + 1

@@ -54,7 +54,8 @@ def test_without_a_camera_file_nothing_changes() -> None:
     assert within_lenses(one, CameraRequest(focal_px=(100.0,))) is one
 
 
-@pytest.mark.parametrize("ignore", [[["x"]], [[[1, 2, 3]]], [[[float("nan"), 1]] * 3], [[]], 7])
+@pytest.mark.parametrize("ignore", [[["x"]], [[[1, 2, 3]]], [[[float("nan"), 1]] * 3], [[]], 7,
+                                    [[[10**400, 1]] * 3]])
 def test_what_is_no_polygon_is_refused(ignore: Any) -> None:
     with pytest.raises(BadRequest, match="a.png: ignore must be polygons"):
         left_out({"ignore": ignore})

@@ -42,10 +42,10 @@ def test_camera_raw_is_the_only_float_picture_that_clips() -> None:
 
 
 def test_what_could_not_be_matched_and_what_is_over_exposed_is_warned_of() -> None:
-    pictures = [picture_from_array(np.zeros((4, 4, 3), np.uint8), name) for name in ("a.jpg", "b.jpg")]
+    names = ["a.jpg", "b.jpg"]
     fine = replace(unchanged(3), overexposed=WARNING.overexposed_share)
-    assert exposure_warnings(pictures, [fine, fine]) == []
-    (one,) = exposure_warnings(pictures, [fine, replace(fine, why_not="it differs by 7.0 stops")])
+    assert exposure_warnings(names, [fine, fine]) == []
+    (one,) = exposure_warnings(names, [fine, replace(fine, why_not="it differs by 7.0 stops")])
     assert "b.jpg" in one and "7.0 stops" in one and "could not be matched" in one
-    (one,) = exposure_warnings(pictures, [replace(fine, overexposed=0.31), fine])
+    (one,) = exposure_warnings(names, [replace(fine, overexposed=0.31), fine])
     assert "a.jpg is over-exposed" in one and "31%" in one

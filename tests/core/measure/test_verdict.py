@@ -331,3 +331,28 @@ def test_pictures_whose_distance_is_not_known_have_a_place_where_they_meet(
 
 def test_without_a_seam_nothing_is_compared_and_nothing_crashes() -> None:
     assert judge(replace(look_of_three(), labels=None), (0, 0), SURE).rating == "good"
+
+
+def test_around_the_poles_of_a_sphere_nothing_is_bent_by_nature() -> None:
+    """A picture that looks straight down, on a whole sphere: rows narrow towards the pole there."""
+    v, u = np.mgrid[:200, :400].astype(np.float32)
+    heading, fall = np.pi * ((u + 0.5) / 200 - 1), np.pi * ((v + 0.5) / 200 - 0.5)
+    x, y, z = np.cos(fall) * np.sin(heading), np.cos(fall) * np.cos(heading), np.sin(fall)
+    below = z > np.cos(np.radians(50))
+    with np.errstate(divide="ignore"):
+        down = PictureMap(np.where(below, 100 * x / z + 150, np.nan), np.where(below, 150 - 100 * y / z, np.nan),
+                          (300, 300))  # fmt: skip
+    ahead = PictureMap(64 * heading, 64 * fall, (400, 200))
+    tones = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (200, 400, 3)).astype(np.uint8), (0, 0), 1)
+    level, labels = np.abs(fall) < 0.7, np.where(below, 1, -1).astype(np.int16)
+    sphere = Look(1, (ahead, down), (tones,) * 2, (tones,) * 2, (level, below), np.zeros_like(below),
+                  np.where(level & ~below, 0, labels).astype(np.int16))  # fmt: skip
+    projection = {"kind": "equirectangular", "focal_px": 200 / np.pi, "centre": [199.5, 99.5]}
+    report = {**RIGHT, "canvas": {"projection": projection}}
+
+    def bent(seen: Look) -> list[str]:
+        return [place.what for place in judge(seen, (0, 0), report).places if "bent" in place.what]
+
+    assert bent(sphere) == []
+    squeezed = PictureMap(150 + 2.5 * (down.x - 150), down.y, (600, 300))
+    assert len(bent(replace(sphere, maps=(ahead, squeezed)))) > 0

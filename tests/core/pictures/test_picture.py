@@ -304,6 +304,17 @@ def test_exr_windows_and_half(tmp_path: Path) -> None:
     assert apart.alpha is not None and not apart.alpha.any()
 
 
+def test_nan_that_signals_is_read_without_a_word(tmp_path: Path) -> None:
+    """As flipped bits make it: arithmetic with it warns, which pytest makes an error of."""
+    colour = {name: np.full((40, 60), 0.5, np.float32) for name in "RGB"}
+    alpha = np.ones((40, 60), np.float32)
+    alpha.view(np.uint32)[3, 4] = 0x7F800001
+    path = tmp_path / "a.exr"
+    path.write_bytes(exr({**colour, "A": alpha}))
+    picture = load_picture(path)
+    assert picture.alpha is not None and picture.alpha[3, 4] == 0 and picture.alpha.sum() == 40 * 60 - 1
+
+
 @pytest.mark.parametrize("suffix", [".exr", ".tif"])
 def test_pixels_that_are_no_numbers(tmp_path: Path, suffix: str) -> None:
     array = image(np.float32, 3)

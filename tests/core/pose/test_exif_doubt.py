@@ -14,7 +14,7 @@ from edf_stitch.core.cameras.rig import PictureMatches
 from edf_stitch.core.cameras.two_view import TwoView
 from edf_stitch.core.pose.estimation import estimate
 from edf_stitch.core.pose.exif_doubt import by_exif_or_without, exif_warning
-from edf_stitch.core.rig.exif_doubt import without_wrong_exif, wrong_exif
+from edf_stitch.core.rig.exif_doubt import exif_warnings, without_wrong_exif, wrong_exif
 from edf_stitch.core.rig.matching import Matched
 
 from ..point_scenes import FOCAL, SIZE, spoiled, turned_by, unit
@@ -103,12 +103,13 @@ def test_the_strongest_pairs_of_a_set_are_asked(factor: float) -> None:
     matched = Matched(tuple(points), tuple(PictureMatches(i, j, index) for i, j in ((0, 1), (0, 2), (1, 2))), 1.0)
     cameras = [by_exif(factor * FOCAL)] * 3
     doubted = wrong_exif(cameras, matched, 0)
-    used, warnings = without_wrong_exif(cameras, doubted, ["a", "b", "c"])
+    used = without_wrong_exif(cameras, doubted, ["a", "b", "c"])
+    warnings = exif_warnings(cameras, doubted, ["a", "b", "c"], {1: FOCAL})
     if factor == 1.0:
         assert not doubted and used == tuple(cameras) and not warnings
         return
-    assert doubted[0].pictures == (0, 1, 2) and abs(np.log(doubted[0].focal / FOCAL)) < 0.05
-    assert all(camera.assumed for camera in used)
+    assert doubted[0].pictures == (0, 1, 2) and all(camera.assumed for camera in used)
+    assert f"give {FOCAL:.0f} px" in warnings[0] and not exif_warnings(cameras, doubted, ["a", "b", "c"], {})
     assert f"EXIF of 3 pictures ({factor * FOCAL:.0f} px" in warnings[0] and "contradicts the matches" in warnings[0]
 
 
@@ -121,8 +122,48 @@ def test_another_body_of_a_set_keeps_its_own() -> None:
     cameras = [by_exif(0.5 * FOCAL), by_exif(0.5 * FOCAL), by_exif(FOCAL)]
     doubted = wrong_exif(cameras, matched, 0)
     assert [one.pictures for one in doubted] == [(0, 1)]
-    used, _ = without_wrong_exif(cameras, doubted, ["a.jpg", "b.jpg", "c.jpg"])
+    used = without_wrong_exif(cameras, doubted, ["a.jpg", "b.jpg", "c.jpg"])
     assert [camera.assumed for camera in used] == [True, True, False]
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.0, 1.6])
+def test_one_picture_beside_others_is_asked(factor: float) -> None:
+    """Nothing has the focal length that it says: it is given that of the others, where they say the same."""
+    rng = np.random.default_rng(5)
+    points = [one + rng.normal(0, 0.1, one.shape) for one in views(4)]
+    index = np.repeat(np.arange(len(points[0]))[:, None], 2, axis=1)
+    pairs = tuple(PictureMatches(i, j, index) for i in range(4) for j in range(i + 1, 4))
+    matched = Matched(tuple(points), pairs, 1.0)
+    cameras = [by_exif(FOCAL), by_exif(factor * FOCAL), by_exif(FOCAL), by_exif(FOCAL)]
+    doubted, names = wrong_exif(cameras, matched, 0), ["a.jpg", "b.jpg", "c.jpg", "d.jpg"]
+    used = without_wrong_exif(cameras, doubted, names)
+    assert [camera.focal for camera in used] == pytest.approx([FOCAL] * 4)
+    assert [one.pictures for one in doubted] == ([] if factor == 1.0 else [(1,)])
+    assert used[1].lens_of == ("" if factor == 1.0 else "a.jpg")
+
+
+def test_pairs_with_few_matches_do_not_outvote_one_with_many() -> None:
+    """A picture at the end of a row: what it shares with those further on tells nothing."""
+    rng = np.random.default_rng(5)
+    points = [one + rng.normal(0, 0.1, one.shape) for one in views(4)]
+    index = np.repeat(np.arange(len(points[0]))[:, None], 2, axis=1)
+    pairs = tuple(
+        PictureMatches(i, j, index if j == i + 1 else rng.permuted(index, axis=0)[:30])
+        for i in range(4) for j in range(i + 1, 4)
+    )  # fmt: skip
+    cameras = [by_exif(1.6 * FOCAL), by_exif(FOCAL), by_exif(FOCAL), by_exif(FOCAL)]
+    assert [one.pictures for one in wrong_exif(cameras, Matched(tuple(points), pairs, 1.0), 0)] == [(0,)]
+
+
+def test_a_picture_that_was_zoomed_keeps_its_own() -> None:
+    """Its EXIF says so, and the matches agree."""
+    rng = np.random.default_rng(5)
+    points = [one + rng.normal(0, 0.1, one.shape) for one in views(4)]
+    points[1] = 1.6 * (points[1] - by_exif(FOCAL).K[:2, 2]) + by_exif(FOCAL).K[:2, 2]
+    index = np.repeat(np.arange(len(points[0]))[:, None], 2, axis=1)
+    pairs = tuple(PictureMatches(i, j, index) for i in range(4) for j in range(i + 1, 4))
+    cameras = [by_exif(FOCAL), by_exif(1.6 * FOCAL), by_exif(FOCAL), by_exif(FOCAL)]
+    assert wrong_exif(cameras, Matched(tuple(points), pairs, 1.0), 0) == ()
 
 
 def test_the_warning_names_both_values_and_what_to_do() -> None:

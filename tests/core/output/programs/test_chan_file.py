@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from edf_stitch.core.cameras.projective import rotation_from_vector
 from edf_stitch.core.output.camera_file import found_cameras
 from edf_stitch.core.output.programs.chan_file import chan_file
@@ -34,3 +35,10 @@ def test_the_last_line_is_the_panorama(of_four: StitchResult) -> None:
     values = np.array(line.split("\t"), float)
     # to the right is a negative turn about y, which is up there
     assert np.allclose(values, (5, 0, 0, 0, 0, -30, 0, 50), atol=1e-8)
+
+
+def test_a_camera_that_looks_straight_up_is_written_without_a_word() -> None:
+    """Its angles are not unique, which SciPy warns about (and pytest would make an error of): any are right."""
+    line = chan_file([], (axis(0, 90.0), np.radians(50))).decode().splitlines()[-1]
+    x, y, z = (float(value) for value in line.split("\t")[4:7])
+    assert x == pytest.approx(90, abs=1e-3) and y + z == pytest.approx(0, abs=1e-3)

@@ -40,6 +40,16 @@ def test_what_hugin_has_is_met(camera: Camera) -> None:
     assert np.allclose(lens.shift, (5.5, -9.0))
 
 
+@pytest.mark.parametrize("lens", [Lens(LensProjection.EQUIDISTANT), Lens(LensProjection.EQUISOLID)])
+def test_a_fisheyes_circle_is_met_by_what_is_used_of_it(lens: Lens) -> None:
+    """Its corners lie beyond 180°, where no ray is, and what is further than 80° from the axis is not used."""
+    circle = Camera(np.array([[180.0, 0, 309.5], [0, 180, 299.5], [0, 0, 1]]), (620, 600), "test", 0.0, lens=lens)
+    found = hugin_lens(circle, "a")
+    assert found.off < 1e-6 and np.allclose(found.abc, 0, atol=1e-9)
+    bent = replace(circle, lens=Lens(LensProjection.EQUIDISTANT, angular=(0.02, -0.01, 0, 0)))
+    assert hugin_lens(bent, "a").off < 1 and max(map(abs, hugin_lens(bent, "a").abc)) < 0.2
+
+
 def test_what_hugin_lacks_is_fitted_and_said() -> None:
     camera = replace(CAMERA, distortion=np.array([-0.2, 0.1, 0.004, 0, 0]))
     lens = hugin_lens(camera, "a")
