@@ -18,6 +18,9 @@ class ComparisonOptions:
     difference_gain: int = 4
     """Factor by which differences are shown stronger than they are: a few levels would not be seen."""
 
+    features: int = 4000
+    """Features of a picture, at most, by which its epipolar lines with the others are found for measuring alone."""
+
     max_fields: int = 12
     """Fields that one page shows at most: each needs a rule of its own to be chosen without a script."""
 

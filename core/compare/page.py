@@ -19,6 +19,7 @@ from .tables import Summary, best, failures, figure, medians, shown
 
 # The overview's columns: two figures a field.
 OVERVIEW = ("overlap_psnr_db", "overlap_ssim", "projectivity_px")
+SET_OVERVIEW = ("gained_psnr_db", "gained_ssim", "bent_px")
 KINDS = {
     "panorama": "panorama", "average": "average of both in the overlap: what is off shows twice",
     "difference": f"difference × {COMPARISON.difference_gain} in the overlap",
@@ -41,11 +42,12 @@ BLINK = "\n".join([
 
 def comparison_page(summary: Summary) -> str:
     """The page as HTML, from the content of compare.json."""
-    pairs, fields = summary["pairs"], summary["fields"]
+    sets: Summary = summary["sets"]
+    pairs, fields = [*summary["pairs"], *sets["pairs"]], summary["fields"]
     done = sum(entry["status"] == "done" for entry in pairs)
     header = (
-        f'<header class="{"good" if done == len(pairs) else "bad"}"><h1>{len(fields)} fields, {done} pairs compared'
-        f"{'' if done == len(pairs) else f', {len(pairs) - done} not'}</h1>"
+        f'<header class="{"good" if done == len(pairs) else "bad"}"><h1>{len(fields)} fields, {done} pairs and sets '
+        f"compared{'' if done == len(pairs) else f', {len(pairs) - done} not'}</h1>"
         f'<p class="quiet">EDF Stitch {escape(summary["version"])}. Overlap figures are taken between the reference '
         "and the warped target, 8 bit, before any blending; exposure differences are in them. Best of each pair: bold."
         "</p></header>"
@@ -53,28 +55,37 @@ def comparison_page(summary: Summary) -> str:
     return "\n".join([
         "<!doctype html>", '<html lang="en">', "<head>", '<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>Fields compared on {done} pairs</title>", f"<style>{STYLE}{BLINK}</style>", "</head>", "<body>",
-        "<main>", header, "<h2>All pairs</h2>", _overview(pairs, fields, summary),
-        *(_section(entry, fields) for entry in pairs), "</main>", "</body>", "</html>", "",
+        f"<title>Fields compared on {done} pairs and sets</title>", f"<style>{STYLE}{BLINK}</style>", "</head>",
+        "<body>", "<main>", header, *_all("All pairs", summary, OVERVIEW), *_all("All sets", sets, SET_OVERVIEW),
+        "</main>", "</body>", "</html>", "",
     ])  # fmt: skip
 
 
-def _overview(pairs: Sequence[dict[str, Any]], fields: Sequence[str], summary: Summary) -> str:
-    groups = "".join(f'<th colspan="{len(fields)}" class=first>{_named(name)}</th>' for name in OVERVIEW)
+def _all(title: str, summary: Summary, columns: Sequence[str]) -> list[str]:
+    """An overview of all pairs, or all sets, and a section for each."""
+    if not summary["pairs"]:
+        return []
+    sections = (_section(entry, summary["fields"]) for entry in summary["pairs"])
+    return [f"<h2>{title}</h2>", _overview(summary, columns), *sections]
+
+
+def _overview(summary: Summary, columns: Sequence[str]) -> str:
+    pairs, fields = summary["pairs"], summary["fields"]
+    groups = "".join(f'<th colspan="{len(fields)}" class=first>{_named(name)}</th>' for name in columns)
     names = "".join(
-        f'<th class="n{" first" if field == fields[0] else ""}">{escape(field)}</th>' for _ in OVERVIEW
+        f'<th class="n{" first" if field == fields[0] else ""}">{escape(field)}</th>' for _ in columns
         for field in fields
     )  # fmt: skip
     rows = []
     for entry in pairs:
         title = f'<tr><th><a href="#{_slug(entry["name"])}">{escape(entry["name"])}</a></th>'
         if entry["status"] != "done":
-            why = f'<td class=bad colspan="{len(OVERVIEW) * len(fields)}">{escape(entry["message"])}</td>'
+            why = f'<td class=bad colspan="{len(columns) * len(fields)}">{escape(entry["message"])}</td>'
             rows.append(f"{title}{why}</tr>")
             continue
-        cells = (_cell(entry, field, name, fields, field == fields[0]) for name in OVERVIEW for field in fields)
+        cells = (_cell(entry, field, name, fields, field == fields[0]) for name in columns for field in fields)
         rows.append(f"{title}{''.join(cells)}</tr>")
-    middles = [(name, medians(summary, name)) for name in OVERVIEW]
+    middles = [(name, medians(summary, name)) for name in columns]
     cells = (f"<td class=n>{shown(middle[field], name)}</td>" for name, middle in middles for field in fields)
     rows.append(f"<tr><th>median</th>{''.join(cells)}</tr>")
     return table(f"<tr><th rowspan=2>pair</th>{groups}</tr><tr>{names}</tr>", rows)
@@ -83,7 +94,9 @@ def _overview(pairs: Sequence[dict[str, Any]], fields: Sequence[str], summary: S
 def _section(entry: dict[str, Any], fields: Sequence[str]) -> str:
     slug, name = _slug(entry["name"]), escape(entry["name"])
     parts = [f'<section id="{slug}"><h2>{name}</h2>']
-    if entry["status"] == "done":
+    if entry["status"] == "done" and "pictures" in entry:
+        parts.append(f'<p class="quiet">{len(entry["pictures"])} pictures: {escape(", ".join(entry["pictures"]))}</p>')
+    elif entry["status"] == "done":
         (width, height), about = entry["size"], f"{entry['inliers']} of {entry['matches']} matches"
         facts = [f"{width} × {height}", f"model: {entry['model']}", about, entry["focal_source"]]
         parts.append(f'<p class="quiet">{escape("; ".join(facts))}</p>')
@@ -92,7 +105,8 @@ def _section(entry: dict[str, Any], fields: Sequence[str]) -> str:
         parts.append(f'<ul class="failures bad">{"".join(f"<li>{escape(one)}</li>" for one in said)}</ul>')
     there = [field for field in fields if entry["fields"].get(field, {}).get("status") == "done"]
     if there:
-        parts += [_figures(entry, there), _blink(entry, there, slug), _grid(entry, there)]
+        in_turn = [field for field in there if "warped" in entry["fields"][field]["pictures"]]
+        parts += [_figures(entry, there), *([_blink(entry, in_turn, slug)] * bool(in_turn)), _grid(entry, there)]
     return "\n".join([*parts, '<p class="quiet"><a href="#">to the top</a></p></section>'])
 
 
@@ -132,8 +146,11 @@ def _grid(entry: dict[str, Any], fields: Sequence[str]) -> str:
     figures = []
     for kind, caption in KINDS.items():
         for field in fields:
+            if kind not in entry["fields"][field]["pictures"]:
+                continue
             path, alt = _path(entry, field, kind), escape(f"{entry['name']}: {field}, {caption}")
-            score = f"{shown(figure(entry, field, 'overlap_psnr_db'), 'overlap_psnr_db')} dB"
+            psnr = "gained_psnr_db" if "pictures" in entry else "overlap_psnr_db"
+            score = f"{shown(figure(entry, field, psnr), psnr)} dB"
             figures.append(
                 f'<figure><a href="{path}"><img loading="lazy" src="{path}" alt="{alt}"></a>'
                 f"<figcaption><b>{escape(field)}</b> ({score}): {escape(caption)}</figcaption></figure>"

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..measure.metrics import overlap_views
+from ..measure.placed.placed import PlacedSet
 from ..pipeline import StitchResult
+from ..raster.arrays import bounds
 from ..raster.colour import encode
 from .options import COMPARISON
 
@@ -31,6 +33,27 @@ def field_pictures(result: StitchResult) -> dict[str, bytes]:
         "reference": np.where(both, reference, 0),  # the overlap differs from field to field
     }  # fmt: skip
     return {kind: _jpeg(picture.astype(np.uint8)) for kind, picture in pictures.items()}
+
+
+def placed_pictures(panorama: PlacedSet) -> dict[str, bytes]:
+    """JPEG files by kind: panorama, the average of all that is shown at a place, so that what is off shows twice;
+    difference (amplified), between the least and the most that is shown there."""
+    shape = panorama.size[::-1]
+    total = np.zeros((*shape, 3), np.float32)
+    least, most = np.full((*shape, 3), 255, np.uint8), np.zeros((*shape, 3), np.uint8)
+    for one in panorama.pictures:
+        shows = one.shows[..., None]
+        total[one.box] += one.colours * shows
+        least[one.box] = np.where(shows, np.minimum(least[one.box], one.colours), least[one.box])
+        most[one.box] = np.where(shows, np.maximum(most[one.box], one.colours), most[one.box])
+    views = panorama.views_at[..., None]
+    average = np.where(views > 0, total / np.maximum(views, 1), 96)
+    spread = np.where(views > 1, np.minimum(COMPARISON.difference_gain * (most.astype(int) - least), 255), 0)
+    part = bounds(panorama.views_at > 0) or (slice(0, 1), slice(0, 1))
+    return {
+        "panorama": _jpeg(np.rint(average[part]).astype(np.uint8)),
+        "difference": _jpeg(np.abs(spread[part]).astype(np.uint8)),
+    }  # fmt: skip
 
 
 def _on_gray(result: StitchResult) -> Rgb:

@@ -67,12 +67,12 @@ def straight_edges(picture: Picture, camera: Camera, K: Array) -> StraightEdges:
     ----------
     von Gioi et al., LSD: a Line Segment Detector, IPOL 2012.
     """
-    ends, lengths = _segments(picture)
+    ends, lengths = edge_ends(picture)
     rays = homogeneous(undistort(ends.reshape(-1, 2), camera)) @ np.linalg.inv(K).T
     return StraightEdges(rays.reshape(-1, 2, 3), lengths)
 
 
-def _segments(picture: Picture) -> tuple[Array, Array]:
+def edge_ends(picture: Picture) -> tuple[Array, Array]:
     """Ends (N, 2, 2) px of the straight edges of a picture, the longest first, and lengths (N,) in shares of its longer
     side."""
     if picture not in _found:
@@ -81,7 +81,7 @@ def _segments(picture: Picture) -> tuple[Array, Array]:
 
 
 def _detected(picture: Picture) -> tuple[Array, Array]:
-    """See `_segments`."""
+    """See `edge_ends`."""
     height, width = picture.view.shape[:2]
     scale = min(1.0, EDGES.side_px / max(width, height))
     size = (max(1, round(scale * width)), max(1, round(scale * height)))

@@ -41,7 +41,8 @@ def failed(name: str) -> dict[str, Any]:
 
 
 def summary(*pairs: dict[str, Any], fields: tuple[str, ...] = ("slack", "rew")) -> dict[str, Any]:
-    return {"schema": 1, "version": "1.2.3", "fields": list(fields), "pairs": list(pairs)}
+    return {"schema": 1, "version": "1.2.3", "fields": list(fields), "pairs": list(pairs),
+            "sets": {"fields": [], "pairs": []}}  # fmt: skip
 
 
 def test_the_best_is_marked_and_equals_share_it() -> None:
@@ -90,7 +91,7 @@ def test_seconds_have_a_table_of_their_own() -> None:
 def test_the_page_runs_nothing_and_loads_nothing_from_elsewhere() -> None:
     page = comparison_page(summary(entry("temple <b>", slack=20.0, rew=None), failed("desk")))
     assert "<script" not in page and "http" not in page and "temple <b>" not in page and "temple &lt;b&gt;" in page
-    assert "no &lt;content&gt; in common" in page and "1 pairs compared, 1 not" in page
+    assert "no &lt;content&gt; in common" in page and "1 pairs and sets compared, 1 not" in page
     assert 'src="pictures/temple%20%3Cb%3E/slack-warped.jpg"' in page and "rew-warped" not in page
 
 
