@@ -67,9 +67,13 @@ def straight_edges(picture: Picture, camera: Camera, K: Array) -> StraightEdges:
     ----------
     von Gioi et al., LSD: a Line Segment Detector, IPOL 2012.
     """
-    ends, lengths = edge_ends(picture)
-    rays = homogeneous(undistort(ends.reshape(-1, 2), camera)) @ np.linalg.inv(K).T
-    return StraightEdges(rays.reshape(-1, 2, 3), lengths)
+    rays = homogeneous(ideal_ends(picture, camera).reshape(-1, 2)) @ np.linalg.inv(K).T
+    return StraightEdges(rays.reshape(-1, 2, 3), edge_ends(picture)[1])
+
+
+def ideal_ends(picture: Picture, camera: Camera) -> Array:
+    """Ends (N, 2, 2) of the straight edges of a picture, ideal px, the longest first."""
+    return undistort(edge_ends(picture)[0].reshape(-1, 2), camera).reshape(-1, 2, 2)
 
 
 def edge_ends(picture: Picture) -> tuple[Array, Array]:
