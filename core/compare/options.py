@@ -12,6 +12,10 @@ class ComparisonOptions:
     max_side_px: int = 1600
     """px of the longer side of the page's pictures at most; differences are taken before they are shrunk."""
 
+    panorama_side_px: int = 8000
+    """px of the longer side of its panoramas at most, which a loupe shows at 1:1: JPEG ends at 65535, and browsers
+    decode them whole."""
+
     jpeg_quality: int = 88
     """Quality of the page's pictures, of 100."""
 

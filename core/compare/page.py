@@ -1,4 +1,4 @@
-"""compare.html: one page that opens offline, without scripts; pictures lie beside it.
+"""compare.html: one page that opens offline; pictures lie beside it, and the loupe's script in it.
 
 For every pair a table, the panorama of every field with the average and the difference in the overlap, and the
 reference alternating with the warped target of a field that can be chosen.
@@ -14,6 +14,7 @@ from urllib.parse import quote
 
 from ..output.page import STYLE, table
 from .figures import FIGURES
+from .loupe import LOUPE_NOTE, LOUPE_SCRIPT, LOUPE_STYLE, loupe_of
 from .options import COMPARISON
 from .tables import Summary, best, failures, figure, medians, shown
 
@@ -23,6 +24,10 @@ SET_OVERVIEW = ("gained_psnr_db", "gained_ssim", "bent_px")
 KINDS = {
     "panorama": "panorama", "average": "average of both in the overlap: what is off shows twice",
     "difference": f"difference × {COMPARISON.difference_gain} in the overlap",
+}  # fmt: skip
+SET_KINDS = {
+    "panorama": "the average of all that it shows at a place: what is off shows twice",
+    "difference": f"between the least and the most that it shows at a place, × {COMPARISON.difference_gain}",
 }  # fmt: skip
 BLINK = "\n".join([
     ".best { font-weight: 700; }",
@@ -40,6 +45,13 @@ BLINK = "\n".join([
 ])  # fmt: skip
 
 
+# Nothing is loaded but the pictures beside the page.
+POLICY = (
+    '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src \'self\' file:; '
+    "style-src 'unsafe-inline'; script-src 'unsafe-inline'\">"
+)
+
+
 def comparison_page(summary: Summary) -> str:
     """The page as HTML, from the content of compare.json."""
     sets: Summary = summary["sets"]
@@ -54,10 +66,11 @@ def comparison_page(summary: Summary) -> str:
     )
     return "\n".join([
         "<!doctype html>", '<html lang="en">', "<head>", '<meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>Fields compared on {done} pairs and sets</title>", f"<style>{STYLE}{BLINK}</style>", "</head>",
-        "<body>", "<main>", header, *_all("All pairs", summary, OVERVIEW), *_all("All sets", sets, SET_OVERVIEW),
-        "</main>", "</body>", "</html>", "",
+        '<meta name="viewport" content="width=device-width, initial-scale=1">', POLICY,
+        f"<title>Fields compared on {done} pairs and sets</title>",
+        f"<style>{STYLE}{BLINK}{LOUPE_STYLE}</style>", "</head>", "<body>", "<main>", header,
+        *_all("All pairs", summary, OVERVIEW), *_all("All sets", sets, SET_OVERVIEW), "</main>",
+        f"<script>{LOUPE_SCRIPT}</script>", "</body>", "</html>", "",
     ])  # fmt: skip
 
 
@@ -144,7 +157,7 @@ def _blink(entry: dict[str, Any], fields: Sequence[str], slug: str) -> str:
 
 def _grid(entry: dict[str, Any], fields: Sequence[str]) -> str:
     figures = []
-    for kind, caption in KINDS.items():
+    for kind, caption in (SET_KINDS if "pictures" in entry else KINDS).items():
         for field in fields:
             if kind not in entry["fields"][field]["pictures"]:
                 continue
@@ -152,10 +165,11 @@ def _grid(entry: dict[str, Any], fields: Sequence[str]) -> str:
             psnr = "gained_psnr_db" if "pictures" in entry else "overlap_psnr_db"
             score = f"{shown(figure(entry, field, psnr), psnr)} dB"
             figures.append(
-                f'<figure><a href="{path}"><img loading="lazy" src="{path}" alt="{alt}"></a>'
+                f'<figure{loupe_of(entry["fields"][field], kind)}><a href="{path}">'
+                f'<img loading="lazy" src="{path}" alt="{alt}"></a><span class="glass"></span>'
                 f"<figcaption><b>{escape(field)}</b> ({score}): {escape(caption)}</figcaption></figure>"
             )
-    return f'<div class="pictures">{"".join(figures)}</div>'
+    return f'<p class="quiet">{LOUPE_NOTE}</p><div class="pictures">{"".join(figures)}</div>'
 
 
 def _path(entry: dict[str, Any], field: str, kind: str) -> str:

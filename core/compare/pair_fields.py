@@ -20,7 +20,7 @@ from ..system.progress import Stopwatch
 from .figures import figures_of, figures_of_placed
 from .outcome import PICTURES, Outcome
 from .pairs import PairFiles
-from .pictures import field_pictures, placed_pictures
+from .pictures import field_pictures, origin_of, placed_pictures
 from .published import published
 from .sets import Fundamentals, Made
 
@@ -106,6 +106,7 @@ def compared_pair(
             continue
         figures = figures_of(results[name], edge, independent, options.seed, measures)
         _note(outcome, name, figures, field_pictures(results[name]))
+        entry["fields"][name]["origin"] = origin_of(results[name])
         if truth is None:
             del results[name]  # only needed to be compared with the truth
     if truth is not None:

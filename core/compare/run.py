@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import platform
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import cv2
+import numpy as np
 
 from ..choices import FIELDS
 from ..options import StitchOptions
@@ -15,6 +20,7 @@ from ..system.output_files import OutputFiles
 from ..system.progress import Progress, Stopwatch
 from ..system.threads import asking
 from .elsewhere.folders import outside_of
+from .elsewhere.hugin import hugin_version
 from .figures import MEASURES
 from .outcome import Outcome, keep_part, kept_part, mark_of
 from .page import comparison_page
@@ -22,9 +28,11 @@ from .pair_fields import Truths, compared_pair
 from .pairs import PairFiles
 from .published import published
 from .sets import PROGRAMS, Made, compared_set
-from .tables import SCHEMA, comparison_csv, comparison_markdown, figure, timing_markdown
+from .tables import SCHEMA, comparison_csv, comparison_markdown, document, figure, timing_markdown
 
-FILES = ("compare.json", "compare.csv", "compare.md", "compare.html", "timing.json", "timing.md")
+FILES = (
+    "compare.json", "compare.csv", "compare.md", "compare.html", "timing.json", "timing.md", "timing_and_tables.md",
+)  # fmt: skip
 Tell = Callable[[str], None]
 Show = Callable[[str, float], None]
 
@@ -179,12 +187,22 @@ def _summary(request: ComparisonRequest, version: str, outcomes: Sequence[Outcom
     }  # fmt: skip
 
 
+def _made(version: str) -> str:
+    """When it is made, and with which versions."""
+    programs = {"EDF Stitch": version, "Python": platform.python_version(), "NumPy": np.__version__,
+                "OpenCV": cv2.__version__}  # fmt: skip
+    hugin = hugin_version()
+    named = ", ".join(f"{name} {number}" for name, number in (programs | ({"Hugin": hugin} if hugin else {})).items())
+    return f"{time.strftime('%Y-%m-%d', time.gmtime())}, {named}"
+
+
 def _stage(folder: Path, summary: dict[str, Any], outcomes: Sequence[Outcome], files: OutputFiles) -> None:
     """Stages all tables, the page and the pictures that are not in place yet."""
     seconds = {outcome.entry["name"]: outcome.seconds for outcome in outcomes}
     texts = {
         "compare.csv": comparison_csv(summary), "compare.md": comparison_markdown(summary),
         "compare.html": comparison_page(summary), "timing.md": timing_markdown(seconds),
+        "timing_and_tables.md": document(summary, seconds, _made(summary["version"])),
     }  # fmt: skip
     for name, text in texts.items():
         files.add_to_folder(folder, name, text.encode())

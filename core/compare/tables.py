@@ -179,3 +179,31 @@ def timing_markdown(seconds: dict[str, dict[str, float]]) -> str:
     for pair, one in seconds.items():
         rows.append([pair, *(f"{one[name]:.2f}" if name in one else "–" for name in names)])
     return "\n".join(["# CPU seconds", "", *(_line(row) for row in rows)]) + "\n"
+
+
+def document(summary: Summary, seconds: dict[str, dict[str, float]], made: str) -> str:
+    """All tables as one page for a documentation, with what it was made with and the CPU seconds of each field.
+
+    made: the date, and versions of programs, in words.
+    """
+    about = (
+        f"Made by `edf compare`: {made}. Overlap figures of pairs are taken between the reference and the warped "
+        "target, 8 bit, before any blending, exposure differences in them; the best of each row is bold. What each "
+        "figure is stands in [how-to.md](how-to.md#compare-and-validate), how fields work in [method.md](method.md)."
+    )
+    tables = comparison_markdown(summary).replace("# Fields compared", "", 1).strip()
+    totals = {}
+    for name, one in seconds.items():
+        totals[name] = {"registration": one["registration"]} if "registration" in one else {}
+        for step, value in one.items():
+            field = step.partition(":")[0]
+            totals[name][field] = value if field == step else totals[name].get(field, 0.0) + value
+    pairs, sets = (
+        {entry["name"]: totals.get(entry["name"], {}) for entry in part["pairs"]} for part in (summary, summary["sets"])
+    )
+    parts = ["# Compared with others", "", about, "", tables]
+    for title, part in (("pairs", pairs), ("sets", sets)):
+        if part:
+            parts += ["", f"CPU seconds, {title} (the first of a set with features and registration):", "",
+                      *timing_markdown(part).strip().split("\n")[2:]]  # fmt: skip
+    return "\n".join(parts) + "\n"

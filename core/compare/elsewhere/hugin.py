@@ -39,6 +39,18 @@ def installed() -> bool:
     return all(shutil.which(program) for program in PROGRAMS)
 
 
+def hugin_version() -> str:
+    """Its version; empty where it is not installed."""
+    if not installed():
+        return ""
+    try:
+        done = subprocess.run(["nona", "--help"], capture_output=True, text=True, errors="replace", timeout=60)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    found = re.search(r"version (\d+\.\d+\.\d+)", done.stdout + done.stderr)
+    return found[1] if found else ""
+
+
 def run(folder: Path, *command: str) -> None:
     """Runs a program of theirs in a folder. Raises HuginFailed with what it said last."""
     try:
