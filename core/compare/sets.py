@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..alignment import Geometry, estimate_geometry, fit_and_warp
+from ..alignment import Geometry, estimate_geometry
 from ..frames.frame import Frame
 from ..frames.reading import read_frame
 from ..measure.placed.of_result import placed
@@ -18,7 +18,7 @@ from ..measure.placed.placed import PlacedSet
 from ..measure.projectivity import independent_fundamental
 from ..options import StitchOptions
 from ..pictures.picture import Picture
-from ..pipeline import compose
+from ..pipeline import panorama_of
 from ..pose.features import Features, detect, match
 from ..raster.arrays import Array
 from ..system.errors import Cancelled, StitchError
@@ -161,4 +161,4 @@ class _Ours:
             still = replace(rig, t=np.zeros_like(rig.t), inverse_ranges=np.zeros_like(rig.inverse_ranges))
             geometry = replace(geometry, rig=still)
         frame = self._frame.only(geometry.numbers)
-        return placed(compose(frame, fit_and_warp(geometry, [frame], self._options, watch), self._options, watch))
+        return placed(panorama_of(frame, geometry, self._options, watch))
