@@ -118,11 +118,8 @@ def shrunk(
     """A picture on the canvas, all of it, at (W, H) px: it shows what it shows everywhere below a pixel."""
     if shows.shape == size[::-1]:
         return colours, shows, found
-    # colours where nothing is shown must not darken the rim
-    weight = shows.astype(np.float32)[..., None]
-    mixed = cv2.resize(colours * weight, size, interpolation=cv2.INTER_AREA)
-    share = cv2.resize(weight, size, interpolation=cv2.INTER_AREA)
-    small = np.rint(mixed / np.maximum(share, 1e-6)[..., None]).astype(np.uint8)
+    small = np.asarray(cv2.resize(colours, size, interpolation=cv2.INTER_AREA), np.uint8)
+    share = cv2.resize(shows.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     if found is not None:
         x, y = (cv2.resize(values, size, interpolation=cv2.INTER_LINEAR) for values in (found.x, found.y))
         found = PictureMap(np.asarray(x, np.float32), np.asarray(y, np.float32), found.size)

@@ -43,6 +43,10 @@ def test_the_same_lines_find_each_other_whatever_their_ends() -> None:
     turned = through(target) + np.array([[0, 0], [0, 40]])
     assert len(matched_lines(PairLines(turned, target), matches_on(G), G).ends) < 8
     assert not len(matched_lines(PairLines.none(), matches_on(G), G).ends)
+    further = reference + 1.5 * np.diff(reference, axis=1)  # on the same lines, but with nothing in common
+    assert len(matched_lines(PairLines(further, target), matches_on(G), G).ends) < 5
+    twice = np.concatenate([target, target + 1.0])
+    assert len(matched_lines(PairLines(reference, twice), matches_on(G), G).ends) <= len(target)
 
 
 def test_pieces_of_one_line_are_joined() -> None:

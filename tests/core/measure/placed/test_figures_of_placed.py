@@ -33,13 +33,17 @@ def world(shift: int) -> np.ndarray:
 PICTURES = [replace(picture_from_array(world(shift)), name=name) for shift, name in ((0, "a"), (SHIFT, "b"))]
 
 
-def placed_at(off: float = 0.0, gain: float = 1.0, bend: float = 0.0) -> PlacedSet:
-    """Both pictures on a plane; of the second what it shows is off by px, brighter, and bent by px in its middle."""
+def placed_at(
+    off: float = 0.0, gain: float = 1.0, bend: float = 0.0, where: tuple[float, float] = (0, SIZE[0])
+) -> PlacedSet:
+    """Both pictures on a plane; of the second what it shows is off by px, brighter, and bent by px in its middle, where
+    its columns lie between two."""
     pictures = []
     for picture, shift in zip(PICTURES, (0, SHIFT), strict=True):
         y, x = np.mgrid[: SIZE[1], : SIZE[0]].astype(np.float32)
         if shift:
-            x = x + np.float32(off) + np.float32(bend) * np.sin(np.pi * y / SIZE[1]).astype(np.float32)
+            bent = np.where((x >= where[0]) & (x < where[1]), bend * np.sin(np.pi * y / SIZE[1]), 0)
+            x = x + np.float32(off) + bent.astype(np.float32)
         found = PictureMap(x, y, SIZE)
         colours = cv2.remap(picture.view, x, y, cv2.INTER_LINEAR)
         colours = np.clip(colours * (gain if shift else 1.0), 0, 255).astype(np.uint8)
@@ -73,6 +77,8 @@ def test_lines_that_a_map_bends_are_found_where_it_bends_them() -> None:
     assert right["bent_px"] < 0.1 and right["lines"] > 10 and right["lines_alone"] >= 5
     # 8 px of the middle of a line is 5 off the straight line through it, at 500 px per radian, and so 9 at 900
     assert 2 < bent["bent_px"] < 15 and 2 < bent["bent_alone_px"] < 15
+    both, alone = (line_figures(placed_at(bend=8.0, where=part), PICTURES) for part in ((0, 200), (240, 400)))
+    assert both["bent_alone_px"] < 0.1 < 2 < both["bent_px"] and alone["bent_alone_px"] > 2
     assert np.isnan(line_figures(replace(placed_at(), rays_at=None), PICTURES)["bent_px"])
 
 
