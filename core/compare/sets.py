@@ -21,7 +21,7 @@ from ..pictures.picture import Picture
 from ..pipeline import panorama_of
 from ..pose.features import Features, detect, match
 from ..raster.arrays import Array
-from ..system.errors import Cancelled, StitchError
+from ..system.errors import BadRequest, Cancelled, StitchError
 from ..system.progress import Stopwatch
 from .elsewhere.hugin import hugin_panorama
 from .elsewhere.opencv_stitcher import stitcher_panorama
@@ -90,6 +90,11 @@ def compared_set(
     """
     options = replace(options, measure=False, cache=None, crop="full")
     frame = read_frame(files.all_pictures, options)
+    if len(frame.pictures) != len(files.all_pictures):
+        raise BadRequest(
+            f"{len(files.all_pictures)} files are {len(frame.pictures)} pictures: other programs take each file for a "
+            "picture of its own; leave copies, further exposures and spheres out, or --brackets off"
+        )
     entry: dict[str, Any] = {
         "name": files.name, "pictures": [path.name for path in files.all_pictures], "status": "failed", "message": "",
         "published": {}, "fields": {},

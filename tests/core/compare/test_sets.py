@@ -70,6 +70,16 @@ def test_every_program_is_a_column_and_a_failure_says_why(
     assert ",opencv,done," in (tmp_path / "out" / "compare.csv").read_text()
 
 
+def test_copies_are_refused_since_others_take_them_for_pictures(
+    folder_of_three: Path, tmp_path: Path, programs: None
+) -> None:
+    (folder_of_three / "3.png").write_bytes((folder_of_three / "2.png").read_bytes())
+    request = ComparisonRequest(tmp_path / "out", tuple(find_pairs([folder_of_three])))
+    summary, code = run_comparison(request, StitchOptions(), "1.2.3")
+    assert code == 2 and "4 files are 3 pictures" in summary["sets"]["pairs"][0]["message"]
+    assert "- street: 4 files are 3 pictures" in (tmp_path / "out" / "compare.md").read_text()
+
+
 def test_what_is_not_asked_for_is_not_measured(folder_of_three: Path, tmp_path: Path, programs: None) -> None:
     request = ComparisonRequest(tmp_path / "out", tuple(find_pairs([folder_of_three])), measures=("keep",))
     summary, _ = run_comparison(request, StitchOptions(), "1.2.3")
