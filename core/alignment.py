@@ -30,7 +30,7 @@ from .field.field import Field
 from .field.slack import SlackField
 from .field.sphere_field import SphereField, fit_sphere_field
 from .field.strict import StrictField
-from .fields import fit_field
+from .fields import field_of
 from .frames.frame import Frame, size_of
 from .mapping import map_pictures, map_rig
 from .options import StitchOptions
@@ -327,8 +327,7 @@ def fit_and_warp(
     (edge,) = geometry.edges
     progress("field", 0.0)
     inliers, pair = edge.inliers, edge.pair(cameras)
-    decided = (options.field, options.fade, edge.two_view, inliers, pair[0].size, pair[1].size, options.seed)
-    field = Cache(options.cache).remember("field", decided, lambda: fit_field(*decided))
+    field = field_of(edge, cameras, frames[0].pictures, options)
 
     dense = None
     if options.dense:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 # Displacement fields. `strict` moves points along their epipolar lines only, `slack` also a little across them; `paper`
 # is the published method's own. The rivals know no depth: they are what ours are measured against.
-RIVALS = ("rew", "apap", "homography")
+RIVALS = ("rew", "apap", "spw", "lpc", "homography")
+# Of them, those that stand on straight lines as well.
+LINE_FIELDS = ("spw", "lpc")
 FIELDS = ("slack", "strict", "paper", *RIVALS)
 # Fields that are defined on every ray, not only in the reference's image plane: a cylinder or sphere needs one.
 ROUND_FIELDS = ("slack", "strict")

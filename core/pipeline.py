@@ -99,7 +99,13 @@ def stitch(
             frame = frame.only(geometry.numbers)
             if options.preview:
                 return _preview(frame, geometry, options, stopwatch)
-            return (_made if geometry.rig is None else _of_many)(frame, geometry, options, stopwatch)
+            return panorama_of(frame, geometry, options, stopwatch)
+
+
+def panorama_of(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:
+    """The panorama of pictures whose geometry is known, as `stitch` makes it: of a pair the first that is usable, of a
+    large set by what is decided on small pictures. frame: the pictures of the geometry. Raises as `stitch` does."""
+    return (_made if geometry.rig is None else _of_many)(frame, geometry, options, progress)
 
 
 def _made(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:

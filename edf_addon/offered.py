@@ -14,12 +14,14 @@ CAMERA_SOURCES = (
     ("CAMERAS", "Scene Cameras", "Two cameras of the scene give lens, shift and place; only the field is fitted"),
 )
 FIELDS = (
-    ("SLACK", "Slack", "Along the epipolar lines, with a little slack for what lens distortion does"),
-    ("STRICT", "Strict", "Exactly along the epipolar lines: every point of the panorama is geometrically right"),
-    ("PAPER", "Paper", "As published: free to leave the epipolar lines"),
-    ("REW", "Elastic Warp", "For comparison: one homography, bent freely towards the matches; no depth, no cameras"),
-    ("APAP", "As-Projective-As-Possible", "For comparison: a homography for each cell of a grid; no depth, no cameras"),
-    ("HOMOGRAPHY", "Homography", "For comparison: what every other stitcher starts from; no depth, no cameras"),
+    ("SLACK", "Slack", "Along the epipolar lines, with a little slack for what lens distortion does", 0),
+    ("STRICT", "Strict", "Exactly along the epipolar lines: every point of the panorama is geometrically right", 1),
+    ("PAPER", "Paper", "As published: free to leave the epipolar lines", 2),
+    ("REW", "Elastic Warp", "For comparison: one homography, bent freely towards the matches; no depth, no cameras", 3),
+    ("APAP", "As-Projective-As-Possible", "For comparison: a homography for each cell; no depth, no cameras", 4),
+    ("SPW", "Single Perspective", "For comparison: a mesh that keeps the homography's slopes; no depth, no cameras", 6),
+    ("LPC", "Line-Point Consistence", "For comparison: a mesh that keeps straight lines; no depth, no cameras", 7),
+    ("HOMOGRAPHY", "Homography", "For comparison: what every other stitcher starts from; no depth, no cameras", 5),
 )
 GUIDES = (
     ("VERTICAL", "Vertical", "The line is upright, as the edge of a house"),

@@ -41,7 +41,7 @@ MAY_IMPORT = {
     "choices": (),
     "options": ("system", "pictures", "cameras", "choices"),
     "frames": (*BELOW_POSE, "options"),
-    "fields": ("cameras", "field", "rivals"),
+    "fields": ("system", "raster", "pictures", "cameras", "field", "panorama", "rivals", "choices", "options"),
     "mapping": (*BELOW_MEASURE, "choices", "options"),
     "alignment": (*BELOW_MEASURE, "frames", "options", "fields", "mapping"),
     "pipeline": (*BELOW_MEASURE, "frames", "measure", "options", "mapping", "alignment"),

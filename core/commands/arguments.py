@@ -45,7 +45,7 @@ def add_options(parser: argparse.ArgumentParser, with_field: bool = True) -> Non
         how.add_argument(
             "--field", default="slack", type=_choice(FIELDS), metavar="FIELD",
             help="displacement field: slack (default: epipolar lines with a little slack), strict (exactly on them), "
-            "paper, or one that knows no depth: rew, apap, homography",
+            "paper, or one that knows no depth: rew, apap, spw, lpc, homography",
         )  # fmt: skip
     _add_alignment(how)
     _add_composition(how)

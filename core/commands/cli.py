@@ -253,12 +253,16 @@ def _compare(args: argparse.Namespace) -> int:
 
     from ...synthetic_scenes.compared import truth_beside
     from ..choices import FIELDS
+    from ..compare.figures import MEASURES
     from ..compare.pairs import find_pairs
     from ..compare.run import ComparisonRequest, run_comparison
     from ..compare.tables import comparison_markdown
 
     pairs = tuple(find_pairs(args.paths))
-    request = ComparisonRequest(args.output, pairs, args.fields or FIELDS, args.overwrite)
+    request = ComparisonRequest(
+        args.output, pairs, args.fields or FIELDS, args.overwrite, args.measure or MEASURES, tuple(args.outside),
+        args.resume, args.shard,
+    )  # fmt: skip
     version = str(import_module(__package__.rpartition(".core")[0]).__version__)
     options = options_from(args, measure=False)
     with progress_shown(args.quiet or not sys.stderr.isatty()) as show:
@@ -266,6 +270,10 @@ def _compare(args: argparse.Namespace) -> int:
             request, options, version, truth_beside, lambda what, share: show(f"{what:<32}", share),
             lambda line: None if args.quiet and "failed" not in line else say(f"edf: {line}"),
         )  # fmt: skip
+    if summary["missing"]:
+        said = ", ".join(summary["missing"])
+        say(f"edf: still to be compared: {said}; --resume without --shard puts all together")
+        return code
     if args.verbose:
         print(comparison_markdown(summary), file=sys.stderr)
     print(args.output / "compare.html")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -128,3 +129,13 @@ def without_plan(given: Sequence[str]) -> list[str]:
         else:
             left.append(one)
     return left
+
+
+def outside(text: str) -> tuple[str, Path]:
+    """NAME=FOLDER of --outside."""
+    name, found, folder = text.partition("=")
+    if not (found and folder) or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9 ._+-]{0,30}", name):
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: it is NAME=FOLDER, NAME of letters, digits, spaces, and . _ + -"
+        )
+    return name, Path(folder)

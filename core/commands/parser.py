@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from .arguments import add_options
 from .config_file import add_config, with_config
-from .file_arguments import add_batch_files, add_files, shard
+from .file_arguments import add_batch_files, add_files, outside, shard
 from .info import INFO, add_info
 from .meant import what_was_meant
 
@@ -26,7 +26,7 @@ _COMMON = {
         "--output", "--resume", "--keep-going", "--shard", "--format", "--projection", "--crop", "--focal35", "--depth",
         "--overwrite",
     ),
-    "compare": ("--output", "--fields", "--overwrite"),
+    "compare": ("--output", "--fields", "--measure", "--outside", "--resume", "--overwrite"),
 }  # fmt: skip
 _EXIT_CODES = """Exit codes of all commands: 0 done, 1 measured but not within its limits, 2 the call is wrong, 3 the
 pictures can't be stitched, 4 a file can't be read or written, 130 interrupted. `edf COMMAND --help` says more of
@@ -145,11 +145,12 @@ _BATCH = """Stitch every line of LIST.csv: pictures, a folder of them, or a clip
 header may name picture3 and so on, first, last, step, focal_px and focal35 as well. The first that cannot be made stops
 it, unless --keep-going is given; DIR/batch.json says what became of each. Exit codes: 0 all done, 1 some failed (with
 --keep-going), 2 the call is wrong, 3 one can't be stitched, 4 a file can't be read or written, 130 interrupted."""
-_COMPARE = """Stitch every pair with every field, features and geometry found once, and put the figures side by side:
+_COMPARE = """Stitch every pair with every field, features and geometry found once; every set of more pictures with
+ours, as if all were taken from one place, with Hugin and with OpenCV's Stitcher; and put the figures side by side:
 OUTDIR gets compare.html, .md, .csv and .json, pictures, and the seconds in timing.md and .json. A PATH is a folder of
-two pictures, a folder of such folders (also OUTDIR/pictures of `edf validate`: then the truth is asked too), or a
-picture followed by its target. Exit codes: 0 done, 2 the call is wrong, 3 a pair can't be stitched with any field, 4 a
-file can't be read or written, 130 interrupted."""
+two pictures or more, a folder of such folders (also OUTDIR/pictures of `edf validate`: then the truth is asked too), or
+a picture followed by its target. Exit codes: 0 done, 2 the call is wrong, 3 a pair can't be stitched with any field, 4
+a file can't be read or written, 130 interrupted."""
 _VALIDATE = """Render scenes with known cameras in Blender, stitch them, and hold all of it against the truth: OUTDIR
 gets report.html, report.json and report.csv. Pictures are kept in OUTDIR/pictures and made only once. Exit codes: 0 all
 thresholds held, 1 some did not, 2 the call is wrong, 3 nothing can render, 4 a file can't be read or written, 130
@@ -193,9 +194,19 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUTDIR", help="folder for everything")
     parser.add_argument(
         "--fields", type=lambda text: tuple(text.split(",")), default=None, metavar="A,B,C",
-        help="the fields to compare, in this order (default: all)",
+        help="the fields to compare on pairs, in this order (default: all)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--measure", type=lambda text: tuple(text.split(",")), default=None, metavar="A,B,C",
+        help="what is measured: keep, overlap, projectivity, lines (default: all)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--outside", type=outside, action="append", default=[], metavar="NAME=FOLDER",
+        help="another program's results, made elsewhere: FOLDER/PAIR/ holds its layers, masks or maps; may be repeated",
     )  # fmt: skip
     add_options(parser, with_field=False)
+    parser.add_argument("--shard", type=shard, default=(1, 1), metavar="I/N", help="the I-th of N runs sharing OUTDIR")
+    parser.add_argument("--resume", action="store_true", help="compare only what is missing or was compared otherwise")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     _add_loudness(parser)
 

@@ -1,9 +1,9 @@
-"""The pairs to compare: two files, a folder of two pictures, or a folder of such folders."""
+"""The pairs and sets to compare: two files, a folder of pictures, or a folder of such folders."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..pictures.listing import SUFFIXES, each_once
@@ -15,9 +15,10 @@ ROLES = ("reference", "target")
 
 @dataclass(frozen=True)
 class PairFiles:
-    """Two pictures and the name of the pair.
+    """Two pictures and the name of the pair; of a set, its first two.
 
-    folder: that holds both, None for two files given by name; trouble: why they are no pair, empty if they are.
+    folder: that holds all, None for two files given by name; trouble: why they are no pair, empty if they are; more:
+    the further pictures of a set.
     """
 
     name: str
@@ -25,6 +26,12 @@ class PairFiles:
     target: Path
     folder: Path | None = None
     trouble: str = ""
+    more: tuple[Path, ...] = ()
+
+    @property
+    def all_pictures(self) -> tuple[Path, ...]:
+        """In order, the reference first."""
+        return self.reference, self.target, *self.more
 
 
 def find_pairs(paths: Sequence[Path]) -> list[PairFiles]:
@@ -34,7 +41,8 @@ def find_pairs(paths: Sequence[Path]) -> list[PairFiles]:
     ----------
     paths : sequence of Path
         Files, two for each pair with the reference first, and folders. In a folder the reference is the picture of that
-        name, or the first by name. Folders without pictures are skipped if others have some.
+        name, or the first by name; one with more than two is a set. Folders without pictures are skipped if others
+        have some.
 
     Returns
     -------
@@ -85,8 +93,9 @@ def _pair_of(folder: Path) -> PairFiles | None:
     roles = [next((one for one in pictures if one.stem == role), None) for role in ROLES]
     if roles[0] is not None and roles[1] is not None:
         return PairFiles(name, roles[0], roles[1], folder)
-    trouble = "" if len(pictures) == 2 else f"the folder holds {len(pictures)} pictures, a pair has two"
-    return PairFiles(name, pictures[0], pictures[-1], folder, trouble)
+    trouble = "" if len(pictures) > 1 else "the folder holds one picture: a pair has two, a set more"
+    second = pictures[min(1, len(pictures) - 1)]
+    return PairFiles(name, pictures[0], second, folder, trouble, tuple(pictures[2:]))
 
 
 def _named_apart(pairs: list[PairFiles]) -> Iterator[PairFiles]:
@@ -96,4 +105,4 @@ def _named_apart(pairs: list[PairFiles]) -> Iterator[PairFiles]:
         while name.casefold() in taken:
             name, number = f"{pair.name}-{number}", number + 1
         taken.add(name.casefold())
-        yield PairFiles(name, pair.reference, pair.target, pair.folder, pair.trouble)
+        yield replace(pair, name=name)

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..measure.metrics import overlap_views
+from ..measure.placed.placed import PlacedSet
 from ..pipeline import StitchResult
+from ..raster.arrays import bounds
 from ..raster.colour import encode
 from .options import COMPARISON
 
@@ -30,7 +32,39 @@ def field_pictures(result: StitchResult) -> dict[str, bytes]:
         "difference": np.where(both, difference, 0), "warped": np.where(both, warped, 0),
         "reference": np.where(both, reference, 0),  # the overlap differs from field to field
     }  # fmt: skip
-    return {kind: _jpeg(picture.astype(np.uint8)) for kind, picture in pictures.items()}
+    return {
+        kind: _jpeg(picture.astype(np.uint8), COMPARISON.panorama_side_px if kind == "panorama" else None)
+        for kind, picture in pictures.items()
+    }  # fmt: skip
+
+
+def origin_of(result: StitchResult) -> tuple[float, float, float]:
+    """Where the reference's first px lies in the picture of its flat panorama, px, and px of that for one of the
+    reference: by these the loupe shows one place in all panoramas."""
+    scale = _scale((result.canvas.height, result.canvas.width), COMPARISON.panorama_side_px)
+    x, y = ((offset + 0.5) * scale for offset in result.canvas.offset)
+    return x, y, scale
+
+
+def placed_pictures(panorama: PlacedSet) -> dict[str, bytes]:
+    """JPEG files by kind: panorama, the average of all that is shown at a place, so that what is off shows twice;
+    difference (amplified), between the least and the most that is shown there."""
+    shape = panorama.size[::-1]
+    total = np.zeros((*shape, 3), np.float32)
+    least, most = np.full((*shape, 3), 255, np.uint8), np.zeros((*shape, 3), np.uint8)
+    for one in panorama.pictures:
+        shows = one.shows[..., None]
+        total[one.box] += one.colours * shows
+        least[one.box] = np.where(shows, np.minimum(least[one.box], one.colours), least[one.box])
+        most[one.box] = np.where(shows, np.maximum(most[one.box], one.colours), most[one.box])
+    views = panorama.views_at[..., None]
+    average = np.where(views > 0, total / np.maximum(views, 1), 96)
+    spread = np.where(views > 1, np.minimum(COMPARISON.difference_gain * (most.astype(int) - least), 255), 0)
+    part = bounds(panorama.views_at > 0) or (slice(0, 1), slice(0, 1))
+    return {
+        "panorama": _jpeg(np.rint(average[part]).astype(np.uint8), COMPARISON.panorama_side_px),
+        "difference": _jpeg(np.abs(spread[part]).astype(np.uint8)),
+    }  # fmt: skip
 
 
 def _on_gray(result: StitchResult) -> Rgb:
@@ -51,8 +85,13 @@ def _bounds(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
     return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
 
-def _jpeg(picture: Rgb) -> bytes:
-    scale = min(1.0, COMPARISON.max_side_px / max(picture.shape[:2]))
+def _scale(shape: tuple[int, ...], side: int) -> float:
+    """By how much a picture (H, W) is shrunk so that its longer side has so many px at most."""
+    return min(1.0, side / max(shape[:2]))
+
+
+def _jpeg(picture: Rgb, side: int | None = None) -> bytes:
+    scale = _scale(picture.shape, COMPARISON.max_side_px if side is None else side)
     if scale < 1:
         picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     quality = [cv2.IMWRITE_JPEG_QUALITY, COMPARISON.jpeg_quality]

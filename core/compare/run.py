@@ -1,81 +1,88 @@
-"""Runs a comparison: the geometry of each pair is estimated once, then every field is fitted, composed and measured."""
+"""Runs a comparison: every field on every pair and every program on every set, resumable and in shards."""
 
 from __future__ import annotations
 
+import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from ..alignment import Geometry, estimate_geometry, fit_and_warp
-from ..cameras.sources import CameraRequest
+import cv2
+import numpy as np
+
 from ..choices import FIELDS
-from ..frames.frame import Frame
-from ..frames.reading import read_frame
-from ..measure.projectivity import independent_fundamental
 from ..options import StitchOptions
 from ..output.json_file import json_bytes
-from ..pipeline import StitchResult, compose
 from ..system.errors import BadRequest, Cancelled, StitchError
 from ..system.output_files import OutputFiles
 from ..system.progress import Progress, Stopwatch
 from ..system.threads import asking
-from .figures import figures_of
+from .elsewhere.folders import outside_of
+from .elsewhere.hugin import hugin_version
+from .figures import MEASURES
+from .outcome import Outcome, keep_part, kept_part, mark_of
 from .page import comparison_page
+from .pair_fields import Truths, compared_pair
 from .pairs import PairFiles
-from .pictures import field_pictures
 from .published import published
-from .tables import SCHEMA, comparison_csv, comparison_markdown, timing_markdown
+from .sets import PROGRAMS, Made, compared_set
+from .tables import SCHEMA, comparison_csv, comparison_markdown, document, figure, timing_markdown
 
-FILES = ("compare.json", "compare.csv", "compare.md", "compare.html", "timing.json", "timing.md")
-PICTURES = "pictures"
+FILES = (
+    "compare.json", "compare.csv", "compare.md", "compare.html", "timing.json", "timing.md", "timing_and_tables.md",
+)  # fmt: skip
 Tell = Callable[[str], None]
 Show = Callable[[str, float], None]
 
 
-class PairTruth(Protocol):
-    """The truth about a rendered pair."""
-
-    @property
-    def camera(self) -> CameraRequest:
-        """What the stitch is told about the cameras."""
-        ...
-
-    def figures(self, results: Mapping[str, StitchResult]) -> dict[str, dict[str, float]]:
-        """Figures against the truth, by field, over the pixels that all fields show."""
-        ...
-
-
-Truths = Callable[[Path], PairTruth | None]
-
-
 @dataclass(frozen=True)
 class ComparisonRequest:
-    """All pairs are compared with all fields, into a folder. Raises BadRequest."""
+    """All pairs are compared with all fields and all sets with all programs, into a folder.
+
+    measures: what is measured, some of MEASURES; outside: names of other programs and the folders of their results;
+    resume: what an earlier run has kept is not done again; shard: (I, N), the I-th (from 1) of N runs that share the
+    work. With either, what is finished is kept in OUTDIR/parts. Raises BadRequest.
+    """
 
     folder: Path
     pairs: tuple[PairFiles, ...]
     fields: tuple[str, ...] = FIELDS
     overwrite: bool = False
+    measures: tuple[str, ...] = MEASURES
+    outside: tuple[tuple[str, Path], ...] = ()
+    resume: bool = False
+    shard: tuple[int, int] = (1, 1)
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.fields if name not in FIELDS]
-        if unknown or not self.fields:
-            raise BadRequest(f"no field {', '.join(map(repr, unknown)) or 'named'}; choose from: {', '.join(FIELDS)}")
-        if len(set(self.fields)) < len(self.fields):
-            raise BadRequest("a field is named twice")
+        for what, names, known in (("field", self.fields, FIELDS), ("measure", self.measures, MEASURES)):
+            unknown = [name for name in names if name not in known]
+            if unknown or not names:
+                said = ", ".join(map(repr, unknown)) or "named"
+                raise BadRequest(f"no {what} {said}; choose from: {', '.join(known)}")
+            if len(set(names)) < len(names):
+                raise BadRequest(f"a {what} is named twice")
+        others = [name for name, _ in self.outside]
+        taken = [name for name in others if name in (*FIELDS, *PROGRAMS) or others.count(name) > 1]
+        if taken:
+            raise BadRequest(f"--outside {taken[0]}=…: the name stands for something else already; choose another")
+        if not 1 <= self.shard[0] <= self.shard[1]:
+            raise BadRequest(f"shard {self.shard[0]}/{self.shard[1]}: it is I/N with I from 1 to N")
 
+    @property
+    def keeps(self) -> bool:
+        """Whether what is finished is kept for a later run."""
+        return self.resume or self.shard[1] > 1
 
-@dataclass
-class PairOutcome:
-    """The results of a pair: its entry in compare.json; pictures by path below `pictures`; CPU seconds by step; the
-    exit code, not 0 if no field could be stitched."""
+    @property
+    def others(self) -> list[str]:
+        """Names of programs whose results were made elsewhere."""
+        return [name for name, _ in self.outside]
 
-    entry: dict[str, Any]
-    pictures: dict[str, bytes] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-    exit_code: int = 0
+    def is_ours(self, number: int) -> bool:
+        """Whether a pair or set, by its number, is this shard's."""
+        return number % self.shard[1] == self.shard[0] - 1
 
 
 def comparable(options: StitchOptions, pairs: Sequence[PairFiles]) -> StitchOptions:
@@ -106,13 +113,13 @@ def run_comparison(
     request: ComparisonRequest, options: StitchOptions, version: str, truths: Truths | None = None,
     show: Show | None = None, tell: Tell | None = None, cancelled: Callable[[], bool] | None = None,
 ) -> tuple[dict[str, Any], int]:  # fmt: skip
-    """Compares fields on pairs and writes all of FILES and the pictures into the request's folder.
+    """Compares fields on pairs, and programs on sets, and writes FILES and the pictures into the request's folder.
 
     Parameters
     ----------
     request : ComparisonRequest
     options : StitchOptions
-        Of every stitch; the field they name does not matter.
+        Of every stitch; the field they name matters for sets only.
     version : str
         Of this program, for the files.
     truths : callable, optional
@@ -127,46 +134,82 @@ def run_comparison(
     Returns
     -------
     summary : dict
-        The content of compare.json.
+        The content of compare.json; `missing` names what other shards have still to do: then no tables are written.
     exit_code : int
-        0, or that of the first pair for which no field could be stitched.
+        0, or that of the first pair or set for which nothing could be stitched.
 
     Raises
     ------
     StitchError
-        Before the work, or if nothing can be written; nothing is left then.
+        Before the work, or if nothing can be written; nothing is left then but what is kept.
     Cancelled
-        Nothing is left.
+        The same.
     """
-    options = comparable(options, request.pairs)
-    read = [path for pair in request.pairs for path in (pair.reference, pair.target)]
-    with OutputFiles(request.overwrite, [*read, *options.files_read]) as files:
+    flat = comparable(options, [pair for pair in request.pairs if not pair.more])
+    read = [path for pair in request.pairs for path in pair.all_pictures]
+    with OutputFiles(request.overwrite or request.resume, [*read, *options.files_read]) as files:
         files.check_folder(request.folder, FILES)
-        outcomes = []
+        outcomes: list[Outcome] = []
+        missing = []
         for number, pair in enumerate(request.pairs):
-            progress = _Meter(show, cancelled, number, len(request.pairs), len(request.fields))
-            with asking(cancelled):
-                outcomes.append(_outcome(pair, request.fields, options, truths, progress))
-            if tell is not None:
-                tell(_in_words(outcomes[-1].entry, number + 1, len(request.pairs)))
-        summary = {
-            "schema": SCHEMA, "version": version, "fields": list(request.fields),
-            "pairs": [outcome.entry for outcome in outcomes],
-        }  # fmt: skip
-        seconds = {outcome.entry["name"]: outcome.seconds for outcome in outcomes}
-        texts = {
-            "compare.csv": comparison_csv(summary), "compare.md": comparison_markdown(summary),
-            "compare.html": comparison_page(summary), "timing.md": timing_markdown(seconds),
-        }  # fmt: skip
-        for name, text in texts.items():
-            files.add_to_folder(request.folder, name, text.encode())
-        files.add_to_folder(request.folder, "compare.json", json_bytes(summary))
-        files.add_to_folder(request.folder, "timing.json", json_bytes(seconds))
-        for outcome in outcomes:
-            for path, data in outcome.pictures.items():
-                place = request.folder / PICTURES / path
-                files.add_to_folder(place.parent, place.name, data)
+            outside = outside_of(request.outside, pair, len(request.pairs))
+            given = [path for _, folder in request.outside for path in sorted(folder.rglob("*"))]
+            mark = mark_of([*pair.all_pictures, *given], version, request.fields, request.measures, options)
+            known = kept_part(request.folder, pair.name, mark) if request.keeps else None
+            if known is None and not request.is_ours(number):
+                missing.append(pair.name)
+                continue
+            if known is None:
+                steps = len(PROGRAMS) if pair.more else len(request.fields)
+                progress = _Meter(show, cancelled, number, len(request.pairs), steps + len(outside))
+                with asking(cancelled):
+                    known = _outcome(pair, request, options if pair.more else flat, truths, outside, progress)
+                if request.keeps:
+                    keep_part(request.folder, pair.name, mark, known)
+                    known.pictures.clear()
+                if tell is not None:
+                    tell(_in_words(known.entry, number + 1, len(request.pairs)))
+            outcomes.append(known)
+        summary = _summary(request, version, outcomes) | {"missing": missing}
+        if not missing:
+            _stage(request.folder, summary, outcomes, files)
     return summary, next((outcome.exit_code for outcome in outcomes if outcome.exit_code), 0)
+
+
+def _summary(request: ComparisonRequest, version: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """The content of compare.json: pairs by fields, and sets by programs in the same form."""
+    entries = [outcome.entry for outcome in outcomes]
+    pairs, sets = ([entry for entry in entries if ("pictures" in entry) == is_set] for is_set in (False, True))
+    return {
+        "schema": SCHEMA, "version": version, "measures": list(request.measures),
+        "fields": [*request.fields, *request.others], "pairs": pairs,
+        "sets": {"fields": [*PROGRAMS, *request.others], "pairs": sets},
+    }  # fmt: skip
+
+
+def _made(version: str) -> str:
+    """When it is made, and with which versions."""
+    programs = {"EDF Stitch": version, "Python": platform.python_version(), "NumPy": np.__version__,
+                "OpenCV": cv2.__version__}  # fmt: skip
+    hugin = hugin_version()
+    named = ", ".join(f"{name} {number}" for name, number in (programs | ({"Hugin": hugin} if hugin else {})).items())
+    return f"{time.strftime('%Y-%m-%d', time.gmtime())}, {named}"
+
+
+def _stage(folder: Path, summary: dict[str, Any], outcomes: Sequence[Outcome], files: OutputFiles) -> None:
+    """Stages all tables, the page and the pictures that are not in place yet."""
+    seconds = {outcome.entry["name"]: outcome.seconds for outcome in outcomes}
+    texts = {
+        "compare.csv": comparison_csv(summary), "compare.md": comparison_markdown(summary),
+        "compare.html": comparison_page(summary), "timing.md": timing_markdown(seconds),
+        "timing_and_tables.md": document(summary, seconds, _made(summary["version"])),
+    }  # fmt: skip
+    for name, text in texts.items():
+        files.add_to_folder(folder, name, text.encode())
+    files.add_to_folder(folder, "compare.json", json_bytes(summary))
+    files.add_to_folder(folder, "timing.json", json_bytes(seconds))
+    for outcome in outcomes:
+        outcome.add_pictures(folder, files)
 
 
 class _Meter:
@@ -193,97 +236,38 @@ class _Meter:
 
 
 def _outcome(
-    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Meter
-) -> PairOutcome:
-    """Processes a pair. Raises Cancelled only: any other failure becomes its outcome."""
-    entry: dict[str, Any] = {
-        "name": pair.name, "reference": pair.reference.name, "target": pair.target.name, "status": "failed",
-        "message": "", "published": published(pair.name), "fields": {},
-    }  # fmt: skip
+    pair: PairFiles, request: ComparisonRequest, options: StitchOptions, truths: Truths | None,
+    outside: Mapping[str, Made], progress: _Meter,
+) -> Outcome:  # fmt: skip
+    """Processes a pair or set. Raises Cancelled only: any other failure becomes its outcome."""
+    entry: dict[str, Any] = {"name": pair.name, "status": "failed", "message": "", "fields": {}}
+    if pair.more:
+        entry |= {"pictures": [path.name for path in pair.all_pictures], "published": {}}
+    else:
+        entry |= {
+            "reference": pair.reference.name, "target": pair.target.name, "published": published(pair.name),
+        }  # fmt: skip
     try:
         if pair.trouble:
             raise BadRequest(pair.trouble)
-        return _compared(pair, fields, options, truths, progress, entry)
+        if pair.more:
+            return compared_set(pair, options, request.measures, outside, progress.begin)
+        return compared_pair(pair, request.fields, options, truths, request.measures, outside, progress.begin)
     except Cancelled:
         raise
     except (StitchError, MemoryError) as error:
         message = str(error) if isinstance(error, StitchError) else "not enough memory for pictures of this size"
         code = error.exit_code if isinstance(error, StitchError) else StitchError.exit_code
-        return PairOutcome({**entry, "message": message}, exit_code=code)
-
-
-def _compared(
-    pair: PairFiles, fields: Sequence[str], options: StitchOptions, truths: Truths | None, progress: _Meter,
-    entry: dict[str, Any],
-) -> PairOutcome:  # fmt: skip
-    truth = truths(pair.folder) if truths is not None and pair.folder is not None else None
-    # figures are taken here, alike for all fields; a cache would make the seconds meaningless
-    options = replace(options, measure=False, cache=None)
-    if truth is not None:
-        options = replace(options, camera=truth.camera)
-    watch, start = progress.begin("registration"), time.process_time()
-    watch("read")
-    frame = read_frame((pair.reference, pair.target), options)
-    if len(frame.pictures) > 2:
-        raise BadRequest("a sphere is worked with as several views, and fields are compared on two flat pictures")
-    geometry = estimate_geometry([frame], options, watch)
-    edge = geometry.edges[0]
-    seconds = {"registration": time.process_time() - start}
-    independent = independent_fundamental(edge.ideal, options.seed)
-    outcome = PairOutcome(entry, seconds=seconds)
-    results: dict[str, StitchResult] = {}
-    for name in fields:
-        try:
-            results[name] = _stitched(name, frame, geometry, options, progress.begin(name), seconds)
-        except Cancelled:
-            raise
-        except StitchError as error:
-            entry["fields"][name] = {"status": "failed", "message": str(error), "figures": {}, "pictures": {}}
-            outcome.exit_code = error.exit_code
-            continue
-        figures = figures_of(results[name], edge, independent, options.seed)
-        made = field_pictures(results[name])
-        outcome.pictures |= {f"{pair.name}/{name}-{kind}.jpg": data for kind, data in made.items()}
-        entry["fields"][name] = {
-            "status": "done", "message": "", "figures": figures,
-            "pictures": {kind: f"{PICTURES}/{pair.name}/{name}-{kind}.jpg" for kind in made},
-        }  # fmt: skip
-        if truth is None:
-            del results[name]  # only needed to be compared with the truth
-    if truth is not None:
-        for name, figures in truth.figures(results).items():
-            entry["fields"][name]["figures"] |= figures
-    done = [one for one in entry["fields"].values() if one["status"] == "done"]
-    view = edge.two_view
-    entry |= {
-        "status": "done" if done else "failed",
-        "message": "" if done else next(one["message"] for one in entry["fields"].values()),
-        "size": list(geometry.cameras[edge.i].size), "target_size": list(geometry.cameras[edge.j].size),
-        "model": view.model, "why": view.why, "matches": len(edge.matches), "inliers": int(view.inliers.sum()),
-        "focal_source": view.focal_source, "rendered": truth is not None,
-    }  # fmt: skip
-    outcome.exit_code = 0 if done else outcome.exit_code
-    return outcome
-
-
-def _stitched(
-    name: str, frame: Frame, geometry: Geometry, options: StitchOptions, watch: Stopwatch,
-    seconds: dict[str, float],
-) -> StitchResult:  # fmt: skip
-    chosen, start = replace(options, field=name), time.process_time()
-    alignment = fit_and_warp(geometry, [frame], chosen, watch)
-    aligned = time.process_time()
-    result = compose(frame, alignment, chosen, watch)
-    seconds |= {f"{name}: alignment": aligned - start, f"{name}: composition": time.process_time() - aligned}
-    return result
+        return Outcome({**entry, "message": message}, exit_code=code)
 
 
 def _in_words(entry: dict[str, Any], number: int, count: int) -> str:
     """A line about a pair: its fields, best first, or why there are none."""
     if entry["status"] != "done":
         return f"[{number}/{count}] {entry['name']}: failed: {entry['message']}"
-    psnr = {
-        name: one["figures"]["overlap_psnr_db"] for name, one in entry["fields"].items() if one["status"] == "done"
-    }  # fmt: skip
-    ranked = sorted(psnr, key=lambda name: -psnr[name])
-    return f"[{number}/{count}] {entry['name']}: " + ", ".join(f"{name} {psnr[name]:.2f} dB" for name in ranked)
+    key = "gained_psnr_db" if "pictures" in entry else "overlap_psnr_db"
+    done = [name for name, one in entry["fields"].items() if one["status"] == "done"]
+    psnr = {name: figure(entry, name, key) for name in done}
+    ranked = sorted(done, key=lambda name: -(psnr[name] or 0.0))
+    told = ", ".join(name if psnr[name] is None else f"{name} {psnr[name]:.2f} dB" for name in ranked)
+    return f"[{number}/{count}] {entry['name']}: {told}"

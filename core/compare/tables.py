@@ -14,7 +14,9 @@ from .figures import FIGURES, SHARES
 SCHEMA = 1
 # The figures that have a table of their own in Markdown, a row a pair; PSNR and SSIM share one.
 TABLES = ("projectivity_px", "projectivity_independent_px", "held_out_rms_px", "folds", "truth_alignment_px",
-          "truth_alignment_p95_px", "truth_whole_psnr_db")  # fmt: skip
+          "truth_alignment_p95_px", "truth_whole_psnr_db", "bent_px", "bent_alone_px", "far_enlarged")  # fmt: skip
+# The same of sets.
+SET_TABLES = ("gained_ssim_worst", "off_lines_px", "bent_px", "bent_alone_px", "inscribed", "holes", "used")
 Summary = dict[str, Any]
 
 
@@ -58,15 +60,18 @@ def medians(summary: Summary, name: str) -> dict[str, float | None]:
 
 def comparison_markdown(summary: Summary) -> str:
     """A table for each important figure, the best in bold, medians below; then published figures."""
-    parts = ["# Fields compared", "", "Overlap, PSNR in dB / SSIM:", "", *_main_table(summary)]
-    for name in TABLES:
-        if any(figure(entry, field, name) is not None for entry in summary["pairs"] for field in summary["fields"]):
-            title, unit, _, _ = FIGURES[name]
-            parts += ["", f"{title[0].upper()}{title[1:]}{f', {unit}' if unit else ''}:", "", *_table(summary, name)]
-    parts += _published(summary)
+    sets: Summary = summary["sets"]
+    parts = ["# Fields compared"]
+    if summary["pairs"]:
+        overlap = _main_table(summary, ("overlap_psnr_db", "overlap_ssim"))
+        parts += ["", "Overlap, PSNR in dB / SSIM:", "", *overlap, *_tables(summary, TABLES), *_published(summary)]
+    if sets["pairs"]:
+        overlap = _main_table(sets, ("gained_psnr_db", "gained_ssim"))
+        about = "Overlaps of sets after one gain for each channel, PSNR in dB / SSIM, at 900 px per radian:"
+        parts += ["", about, "", *overlap, *_tables(sets, SET_TABLES)]
     failed = [
         f"- {entry['name']}{f', {field}' if field else ''}: {message}"
-        for entry in summary["pairs"] for field, message in failures(entry)
+        for entry in (*summary["pairs"], *sets["pairs"]) for field, message in failures(entry)
     ]  # fmt: skip
     if failed:
         parts += ["", "Not compared:", "", *failed]
@@ -80,18 +85,27 @@ def failures(entry: dict[str, Any]) -> list[tuple[str, str]]:
     return [(name, one["message"]) for name, one in entry["fields"].items() if one["status"] != "done"]
 
 
-def _main_table(summary: Summary) -> list[str]:
+def _tables(summary: Summary, names: Iterable[str]) -> list[str]:
+    """A table with its title for each figure that any field has."""
+    parts: list[str] = []
+    for name in names:
+        if any(figure(entry, field, name) is not None for entry in summary["pairs"] for field in summary["fields"]):
+            title, unit, _, _ = FIGURES[name]
+            parts += ["", f"{title[0].upper()}{title[1:]}{f', {unit}' if unit else ''}:", "", *_table(summary, name)]
+    return parts
+
+
+def _main_table(summary: Summary, both: tuple[str, str]) -> list[str]:
+    """A table of two figures that share a column."""
     fields = summary["fields"]
     rows = [["pair", *fields], ["---"] * (1 + len(fields))]
     for entry in summary["pairs"]:
         row = [_title(entry)]
         for field in fields:
-            row.append(" / ".join(
-                _marked(entry, field, name, fields) for name in ("overlap_psnr_db", "overlap_ssim")
-            ))  # fmt: skip
+            row.append(" / ".join(_marked(entry, field, name, fields) for name in both))
         rows.append(row)
-    psnr, ssim = (medians(summary, name) for name in ("overlap_psnr_db", "overlap_ssim"))
-    middle = [f"{shown(psnr[f], 'overlap_psnr_db')} / {shown(ssim[f], 'overlap_ssim')}" for f in fields]
+    found = [medians(summary, name) for name in both]
+    middle = [" / ".join(shown(one[f], name) for one, name in zip(found, both, strict=True)) for f in fields]
     return [_line(row) for row in [*rows, ["median", *middle]]]
 
 
@@ -147,8 +161,8 @@ def comparison_csv(summary: Summary) -> str:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["pair", "reference", "target", "width", "height", "model", "field", "status", "why", *FIGURES])
-    for entry in summary["pairs"]:
-        first = [entry["name"], entry["reference"], entry["target"], *entry.get("size", ("", "")),
+    for entry in (*summary["pairs"], *summary["sets"]["pairs"]):
+        first = [entry["name"], entry.get("reference", ""), entry.get("target", ""), *entry.get("size", ("", "")),
                  entry.get("model", "")]  # fmt: skip
         fields = entry["fields"] or {"": {"status": "failed", "message": entry["message"], "figures": {}}}
         for name, one in fields.items():
@@ -165,3 +179,30 @@ def timing_markdown(seconds: dict[str, dict[str, float]]) -> str:
     for pair, one in seconds.items():
         rows.append([pair, *(f"{one[name]:.2f}" if name in one else "–" for name in names)])
     return "\n".join(["# CPU seconds", "", *(_line(row) for row in rows)]) + "\n"
+
+
+def document(summary: Summary, seconds: dict[str, dict[str, float]], made: str) -> str:
+    """All tables as one page for a documentation, with what it was made with and the CPU seconds of each field.
+
+    made: the date, and versions of programs, in words.
+    """
+    about = (
+        f"Made by `edf compare`: {made}. Overlap figures of pairs are taken between the reference and the warped "
+        "target, 8 bit, before any blending, exposure differences in them; the best of each row is bold. What each "
+        "figure is stands in [how-to.md](how-to.md#compare-and-validate), how fields work in [method.md](method.md)."
+    )
+    tables = comparison_markdown(summary).replace("# Fields compared", "", 1).strip()
+    totals = {}
+    for name, one in seconds.items():
+        totals[name] = {"registration": one["registration"]} if "registration" in one else {}
+        for step, value in one.items():
+            field = step.partition(":")[0]
+            totals[name][field] = value if field == step else totals[name].get(field, 0.0) + value
+    pairs, sets = (
+        {entry["name"]: totals.get(entry["name"], {}) for entry in part["pairs"]} for part in (summary, summary["sets"])
+    )
+    parts = ["# Compared with others", "", about, "", tables]
+    for title, part in (("pairs", pairs), ("sets (ours with features and registration)", sets)):
+        if part:
+            parts += ["", f"CPU seconds, {title}:", "", *timing_markdown(part).strip().split("\n")[2:]]
+    return "\n".join(parts) + "\n"

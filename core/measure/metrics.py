@@ -168,14 +168,10 @@ def appearance(
     levels = [_levels(part.light, box, floats) for part in (panorama, *layers)]
     several = several[box]
 
-    def smooth(values: NDArray[np.float32]) -> NDArray[np.float32]:
-        result: NDArray[np.float32] = cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
-        return result
-
     def best(rows: slice) -> NDArray[np.float32]:
         with_margin, own = beside(rows, 3, len(several))
         stitched, *others = (_gray(part[with_margin].astype(np.float32)) for part in levels)
-        similarities = [_similarity(stitched, part, smooth)[own][several[rows]] for part in others]
+        similarities = [_similarity(stitched, part, _averaged)[own][several[rows]] for part in others]
         return np.asarray(np.max(similarities, axis=0))
 
     fidelity = np.concatenate(list(in_order(best, small_strips(several.shape))))
@@ -184,6 +180,17 @@ def appearance(
         "source_fidelity_mean": float(fidelity.mean(dtype=np.float64)),
         "source_fidelity_p5": float(np.percentile(fidelity, 5)), "seam_visibility": seam,
     }  # fmt: skip
+
+
+def box_similarity(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """The structural similarity (H, W) of two pictures (H, W, C), gray, in plain 7×7 windows."""
+    return np.asarray(_similarity(_gray(a).astype(np.float32), _gray(b).astype(np.float32), _averaged))
+
+
+def _averaged(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means over 7×7 windows."""
+    result: NDArray[np.float32] = cv2.blur(values, (7, 7), borderType=cv2.BORDER_REFLECT_101)
+    return result
 
 
 def _levels(light: AnyImage, box: Part, floats: bool) -> NDArray[Any]:

@@ -67,12 +67,16 @@ def straight_edges(picture: Picture, camera: Camera, K: Array) -> StraightEdges:
     ----------
     von Gioi et al., LSD: a Line Segment Detector, IPOL 2012.
     """
-    ends, lengths = _segments(picture)
-    rays = homogeneous(undistort(ends.reshape(-1, 2), camera)) @ np.linalg.inv(K).T
-    return StraightEdges(rays.reshape(-1, 2, 3), lengths)
+    rays = homogeneous(ideal_ends(picture, camera).reshape(-1, 2)) @ np.linalg.inv(K).T
+    return StraightEdges(rays.reshape(-1, 2, 3), edge_ends(picture)[1])
 
 
-def _segments(picture: Picture) -> tuple[Array, Array]:
+def ideal_ends(picture: Picture, camera: Camera) -> Array:
+    """Ends (N, 2, 2) of the straight edges of a picture, ideal px, the longest first."""
+    return undistort(edge_ends(picture)[0].reshape(-1, 2), camera).reshape(-1, 2, 2)
+
+
+def edge_ends(picture: Picture) -> tuple[Array, Array]:
     """Ends (N, 2, 2) px of the straight edges of a picture, the longest first, and lengths (N,) in shares of its longer
     side."""
     if picture not in _found:
@@ -81,7 +85,7 @@ def _segments(picture: Picture) -> tuple[Array, Array]:
 
 
 def _detected(picture: Picture) -> tuple[Array, Array]:
-    """See `_segments`."""
+    """See `edge_ends`."""
     height, width = picture.view.shape[:2]
     scale = min(1.0, EDGES.side_px / max(width, height))
     size = (max(1, round(scale * width)), max(1, round(scale * height)))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,75 @@ class RewOptions:
     """px that a rotation may miss them by in any case."""
 
 
+@dataclass(frozen=True)
+class LineOptions:
+    """Straight lines of two pictures, matched and joined (`lines`). px are in units of the matches' scale."""
+
+    neighbours: int = 8
+    """Matches beside a line's end that say where it lies on the reference: enough for a median."""
+
+    turn_deg: float = 4.0
+    """Degrees by which the same line may differ in direction: detection is off by one, and parallax turns lines."""
+
+    off_px: float = 6.0
+    """px by which its ends may be off the other's line: what matches beside it are uncertain by at a jump of depth."""
+
+    shared: float = 0.5
+    """Share of the shorter of two lines that both must have in common along it."""
+
+    joined_px: float = 2.0
+    """px by which both ends of a piece may be off the line that it is joined to."""
+
+    joined_deg: float = 1.5
+    """Degrees by which a piece may be turned from it."""
+
+
+def _spw() -> Mapping[str, float]:
+    return MappingProxyType({"lines": 5.0, "slopes": 50.0, "even": 5.0, "local": 5.0, "global": 0.0})
+
+
+def _lpc() -> Mapping[str, float]:
+    return MappingProxyType({"lines": 5.0, "slopes": 50.0, "even": 100.0, "local": 50.0, "global": 100.0})
+
+
+@dataclass(frozen=True)
+class LineMeshOptions:
+    """Meshes of SPW (Liao and Li, IEEE TIP 2020) and LPC (Jia et al., CVPR 2021).
+
+    px are in units of the matches' scale.
+    """
+
+    cell_px: float = 40.0
+    """px of a cell's side: SPW's published program has it."""
+
+    max_nodes: int = 6000
+    """Nodes at most: cells of large pictures are larger, and the mesh as fine as in the papers' pictures."""
+
+    samples_per_cell: int = 2
+    """Points along a line for each cell that it crosses: a bilinear cell has no more freedom."""
+
+    least_ahead: float = 0.05
+    """Third coordinate of a corner, relative to the middle's, below which a homography has no use as a start."""
+
+    ridge: float = 1e-4
+    """Weight of a node's way from where the homography has it: less than any match counts, it settles only nodes that
+    nothing else speaks of."""
+
+    homography_steps: int = 5
+    """Gauss-Newton steps of the homography of points and lines; it starts next to its end."""
+
+    far_px: float = 1e7
+    """px outside the picture at which a point behind the camera is put."""
+
+    spw: Mapping[str, float] = field(default_factory=_spw)
+    """Weights of SPW's terms beside the points', as in its published program."""
+
+    lpc: Mapping[str, float] = field(default_factory=_lpc)
+    """Weights of LPC's: those that its published results are named by."""
+
+
+LINES = LineOptions()
+LINE_MESH = LineMeshOptions()
 HOMOGRAPHY = HomographyOptions()
 APAP = ApapOptions()
 REW = RewOptions()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,9 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ...core.compare.elsewhere.hugin import HuginFailed, optimised, run
 from ...core.raster.arrays import Array
 from ...core.raster.colour import decode
-from ...core.system.errors import StitchError
 from ..recipes import View
 from ..scene_camera import SceneCamera
 from .rendered_set import RenderedSet
@@ -23,34 +21,16 @@ from .rival_panorama import RivalPanorama
 from .set_stitches import told_lens
 from .sphere_camera import SphereCamera
 
-PROGRAMS = ("pto_gen", "cpfind", "autooptimiser", "pano_modify", "hugin_executor")
-# Seconds after which a program of theirs is given up.
-PATIENCE = 900
-
-
-class HuginFailed(StitchError):
-    """Hugin made no panorama."""
-
-
-def installed() -> bool:
-    """Whether all its programs are there."""
-    return all(shutil.which(program) for program in PROGRAMS)
-
 
 def hugin_panorama(rendered: RenderedSet, numbers: Sequence[int]) -> RivalPanorama:
     """Its panorama of a set, to be turned by those of its pictures that have these numbers. Raises HuginFailed."""
     size = rendered.sphere.size
     with tempfile.TemporaryDirectory(prefix="edf-hugin-") as temporary:
         folder = Path(temporary)
-        pictures = [str(path.absolute()) for path in rendered.pictures]
-        _run(folder, "pto_gen", "-o", "a.pto", "-f", "50", *pictures)
-        told = with_lenses((folder / "a.pto").read_text("utf-8"), rendered.cameras)
-        (folder / "a.pto").write_text(told, "utf-8")
-        _run(folder, "cpfind", "--multirow", "-o", "b.pto", "a.pto")
-        _run(folder, "autooptimiser", "-a", "-m", "-o", "c.pto", "b.pto")
-        _run(folder, "pano_modify", "--projection=2", "--fov=360x180", f"--canvas={size[0]}x{size[1]}",
-             "--crop=0,{},0,{}".format(*size), "-o", "d.pto", "c.pto")  # fmt: skip
-        _run(folder, "hugin_executor", "--stitching", "--prefix=out", "d.pto")
+        found = optimised(folder, rendered.pictures, lambda project: with_lenses(project, rendered.cameras))
+        run(folder, "pano_modify", "--projection=2", "--fov=360x180", f"--canvas={size[0]}x{size[1]}",
+             "--crop=0,{},0,{}".format(*size), "-o", "d.pto", found.name)  # fmt: skip
+        run(folder, "hugin_executor", "--stitching", "--prefix=out", "d.pto")
         made = cv2.imread(str(folder / "out.tif"), cv2.IMREAD_UNCHANGED)
         rotations = rotations_of((folder / "d.pto").read_text("utf-8"))
     if made is None or made.shape != (size[1], size[0], 4):
@@ -84,16 +64,3 @@ def _value(line: str, name: str) -> float:
     if found is None:
         raise HuginFailed(f"Hugin's project names no {name}")
     return float(found[1])
-
-
-def _run(folder: Path, *command: str) -> None:
-    try:
-        done = subprocess.run(
-            command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
-            timeout=PATIENCE,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        raise HuginFailed(f"{command[0]} took more than {PATIENCE} s") from None
-    if done.returncode:
-        said = (done.stdout + done.stderr).strip().splitlines()
-        raise HuginFailed(f"{command[0]} ended with {done.returncode}: {said[-1] if said else 'it said nothing'}")

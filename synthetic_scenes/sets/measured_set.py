@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.compare.elsewhere.hugin import installed
 from ...core.raster.arrays import bounds, dilated
 from ...core.raster.colour import encode
 from ...core.system.errors import StitchError
 from ..scene_pictures import error_colours, jpeg
-from .hugin import hugin_panorama, installed
+from .hugin import hugin_panorama
 from .opencv_stitcher import stitcher_panorama
 from .rendered_set import RenderedSet
 from .set_lines import line_figures

@@ -38,7 +38,7 @@ def field_of(name: str, fade: str = "plane", two_view: TwoView = SIDE, noise: fl
 
 
 def test_each_name_makes_its_field() -> None:
-    assert FIELDS == ("slack", "strict", "paper", "rew", "apap", "homography")
+    assert FIELDS == ("slack", "strict", "paper", "rew", "apap", "spw", "lpc", "homography")
     assert FADES == ("continue", "plane", "infinity")
     for name, kind in zip(OURS, (SlackField, StrictField, PaperField), strict=True):
         field = field_of(name, "infinity")

@@ -13,6 +13,9 @@ from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.compose.enlarging import draft
 from edf_stitch.core.compose.enlarging.draft import draft_times
 from edf_stitch.core.measure.metrics import psnr
+from edf_stitch.core.measure.placed.of_result import placed
+from edf_stitch.core.measure.placed.overlaps import gained_figures
+from edf_stitch.core.measure.placed.straightness import line_figures
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.depth.mesh import mesh_bytes
 from edf_stitch.core.output.depth.range_image import range_image
@@ -65,6 +68,21 @@ def test_how_much_a_set_is_shrunk_depends_on_its_pixels_alone() -> None:
     assert draft_times([(640, 480)] * 60, options) == 1
     for other in ({"blend": "linear"}, {"blend": "feather"}, {"projection": "reference"}):
         assert draft_times(30 * phone, replace(options, **other)) == 1
+
+
+def test_its_pictures_are_placed_as_those_of_what_is_made_at_once(
+    at_once: StitchResult, drafted: StitchResult
+) -> None:
+    """A draft is coarser than all are compared at, so the full pictures are measured."""
+    first, second = placed(at_once), placed(drafted)
+    assert second.px_per_radian == pytest.approx(first.px_per_radian, rel=0.03)
+    assert second.px_per_radian == pytest.approx(drafted.canvas.projection.focal, rel=1e-6)
+    one, other = gained_figures(first), gained_figures(second)
+    assert other["used"] == one["used"] and abs(other["gained_ssim"] - one["gained_ssim"]) < 0.05
+    lines = [line_figures(*one)["lines"] for one in ((first, at_once.pictures), (second, drafted.pictures))]
+    assert lines[1] == pytest.approx(lines[0], rel=0.05)
+    shown = [np.logical_and(one.alpha, one.views_at > 0).sum() / (one.views_at > 0).sum() for one in (first, second)]
+    assert min(shown) > 0.98
 
 
 def test_it_is_the_panorama_that_is_made_at_once(at_once: StitchResult, drafted: StitchResult) -> None:

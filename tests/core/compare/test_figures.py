@@ -10,9 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edf_stitch.core.compare.figures import FIGURES, figures_of
+from edf_stitch.core.compare.figures import FIGURES, figures_of, figures_of_placed
 from edf_stitch.core.compare.tables import shown
-from edf_stitch.core.measure.metrics import canvas_quality, overlap_quality, overlap_views, psnr, ssim
+from edf_stitch.core.measure.metrics import box_similarity, canvas_quality, overlap_quality, overlap_views, psnr, ssim
+from edf_stitch.core.measure.placed.of_result import placed
+from edf_stitch.core.measure.published_measures import udis_quality
 from edf_stitch.core.output.warp_file import warp_bytes
 from edf_stitch.core.pipeline import StitchResult
 
@@ -34,6 +36,18 @@ def test_canvas_values_are_of_both_pictures_black_outside_the_overlap(small_resu
     assert found["canvas_psnr_db"] > overlap_quality(result.pictures, result.warp)["overlap_psnr_db"]
 
 
+def test_published_measures_count_black_as_their_papers_do(small_result: StitchResult) -> None:
+    """The slow way: both pictures black outside the overlap, averaged over the reference's whole frame."""
+    view, fetched, inside = overlap_views(small_result.pictures, small_result.warp)
+    bare = [np.where(inside[..., None], one, 0).astype(np.uint8) for one in (view, fetched)]
+    everywhere = np.ones(inside.shape, bool)
+    found = udis_quality(small_result.pictures, small_result.warp)
+    assert found["udis_psnr_db"] == pytest.approx(psnr(*bare, everywhere), abs=1e-4)
+    alike = [box_similarity(bare[0][..., [c]], bare[1][..., [c]]).mean() for c in range(3)]
+    assert found["udis_ssim"] == pytest.approx(float(np.mean(alike)), abs=2e-3)
+    assert found["udis_psnr_db"] > overlap_quality(small_result.pictures, small_result.warp)["overlap_psnr_db"]
+
+
 def test_folds_are_those_of_the_report(small_result: StitchResult) -> None:
     """Before what turns over was taken for hidden: else no field would have any."""
     report = {**small_result.report, "measured": {**small_result.report["measured"], "folds": 0.125}}
@@ -45,7 +59,9 @@ def test_folds_are_those_of_the_report(small_result: StitchResult) -> None:
 def test_every_figure_has_a_name_and_digits(small_result: StitchResult) -> None:
     edge = small_result.edges[0]
     found = figures_of(small_result, edge, edge.two_view.F, 0)
-    assert set(found) == {name for name in FIGURES if not name.startswith("truth_")}
+    others = figures_of_placed(placed(small_result), small_result.pictures, lambda one, other: edge.two_view.F)
+    assert found.keys() | others.keys() == {name for name in FIGURES if not name.startswith("truth_")}
+    assert others["overlap_psnr_db"] == pytest.approx(found["overlap_psnr_db"], abs=0.5), "measured on the canvas"
     assert all(shown(value, name) for name, value in found.items())
     assert found["projectivity_px"] == found["projectivity_independent_px"], "by the same F the same"
 

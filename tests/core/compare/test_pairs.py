@@ -42,12 +42,17 @@ def test_a_folder_that_names_its_two_may_hold_more(tmp_path: Path) -> None:
     assert (pair.reference.name, pair.target.name, pair.trouble) == ("reference.png", "target.png", "")
 
 
-@pytest.mark.parametrize("names", [("a.png",), ("a.png", "b.png", "c.png")])
-def test_a_folder_that_is_no_pair_is_a_row_that_says_why(tmp_path: Path, names: tuple[str, ...]) -> None:
-    touch(tmp_path / "set", *names)
+def test_a_folder_that_is_no_pair_is_a_row_that_says_why(tmp_path: Path) -> None:
+    touch(tmp_path / "one", "a.png")
     touch(tmp_path / "desk", "a.png", "b.png")
     desk, other = find_pairs([tmp_path])
-    assert not desk.trouble and f"{len(names)} pictures" in other.trouble
+    assert not desk.trouble and "holds one picture" in other.trouble
+
+
+def test_a_folder_of_more_pictures_is_a_set(tmp_path: Path) -> None:
+    (found,) = find_pairs([touch(tmp_path / "street", "c.png", "a.png", "b.png")])
+    assert [path.name for path in found.all_pictures] == ["a.png", "b.png", "c.png"] and not found.trouble
+    assert [path.name for path in found.more] == ["c.png"]
 
 
 def test_no_two_have_the_same_name(tmp_path: Path) -> None:

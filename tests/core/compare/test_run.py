@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.commands.cli import main
-from edf_stitch.core.compare import run as run_module
+from edf_stitch.core.compare import pair_fields
 from edf_stitch.core.compare.pairs import PairFiles, find_pairs
 from edf_stitch.core.compare.run import FILES, ComparisonRequest, comparable, run_comparison
 from edf_stitch.core.options import StitchOptions
@@ -104,14 +104,14 @@ def test_a_sphere_is_no_half_of_a_pair(folder: Path, tmp_path: Path) -> None:
 def test_a_field_that_fails_stops_no_other(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = run_module.fit_and_warp
+    real = pair_fields.fit_and_warp
 
     def fit(geometry, frames, options, progress):
         if options.field == "apap":
             raise DegenerateGeometry("nothing to hold on to")
         return real(geometry, frames, options, progress)
 
-    monkeypatch.setattr(run_module, "fit_and_warp", fit)
+    monkeypatch.setattr(pair_fields, "fit_and_warp", fit)
     summary, code = compared(folder, tmp_path, fields=("apap", "homography"))
     fields = summary["pairs"][0]["fields"]
     assert code == 0 and fields["apap"]["message"] == "nothing to hold on to" and fields["homography"]["figures"]

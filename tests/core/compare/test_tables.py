@@ -12,7 +12,15 @@ from edf_stitch.core.choices import FIELDS
 from edf_stitch.core.compare.options import COMPARISON
 from edf_stitch.core.compare.page import comparison_page
 from edf_stitch.core.compare.published import published
-from edf_stitch.core.compare.tables import best, comparison_csv, comparison_markdown, medians, shown, timing_markdown
+from edf_stitch.core.compare.tables import (
+    best,
+    comparison_csv,
+    comparison_markdown,
+    document,
+    medians,
+    shown,
+    timing_markdown,
+)
 
 
 def entry(name: str, **psnr: float | None) -> dict[str, Any]:
@@ -41,7 +49,8 @@ def failed(name: str) -> dict[str, Any]:
 
 
 def summary(*pairs: dict[str, Any], fields: tuple[str, ...] = ("slack", "rew")) -> dict[str, Any]:
-    return {"schema": 1, "version": "1.2.3", "fields": list(fields), "pairs": list(pairs)}
+    return {"schema": 1, "version": "1.2.3", "fields": list(fields), "pairs": list(pairs),
+            "sets": {"fields": [], "pairs": []}}  # fmt: skip
 
 
 def test_the_best_is_marked_and_equals_share_it() -> None:
@@ -87,11 +96,28 @@ def test_seconds_have_a_table_of_their_own() -> None:
     assert not any("second" in text.lower() for text in (comparison_markdown(whole), comparison_csv(whole)))
 
 
-def test_the_page_runs_nothing_and_loads_nothing_from_elsewhere() -> None:
+def test_the_page_loads_nothing_from_elsewhere_and_escapes_names() -> None:
     page = comparison_page(summary(entry("temple <b>", slack=20.0, rew=None), failed("desk")))
-    assert "<script" not in page and "http" not in page and "temple <b>" not in page and "temple &lt;b&gt;" in page
-    assert "no &lt;content&gt; in common" in page and "1 pairs compared, 1 not" in page
+    assert page.count("<script") == 1 and "http:" not in page and "https:" not in page and "default-src 'none'" in page
+    assert "temple <b>" not in page and "temple &lt;b&gt;" in page
+    assert "no &lt;content&gt; in common" in page and "1 pairs and sets compared, 1 not" in page
     assert 'src="pictures/temple%20%3Cb%3E/slack-warped.jpg"' in page and "rew-warped" not in page
+
+
+def test_a_loupe_is_over_each_panorama_and_knows_where_the_reference_lies() -> None:
+    one = entry("a", slack=20.0, rew=21.0)
+    one["fields"]["slack"]["origin"] = [10.5, 20.25, 0.5]
+    page = comparison_page(summary(one))
+    assert page.count("<figure data-loupe=") == 2 and 'data-loupe="10.5000 20.2500 0.5000"' in page
+    assert 'data-loupe=""' in page, "places of others are shares of the picture"
+
+
+def test_a_document_tells_when_and_with_what_it_was_made_and_how_long_each_field_took() -> None:
+    whole = summary(entry("a", slack=20.0, rew=21.0))
+    seconds = {"a": {"registration": 1.5, "slack: alignment": 2.0, "slack: composition": 0.5, "rew: alignment": 1.0}}
+    text = document(whole, seconds, "2026-11-30, EDF Stitch 1.2.3")
+    assert "2026-11-30, EDF Stitch 1.2.3" in text and "| a | 1.50 | 2.50 | 1.00 |" in text
+    assert "20.00 / " in text and text.startswith("# Compared with others")
 
 
 @pytest.mark.parametrize("fields", [("slack", "rew"), FIELDS])

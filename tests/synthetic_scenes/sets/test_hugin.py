@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.projective import rotation_angle
+from edf_stitch.core.compare.elsewhere.hugin import HuginFailed
 from edf_stitch.synthetic_scenes.recipes import View
-from edf_stitch.synthetic_scenes.sets.hugin import HuginFailed, rotations_of, with_lenses
+from edf_stitch.synthetic_scenes.sets.hugin import rotations_of, with_lenses
 from edf_stitch.synthetic_scenes.sets.set_stitches import equivalent_mm, told_lens
 
 # Of a set whose true views these are, as it wrote them (shortened).

@@ -9,10 +9,11 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.projective import homogeneous, rotation_angle
+from edf_stitch.core.compare.elsewhere.opencv_stitcher import StitcherFailed
 from edf_stitch.core.raster.colour import decode
 from edf_stitch.core.raster.sampling import fetch
 from edf_stitch.synthetic_scenes.recipes import View
-from edf_stitch.synthetic_scenes.sets.opencv_stitcher import StitcherFailed, stitcher_panorama
+from edf_stitch.synthetic_scenes.sets.opencv_stitcher import stitcher_panorama
 from edf_stitch.synthetic_scenes.sets.rendered_set import RenderedSet
 from edf_stitch.synthetic_scenes.sets.rival_panorama import RivalPanorama
 from edf_stitch.synthetic_scenes.sets.set_measures import SetTruth, colour_figures
