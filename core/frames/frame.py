@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.bodies import Bodies, bodies_of, called_of_bodies
-from ..pictures.picture import Picture, resized
+from ..pictures.picture import Picture
+from ..pictures.resized import resized
 
 if TYPE_CHECKING:
     from ..cameras.camera import Camera

@@ -18,9 +18,10 @@ from ..cameras.sources import called
 from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_painted, read_wanted, without
 from ..pictures.naming import in_words, told_apart
-from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array, resized
+from ..pictures.picture import Picture, in_same_colour_space, load_picture, picture_from_array
 from ..pictures.raw_clipping import clipping_warnings
 from ..pictures.raw_development import RawExposure, exposure_of_first
+from ..pictures.resized import resized
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
 from ..system.threads import in_order
 from .brackets import brackets_in

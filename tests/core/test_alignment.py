@@ -11,7 +11,8 @@ from edf_stitch.core.cameras.projective import rotation_angle
 from edf_stitch.core.frames.frame import Frame, size_of
 from edf_stitch.core.frames.reading import prepare
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.pictures.picture import picture_from_array, resized
+from edf_stitch.core.pictures.picture import picture_from_array
+from edf_stitch.core.pictures.resized import resized
 from edf_stitch.core.pipeline import compose
 from edf_stitch.core.pose import features, pair_matches
 from edf_stitch.core.pose.options import FEATURES

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from edf_stitch.core.compose.burnt_in import shown_where_alone
 from edf_stitch.core.pictures.masks import without
-from edf_stitch.core.pictures.picture import Picture, picture_from_array, resized
+from edf_stitch.core.pictures.picture import Picture, picture_from_array
+from edf_stitch.core.pictures.resized import resized
 from edf_stitch.core.raster.picture_map import PictureMap
 
 SIZE, SHIFT = (60, 40), 30  # W, H px; px by which the second picture lies to the right

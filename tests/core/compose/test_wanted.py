@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edf_stitch.core.compose.wanted import wanted_on
-from edf_stitch.core.pictures.picture import picture_from_array, resized
+from edf_stitch.core.pictures.picture import picture_from_array
+from edf_stitch.core.pictures.resized import resized
 from edf_stitch.core.raster.picture_map import PictureMap
 
 from .rings import HEIGHT, RING, WIDTH, compose, layers_of, wall, warp_of
