@@ -22,8 +22,9 @@ from typing import Any
 import cv2
 
 from ..batch.list import BatchItem, find_frames
+from ..batch.outcomes import Outcome
 from ..batch.pieces import BatchRequest
-from ..batch.run import Outcome, run_batch
+from ..batch.run import run_batch
 from ..options import StitchOptions
 from ..pictures.listing import SUFFIXES
 from ..system.errors import BadRequest, StitchError, UnreadableImage
