@@ -222,11 +222,15 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
     guides: CollectionProperty(
         name="Guides", type=EDF_PG_guide, description="Upright and level lines that Level ▸ Automatic holds to",
     )
-    guide_index: IntProperty(name="Active Guide", default=0, min=0, options={"SKIP_SAVE"})
+    guide_index: IntProperty(
+        name="Active Guide", description="The guide that is removed", default=0, min=0, options={"SKIP_SAVE"},
+    )
     places: CollectionProperty(
         name="Places", type=EDF_PG_place, description="Places of the panorama that come from a certain picture",
     )
-    place_index: IntProperty(name="Active Place", default=0, min=0, options={"SKIP_SAVE"})
+    place_index: IntProperty(
+        name="Active Place", description="The place that is removed", default=0, min=0, options={"SKIP_SAVE"},
+    )
     edited_matches: BoolProperty(
         name="Use These Matches", description="Stitch with the matches of the list, as they were edited, instead of "
         "searching for new ones",

@@ -114,7 +114,7 @@ def test_what_goes_on_is_neither_saved_nor_undone(blender, tmp_path):
 def test_every_option_of_the_engine_is_offered(blender):
     """Those that come as files or images are added to a job by hand; three are nobody's wish, some of more than two
     pictures are right as they are, and two are the command's: a panel shows its picture, a scene has its unit."""
-    by_hand = {"matches", "ignore", "mask", "viewpoint"}
+    by_hand = {"matches", "ignore", "show", "guides", "mask", "viewpoint"}
     of_many = {"require_all", "ignore_in", "brackets"}
     options = {field.name for field in dataclasses.fields(StitchOptions)}
     nobodys, of_command = {"measure", "cache", "memory_gb"}, {"preview", "scale_metres"}
