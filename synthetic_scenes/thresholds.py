@@ -57,7 +57,8 @@ COMPOSED = (
 )
 # Every scene with parallax: no worse than any rival by more than this, whole picture against the true panorama. A rival
 # that refused the scene, or that does not exist yet, is none.
-OURS, RIVALS = "known/strict", ("known/paper", "known/rew", "known/apap", "known/homography")
+OURS = "known/strict"
+RIVALS = ("known/paper", "known/rew", "known/apap", "known/spw", "known/lpc", "known/homography")
 LEAD = Limit(OURS, "whole_psnr_db", "dB", at_least=-0.2)
 # What the target alone shows, of the default field, beside one homography's: how far it is off.
 BEYOND_RUN, BEYOND_MEASURES, PLAIN_RUN = "known/slack", ("beyond_px", "beyond_p90_px"), "known/homography"

@@ -13,7 +13,7 @@ from ..raster.arrays import Array
 from .options import PREVIEW
 
 
-def first_share(cameras: Sequence[Camera], rotations: Sequence[Array], wanted: float = PREVIEW.pixels) -> float:
+def first_share(cameras: Sequence[Camera], rotations: Sequence[Array], wanted: float | None = None) -> float:
     """By which share of their sides pictures are to be worked on, as far as that can be told before the panorama is
     framed: by how many px it has that all pictures lie in, each at infinity.
 
@@ -23,8 +23,8 @@ def first_share(cameras: Sequence[Camera], rotations: Sequence[Array], wanted: f
         The reference's first.
     rotations : sequence of (3, 3) arrays
         From the reference's frame to each camera's; NaN where one is not known.
-    wanted : float
-        px of the panorama.
+    wanted : float, optional
+        px of the panorama; by itself as many as a preview has.
     """
     rays = np.concatenate([
         _border(camera) @ (R if np.isfinite(R).all() else np.eye(3))
@@ -42,9 +42,9 @@ def next_share(share: float, pixels: int) -> float:
     return _share(share, pixels) if too_small or pixels > PREVIEW.most_pixels else share
 
 
-def _share(share: float, pixels: float, wanted: float = PREVIEW.pixels) -> float:
-    """What makes a panorama of these px one of as many as are wanted."""
-    return float(np.clip(share * np.sqrt(wanted / max(pixels, 1)), LEAST_SCALE, 1.0))
+def _share(share: float, pixels: float, wanted: float | None = None) -> float:
+    """What makes a panorama of these px one of as many as are wanted, or of a preview's."""
+    return float(np.clip(share * np.sqrt((wanted or PREVIEW.pixels) / max(pixels, 1)), LEAST_SCALE, 1.0))
 
 
 def _border(camera: Camera) -> Array:

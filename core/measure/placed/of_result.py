@@ -19,7 +19,7 @@ def placed(result: StitchResult) -> PlacedSet:
     focal = focal_of(K) if projection is None else projection.focal
     full = result.enlarged is not None and shrinking(focal / result.times) == 1
     times = 1 if full else result.times  # px of the panorama along one of the canvas
-    canvas = result.enlarged.canvas if full and result.enlarged is not None else result.warp.canvas
+    canvas = result.warp.canvas.enlarged(result.times, K) if full else result.warp.canvas
     focal, shrink = focal / times, shrinking(focal / times)
     size = max(1, round(shrink * canvas.width)), max(1, round(shrink * canvas.height))
     pictures = []

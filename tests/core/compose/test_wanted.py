@@ -14,7 +14,7 @@ from .rings import HEIGHT, RING, WIDTH, compose, layers_of, wall, warp_of
 
 @pytest.mark.parametrize("number", range(len(RING)))
 def test_each_picture_of_a_set_can_be_chosen_whenever_it_is_added(number: int) -> None:
-    layers, warp = layers_of(wall()), warp_of()
+    layers, warp = layers_of([wall()] * len(RING)), warp_of()
     usual = compose(layers, warp)
     others = [one for one in range(len(RING)) if one != number]
     overlap = (layers[number].alpha > 0) & np.logical_or.reduce([layers[one].alpha > 0 for one in others])
