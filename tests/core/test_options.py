@@ -33,7 +33,8 @@ def test_the_defaults_are_the_designs() -> None:
         "field": "slack", "fade": "continue", "camera": CameraRequest(), "matches": None, "ignore": (),
         "ignore_in": (), "show": (), "guides": (), "viewpoint": None, "require_all": False, "scale_metres": None,
         "brackets": "auto", "slide": "auto", "projection": "auto", "level": "auto", "centre": None, "fov": None,
-        "scale": 1.0, "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None, "exposure": "auto",
+        "scale": 1.0, "crop": "auto", "dense": True, "blend": "multiband", "seam": "graphcut", "mask": None,
+        "exposure": "auto",
         "holes": "auto", "preview": False, "seed": 0, "measure": True, "memory_gb": None, "cache": None,
     }  # fmt: skip
 

@@ -125,6 +125,7 @@ def test_flamenco_is_told_what_is_missing(tmp_path: Path, change: dict, words: s
 
 @needs("node")
 @pytest.mark.slow
+@pytest.mark.soak
 def test_flamenco_s_tasks_validate(tmp_path: Path) -> None:
     """Shards of a scene or two, rendered and measured; the last task writes the report."""
     pytest.importorskip("bpy")
