@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 import shlex
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.commands.parser import edf_parser
 from edf_stitch.core.pictures.picture import load_picture
+from edf_stitch.edf_addon import offered
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [*(ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")),
@@ -27,6 +29,9 @@ OF_EDF = [page for page in PAGES if page.name not in ("CHANGELOG.md", "CONTRIBUT
 # Options of other programs: pip's, Blender's own, GNU parallel's, SLURM's and shtab's.
 FOREIGN = {"--command", "--enable", "--python", "--jobs", "--joblog", "--retries", "--sshlogin", "--array", "--mem",
            "--cpus-per-task", "--shell", "--prog"}  # fmt: skip
+# Pages that name buttons and settings of the panel, and what in them is Blender's own.
+OF_PANEL = ("tutorial", "blender")
+OF_BLENDER = {"Install from Disk", "Environment Texture", "Start Frame", "Frame Offset"}
 
 
 def named(pages: list[Path]) -> dict[str, list]:
@@ -119,6 +124,20 @@ def test_options_that_are_named_exist(page: Path) -> None:
     text = re.sub(r"`\.venv/bin/python [^`]*`|\]\([^)]*\)", "", page.read_text("utf-8"))
     found = set(re.findall(r"(?<![\w-])--[a-z][\w-]*(?<!-)", text))
     assert found - options() <= FOREIGN
+
+
+@pytest.mark.parametrize("page", **named([ROOT / "README.md", *(ROOT / "docs" / f"{name}.md" for name in OF_PANEL)]))
+def test_buttons_and_settings_are_called_as_in_the_panel(page: Path) -> None:
+    """What stands in italics with a capital letter; of “Level: Automatic” both words."""
+    folder = ROOT / "edf_addon"
+    called = {path.stem.replace("_", " ") for path in (folder / "presets").rglob("*.py")}
+    for path in folder.rglob("*.py"):
+        tree = ast.parse(path.read_text("utf-8"))
+        called |= {one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)}
+    called |= {f"{name} Guide" for _, name, _ in offered.GUIDES}
+    found = re.findall(r"(?<![*\w])\*([A-Z][^*]{1,40})\*(?![*\w])", prose(page))
+    words = {word for one in found for word in re.sub(r"\s+", " ", one).split(": ")}
+    assert words and words - called <= OF_BLENDER
 
 
 @pytest.mark.parametrize("page", **named(WITH_COMMANDS))

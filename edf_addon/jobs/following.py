@@ -97,8 +97,12 @@ def _as_wide(context: bpy.types.Context, area: bpy.types.Area, space: bpy.types.
 
 @bpy.app.handlers.persistent
 def _show_again(*_: Any) -> None:
-    """What Blender calls after an undo or a redo: where the picture is gone that was shown, the panorama of then is."""
-    last = properties.settings_of(bpy.context.scene).result
+    """What Blender calls after an undo or a redo: where the picture is gone that was shown, the panorama of then is.
+    What is being made of the settings, guides, masks and places of before is made anew, of those that are there now."""
+    settings = properties.settings_of(bpy.context.scene)
+    last = settings.result
+    if modal.make_way():
+        ask(settings)
     for _area, space in editor.all_spaces(bpy.context):
         if space.as_pointer() in _shown_in and space.image is None and last is not None:
             space.image = last

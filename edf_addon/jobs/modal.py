@@ -52,10 +52,12 @@ def _take_ahead() -> job.Job | None:
     return taken
 
 
-def make_way() -> None:
-    """End the picture that follows the frame, without a word, if one is being made."""
-    if _is_following:
+def make_way() -> bool:
+    """End the picture that follows the frame, without a word; returns whether one was being made."""
+    was_made = _is_following
+    if was_made:
         _end()
+    return was_made
 
 
 def cancel() -> None:

@@ -27,9 +27,8 @@ def why_not(settings: Any) -> str:
     """Why nothing can be stitched as things stand, in words; "" where it can."""
     if pictures.is_set(settings):
         return _why_no_set(settings)
-    for side in ownership.SIDES:
-        if getattr(settings, side) is None:
-            return f"no {side} is chosen: add pictures to the list, two or more"
+    if None in (settings.reference, settings.target):
+        return "a panorama takes two pictures or more: add some to the list, or switch on the eyes of their rows"
     if settings.reference == settings.target:
         name = settings.target.name
         return f"“{name}” is both reference and target: choose two photographs taken from different places"

@@ -160,6 +160,18 @@ def leftover_folders():
     return leftovers()
 
 
+def test_an_undo_while_it_is_made_begins_anew(blender, monkeypatch):
+    """Else it would show the guide, mask or place that was just undone."""
+    asked, ended = [], []
+    monkeypatch.setattr(following, "ask", asked.append)
+    monkeypatch.setattr(modal, "_end", lambda: ended.append("ended"))
+    following._show_again()
+    assert not asked and not ended, "nothing was being made"
+    monkeypatch.setattr(modal, "_is_following", True)
+    following._show_again()
+    assert len(ended) == len(asked) == 1 and asked[0] == blender.settings
+
+
 def test_after_an_undo_the_editor_that_showed_it_shows_the_panorama_of_then(blender, monkeypatch):
     """Blender forgets what an editor showed when the image goes; other editors are left alone."""
     then = blender.settings.result = bpy.data.images.new("then", 8, 8)

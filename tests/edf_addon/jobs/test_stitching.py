@@ -357,7 +357,7 @@ def test_a_scene_that_is_deleted_meanwhile(working):
     ("change", "words"),
     [
         (lambda s: setattr(s, "target", s.reference), "both reference and target"),
-        (lambda s: setattr(s, "target", None), "No target is chosen"),
+        (lambda s: setattr(s, "target", None), "takes two pictures or more"),
         (lambda s: setattr(s, "camera", "CAMERAS"), "No reference camera is chosen"),
         (lambda s: setattr(s, "edited_matches", True), "none that is switched on"),
         (lambda s: setattr(s, "crop", "BOX"), "not a part of the panorama"),

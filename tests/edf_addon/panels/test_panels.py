@@ -104,7 +104,7 @@ def test_with_nothing_chosen_stitch_is_gray_and_says_why(draw):
     notes = draw()
     assert ("edf.stitch", False) in notes.buttons and ("edf.preview", False) in notes.buttons
     assert ("edf.add_pictures", True) in notes.buttons and ("edf.add_folder", True) in notes.buttons
-    assert "No reference is chosen" in text(notes) and "There is something to see after a stitch" in text(notes)
+    assert "takes two pictures or more" in text(notes) and "There is something to see after a stitch" in text(notes)
     assert "Stitch a panorama first" in text(notes)
 
 
