@@ -334,8 +334,12 @@ class StitchOptions:
 
     def _check_guides(self) -> None:
         for name, kind, ends in self.guides:
-            if kind not in GUIDES or len(ends) != 4 or not np.isfinite(ends).all() or ends[:2] == ends[2:]:
-                raise BadRequest(f"the guide {kind} of {name} needs two different points: X,Y,X2,Y2 in px")
+            far = len(ends) == 4 and np.hypot(ends[0] - ends[2], ends[1] - ends[3]) >= 1 and np.abs(ends).max() <= 1e6
+            if kind not in GUIDES or not far:  # NaN too
+                raise BadRequest(
+                    f"the guide {kind} of {name} needs two different points, at least 1 px apart and in or near the "
+                    "picture: X,Y,X2,Y2 in px"
+                )
 
     def _check_frame(self) -> None:
         if self.centre is not None and (len(self.centre) != 2 or not np.abs(self.centre).max() <= 180):  # NaN too

@@ -15,7 +15,7 @@ from ..cameras.sources import CameraRequest
 from ..pictures.listing import SUFFIXES, listed
 from ..system.errors import BadRequest, StitchError
 from ..system.text_files import read_lines
-from .options import CLIP
+from .options import CLIP, NAME
 
 COLUMNS = ("reference", "target", "name", "first", "last", "step", "focal_px", "focal35")
 _LAYOUT = (
@@ -53,6 +53,11 @@ class BatchItem:
 
     def __post_init__(self) -> None:
         found = _NOT_IN_NAMES.search(self.name)
+        if len(self.name.encode("utf-8", "surrogateescape")) > NAME.max_bytes:
+            raise BadRequest(
+                f"'{self.name[:20]}…' is too long for a name of outputs: {NAME.max_bytes} bytes are the most; give a "
+                "shorter one in a column called name"
+            )
         if found or not self.name or self.name.startswith(".") or self.name != self.name.strip():
             raise BadRequest(
                 f"{self.name!r} is no name for outputs: it names a file, so it must not be empty, start with a dot or "

@@ -54,3 +54,14 @@ class UnitOptions:
 
 CLIP = ClipOptions()
 UNIT = UnitOptions()
+
+
+@dataclass(frozen=True)
+class NameOptions:
+    """What outputs may be called (`list`)."""
+
+    max_bytes: int = 230
+    """Bytes of a name in UTF-8: file systems take 255, and endings like .matches.csv and numbers of frames follow."""
+
+
+NAME = NameOptions()

@@ -235,12 +235,14 @@ def _plan(args: argparse.Namespace, request: BatchRequest) -> int:
     command = ["edf", *without_plan(args.given)]
     if not (request.goes_on or request.overwrite):
         command.append("--resume")  # for a unit that is killed and called again
-    document = plan_document(read_list(args.list), options_from(args, measure=True), request, command)
+    items, options = read_list(args.list), options_from(args, measure=True)
+    document = plan_document(items, options, request, command)
     data = json_bytes(document)
     if str(args.plan) == "-":
         sys.stdout.write(data.decode())
     else:
-        with OutputFiles(request.overwrite or request.goes_on) as files:
+        read = [args.list, *options.files_read, *(path for item in items for path in item.files())]
+        with OutputFiles(request.overwrite or request.goes_on, read) as files:
             files.check(args.plan)
             files.add(args.plan, data)
     if not args.quiet:

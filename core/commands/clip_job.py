@@ -15,7 +15,8 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,8 @@ from ..batch.pieces import BatchRequest
 from ..batch.run import run_batch
 from ..options import StitchOptions
 from ..pictures.listing import SUFFIXES
-from ..system.errors import BadRequest, StitchError, UnreadableImage
+from ..system.errors import BadRequest, StitchError, UnreadableImage, UnwritableOutput
+from ..system.output_files import OutputFiles
 
 # How the laid out frames of a camera are called.
 _FRAME = "frame_%06d"
@@ -64,7 +66,9 @@ def stitch_clip(
     """
     began = time.monotonic()
     out = Path(clip["folder"])
-    out.mkdir(parents=True, exist_ok=True)
+    with OutputFiles() as files:
+        files.check_folder(out)
+        files.make_folder(out)
     laid_out = out / _LAID_OUT
     shutil.rmtree(laid_out, ignore_errors=True)  # of a run that was killed
     numbers = range(clip["first"], clip["last"] + 1)
@@ -82,10 +86,17 @@ def stitch_clip(
         ).outcomes
     finally:
         shutil.rmtree(laid_out, ignore_errors=True)
+    outcome = replace(outcome, message=_by_source(outcome.message, laid_out, clip["cameras"]))
     made = outcome.frames
     if made is None or made.done + made.skipped == 0:
         raise StitchError(outcome.message)
     (folder / "result.json").write_text(json.dumps(_result(item, outcome, request, time.monotonic() - began)), "utf-8")
+
+
+def _by_source(message: str, laid_out: Path, cameras: Sequence[dict[str, Any]]) -> str:
+    """A message that names laid out frames, which are gone when it is read, by the clips that they are of."""
+    named = re.escape(str(laid_out)) + r"[/\\](\d+)[/\\]frame_(\d+)\.\w+"
+    return re.sub(named, lambda found: f"frame {int(found[2])} of {Path(cameras[int(found[1])]['path']).name}", message)
 
 
 def _result(item: BatchItem, outcome: Outcome, request: BatchRequest, seconds: float) -> dict[str, Any]:
@@ -148,11 +159,15 @@ def _frames_of_movie(
                 break
             if number not in numbers:
                 continue
-            frame = movie.retrieve()[1]
+            whole, frame = movie.retrieve()
+            if not whole:  # a damaged frame is one that is missing
+                continue
             file = folder / f"{_FRAME % number}.png"
             file.write_bytes(cv2.imencode(".png", frame, [cv2.IMWRITE_PNG_COMPRESSION, _PNG_LEVEL])[1].tobytes())
             os.utime(file, ns=(age, age))
             say(f"frame {number} of {path.name}", 0.0)
+    except OSError as error:
+        raise UnwritableOutput(f"{folder}: {path.name} cannot be laid out there: {error.strerror}") from error
     finally:
         movie.release()
     return folder / f"{_FRAME}.png"

@@ -46,6 +46,11 @@ class Outcome:
             files.add_to_folder(place.parent, place.name, data)
 
 
+def slug(name: str) -> str:
+    """What a program is called in the names of its pictures."""
+    return name.replace(" ", "_")
+
+
 def mark_of(paths: Iterable[Path], *decided: object) -> str:
     """What tells whether a kept part is still right: of the files, as they are now, and of all that was decided."""
     digest = hashlib.sha256()

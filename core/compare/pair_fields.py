@@ -120,7 +120,7 @@ def compared_pair(
         except StitchError as error:
             outcome.failed_at(name, str(error), error.exit_code)
             continue
-        figures = figures_of_placed(panorama, frame.pictures, fundamental, measures)
+        figures = figures_of_placed(panorama, panorama.used_of(frame.pictures), fundamental, measures)
         _note(outcome, name, figures, placed_pictures(panorama))
     return outcome.settled()
 

@@ -15,14 +15,14 @@ import numpy as np
 from ..choices import FIELDS
 from ..options import StitchOptions
 from ..output.json_file import json_bytes
-from ..system.errors import BadRequest, Cancelled, StitchError
+from ..system.errors import BadRequest, Cancelled, StitchError, UnreadableImage
 from ..system.output_files import OutputFiles
 from ..system.progress import Progress, Stopwatch
 from ..system.threads import asking
 from .elsewhere.folders import outside_of
 from .elsewhere.hugin import hugin_version
 from .figures import MEASURES
-from .outcome import Outcome, keep_part, kept_part, mark_of
+from .outcome import Outcome, keep_part, kept_part, mark_of, slug
 from .page import comparison_page
 from .pair_fields import Truths, compared_pair
 from .pairs import PairFiles
@@ -64,7 +64,8 @@ class ComparisonRequest:
             if len(set(names)) < len(names):
                 raise BadRequest(f"a {what} is named twice")
         others = [name for name, _ in self.outside]
-        taken = [name for name in others if name in (*FIELDS, *PROGRAMS) or others.count(name) > 1]
+        files = [slug(name).casefold() for name in (*FIELDS, *PROGRAMS, *others)]
+        taken = [name for name in others if files.count(slug(name).casefold()) > 1]
         if taken:
             raise BadRequest(f"--outside {taken[0]}=…: the name stands for something else already; choose another")
         if not 1 <= self.shard[0] <= self.shard[1]:
@@ -146,6 +147,9 @@ def run_comparison(
         The same.
     """
     flat = comparable(options, [pair for pair in request.pairs if not pair.more])
+    for name, place in request.outside:
+        if not place.is_dir():
+            raise UnreadableImage(f"--outside {name}={place}: there is no such folder; check the name")
     read = [path for pair in request.pairs for path in pair.all_pictures]
     with OutputFiles(request.overwrite or request.resume, [*read, *options.files_read]) as files:
         files.check_folder(request.folder, FILES)

@@ -27,7 +27,7 @@ from .elsewhere.hugin import hugin_panorama
 from .elsewhere.opencv_stitcher import stitcher_panorama
 from .figures import figures_of_placed
 from .options import COMPARISON
-from .outcome import PICTURES, Outcome
+from .outcome import PICTURES, Outcome, slug
 from .pairs import PairFiles
 from .pictures import placed_pictures
 
@@ -106,7 +106,6 @@ def compared_set(
         OPENCV: lambda watch: stitcher_panorama(frame.pictures),
         **{name: partial(_elsewhere, made, frame.pictures) for name, made in outside.items()},
     }
-    by_name = {picture.name: picture for picture in frame.pictures}
     for name, source in sources.items():
         start = _cpu()
         watch = begin(name)
@@ -119,15 +118,14 @@ def compared_set(
             outcome.failed_at(name, str(error), error.exit_code)
             continue
         outcome.seconds[name] = _cpu() - start
-        used = [by_name[one.name] for one in panorama.pictures]
+        used = panorama.used_of(frame.pictures)
         made = placed_pictures(panorama)
-        slug = name.replace(" ", "_")
-        outcome.pictures |= {f"{files.name}/{slug}-{kind}.jpg": data for kind, data in made.items()}
+        outcome.pictures |= {f"{files.name}/{slug(name)}-{kind}.jpg": data for kind, data in made.items()}
         left = [one.name for one in frame.pictures if one.name not in {placed.name for placed in used}]
         entry["fields"][name] = {
             "status": "done", "message": f"leaves out {', '.join(left)}" if left else "",
             "figures": figures_of_placed(panorama, used, fundamental, measures),
-            "pictures": {kind: f"{PICTURES}/{files.name}/{slug}-{kind}.jpg" for kind in made},
+            "pictures": {kind: f"{PICTURES}/{files.name}/{slug(name)}-{kind}.jpg" for kind in made},
         }  # fmt: skip
     return outcome.settled()
 

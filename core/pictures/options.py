@@ -36,6 +36,9 @@ class ReadingOptions:
     same_primaries: float = 0.002
     # Share of pixels that are not finite up to which a float picture is used; beyond, something else went wrong.
     max_not_finite: float = 0.5
+    # Light up to which a float picture is taken as it is, beyond as that: the blend works on its logarithm and goes
+    # beyond it at edges, and floats end at 3.4e38.
+    max_light: float = 1e31
     # Times that pixels of an EXR may be wider than high, or higher than wide: anamorphic lenses have 2, and what is
     # beyond is no picture's.
     max_pixel_aspect: float = 4.0

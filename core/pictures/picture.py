@@ -269,14 +269,19 @@ def _straight(colour: NDArray[Any], alpha: NDArray[Any]) -> NDArray[Any]:
 
 
 def _finite(colour: NDArray[Any], alpha: NDArray[Any] | None) -> tuple[NDArray[Any], NDArray[Any] | None, float]:
-    """Colours and alpha with 0 wherever one of the values is not finite, and the share of such pixels."""
+    """Colours, none beyond READING.max_light, and alpha with 0 wherever one of the values is not finite, and the share
+    of such pixels."""
     good = np.isfinite(colour).all(axis=2)
     if alpha is not None:
         good &= np.isfinite(alpha)
-    if good.all():
-        return colour, alpha, 0.0
-    alpha = np.where(good, np.float32(1) if alpha is None else alpha, np.float32(0))
-    return np.where(good[..., None], colour, np.float32(0)), alpha, 1.0 - float(good.mean())
+    share = 1.0 - float(good.mean())
+    if share > 0:
+        alpha = np.where(good, np.float32(1) if alpha is None else alpha, np.float32(0))
+        colour = np.where(good[..., None], colour, np.float32(0))
+    most = np.float32(READING.max_light)
+    if colour.max() > most or colour.min() < -most:
+        colour = np.clip(colour, -most, most)
+    return colour, alpha, share
 
 
 def _exposure(pixels: AnyImage, alpha: NDArray[Any] | None) -> float:

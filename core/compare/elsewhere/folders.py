@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,10 @@ _SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg")
 _LAYER = re.compile(r"(\d+)_(?!mask$).+")
 # Alpha from which a px of a layer counts as shown, of 255: less is the rim.
 _SHOWN = 250
+# px outside a picture beyond which a map need not say how far: what is larger overflows.
+_FARTHEST = 1e9
+# What reading a damaged file raises.
+_DAMAGED = (OSError, ValueError, KeyError, IndexError, TypeError, RecursionError)
 
 
 def outside_of(
@@ -139,7 +145,7 @@ def _maps(path: Path, count: int) -> dict[int, PictureMap]:
     if not path.is_file():
         return {}
     try:
-        with np.load(path, allow_pickle=False) as content:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
             width, height = (int(side) for side in content["canvas"])
             sizes = content["sizes"]
             found = {}
@@ -151,9 +157,10 @@ def _maps(path: Path, count: int) -> dict[int, PictureMap]:
                 left, top, across, down = (int(side) for side in content[f"box_{number:02d}"])
                 x, y = (np.full((height, width), np.nan, np.float32) for _ in "xy")
                 for whole, axis in ((x, "x"), (y, "y")):
-                    whole[top : top + down, left : left + across] = content[f"map_{axis}_{number:02d}"]
+                    part = content[f"map_{axis}_{number:02d}"]
+                    whole[top : top + down, left : left + across] = np.clip(part, -_FARTHEST, _FARTHEST)
                 found[number] = PictureMap(x, y, (int(sizes[number][0]), int(sizes[number][1])))
-    except (OSError, ValueError, KeyError, IndexError) as error:
+    except (*_DAMAGED, zipfile.BadZipFile, zlib.error, EOFError) as error:
         raise BadRequest(f"{path}: not a file of maps ({error}); docs/formats.md says what is in one") from error
     return found
 
@@ -161,7 +168,8 @@ def _maps(path: Path, count: int) -> dict[int, PictureMap]:
 def _pasted(offset: NDArray[Any], canvas: tuple[int, int], size: tuple[int, int]) -> PictureMap:
     """The map of a picture that lies on its own plane, its first pixel at `offset` of the canvas."""
     y, x = np.mgrid[: canvas[1], : canvas[0]].astype(np.float32)
-    return PictureMap(x - np.float32(offset[0]), y - np.float32(offset[1]), size)
+    left, top = np.clip(offset, -_FARTHEST, _FARTHEST).astype(np.float32)
+    return PictureMap(x - left, y - top, size)
 
 
 def _fetched(picture: Picture, found: PictureMap) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
@@ -185,10 +193,18 @@ def _projection(folder: Path) -> Projection | None:
             str(told["kind"]), float(told["focal_px"]), (float(told["centre"][0]), float(told["centre"][1])),
             np.array(told["rotation"], np.float64).reshape(3, 3), np.eye(3), float(told.get("distance", 0.0)),
         )
-    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+    except _DAMAGED as error:
         raise BadRequest(f"{path}: not what --layers writes ({error}); leave it out if that is not known") from None
     if projection.kind not in ("perspective", "pannini", "cylindrical", "equirectangular"):
         raise BadRequest(f"{path}: the projection {projection.kind!r} is not known; leave the file out")
+    turned = projection.rotation @ projection.rotation.T
+    if not np.allclose(turned, np.eye(3), atol=1e-3):  # NaN too
+        raise BadRequest(f"{path}: its rotation is none; leave the file out if that is not known")
+    if not (0 < projection.focal < np.inf and np.isfinite(projection.centre).all() and 0 <= projection.distance <= 1):
+        raise BadRequest(
+            f"{path}: focal_px above 0, a finite centre and a distance from 0 to 1 are needed; leave the file out if "
+            "they are not known"
+        )
     return projection
 
 

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...pictures.picture import Picture
 from ...raster.arrays import Array, Part, bounds
 from ...raster.picture_map import PictureMap
 from .options import PLACED
@@ -97,6 +98,11 @@ class PlacedSet:
         for picture in self.pictures:
             count[picture.box] += picture.shows
         return count
+
+    def used_of(self, pictures: Sequence[Picture]) -> list[Picture]:
+        """Those of the pictures that were given that it uses, in its order."""
+        by_name = {picture.name: picture for picture in pictures}
+        return [by_name[one.name] for one in self.pictures]
 
 
 def union(size: tuple[int, int], pictures: Sequence[PlacedPicture]) -> NDArray[np.bool_]:

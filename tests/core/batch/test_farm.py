@@ -49,6 +49,13 @@ def test_a_plan_names_units_needs_and_commands(work: Path, quick: list, said: Ca
     assert run(work, "--plan", str(work / "plan.json")) == 4 and "plan.json exists" in said()[-1]
 
 
+def test_a_plan_never_replaces_what_the_batch_reads(work: Path, said: Callable) -> None:
+    for name in ("good.csv", "in/target2.png"):
+        before = (work / name).read_bytes()
+        assert run(work, "--plan", str(work / name), "--resume", items="good.csv") == 2
+        assert "is read" in said()[-1] and (work / name).read_bytes() == before
+
+
 def test_units_make_what_the_whole_would_and_a_plan_holds_what_is_left(work: Path, quick: list) -> None:
     assert run(work, "--quiet", out="whole") == 0
     quick.clear()

@@ -141,6 +141,7 @@ def test_frames_for_those_who_have_no_list(tmp_path: Path) -> None:
     ('a,"b\n', 1, "unexpected end of data"),
     ("a.png,b.png,x\nc.png,d.png,X\n", 2, "like those of line 1"),
     ("d/a.png,b.png\ne/a.jpg,b.png\n", 2, "column called name"),
+    (f"a,b,{116 * 'é'}\n", 1, "is too long for a name of outputs: 230 bytes"),
     ("a,b,x/y\n", 1, "no name for outputs"), ("a,b,..\n", 1, "no name"), ("a,b,.edf\n", 1, "no name"),
     ("a,b,c:d\n", 1, "no name"),
     ("a_%04d.png,b.png\n", 1, "one side is a pattern"), ("a_%d_%d.png,b_%d.png\n", 1, "one place"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.commands.clip_job import lay_out, stitch_clip
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.system.errors import BadRequest, UnreadableImage
+from edf_stitch.core.system.errors import BadRequest, StitchError, UnreadableImage, UnwritableOutput
 from edf_stitch.synthetic_scenes.two_planes import Pair
 
 
@@ -66,6 +66,41 @@ def test_what_is_no_clip_is_refused_in_words(tmp_path: Path) -> None:
         lay_out({"path": str(tmp_path / "still.png"), "start": 1}, range(1, 2), tmp_path / "out", silent)
     with pytest.raises(UnreadableImage, match="is no movie"):
         lay_out({"path": str(tmp_path / "not.mp4"), "start": 1}, range(1, 2), tmp_path / "out", silent)
+
+
+def test_damaged_frames_are_named_by_their_clip(tmp_path: Path) -> None:
+    for stem in ("left_", "right_"):
+        (tmp_path / f"{stem}0012.png").write_bytes(b"nonsense")
+    clip = {
+        "cameras": [{"path": str(tmp_path / f"{stem}0012.png"), "start": 1} for stem in ("left_", "right_")],
+        "first": 1, "last": 1, "folder": str(tmp_path / "out"), "name": "both", "suffix": ".png",
+    }  # fmt: skip
+    with pytest.raises(StitchError, match="frame 1 of left_0012.png: not a picture") as refused:
+        stitch_clip(tmp_path, clip, StitchOptions(), silent, lambda: False)
+    assert ".edf_frames" not in str(refused.value)
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(UnwritableOutput, match="is a file, not a folder"):
+        stitch_clip(tmp_path, {**clip, "folder": str(tmp_path / "file")}, StitchOptions(), silent, lambda: False)
+
+
+def test_a_damaged_frame_of_a_movie_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = movie(tmp_path / "shot.avi", GRAYS)
+    real = cv2.VideoCapture
+
+    class Damaged:
+        def __init__(self, name: str) -> None:
+            self.movie, self.at = real(name), 0
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self.movie, name)
+
+        def retrieve(self) -> tuple[bool, np.ndarray | None]:
+            self.at += 1
+            return (False, None) if self.at == 2 else self.movie.retrieve()
+
+    monkeypatch.setattr(cv2, "VideoCapture", Damaged)
+    pattern = lay_out({"path": str(path), "start": 1}, range(1, 4), tmp_path / "out", silent)
+    assert sorted(one.name for one in pattern.parent.iterdir()) == ["frame_000001.png", "frame_000003.png"]
 
 
 def test_clips_that_count_differently_become_one_and_are_gone_on_with(tmp_path: Path, small_pair: Pair) -> None:

@@ -70,6 +70,15 @@ def test_every_program_is_a_column_and_a_failure_says_why(
     assert ",opencv,done," in (tmp_path / "out" / "compare.csv").read_text()
 
 
+def test_a_picture_that_another_program_leaves_out_is_none_of_its_figures(folder: Path, tmp_path: Path) -> None:
+    pair, theirs = find_pairs([folder]), tmp_path / "theirs"
+    theirs.mkdir()
+    cv2.imwrite(str(theirs / "01_target.png"), np.full((200, 300, 4), 255, np.uint8))
+    request = ComparisonRequest(tmp_path / "out", tuple(pair), ("homography",), outside=(("one", theirs),))
+    summary, code = run_comparison(request, StitchOptions(dense=False), "1")
+    assert code == 0 and summary["pairs"][0]["fields"]["one"]["figures"]["used"] == 1
+
+
 def test_copies_are_refused_since_others_take_them_for_pictures(
     folder_of_three: Path, tmp_path: Path, programs: None
 ) -> None:
@@ -117,6 +126,8 @@ def test_shards_share_the_work_and_a_resumed_run_puts_all_together(
     ({"measures": ("beauty",)}, "no measure 'beauty'"), ({"measures": ()}, "no measure named"),
     ({"outside": (("hugin", Path()),)}, "--outside hugin"),
     ({"outside": (("a", Path()), ("a", Path()))}, "--outside a"),
+    ({"outside": (("rotation_only", Path()),)}, "--outside rotation_only"),  # its pictures would be that program's
+    ({"outside": (("a", Path()), ("A", Path()))}, "--outside a"),
     ({"shard": (3, 2)}, "shard 3/2"),
 ])  # fmt: skip
 def test_what_cannot_be_asked_for_is_refused(given: dict, words: str, tmp_path: Path) -> None:
@@ -138,3 +149,4 @@ def test_the_command_takes_results_made_elsewhere(
     theirs, ours = (entry["fields"][name]["figures"] for name in ("UDIS2", "homography"))
     assert theirs["overlap_psnr_db"] > ours["overlap_psnr_db"] + 1
     assert main([*words[:-2], "UDIS2", "--overwrite"]) == 2 and "NAME=FOLDER" in capfd.readouterr().err
+    assert main([*words[:-2], "UDIS2=nowhere", "--overwrite"]) == 4 and "no such folder" in capfd.readouterr().err

@@ -68,3 +68,6 @@ def test_options_know_whose_they_are_and_refuse_what_is_no_line() -> None:
     assert options.guides_in(["a.png", "b.png"]) == [[("horizontal", (5, 6, 7, 8))], [("vertical", (1, 2, 3, 4))]]
     with pytest.raises(BadRequest, match="two different points"):
         StitchOptions(guides=((1, "vertical", (1.0, 2, 1, 2)),))
+    for ends in ((1.0, 2.0, 1.0, 2.5), (1e300, 1.0, 2.0, 3.0), (float("nan"), 1.0, 2.0, 3.0), (1.0, 2.0, 3.0)):
+        with pytest.raises(BadRequest, match="at least 1 px apart and in or near"):
+            StitchOptions(guides=((1, "vertical", ends),))

@@ -333,6 +333,15 @@ def test_pixels_that_are_no_numbers(tmp_path: Path, suffix: str) -> None:
         load(tmp_path, data(), suffix)
 
 
+def test_light_that_the_blend_cannot_go_beyond_is_made_less(tmp_path: Path) -> None:
+    array = image(np.float32, 3)
+    array[0, 0], array[0, 1], array[0, 2] = 3.4e38, -3.4e38, np.nan
+    picture = load(tmp_path, exr({name: array[..., i] for i, name in enumerate("RGB")}), ".exr")
+    assert picture.alpha is not None and picture.alpha.sum() == HEIGHT * WIDTH - 1
+    assert (picture.pixels[0, 0] == np.float32(1e31)).all() and (picture.pixels[0, 1] == np.float32(-1e31)).all()
+    assert np.array_equal(picture.pixels[1:], array[1:])
+
+
 def test_a_float_view_shows_dark_and_bright_pictures_alike() -> None:
     light = SMOOTH[..., :3].astype(np.float32) + 0.01
     views = [picture_from_array(light * np.float32(factor)).view.astype(int) for factor in (1, 1e-6, 5e4, 1e30)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -107,3 +108,47 @@ def test_results_of_a_pair_lie_in_a_folder_of_its_name(small_result: StitchResul
         among(small_result.pictures)
     (own,) = outside_of([("mine", left.parent)], replace(pair, name="left"), 2).values()
     assert len(own(small_result.pictures).pictures) == 2
+
+
+@pytest.mark.parametrize("damage", [
+    lambda raw: b"",
+    lambda raw: raw[: len(raw) // 2],
+    lambda raw: b"PK\3\4" + b"nonsense" * 40,
+    lambda raw: raw[:500] + b"\xff" * 400 + raw[900:],
+])  # fmt: skip
+def test_damaged_maps_are_said_and_nothing_else_breaks(
+    small_result: StitchResult, left: Path, damage: Callable[[bytes], bytes]
+) -> None:
+    whole = (left / "warp.npz").read_bytes()
+    (left / "warp.npz").write_bytes(damage(whole))
+    with pytest.raises(BadRequest, match="not a file of maps"):
+        read_folder(left, small_result.pictures)
+
+
+@pytest.mark.parametrize(("wrong", "said"), [
+    ({"focal_px": 0}, "focal_px above 0"),
+    ({"focal_px": -300.0}, "focal_px above 0"),
+    ({"focal_px": float("inf")}, "focal_px above 0"),
+    ({"centre": [float("nan"), 0.0]}, "a finite centre"),
+    ({"rotation": [0.0] * 9}, "its rotation is none"),
+    ({"rotation": [float("nan")] * 9}, "its rotation is none"),
+])  # fmt: skip
+def test_a_surface_that_cannot_be_is_refused(
+    small_result: StitchResult, left: Path, wrong: dict[str, object], said: str
+) -> None:
+    told = json.loads((left / "canvas.json").read_text("utf-8"))
+    told["projection"] |= wrong
+    (left / "canvas.json").write_text(json.dumps(told), "utf-8")
+    with pytest.raises(BadRequest, match=said):
+        read_folder(left, small_result.pictures)
+
+
+def test_maps_that_point_further_than_floats_reach_show_nothing(small_result: StitchResult, left: Path) -> None:
+    for path in left.glob("*.png"):
+        path.unlink()
+    with np.load(left / "warp.npz") as content:
+        maps = dict(content)
+    maps["map_x_01"] = np.full(maps["map_x_01"].shape, 1e300)
+    np.savez(left / "warp.npz", **maps)
+    found = read_folder(left, small_result.pictures)
+    assert not found.pictures[1].shows.any()
