@@ -70,6 +70,7 @@ def test_how_much_a_set_is_shrunk_depends_on_its_pixels_alone() -> None:
         assert draft_times(30 * phone, replace(options, **other)) == 1
 
 
+@pytest.mark.slow
 def test_its_pictures_are_placed_as_those_of_what_is_made_at_once(
     at_once: StitchResult, drafted: StitchResult
 ) -> None:
@@ -85,6 +86,7 @@ def test_its_pictures_are_placed_as_those_of_what_is_made_at_once(
     assert min(shown) > 0.98
 
 
+@pytest.mark.slow
 def test_it_is_the_panorama_that_is_made_at_once(at_once: StitchResult, drafted: StitchResult) -> None:
     assert (at_once.times, drafted.times) == (1, 2)
     assert drafted.warp.canvas.width < 0.6 * drafted.canvas.width

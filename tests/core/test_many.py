@@ -204,6 +204,7 @@ def test_a_preview_whose_size_was_guessed_wrong_is_made_once(
     assert told == sorted(told), "nothing is told twice"
 
 
+@pytest.mark.slow
 def test_a_picture_that_does_not_belong_is_left_out_and_named(four: PictureSet) -> None:
     noise = np.random.default_rng(0).integers(0, 255, (60, 80, 3)).astype(np.uint8)
     stranger = picture_from_array(cv2.resize(noise, (320, 240), interpolation=cv2.INTER_CUBIC), "stranger.png")

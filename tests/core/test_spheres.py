@@ -73,6 +73,7 @@ def test_a_sphere_and_stills_are_placed(whole: Picture) -> None:
     assert rig.cameras[of("0.png", frame, geometry)].focal == pytest.approx(FOCAL, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_sphere_and_one_still_are_stitched_as_seen_from_either(whole: Picture) -> None:
     still = taken(0)
     frame, geometry = aligned([*still, whole])
@@ -135,6 +136,7 @@ def test_a_fisheyes_circle_and_stills_are_placed() -> None:
         assert rotation_angle(R, STILLS[number][1] @ TILTED.T) < 0.3
 
 
+@pytest.mark.slow
 def test_progress_of_a_sphere_and_a_still_is_that_of_many(whole: Picture) -> None:
     """Two are given, and nine pictures are stitched."""
     told: list[tuple[str, float]] = []

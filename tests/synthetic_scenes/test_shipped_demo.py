@@ -14,6 +14,7 @@ from edf_stitch.synthetic_scenes.demo import LABEL
 from edf_stitch.synthetic_scenes.shipped_demo import SHIPPED
 
 
+@pytest.mark.slow
 def test_what_ships_is_stitched_and_beside_the_truth(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

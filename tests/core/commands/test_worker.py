@@ -70,6 +70,7 @@ def test_a_job_gives_the_panorama_that_the_pipeline_gives(job, tmp_path, small_r
     assert index["report"] == json.loads(json.dumps(index["report"])) and index["report"]["two_view"]["model"]
 
 
+@pytest.mark.slow
 def test_more_than_two_pictures_give_a_panorama_with_the_cameras_of_all(tmp_path):
     """One of them has nothing to do with the others, and the third is where all is seen from."""
     taken = make_set(3)

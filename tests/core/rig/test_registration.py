@@ -113,6 +113,7 @@ def test_the_order_of_the_pictures_does_not_matter(ring: tuple[SyntheticRig, Reg
     assert placed_off(replace(other, rig=other.rig, numbers=tuple(order)), as_truth).max() < 0.002
 
 
+@pytest.mark.slow
 def test_a_tripod_invents_no_depth() -> None:
     """Also where many pairs have too few matches to show that they rotate."""
     rig = make_rig("tripod", 0, points=5000)
@@ -123,6 +124,7 @@ def test_a_tripod_invents_no_depth() -> None:
     assert {edge.baseline for edge in found.rig.edges} == {"none"}
 
 
+@pytest.mark.slow
 def test_half_tripod_half_hand_held() -> None:
     """The bundle's cost finds the station: without it, points behind are invented."""
     rig = make_rig("half", 1, points=4000)
