@@ -223,6 +223,11 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
         for number, first in copies.items()
     )
     warnings += *own_panorama_warnings(pictures),
+    if options.guides and (options.level != "auto" or options.surface[0] == "reference"):
+        warnings += (
+            "the lines that are upright or level are left out: they turn a panorama whose level is automatic, and not "
+            "the reference's own plane",
+        )
     finished = [picture.name for picture in pictures if picture.bits < 32]
     if finished and any(picture.is_raw for picture in pictures):
         warnings += (

@@ -1,12 +1,14 @@
 """Lines that a user says are upright or level, and which way is down by them."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.projective import project, rotation_from_angles
 from edf_stitch.core.cameras.view import View
+from edf_stitch.core.frames.reading import prepare
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.guides import constraints, guided
 from edf_stitch.core.pictures.picture import picture_from_array
@@ -71,3 +73,13 @@ def test_options_know_whose_they_are_and_refuse_what_is_no_line() -> None:
     for ends in ((1.0, 2.0, 1.0, 2.5), (1e300, 1.0, 2.0, 3.0), (float("nan"), 1.0, 2.0, 3.0), (1.0, 2.0, 3.0)):
         with pytest.raises(BadRequest, match="at least 1 px apart and in or near"):
             StitchOptions(guides=((1, "vertical", ends),))
+
+
+@pytest.mark.parametrize(("frame", "left_out"), [
+    ({}, False), ({"level": "none"}, True), ({"level": (1.0, 2.0, 3.0)}, True), ({"projection": "reference"}, True),
+])  # fmt: skip
+def test_lines_that_nothing_can_be_turned_by_are_told(frame: dict[str, Any], left_out: bool) -> None:
+    pictures = [replace(PLAIN, name=name, view=np.full_like(PLAIN.view, level)) for name, level in (("a", 9), ("b", 90))]
+    given = StitchOptions(guides=((1, "vertical", (10.0, 20.0, 12.0, 200.0)),), **frame)
+    told = [one for one in prepare(pictures, given).warnings if "left out" in one]
+    assert len(told) == left_out
