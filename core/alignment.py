@@ -348,7 +348,8 @@ def fit_and_warp(
     mapped = map_pictures(field, views, refined, frames[0].pictures, shown, progress)
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(
-        cameras, edges, views, field, mapped.warp, geometry.warnings, dense, mapped.continuation, mapped.slide,
+        cameras, edges, views, field, mapped.warp, (*geometry.warnings, *mapped.warnings), dense, mapped.continuation,
+        mapped.slide,
         left_out=geometry.left_out, numbers=geometry.numbers, scale=geometry.scale,
     )  # fmt: skip
 
@@ -372,7 +373,7 @@ def _many_mapped(
     progress("warp", 0.0)
     refined = None if dense is None else dense.refined
     mapped = map_rig(rig, field, frames[0].pictures, options, progress, refined)
-    warnings = (*geometry.warnings, *field.warnings)
+    warnings = (*geometry.warnings, *field.warnings, *mapped.warnings)
     return Alignment(
         geometry.cameras, geometry.edges, rig.views, field, mapped.warp, warnings, None, mapped.continuation,
         mapped.slide, rig, geometry.left_out, geometry.numbers, dense, geometry.scale,

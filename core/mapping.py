@@ -28,7 +28,7 @@ from .field.strict import StrictField
 from .options import StitchOptions
 from .panorama.choosing_slide import NO_WAY, SlideChoice, choose_rig_slide, choose_slide
 from .panorama.framing import FrameRequest, frame_for
-from .panorama.guides import constraints, guided
+from .panorama.guides import constraints, guide_warnings, guided
 from .panorama.levelling import confirmed, gravity_by_edges, upright
 from .panorama.options import CHOICE
 from .panorama.projection import Projection, focal_of, round_projection
@@ -48,12 +48,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Mapped:
-    """The maps of all pictures, what goes on beyond the overlap (None without depth), and how far the viewpoint slides.
-    """
+    """The maps of all pictures, what goes on beyond the overlap (None without depth), how far the viewpoint slides, and
+    what is said of a user's lines."""
 
     warp: Warp
     continuation: Continuation | None
     slide: SlideChoice
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,7 @@ class AllEdges:
     @cached_property
     def down(self) -> Array:
         """The unit vector (3,) along gravity."""
-        return guided(self._down_by_edges, self.guides) if len(self.guides) else self._down_by_edges
+        return guided(self.down_by_edges, self.guides) if len(self.guides) else self.down_by_edges
 
     @cached_property
     def guides(self) -> Array:
@@ -92,7 +93,8 @@ class AllEdges:
         return constraints(self.pictures, self.views)
 
     @cached_property
-    def _down_by_edges(self) -> Array:
+    def down_by_edges(self) -> Array:
+        """The same without a user's lines."""
         rotations = tuple(view.R for view in self.views if np.isfinite(view.R).all())
         edges = self.together
         self.tick()
@@ -166,7 +168,7 @@ def map_pictures(
         cache = Cache(options.cache if options.slide != "auto" else None)
         base = known.base(lines.down, focal_of(views[0].K), cache)
         warp = slid_warp(base, views, sliding.viewpoint, frame)
-    return Mapped(_settled(warp, known, pictures), continuation, slide)
+    return Mapped(_settled(warp, known, pictures), continuation, slide, _guide_warnings(lines, options))
 
 
 def map_rig(
@@ -215,7 +217,7 @@ def map_rig(
     tell(0.3)
     frame = _frame(lines, options, lambda one: build_rig_warp(surface, one, tell))
     tell(0.5)
-    return Mapped(build_rig_warp(surface, frame, tell), None, slide)
+    return Mapped(build_rig_warp(surface, frame, tell), None, slide, _guide_warnings(lines, options))
 
 
 def _rig_slide(
@@ -245,6 +247,13 @@ def _frame(lines: AllEdges, options: StitchOptions, warp_on: Callable[[Projectio
     asked = FrameRequest(kind, distance, options.level, options.centre, options.fov, len(lines.guides) > 0)
     edges, down = lines.together if asked.needs_edges else None, lines.down if asked.level == "auto" else None
     return frame_for(asked, lines.views, edges, down, warp_on)
+
+
+def _guide_warnings(lines: AllEdges, options: StitchOptions) -> tuple[str, ...]:
+    """What is said of a user's lines, where they turn the panorama."""
+    if not len(lines.guides) or options.level != "auto":
+        return ()
+    return guide_warnings(lines.down, lines.guides, lines.down_by_edges)
 
 
 def _settled(warp: Warp, known: _Known, pictures: Sequence[Picture]) -> Warp:

@@ -53,3 +53,16 @@ def guided(down: Array, rows: Array) -> Array:
     length = float(np.linalg.norm(found))
     unit: Array = found / length
     return unit
+
+
+def guide_warnings(down: Array, rows: Array, otherwise: Array) -> tuple[str, ...]:
+    """What is said where lines, see `constraints`, do not agree on one `down` (3,), or hardly with what is down
+    otherwise (3,)."""
+    off = np.degrees(np.arcsin(np.minimum(np.abs(rows @ down), 1.0))).max()
+    turned = np.degrees(np.arccos(np.clip(down @ otherwise, -1, 1)))
+    kind = "see whether one of them is of the other kind"
+    if off > LEVELLING.contradicting_deg:
+        return (f"the lines that are upright or level contradict each other by {off:.0f}°: {kind}",)
+    if turned > LEVELLING.overturned_deg:
+        return (f"the lines that are upright or level turn the panorama by {turned:.0f}°: {kind}",)
+    return ()

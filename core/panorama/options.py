@@ -88,6 +88,12 @@ class LevellingOptions:
     guided_share: float = 1e-4
     """Weight of down as it is found otherwise beside one given line: it decides only what the lines leave open."""
 
+    contradicting_deg: float = 3.0
+    """Degrees by which a given line may miss the way that is down by all of them: who draws one is a degree off."""
+
+    overturned_deg: float = 25.0
+    """Degrees by which given lines may turn what is down otherwise: cameras are held better than that."""
+
     pitch_reach_deg: float = 45.0
     """Degrees of pitch to either side of a camera's own axes within which down is looked for by edges: most of what is
     photographed, with 2 σ to spare."""

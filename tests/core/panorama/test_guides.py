@@ -10,7 +10,7 @@ from edf_stitch.core.cameras.projective import project, rotation_from_angles
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.frames.reading import prepare
 from edf_stitch.core.options import StitchOptions
-from edf_stitch.core.panorama.guides import constraints, guided
+from edf_stitch.core.panorama.guides import constraints, guide_warnings, guided
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.system.errors import BadRequest
 
@@ -79,7 +79,21 @@ def test_options_know_whose_they_are_and_refuse_what_is_no_line() -> None:
     ({}, False), ({"level": "none"}, True), ({"level": (1.0, 2.0, 3.0)}, True), ({"projection": "reference"}, True),
 ])  # fmt: skip
 def test_lines_that_nothing_can_be_turned_by_are_told(frame: dict[str, Any], left_out: bool) -> None:
-    pictures = [replace(PLAIN, name=name, view=np.full_like(PLAIN.view, level)) for name, level in (("a", 9), ("b", 90))]
+    views = [np.full_like(PLAIN.view, level) for level in (9, 90)]
+    pictures = [replace(PLAIN, name=str(number), view=one) for number, one in enumerate(views)]
     given = StitchOptions(guides=((1, "vertical", (10.0, 20.0, 12.0, 200.0)),), **frame)
     told = [one for one in prepare(pictures, given).warnings if "left out" in one]
     assert len(told) == left_out
+
+
+@pytest.mark.parametrize(("kinds", "words"), [
+    (("vertical", "horizontal", "vertical"), ""), (("vertical", "horizontal"), ""),
+    (("horizontal", "horizontal", "vertical"), "contradict each other"), (("horizontal",), "turn the panorama"),
+])  # fmt: skip
+def test_lines_that_contradict_each_other_are_told(kinds: tuple[str, ...], words: str) -> None:
+    """Of an upright, a level and another upright line; two alone always agree with some way down."""
+    ends = [(3 * AHEAD + x * RIGHT, 3 * AHEAD + x * RIGHT + along) for x, along in ((0.3, DOWN), (0, RIGHT), (-1, DOWN))]
+    lines = tuple((kind, line(*both, np.eye(3))) for kind, both in zip(kinds, ends, strict=False))
+    rows = constraints([replace(PLAIN, guides=lines)], [view(np.eye(3))])
+    told = guide_warnings(guided(DOWN, rows), rows, DOWN)
+    assert len(told) == bool(words) and all(words in one for one in told)
