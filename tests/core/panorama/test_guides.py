@@ -92,7 +92,8 @@ def test_lines_that_nothing_can_be_turned_by_are_told(frame: dict[str, Any], lef
 ])  # fmt: skip
 def test_lines_that_contradict_each_other_are_told(kinds: tuple[str, ...], words: str) -> None:
     """Of an upright, a level and another upright line; two alone always agree with some way down."""
-    ends = [(3 * AHEAD + x * RIGHT, 3 * AHEAD + x * RIGHT + along) for x, along in ((0.3, DOWN), (0, RIGHT), (-1, DOWN))]
+    begins = [3 * AHEAD + x * RIGHT for x in (0.3, 0, -1)]
+    ends = [(at, at + along) for at, along in zip(begins, (DOWN, RIGHT, DOWN), strict=True)]
     lines = tuple((kind, line(*both, np.eye(3))) for kind, both in zip(kinds, ends, strict=False))
     rows = constraints([replace(PLAIN, guides=lines)], [view(np.eye(3))])
     told = guide_warnings(guided(DOWN, rows), rows, DOWN)
