@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy")
 from edf_stitch.edf_addon.jobs import ahead  # noqa: E402
 
 
-@pytest.mark.skipif(not bpy.app.module, reason="this Python has no bpy to start another with")
+@pytest.mark.skipif(bool(bpy.app.binary_path), reason="a whole Blender's Python has no bpy of its own")
 def test_adding_a_folder_and_starting_a_stitch_load_nothing_of_the_engine_that_was_not_loaded_ahead(tmp_path):
     """In a process of its own: here all is loaded already."""
     script = tmp_path / "loaded.py"
