@@ -69,7 +69,10 @@ def least_torn(first: StitchResult, all_the_way: Callable[[], StitchResult]) -> 
     if not torn:
         return first
     other = all_the_way()
-    return other if _is_usable(other) and _torn_px(other) < torn else first
+    if not _is_usable(other) or _torn_px(other) >= torn:
+        return first
+    took = first.seconds, other.seconds
+    return replace(other, seconds={stage: sum(one.get(stage, 0.0) for one in took) for stage in {**took[0], **took[1]}})
 
 
 def _torn_px(result: StitchResult) -> int:

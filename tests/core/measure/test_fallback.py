@@ -68,6 +68,7 @@ def test_what_tears_within_a_part_of_the_overlap_slides_all_the_way_where_that_t
     assert len(slide["costs"]) == 4 and ("would be torn" in slide["why"]) == slides_all_the_way
     assert result.warp.viewpoint is not None and result.warp.viewpoint.s1 == slide["s1"]
     assert result.report["options"]["slide"] == "auto" and told == sorted(told)
+    assert {"read", "features", "dense", "warp"} <= result.seconds.keys(), "of all that was done"
 
 
 def test_what_was_asked_to_be_simple_is_left_alone(
