@@ -113,6 +113,13 @@ def all_spaces(context: Any) -> list[tuple[bpy.types.Area, bpy.types.SpaceImageE
     ]
 
 
+def let_go(context: Any) -> None:
+    """Give the pointer and the status bar back, after a tool that held them."""
+    context.workspace.status_text_set(None)
+    context.window.cursor_modal_restore()
+    redraw()
+
+
 def redraw() -> None:
     """Have every Image Editor draw itself again; nothing where there is no window."""
     for area, _ in all_spaces(bpy.context):

@@ -96,9 +96,7 @@ class EDF_OT_guide_add(bpy.types.Operator):  # noqa: N801
 
     def _done(self, context: Any, how: set[str]) -> set[str]:
         strokes.line.clear()
-        context.workspace.status_text_set(None)
-        context.window.cursor_modal_restore()
-        editor.redraw()
+        editor.let_go(context)
         return how
 
 

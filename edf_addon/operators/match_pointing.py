@@ -141,9 +141,7 @@ class EDF_OT_match_edit(bpy.types.Operator):  # noqa: N801
 
     def _done(self, context: Any) -> set[str]:
         drawing.pending.clear()
-        context.workspace.status_text_set(None)
-        context.window.cursor_modal_restore()
-        editor.redraw()
+        editor.let_go(context)
         return {"FINISHED"}
 
     def cancel(self, context: Any) -> None:

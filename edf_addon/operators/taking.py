@@ -123,9 +123,7 @@ class EDF_OT_take_from(bpy.types.Operator):  # noqa: N801
 
     def _done(self, context: Any, how: set[str]) -> set[str]:
         strokes.pending.clear()
-        context.workspace.status_text_set(None)
-        context.window.cursor_modal_restore()
-        editor.redraw()
+        editor.let_go(context)
         return how
 
 
