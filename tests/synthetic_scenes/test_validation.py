@@ -30,7 +30,10 @@ FIGURES = {
     "over_average_db": 1.0, "over_average_ssim": 0.01, "overlap_over_average_db": 9.0, "source_fidelity_mean": 0.99,
     "source_fidelity_p5": 0.95, "seam_visibility": 0.5,
 }  # fmt: skip
-RIVALS = {"known/paper": 28.0, "known/rew": 28.5, "known/apap": 27.5, "known/homography": 27.0}
+RIVALS = {
+    "known/paper": 28.0, "known/rew": 28.5, "known/apap": 27.5, "known/spw": 27.8, "known/lpc": 27.9,
+    "known/homography": 27.0,
+}  # fmt: skip
 PROOF = {
     "position_px": 0.001, "depth_relative": 1e-7, "ray_cast_relative": 1e-6, "f_px": 0.001, "warp_psnr_db": 40.0,
     "half_pixel_psnr_db": 30.0, "wide_psnr_db": 50.0,
