@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -42,15 +43,27 @@ def overlays_in(pictures: Sequence[Picture]) -> list[NDArray[np.bool_] | None]:
     return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Compared:
-    """What pictures (H, W) have in common: shared outlines; those of any; of how pixels differ from what is around
-    them the mean over all products of two pictures, and over all squares."""
+    """What pictures have in common, at (H, W) px: shared outlines, and those of any."""
 
+    pictures: Sequence[Picture]
+    reach: int
     shared: NDArray[np.bool_]
     any: NDArray[np.bool_]
-    products: NDArray[np.float32]
-    squares: NDArray[np.float32]
+
+    @cached_property
+    def products_and_squares(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Of how pixels (H, W) differ from what is around them the mean over all products of two pictures, and over all
+        squares; few pictures share outlines that ask for it."""
+        total, squares = np.zeros((*self.any.shape, 3), np.float32), np.zeros(self.any.shape, np.float32)
+        for picture in self.pictures:
+            levels = _shrunk(picture, self.any.shape).astype(np.float32)
+            levels -= cv2.blur(levels, (2 * self.reach + 1,) * 2)
+            total += levels
+            squares += _over_channels(np.square(levels))
+        count = len(self.pictures)
+        return (_over_channels(np.square(total)) - squares) / (count * (count - 1)), squares / count
 
 
 def _burnt_into(pictures: Sequence[Picture]) -> NDArray[np.bool_] | None:
@@ -83,30 +96,37 @@ def _burnt_into(pictures: Sequence[Picture]) -> NDArray[np.bool_] | None:
 def _compared(pictures: Sequence[Picture], shape: tuple[int, int], reach: int) -> _Compared:
     """Pictures of one size compared pixel by pixel, at (H, W) px."""
     often, some = np.zeros(shape, np.int32), np.zeros(shape, bool)
-    sums, squared, total = (np.zeros((*shape, 3), np.float32) for _ in range(3))
-    squares = np.zeros(shape, np.float32)
+    sums, squared = (np.zeros((*shape, 3), np.float32) for _ in range(2))
     beside = np.ones((3, 3), np.uint8)
     for picture in pictures:
-        view = cv2.resize(picture.view, shape[::-1], interpolation=cv2.INTER_AREA).reshape(*shape, -1)
-        view = np.repeat(view, 3, axis=2) if view.shape[2] == 1 else view
-        steep = np.sqrt(sum(np.square(cv2.Sobel(view, cv2.CV_32F, *way)).sum(axis=2) for way in ((1, 0), (0, 1))))
-        strong = steep > OVERLAYS.steep
+        view = _shrunk(picture, shape)
+        slopes = [_over_channels(np.square(cv2.Sobel(view, cv2.CV_32F, *way))) for way in ((1, 0), (0, 1))]
+        strong = np.sqrt(slopes[0] + slopes[1]) > OVERLAYS.steep
         if picture.alpha is not None:
             strong &= cv2.resize(picture.alpha, shape[::-1], interpolation=cv2.INTER_AREA) > 0.99
         often += cv2.dilate(strong.astype(np.uint8), beside)
         some |= strong
         levels = view.astype(np.float32)
         sums += levels
-        squared += np.square(levels)
-        levels -= cv2.blur(levels, (2 * reach + 1,) * 2)
-        total += levels
-        squares += np.square(levels).sum(axis=2)
+        squared += np.square(levels, out=levels)
     count, rim = len(pictures), OVERLAYS.rim
-    differ = (squared / count - np.square(sums / count)).max(axis=2)
+    differ = np.maximum.reduce(cv2.split(squared / count - np.square(sums / count)))
     shared = (often >= max(2, OVERLAYS.outlined * count)) & (differ <= OVERLAYS.same_level**2)
     shared[:rim] = shared[-rim:] = shared[:, :rim] = shared[:, -rim:] = False
-    products = (np.square(total).sum(axis=2) - squares) / (count * (count - 1))
-    return _Compared(shared, some, products, squares / count)
+    return _Compared(pictures, reach, shared, some)
+
+
+def _shrunk(picture: Picture, shape: tuple[int, ...]) -> NDArray[np.uint8]:
+    """A picture's view with three channels, at (H, W) px."""
+    view = cv2.resize(picture.view, shape[::-1], interpolation=cv2.INTER_AREA).reshape(*shape, -1)
+    return np.repeat(view, 3, axis=2) if view.shape[2] == 1 else view
+
+
+def _over_channels(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Sums (H, W) over three channels (H, W, 3), one after the other: NumPy takes several times as long along them."""
+    first, second, third = cv2.split(values)
+    total: NDArray[np.float32] = first + second + third
+    return total
 
 
 def _burnt_in_outline(contour: NDArray[np.int32], compared: _Compared, reach: int, dense: float) -> int:
@@ -122,10 +142,11 @@ def _burnt_in_outline(contour: NDArray[np.int32], compared: _Compared, reach: in
     inside = cv2.drawContours(np.zeros(shared.shape, np.uint8), [contour], 0, 1, cv2.FILLED, offset=offset)
     near, beside = inside > 0, cv2.dilate(inside, _disc(2 * reach)) == 0
     own = int((near & shared).sum())
-    alike = compared.products[around][near].sum() / max(1e-6, float(compared.squares[around][near].sum()))
     moving = float((beside & shared).sum()) / max(1, int((beside & strong).sum()))
-    burnt_in = own >= dense * near.sum() and alike >= OVERLAYS.least_alike and moving <= OVERLAYS.most_agree
-    return own if burnt_in else 0
+    if own < dense * near.sum() or moving > OVERLAYS.most_agree:
+        return 0
+    products, squares = (values[around][near].sum() for values in compared.products_and_squares)
+    return own if products / max(1e-6, float(squares)) >= OVERLAYS.least_alike else 0
 
 
 def _disc(radius: int) -> NDArray[np.uint8]:
