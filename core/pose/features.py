@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,6 +84,12 @@ def detect(
     descriptors = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-12))
     scale = float(np.mean(size_change(small, (width, height))[0]))
     return Features(resized_points(points[chosen], small, (width, height)), descriptors, scale)
+
+
+def at_once(most: int, pixels: Sequence[int]) -> int:
+    """In how many pictures features may be sought at once for their memory; pixels: of each, shrunk to `most` px."""
+    largest = max((min(most, one) for one in pixels), default=1)
+    return max(1, FEATURES.bytes_at_once // (FEATURES.pixel_bytes * largest))
 
 
 def _shown(alpha: NDArray[np.float32] | None, size: tuple[int, int]) -> NDArray[np.uint8] | None:

@@ -79,8 +79,7 @@ def found_features(
         )  # fmt: skip
 
     found = []
-    largest = max((min(most[1], picture.view[..., 0].size) for picture in pictures), default=1)
-    with at_most(max(1, FEATURES.bytes_at_once // (FEATURES.pixel_bytes * largest))):
+    with at_most(features.at_once(most[1], [picture.view[..., 0].size for picture in pictures])):
         for one in in_order(of_one, pictures):
             found.append(one)
             progress(len(found) / len(pictures))

@@ -250,7 +250,7 @@ def test_a_preview_makes_do_with_fewer_features_and_lands_in_the_same_place(
 
     monkeypatch.setattr(features, "detect", detect)
     found = {blend: align([frame], replace(quick, blend=blend), silent) for blend in ("feather", "linear")}
-    assert asked == [(), (), (500, FEATURES.preview_pixels), (500, FEATURES.preview_pixels)]
+    assert asked == [(FEATURES.budget, FEATURES.pixels)] * 2 + [(500, FEATURES.preview_pixels)] * 2
     points = np.stack(np.meshgrid(np.linspace(60, 180, 7), np.linspace(30, 150, 7)), axis=-1).reshape(-1, 2)
     away = np.linalg.norm(found["feather"].field.predict(points) - found["linear"].field.predict(points), axis=1)
     few, many = (len(found[blend].edges[0].matches) for blend in ("linear", "feather"))
