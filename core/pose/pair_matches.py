@@ -56,7 +56,9 @@ def _features_in(picture: Picture, part: Box, most: tuple[int, int]) -> features
     """The features of a part of a picture; most: of the whole of it, and of its px."""
     share = part[2] * part[3] / picture.view[..., 0].size
     alpha = None if picture.alpha is None else cut(picture.alpha, part)
-    found = features.detect(cut(picture.view, part), alpha, *(round(share * one) for one in most))
+    # more to an area than in the whole, where parts without texture leave theirs to others
+    budget = round(share**0.5 * most[0])
+    found = features.detect(cut(picture.view, part), alpha, budget, round(share * most[1]))
     return replace(found, points=found.points + part[:2])
 
 
