@@ -62,9 +62,6 @@ class StitchOptions:
         is not named: nothing.
     ignore_in : tuple of (str, Path or ndarray), default empty
         The same by the names of pictures, with or without their suffix.
-    show : tuple of (str, Path or ndarray), default empty
-        By pictures' names, masks of what the panorama is to show of them, white = from this picture, wherever seams are
-        cut; of two masks for one place that of the later picture counts.
     show : tuple of (int or str, Path or ndarray), default empty
         By a picture's number, from 1, or name, a mask of what the panorama is to show of it, wherever seams are cut:
         white = from this picture. Where those of two pictures meet, the later picture counts.

@@ -110,7 +110,9 @@ def viewpoint_facts(slide: dict[str, Any]) -> list[tuple[str, str]]:
     s1 = slide.get("s1")
     if s1 is None:
         return []
-    return [("Viewpoint", f"slides by {s1:.2f}" if s1 else "the reference's place")]
+    start, end = slide.get("part", (0.0, 1.0))
+    where = f", from {start:.0%} to {end:.0%} of the overlap" if (start, end) != (0.0, 1.0) else ""
+    return [("Viewpoint", f"slides by {s1:.2f}{where}" if s1 else "the reference's place")]
 
 
 def viewpoint(report: dict[str, Any] | None) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,6 +125,31 @@ class Rig:
         return centres
 
     @property
+    def own_order(self) -> list[int]:
+        """The numbers of its pictures in an order of its own, whatever order they were given in: the first, whose frame
+        it is, then the others by how they look and stand."""
+        stands = [(*turn.ravel().tolist(), *shift.tolist()) for turn, shift in zip(self.R, self.t, strict=True)]
+        return [0, *sorted(range(1, len(self)), key=stands.__getitem__)]
+
+    def renumbered(self, order: Sequence[int]) -> Rig:
+        """The same with its pictures in another order, to the last bit: the frame stays that of the one that was first
+        (see `reframing` for another one's)."""
+        new_number = np.argsort(order)
+        edges = (_renumbered(edge, new_number) for edge in self.edges)
+        return replace(
+            self,
+            cameras=tuple(self.cameras[number] for number in order),
+            R=self.R[list(order)],
+            t=self.t[list(order)],
+            observations=replace(self.observations, picture=new_number[self.observations.picture]),
+            edges=tuple(sorted(edges, key=lambda edge: (edge.i, edge.j))),
+            stations=tuple(tuple(sorted(int(new_number[one]) for one in station)) for station in self.stations),
+            lenses=tuple(self.lenses[number] for number in order) if self.lenses else (),
+            focal_deviation=_in_order(self.focal_deviation, order),
+            position_deviation=_in_order(self.position_deviation, order),
+        )
+
+    @property
     def views(self) -> tuple[View, ...]:
         """What warp needs of each picture, for canvas points p = K_0 r."""
         back = inverse_intrinsics(self.cameras[0].K)
@@ -133,11 +159,21 @@ class Rig:
         )
 
 
+def _renumbered(edge: RigEdge, new_number: NDArray[np.intp]) -> RigEdge:
+    i, j = sorted((int(new_number[edge.i]), int(new_number[edge.j])))
+    return replace(edge, i=i, j=j)
+
+
+def _in_order(values: Array, order: Sequence[int]) -> Array:
+    """Values of each picture in another order; as they are where nothing was said."""
+    return values[list(order)] if len(values) else values
+
+
 @dataclass(frozen=True, eq=False)
 class Registration:
     """What became of pictures that were to be registered together.
 
-    rig: of those that were; numbers: which of the given pictures they are, in the rig's order, the viewpoint's first;
+    rig: of those that were; numbers: which of the given pictures they are, in the rig's order;
     left_out: why each other one is not in it, by its number, in words that name its best count of inliers.
     """
 

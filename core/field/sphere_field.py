@@ -6,7 +6,8 @@ it. Beyond them it fades to another, which anchors hold at the inverse range of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,10 @@ class SphereField:
     def deviation(self, rays: Array) -> Array:
         """Standard deviation (…) of that on unit rays (…, 3)."""
         return np.sqrt(self.depth.doubt.at(rays))
+
+    def renumbered(self, order: Sequence[int]) -> SphereField:
+        """The same with the pictures in another order."""
+        return replace(self, slacks=tuple(self.slacks[number] for number in order))
 
     def slack(self, number: int, rays: Array) -> Array | None:
         """px (…, 2), before the lens, by which picture `number` is off on unit rays (…, 3); None if it has none."""
@@ -136,13 +141,16 @@ def fit_sphere_field(rig: Rig, with_slack: bool = True, tick: Tick = unwatched) 
     DegenerateGeometry
         Too few points tell a range.
     """
+    # sums round otherwise in another order, and what is chosen by them differs
+    order = rig.own_order
+    rig = rig.renumbered(order)
     unit = angular_unit(rig)
     depth = _fitted(rig, unit, tick) if rig.t.any() else _without_parallax(unit)
     slacks = []
     for number in range(len(rig)):
         tick()
         slacks.append(fit_sphere_slack(rig, number, depth.at, unit) if with_slack else None)
-    return SphereField(depth, tuple(slacks))
+    return SphereField(depth, tuple(slacks)).renumbered(np.argsort(order).tolist())
 
 
 def _without_parallax(unit: float) -> SphereDepth:

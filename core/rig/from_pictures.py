@@ -16,7 +16,6 @@ from ..system.cache import Cache
 from ..system.progress import ReportProgress
 from .averaging.pairs import chosen_pairs
 from .matching import Matched, content_key, found_features, found_matches
-from .reframing import reordered
 from .registration import register
 
 
@@ -85,7 +84,7 @@ def registered(
     -------
     Registration
         The same in whatever order the pictures are given, but for their numbers: those that connect come in the order
-        that they were given in, and the first one's frame is the rig's.
+        of their content, and the first one's frame is the rig's (`reframing.seen_from` gives it the viewpoint's).
     """
     mirrored = _mirrored(pictures, matched)
     right = tuple(one for one in matched.matches if mirrored.keys().isdisjoint((one.i, one.j)))
@@ -104,11 +103,10 @@ def registered(
 
     progress("geometry", 0.0)
     kept = cache.remember("registration", (cameras, inner.points, inner.matches, inner.scale, seed, names), found)
-    numbers = [order[number] for number in kept.numbers]
-    ascending = np.argsort(numbers).tolist()
+    numbers = tuple(order[number] for number in kept.numbers)
     left_out = {first_of_body[order[number]]: why for number, why in kept.left_out}
     left_out = dict(sorted(left_out.items())) | {first_of_body[number]: why for number, why in mirrored.items()}
-    return Registration(reordered(kept.rig, ascending), tuple(sorted(numbers)), left_out)
+    return Registration(kept.rig, numbers, left_out)
 
 
 def _mirrored(pictures: Sequence[Picture], matched: Matched) -> dict[int, str]:

@@ -6,27 +6,26 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from ..cameras.bodies import bodies_of
-from ..cameras.rig import Registration, Rig, RigEdge
+from ..cameras.rig import Registration, Rig
 from ..choices import CENTRE
 from ..pictures.naming import number_of
-from ..raster.arrays import Array
 from ..system.errors import BadRequest, NoOverlap
 
 
 def seen_from(
     registration: Registration, viewpoint: int | str | None, names: Sequence[str], shown_by: Sequence[int]
 ) -> Registration:
-    """The same rig in the frame of the viewpoint, which comes first; the others stay in the order of their numbers.
+    """The same rig in the frame of the viewpoint, which comes first, then the others in the order of their numbers.
 
     Parameters
     ----------
     registration : Registration
-        Its pictures ascending.
+        Of the same pictures always in the same frame and order, so that what comes out is the same to the last bit
+        however they were given.
     viewpoint : int, str or None
         A picture's number among those that were given, from 1, its name, or CENTRE; None is the first.
     names : sequence of str
@@ -47,8 +46,8 @@ def seen_from(
     """
     numbers = registration.numbers
     if viewpoint is None:
-        return registration
-    if viewpoint == CENTRE and CENTRE not in names:
+        asked = min(numbers)
+    elif viewpoint == CENTRE and CENTRE not in names:
         asked = numbers[best_connected(registration.rig)]
     elif isinstance(viewpoint, int):
         if viewpoint > len(shown_by):
@@ -61,9 +60,7 @@ def seen_from(
             f"{names[asked]} cannot be the viewpoint, since it does not connect with the others: "
             f"{registration.left_out[asked]}; choose another one, or --viewpoint centre"
         )
-    order = sorted(range(len(numbers)), key=lambda place: (numbers[place] != asked, place))
-    if order[0] == 0:
-        return registration
+    order = sorted(range(len(numbers)), key=lambda place: (numbers[place] != asked, numbers[place]))
     return replace(
         registration, rig=reordered(registration.rig, order), numbers=tuple(numbers[place] for place in order)
     )
@@ -83,8 +80,7 @@ def reordered(rig: Rig, order: Sequence[int]) -> Rig:
     Rig
         The longest t has length 1 again, or all are 0.
     """
-    first, order = order[0], list(order)
-    new_number = np.argsort(order)
+    first = order[0]
     turn, shift = rig.R[first], rig.t[first]
     R = rig.R @ turn.T
     t = rig.t - R @ shift
@@ -96,23 +92,16 @@ def reordered(rig: Rig, order: Sequence[int]) -> Rig:
     lengths = np.maximum(np.linalg.norm(moved, axis=1), np.finfo(np.float64).tiny)
     # the derivative of ρ / |R r + ρ t| by ρ
     shrinks = np.abs((moved * turned).sum(axis=1)) / lengths**3
-    seen = rig.observations
-    edges = tuple(sorted((_renumbered(edge, new_number) for edge in rig.edges), key=lambda edge: (edge.i, edge.j)))
-    return replace(
+    framed = replace(
         rig,
-        cameras=tuple(rig.cameras[number] for number in order),
-        R=R[order],
-        t=t[order] / longest,
+        R=R,
+        t=t / longest,
         rays=moved / lengths[:, None],
         inverse_ranges=rig.inverse_ranges / lengths * longest,
         deviations=rig.deviations * shrinks * longest,
-        observations=replace(seen, picture=new_number[seen.picture]),
-        edges=edges,
-        stations=tuple(tuple(sorted(int(new_number[one]) for one in station)) for station in rig.stations),
-        lenses=tuple(rig.lenses[number] for number in order) if rig.lenses else (),
-        focal_deviation=_in_order(rig.focal_deviation, order),
-        position_deviation=_in_order(rig.position_deviation, order) / longest,
+        position_deviation=rig.position_deviation / longest,
     )
+    return framed.renumbered(order)
 
 
 def best_connected(rig: Rig) -> int:
@@ -124,13 +113,3 @@ def best_connected(rig: Rig) -> int:
     lengths = [*(1 / edge.inliers for edge in rig.edges), *[1e-9] * len(bodies.pairs)]
     ways = dijkstra(coo_array((lengths, (i, j)), (count, count)).tocsr(), directed=False)
     return int(bodies.of[np.argmin(ways.sum(axis=1))])
-
-
-def _renumbered(edge: RigEdge, new_number: NDArray[np.intp]) -> RigEdge:
-    i, j = sorted((int(new_number[edge.i]), int(new_number[edge.j])))
-    return replace(edge, i=i, j=j)
-
-
-def _in_order(values: Array, order: list[int]) -> Array:
-    """Values of each picture in another order; as they are where nothing was said."""
-    return values[order] if len(values) else values

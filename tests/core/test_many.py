@@ -15,6 +15,7 @@ from edf_stitch.core.cameras.projective import distance_to_line, project, rotati
 from edf_stitch.core.cameras.sources import CameraRequest
 from edf_stitch.core.frames import preview
 from edf_stitch.core.frames.options import PREVIEW
+from edf_stitch.core.measure.metrics import psnr
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.output.camera_file import camera_table
 from edf_stitch.core.output.depth.range_image import range_image
@@ -25,6 +26,7 @@ from edf_stitch.core.panorama.layers import layer_of
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.pose import features
+from edf_stitch.core.raster.colour import encode
 from edf_stitch.core.system.errors import BadRequest, Cancelled, NoOverlap
 from edf_stitch.core.system.json_values import plain
 from edf_stitch.core.system.output_files import OutputFiles
@@ -92,6 +94,14 @@ def test_dense_refinement_makes_the_pictures_agree(dense_result: StitchResult, s
     assert entry["used"] and 0.5 < entry["found"] <= 1
     assert (dense_result.confidence > 0.5).mean() > 0.2 and not set_result.confidence.any()
     assert set_result.report["field"]["dense"] == {"used": False, "why": "not asked for"}
+
+
+def test_another_order_makes_the_same_dense_panorama(four: PictureSet, dense_result: StitchResult) -> None:
+    order = [0, 3, 2, 1]
+    other = stitch([four.pictures[number] for number in order], replace(KNOWN, dense=True))
+    assert numbers_of(other) == order
+    one, same = (encode(result.pixels, 8) for result in (dense_result, other))
+    assert one.shape == same.shape and psnr(one, same, np.ones(one.shape[:2], bool)) > 45
 
 
 def test_a_dense_panorama_slides_as_well(four: PictureSet, dense_result: StitchResult) -> None:

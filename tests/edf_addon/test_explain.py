@@ -72,6 +72,9 @@ def test_what_a_plane_lacks_is_left_out(small_result):
 
 def test_the_viewpoint_is_told_and_how_it_was_chosen():
     assert explain.viewpoint_facts({"s1": 0.5}) == [("Viewpoint", "slides by 0.50")]
+    within = {"s1": 1.0, "part": [0.25, 0.75]}
+    assert explain.viewpoint_facts(within) == [("Viewpoint", "slides by 1.00, from 25% to 75% of the overlap")]
+    assert explain.viewpoint_facts({"s1": 0.5, "part": [0.0, 1.0]}) == explain.viewpoint_facts({"s1": 0.5})
     assert explain.viewpoint_facts({"s1": 0.0}) == [("Viewpoint", "the reference's place")]
     assert explain.viewpoint_facts({}) == []
     assert explain.viewpoint({"slide": {"s1": 0.5, "why": "least bends"}}) == "Chosen: 0.50 (least bends)"

@@ -31,7 +31,7 @@ from .exposure import TOO_LITTLE, Exposure, too_different, unchanged
 from .graph_options import GRAPH_EXPOSURE
 from .graph_vignetting import fit_vignetting
 from .picture_blocks import PictureBlocks, SharedBlocks, blocks_meet, overlaps_of, picture_blocks
-from .tone_blocks import block_weights, log_ratios, weighted_median
+from .tone_blocks import log_ratios, weighted_median
 from .tone_options import CLIPPED
 from .toned import NO_VIGNETTING, Vignetting
 
@@ -132,8 +132,8 @@ def _body_of(cameras: Sequence[Camera]) -> NDArray[np.intp]:
 def _ratio(shared: SharedBlocks, lenses: Sequence[Vignetting]) -> _Ratio:
     """How much brighter one picture is than the other, without their vignetting."""
     lost = [lenses[number].at(radii) for number, radii in zip((shared.i, shared.j), shared.radii, strict=True)]
-    ratios, weights = log_ratios(shared.blocks.means) - (lost[0] - lost[1])[:, None], block_weights(shared.blocks)
-    middle = np.array([weighted_median(column, weights) for column in ratios.T])
+    ratios = log_ratios(shared.blocks.means) - (lost[0] - lost[1])[:, None]
+    middle = np.array([weighted_median(column, shared.weights) for column in ratios.T])
     spread = np.maximum(np.median(np.abs(ratios - middle), axis=0), GRAPH_EXPOSURE.least_spread)
     return _Ratio(shared.i, shared.j, middle, spread, len(shared.blocks))
 

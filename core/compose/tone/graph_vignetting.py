@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...raster.arrays import Array
 from .graph_options import GRAPH_EXPOSURE
 from .picture_blocks import SharedBlocks
-from .tone_blocks import block_weights, log_ratios, weighted_median
+from .tone_blocks import log_ratios, weighted_median
 from .tone_fit import is_lens
 from .tone_options import TONE
 from .toned import NO_VIGNETTING, Vignetting
@@ -101,6 +101,6 @@ def _rows(overlaps: Sequence[SharedBlocks], lenses: Sequence[int | None]) -> _Ro
             if lens is not None:
                 taken_off[rows, 2 * lens : 2 * lens + 2] += sign * np.column_stack([radii, radii**2])
     values = np.concatenate([log_ratios(one.blocks.means).mean(axis=1) for one in parts])
-    weights = np.concatenate([block_weights(one.blocks) for one in parts])
+    weights = np.concatenate([one.weights for one in parts])
     black = np.concatenate([(one.blocks.at // TONE.tile_blocks).sum(axis=1) % 2 == 0 for one in parts])
     return _Rows(values, weights, black, gains, taken_off)

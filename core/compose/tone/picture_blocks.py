@@ -17,7 +17,7 @@ from ...raster.options import PARTS
 from ...raster.picture_map import CanvasMap
 from ..options import EXPOSURE, OVERLAP
 from .graph_options import GRAPH_EXPOSURE
-from .tone_blocks import Blocks, block_means, block_shares, bright, unclipped_in
+from .tone_blocks import Blocks, block_means, block_shares, bright, tone_weights, unclipped_in
 
 
 @dataclass(frozen=True)
@@ -123,6 +123,12 @@ class SharedBlocks:
     j: int
     blocks: Blocks
     radii: tuple[Array, Array]
+
+    @property
+    def weights(self) -> Array:
+        """How much the error of each block (N,) counts, by both pictures alike, whichever of them is i."""
+        first, second = (tone_weights(means) for means in self.blocks.means)
+        return (first + second) / 2
 
     def thinned(self, most: int) -> SharedBlocks:
         """At most so many of them."""

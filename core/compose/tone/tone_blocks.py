@@ -154,7 +154,12 @@ def bright_blocks(blocks: Blocks) -> Blocks:
 
 def block_weights(blocks: Blocks) -> Array:
     """How much the error of each block (N,) counts: as the eye sees it, for tones grow about as the root of light."""
-    weights: Array = np.sqrt(blocks.means[0].mean(axis=1))
+    return tone_weights(blocks.means[0])
+
+
+def tone_weights(means: Array) -> Array:
+    """The same (N,) by the means (N, C) of one picture."""
+    weights: Array = np.sqrt(means.mean(axis=1))
     return weights
 
 

@@ -87,6 +87,9 @@ def refine_sphere(
     """
     if not rig.t.any():
         return DenseSphere(None, "pictures that were taken from one place tell no distances")
+    # the same in whatever order pictures are given: the least difference of rounding would be another choice somewhere
+    order = rig.own_order
+    field, rig, pictures = field.renumbered(order), rig.renumbered(order), [pictures[number] for number in order]
     viewed = Viewed.of(field, rig.views)
     some = [Place.of(number, rig, viewed) for number in range(len(rig))]
     places = [place for place in some if place is not None]

@@ -15,6 +15,7 @@ from ...raster.arrays import Plane, strips
 from ...raster.lazy import whole
 from ...system.errors import DegenerateGeometry
 from ..inspection import has_depth
+from .pair_deviation import pair_deviation
 
 if TYPE_CHECKING:
     from ...pipeline import StitchResult
@@ -35,7 +36,8 @@ class RangeImage:
         Along the ray of each pixel, from its viewpoint; infinity where d ≤ 0, NaN where the panorama shows nothing or
         knows no depth.
     deviation : (H, W) float32 array or None
-        Its standard deviation, to first order; None if nothing tells it.
+        Its standard deviation, to first order; of a pair NaN where not both pictures see what is shown. None if nothing
+        tells it.
     confidence : (H, W) float32 array or None
         Of dense refinement, 0 to 1, 0 where it said nothing; None without it.
     scale : Scale
@@ -67,9 +69,10 @@ def range_image(result: StitchResult) -> RangeImage:
     """
     warp, alpha = result.warp, result.panorama.alpha
     canvas, reference = result.canvas, result.views[0]
+    known = pair_deviation(result) if result.rig is None and has_depth(result) else warp.deviation
     depth, confidence, off_depth = (
         None if values is None else result.in_full(values, beyond)
-        for values, beyond in ((warp.depth, np.nan), (warp.lazy_confidence, 0.0), (warp.deviation, 0.0))
+        for values, beyond in ((warp.depth, np.nan), (warp.lazy_confidence, 0.0), (known, 0.0))
     )
     assert depth is not None
     out = np.empty(alpha.shape, np.float32)

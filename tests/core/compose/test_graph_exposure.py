@@ -150,6 +150,19 @@ def test_vignetting_of_a_lens_is_found_in_all_overlaps_and_none_is_invented() ->
     assert all(one.vignetting is NO_VIGNETTING for one in exposures(with_lens(known, gains), "reference"))
 
 
+def test_vignetting_does_not_hang_on_the_order_of_the_pictures() -> None:
+    random = np.random.default_rng(6)
+    layers = [
+        Layer(one.pixels * random.uniform(0.9, 1.1, one.pixels.shape).astype(np.float32), one.alpha)
+        for one in with_lens(Vignetting(-0.12, -0.45), 2 ** random.uniform(-1, 1, (7, 3)))
+    ]
+    turn = [4, 0, 6, 2, 5, 1, 3]
+    one = exposures(layers)[0].vignetting
+    other = exposures([layers[k] for k in turn], places=[RING[k] for k in turn])[0].vignetting
+    assert one is not NO_VIGNETTING
+    assert (one.halfway, one.corner) == pytest.approx((other.halfway, other.corner), abs=1e-9)
+
+
 def test_lenses_are_told_apart_by_their_intrinsics() -> None:
     first = Camera(np.diag([50.0, 50.0, 1.0]), (60, 40), "a", 0.0)
     wider = Camera(np.diag([40.0, 40.0, 1.0]), (60, 40), "b", 0.0)

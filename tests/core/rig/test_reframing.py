@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edf_stitch.core.cameras.rig import RigEdge
-from edf_stitch.core.rig.reframing import best_connected, reordered
+from edf_stitch.core.cameras.rig import Registration, RigEdge
+from edf_stitch.core.rig.reframing import best_connected, reordered, seen_from
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -36,6 +36,25 @@ def test_there_and_back_changes_nothing(seed: int, order: list[int]) -> None:
         np.testing.assert_allclose(getattr(back, name), getattr(rig, name), atol=1e-9, err_msg=name)
     assert [(edge.i, edge.j) for edge in back.edges] == [(edge.i, edge.j) for edge in rig.edges]
     np.testing.assert_array_equal(back.observations.picture, rig.observations.picture)
+
+
+@given(seed=st.integers(0, 1000), given_as=st.permutations(range(5)))
+@settings(max_examples=15, deadline=None)
+def test_the_others_come_in_any_order_and_no_bit_changes(seed: int, given_as: list[int]) -> None:
+    rig, _ = known_rig(5, seed)
+    names = [f"{number}.jpg" for number in range(5)]
+    one = seen_from(Registration(rig, (0, 1, 2, 3, 4), {}), "2.jpg", names, range(5))
+    there = [f"{number}.jpg" for number in np.argsort(given_as)]
+    other = seen_from(Registration(rig, tuple(given_as), {}), "2.jpg", there, range(5))
+    assert one.numbers == (2, 0, 1, 3, 4) and other.numbers[0] == given_as[2]
+    assert list(other.numbers[1:]) == sorted(other.numbers[1:])
+    back = [other.numbers.index(given_as[number]) for number in one.numbers]
+    same = other.rig.renumbered(back)
+    for name in ("R", "t", "rays", "inverse_ranges", "deviations", "focal_deviation", "position_deviation"):
+        assert getattr(same, name).tobytes() == getattr(one.rig, name).tobytes(), name
+    np.testing.assert_array_equal(same.observations.picture, one.rig.observations.picture)
+    in_own = [result.rig.renumbered(result.rig.own_order) for result in (one, other)]
+    assert in_own[0].t.tobytes() == in_own[1].t.tobytes() and not in_own[0].t[0].any()
 
 
 def test_what_is_said_of_each_picture_goes_with_it() -> None:

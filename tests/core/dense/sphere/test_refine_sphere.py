@@ -109,6 +109,15 @@ def test_as_many_threads_as_there_are_give_the_same(
     assert alone.confidence.tobytes() == dense.refined.confidence.tobytes()
 
 
+def test_in_whatever_order_the_pictures_come_no_bit_changes(rig: Rig, field: SphereField, dense: DenseSphere) -> None:
+    order = [0, *reversed(range(1, len(rig)))]
+    pictures = pictures_of(rig, GAINS)
+    other = refine_sphere(field.renumbered(order), rig.renumbered(order), [pictures[number] for number in order])
+    assert dense.refined is not None and other.refined is not None and other.found == dense.found
+    for name in ("inverse_range", "confidence", "deviation"):
+        assert getattr(other.refined, name).tobytes() == getattr(dense.refined, name).tobytes(), name
+
+
 def test_what_is_masked_is_not_compared(rig: Rig) -> None:
     pictures = pictures_of(rig)
     hole = np.ones(pictures[0].view.shape[:2], np.float32)

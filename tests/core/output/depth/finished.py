@@ -41,7 +41,7 @@ def rays_of(canvas: Canvas) -> np.ndarray:
 class Finished(SimpleNamespace):
     """Of a set that is made at once."""
 
-    times = 1
+    times, rig = 1, "a rig"
     in_full = StitchResult.in_full
 
 

@@ -32,7 +32,7 @@ def test_a_pairs_ranges_are_those_of_its_scene(small_pair: Pair, small_result: S
     sure = small_result.confidence[y : y + height, x : x + width] > 0.5
     off = np.abs(np.log(found / true))[sure]
     assert sure.mean() > 0.3 and np.median(off) < 0.04
-    assert image.confidence is not None and image.deviation is None
+    assert image.confidence is not None and image.deviation is not None
 
 
 def rays_through(camera: SimpleNamespace, pixels: np.ndarray) -> np.ndarray:
