@@ -69,7 +69,7 @@ def emptied(folder: Path) -> None:
         path.rmdir() if path.is_dir() else path.unlink()
 
 
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", range(1, 5))
 def test_options_in_any_combination(
     four: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], number: int
 ) -> None:
