@@ -5,13 +5,15 @@
 Without --platform, one zip for each. --local: for this machine only, with the wheels of its Blender's Python only (or
 of every Python, where no Blender is named). With a Blender command, Blender builds and validates the zips. Without one,
 Python writes the same files. What goes in is what git tracks, as it stands in the checkout, less the manifest's
-paths_exclude_pattern; the same files give the same bytes.
+paths_exclude_pattern; the same files give the same bytes. Beside each zip stands its bill of materials, ZIP.cdx.json
+(CycloneDX 1.5): the libraries in it, with their versions and hashes.
 """
 
 from __future__ import annotations
 
 import argparse
 import fnmatch
+import json
 import os
 import platform as machine
 import shlex
@@ -71,8 +73,28 @@ def build(platform: str, pythons: Sequence[str], blender: Sequence[str], output:
             subprocess.run([*tool, "validate", str(made)], check=True)
         else:
             _zip(stage, made, manifest["build"]["paths_exclude_pattern"], manifest["wheels"])
+        bill = made.with_suffix(".zip.cdx.json")
+        bill.write_text(bill_of_materials(manifest, platform, wheels.wheels_for(platform, pythons)), "utf-8")
+        os.replace(bill, output / bill.name)
         os.replace(made, output / name)
     return output / name
+
+
+def bill_of_materials(manifest: dict, platform: str, carried: Iterable[wheels.Wheel]) -> str:
+    """What a zip holds of others, as CycloneDX's JSON, from the lock; no date, so that it is the same twice."""
+    components = []
+    for wheel in carried:
+        name, version = wheel.filename.split("-")[:2]
+        components.append({
+            "type": "library", "bom-ref": wheel.filename, "name": name, "version": version,
+            "hashes": [{"alg": "SHA-256", "content": wheel.sha256}],
+        })  # fmt: skip
+    about = {"type": "application", "name": manifest["id"], "version": manifest["version"],
+             "description": f"{manifest['name']} for {platform}",
+             "licenses": [{"license": {"id": one.removeprefix("SPDX:")}} for one in manifest["license"]]}  # fmt: skip
+    bill = {"bomFormat": "CycloneDX", "specVersion": "1.5", "version": 1, "metadata": {"component": about},
+            "components": components}  # fmt: skip
+    return json.dumps(bill, indent=1) + "\n"
 
 
 def _stage(stage: Path, platform: str, carried: Iterable[Path]) -> None:

@@ -1,6 +1,7 @@
 """What stands in .ci: the check of the system before set-up, the lock of the wheels, the extension's zip."""
 
 import importlib.util
+import json
 import subprocess
 import sys
 import tomllib
@@ -142,7 +143,15 @@ def test_a_zip_is_of_one_platform_and_twice_the_same(tmp_path, monkeypatch):
     first = build_extension.build("windows-x64", ["3.11"], [], tmp_path / "a")
     second = build_extension.build("windows-x64", ["3.11"], [], tmp_path / "b")
     assert first.read_bytes() == second.read_bytes()
-    assert list(first.parent.iterdir()) == [first], "nothing stays behind"
+    bill = first.with_name(f"{first.name}.cdx.json")
+    assert set(first.parent.iterdir()) == {first, bill}, "nothing else stays behind"
+    assert bill.read_bytes() == second.with_name(bill.name).read_bytes()
+    listed = json.loads(bill.read_text("utf-8"))
+    assert listed["metadata"]["component"]["version"] == MANIFEST["version"]
+    locked = {(wheel.filename, wheel.sha256) for wheel in wheels.wheels_for("windows-x64", ["3.11"])}
+    assert {(one["bom-ref"], one["hashes"][0]["content"]) for one in listed["components"]} == locked
+    assert {"name": "scipy", "version": "1.15.3"}.items() <= next(
+        one for one in listed["components"] if one["name"] == "scipy").items()  # fmt: skip
     with zipfile.ZipFile(first) as archive:
         names = set(archive.namelist())
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())

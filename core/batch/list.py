@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
+from ..cameras.programs.values import shortened
 from ..cameras.sources import CameraRequest
 from ..pictures.listing import SUFFIXES, listed
 from ..system.errors import BadRequest, StitchError
@@ -297,12 +298,12 @@ def _numbers(cell: str, column: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in re.split(r"[\s,;]+", cell)) if cell else ()
     except ValueError:
-        raise BadRequest(f"{column} is {cell!r}; a number is needed, or two") from None
+        raise BadRequest(f"{column} is {shortened(cell)}; a number is needed, or two") from None
 
 
 def _whole_number(cell: str, column: str) -> int:
     if not (cell.isascii() and cell.isdigit() and len(cell) < 10):
-        raise BadRequest(f"{column} is {cell!r}; a whole number from 0 is needed")
+        raise BadRequest(f"{column} is {shortened(cell)}; a whole number from 0 is needed")
     return int(cell)
 
 
@@ -337,7 +338,7 @@ def _columns(cells: list[str]) -> tuple[tuple[str, ...], bool]:
             raise BadRequest(f"the header lacks {column}; {_LAYOUT}")
     for at, name in enumerate(names):
         if name not in COLUMNS and not _FURTHER.fullmatch(name):
-            raise BadRequest(f"the header names a column {cells[at]!r} that is not known; {_LAYOUT}")
+            raise BadRequest(f"the header names a column {shortened(cells[at])} that is not known; {_LAYOUT}")
         if name in names[:at]:
             raise BadRequest(f"the header names the column {name} twice")
     return names, True

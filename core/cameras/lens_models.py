@@ -155,12 +155,13 @@ def _projected(lens: Lens, angle: Array) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=256)
+@np.errstate(over="ignore", invalid="ignore")  # of coefficients of no lens
 def _limit(lens: Lens) -> float:
     narrow = lens.projection in (LensProjection.RECTILINEAR, LensProjection.ORTHOGRAPHIC)
     whole = np.radians(LENS.widest_flat if narrow else LENS.widest_round)
     angles = np.linspace(0, whole, LENS.radius_samples)
     least = LENS.least_angular_slope
-    folded = ~(lens.slope_at(angles) >= least)  # not a number: of coefficients of no lens
+    folded = ~(lens.slope_at(angles) >= least)  # not a number counts as folded
     if not folded.any():
         return float(whole)
     first = int(np.argmax(folded))

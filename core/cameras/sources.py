@@ -240,14 +240,14 @@ def read_camera_file(
                 raise BadRequest(f"the camera of {name}: an object with K and perhaps distortion, R and t is needed")
             raise BadRequest(
                 f"the camera file has no camera named {name!r} or {role(number)!r}; it has: "
-                f"{', '.join(map(str, table))}"
+                f"{_strangers(table, ())}"
             )
         out.append(replace(_camera_from_entry(entry, name, size), in_metres=unit == "metres"))
     named = [camera for camera in out if camera is not None]
     if not named:
         raise BadRequest(
             f"the camera file names none of the pictures ({', '.join(names[:3])}, …); it has: "
-            f"{', '.join(map(str, table))}"
+            f"{_strangers(table, ())}"
         )
     posed = sum(camera.pose is not None for camera in named)
     if posed == 1 or (posed and not several and posed < len(named)):
@@ -276,8 +276,8 @@ def camera_table(
 
 
 def _strangers(table: dict[str, Any], names: Sequence[str]) -> str:
-    """What a camera file names and is none of the pictures, the first few of many."""
-    strangers = [str(name) for name in table if name not in names]
+    """What a camera file names and is none of the pictures, the first few of many, each shortened."""
+    strangers = [str(name)[:80] for name in table if name not in names]
     return ", ".join(strangers[:5]) + (", …" if len(strangers) > 5 else "")
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
 from ..system.streams import messages_may_be_lost, silence
+from ..system.text_files import printable
 from .arguments import numbered, options_from
 from .file_arguments import exr_form, without_plan
 from .info import run_info
@@ -108,7 +109,7 @@ def _report_error(error: BaseException) -> int:
     else:  # a bug, or a library's error: a sentence is more use than a traceback
         sentence = f"internal error, please report it: {type(error).__name__}: {error}"
         code = StitchError.exit_code
-    print(f"edf: {sentence}", file=sys.stderr)
+    print(f"edf: {printable(sentence)}", file=sys.stderr)
     return code
 
 
@@ -141,7 +142,7 @@ def _stitch(args: argparse.Namespace) -> int:
     pictures = listed(args.pictures)
     if pictures != args.pictures and not args.quiet:
         names = told_apart([str(path) for path in pictures])
-        print(f"edf: {len(pictures)} pictures: {shortened(names)}", file=sys.stderr)
+        print(f"edf: {len(pictures)} pictures: {printable(shortened(names))}", file=sys.stderr)
     options = numbered(options_from(args, measure=bool(args.report or args.verbose)), pictures)
     check_count(len(pictures), options)
     outputs = OutputRequest(
@@ -157,12 +158,12 @@ def _stitch(args: argparse.Namespace) -> int:
         _too_late_to_interrupt()
     verdict = result.report["verdict"]
     if not args.quiet or verdict["is"] != "good":
-        print(f"edf: verdict: {verdict_line(verdict)}", file=sys.stderr)
+        print(f"edf: verdict: {printable(verdict_line(verdict))}", file=sys.stderr)
     if not args.quiet:
         height, width = result.panorama.alpha.shape
-        print(f"edf: {args.output}: {width}×{height}", file=sys.stderr)
+        print(f"edf: {printable(str(args.output))}: {width}×{height}", file=sys.stderr)
     for warning in warnings:
-        print(f"edf: warning: {warning}", file=sys.stderr)
+        print(f"edf: warning: {printable(warning)}", file=sys.stderr)
     if args.verbose:
         print_summary(result.report, result.seconds)
     if args.json:
@@ -214,7 +215,7 @@ def _batch(args: argparse.Namespace) -> int:
         print(f"edf: {request.summary or args.output}: {counts}{stopped}", file=sys.stderr)
     if args.keep_going:
         for line in summary.failures():
-            print(f"edf: {line}", file=sys.stderr)
+            print(f"edf: {printable(line)}", file=sys.stderr)
     if args.json:
         print(json.dumps(plain(summary.as_dict()), indent=1))
     return summary.exit_code

@@ -67,7 +67,7 @@ def _words(path: Path, name: str, value: Any, options: Mapping[str, argparse.Act
     if action is None or option[2:] in _ON_THE_LINE:
         known = [one.removeprefix("--") for one in options if one.startswith("--")]
         near = get_close_matches(option[2:], [one for one in known if one not in _ON_THE_LINE], 1, 0.7)
-        raise BadRequest(f"{path}: {name} is no option here" + (f": is {near[0]} meant?" if near else ""))
+        raise BadRequest(f"{path}: {name[:80]} is no option here" + (f": is {near[0]} meant?" if near else ""))
     if isinstance(value, bool):
         off = f"--no-{option[2:]}"
         if action.nargs != 0 or not (value or off in action.option_strings or action.const is True):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import StitchError, UnreadableImage
+from ..system.text_files import printable
 
 if TYPE_CHECKING:
     from ..pictures.picture import Picture
@@ -40,7 +41,7 @@ def run_info(args: argparse.Namespace) -> int:
         print(json.dumps({"schema": 1, "pictures": entries}, indent=1))
     else:
         for entry in entries:
-            print(line_of(entry))
+            print(printable(line_of(entry)))
     if sys.stdout is not None:  # closed by whoever called
         sys.stdout.flush()
     return UnreadableImage.exit_code if any(entry["error"] for entry in entries) else 0

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from ..system.text_files import printable
 from .options import MESSAGES
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 def say(line: str) -> None:
     """A line on stderr, above the bar where there is one."""
+    line = printable(line)
     if sys.stderr.isatty():
         from tqdm import tqdm
 
@@ -33,7 +35,7 @@ def shortened(names: Sequence[str]) -> str:
 def print_summary(report: dict[str, Any], seconds: dict[str, float]) -> None:
     """What was decided and measured, from a stitch's report, and its seconds by stage; for --verbose."""
     if "rig" in report:
-        print("\n".join(f"edf: {line}" for line in _rig_lines(report, seconds)), file=sys.stderr)
+        print("\n".join(f"edf: {printable(line)}" for line in _rig_lines(report, seconds)), file=sys.stderr)
         return
     view, field, measured = report["two_view"], report["field"], report["measured"]
     focal = ", ".join(f"{value:.1f}" for value in view["focal_px"])

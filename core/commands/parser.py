@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any, NoReturn
 
+from ..system.text_files import printable
 from .arguments import add_options
 from .config_file import add_config, with_config
 from .file_arguments import add_batch_files, add_files, outside, shard
@@ -82,7 +83,7 @@ class Parser(argparse.ArgumentParser):
             message = meant
         elif not message.startswith("argument -"):  # what is wrong with one option's value, its own line says
             self.print_usage(sys.stderr)
-        print(f"{self.prog}: {message}", file=sys.stderr)
+        print(f"{self.prog}: {printable(message)}", file=sys.stderr)
         raise SystemExit(2)
 
 

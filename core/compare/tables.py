@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from statistics import median
 from typing import Any
 
+from ..system.text_files import name_in_table
 from .figures import FIGURES, SHARES
 
 SCHEMA = 1
@@ -162,8 +163,8 @@ def comparison_csv(summary: Summary) -> str:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["pair", "reference", "target", "width", "height", "model", "field", "status", "why", *FIGURES])
     for entry in (*summary["pairs"], *summary["sets"]["pairs"]):
-        first = [entry["name"], entry.get("reference", ""), entry.get("target", ""), *entry.get("size", ("", "")),
-                 entry.get("model", "")]  # fmt: skip
+        named = [name_in_table(entry.get(key, "")) for key in ("name", "reference", "target")]
+        first = [*named, *entry.get("size", ("", "")), entry.get("model", "")]
         fields = entry["fields"] or {"": {"status": "failed", "message": entry["message"], "figures": {}}}
         for name, one in fields.items():
             values = [number(one["figures"].get(key)) for key in FIGURES]

@@ -51,7 +51,7 @@ def number_of(name: str, names: Sequence[str], asked_by: str) -> int:
             if found:
                 return found[0]
     listed = ", ".join(told_apart(names)[:8]) + (", …" if len(names) > 8 else "")
-    raise BadRequest(f"{asked_by}: no picture is called {name!r}; there are: {listed}")
+    raise BadRequest(f"{asked_by}: no picture is called {name[:80]!r}; there are: {listed}")
 
 
 def told_apart(names: Sequence[str]) -> list[str]:

@@ -8,6 +8,7 @@ the user's own matches, which are used as they are.
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from ..cameras.programs.hugin import Project, project_in
 from ..pictures.naming import number_of
 from ..raster.resizing import resized_points
 from ..system.errors import BadRequest
-from ..system.text_files import read_lines
+from ..system.text_files import name_in_table, quoted, read_lines
 
 COLUMNS = ("x", "y", "x2", "y2")
 WEIGHT = "weight"
@@ -104,12 +105,13 @@ def read_matches_of_pairs(
     table = _from_file(Path(source))
     if table.pictures is None:
         raise BadRequest(f"{source}: of {len(names)} pictures, a header must name the columns {columns} as well")
-    numbers = {}
+    numbers: dict[str, int] = {}
     for place, named in zip(table.places, table.pictures.tolist(), strict=True):
-        i, j = (number_of(name, names, place) for name in named)
-        if i == j:
-            raise BadRequest(f"{place}: both points lie in {names[i]}; a match is of two pictures")
-        numbers[named[0]], numbers[named[1]] = i, j
+        for name in named:
+            if name not in numbers:
+                numbers[name] = number_of(name, names, place)
+        if numbers[named[0]] == numbers[named[1]]:
+            raise BadRequest(f"{place}: both points lie in {names[numbers[named[0]]]}; a match is of two pictures")
     pairs = np.array([[numbers[name] for name in named] for named in table.pictures.tolist()])
     table = table._replace(pictures=pairs)
     return {
@@ -229,14 +231,9 @@ def matches_csv(
         cells += [[repr(value) for value in column] for column in (*worked.x.T.tolist(), *worked.y.T.tolist())]
     if pictures is not None:
         names = [*PICTURES, *names]
-        cells = [*([_quoted(name) for name in column] for column in zip(*pictures, strict=True)), *cells]
+        cells = [*([quoted(name_in_table(name)) for name in column] for column in zip(*pictures, strict=True)), *cells]
     lines = [",".join(names), *map(",".join, zip(*cells, strict=True))]
     return ("\n".join(lines) + "\n").encode()
-
-
-def _quoted(name: str) -> str:
-    """A name as a cell of a CSV file."""
-    return '"' + name.replace('"', '""') + '"' if any(mark in name for mark in ',;"#') else name
 
 
 def _whole(source: str | Path | NDArray[Any]) -> str:
@@ -294,7 +291,7 @@ def _from_file(path: Path) -> _Table:
         if STATE in named:
             states.append(_state(named[STATE], place))
         if all(name in named for name in PICTURES):
-            pictures.append([named[name] for name in PICTURES])
+            pictures.append([named[name].removeprefix("./") for name in PICTURES])
     if not rows:
         raise BadRequest(f"{path}: no matches in it; {_LAYOUT}, one line for each match")
     table = np.array(rows, np.float64)
@@ -305,8 +302,8 @@ def _from_file(path: Path) -> _Table:
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     """The cells of each line that holds some, with its number as editors count, from 1."""
     for number, line in read_lines(path, "the file of matches", _LAYOUT):
-        # a semicolon first: where it separates, commas are decimal
-        separator = next((mark for mark in ";," if mark in line), None)
+        # a semicolon first: where it separates, commas are decimal; names in quotation marks may hold either
+        separator = next((mark for mark in ";," if mark in re.sub(r'"[^"]*"', "", line)), None)
         try:
             cells = line.split() if separator is None else next(csv.reader([line], delimiter=separator))
         except csv.Error as error:

@@ -8,6 +8,11 @@ from pathlib import Path
 
 from .errors import BadRequest, UnreadableImage
 
+# What acts on a terminal, turns the direction of what follows, ends a line, or is half a character.
+_NOT_SHOWN = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+# What a spreadsheet takes for the start of a formula.
+_FORMULA = ("=", "+", "-", "@")
+
 
 def read_text(path: Path, what: str, layout: str) -> str:
     """A file in UTF-8, with or without a byte order mark.
@@ -37,3 +42,21 @@ def read_lines(path: Path, what: str, layout: str) -> Iterator[tuple[int, str]]:
     for number, line in enumerate(re.split("\r\n|\r|\n", read_text(path, what, layout)), 1):
         if line.strip() and not line.lstrip().startswith("#"):
             yield number, line
+
+
+def printable(text: str) -> str:
+    """A text for one line of a terminal: names and EXIF are others' data, and must neither steer it nor end the
+    line."""
+    return _NOT_SHOWN.sub(lambda found: found[0].encode("unicode_escape", "surrogatepass").decode(), text)
+
+
+def name_in_table(name: str) -> str:
+    """A file's name as the text of a table's cell: in one line, and no formula to a spreadsheet (./=1.png is the same
+    file as =1.png)."""
+    shown = printable(name)
+    return f"./{shown}" if shown.startswith(_FORMULA) else shown
+
+
+def quoted(text: str) -> str:
+    """A text as a cell of a CSV file."""
+    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',;"#') else text

@@ -29,6 +29,10 @@ PROJECTIONS = {
 _NOT_READ = {1: "a panorama on a cylinder", 4: "an equirectangular panorama", 20: "Thoby's fisheye"}
 # Kinds of masks (t) that hide: of this image, of its stack, of its lens. Those that ask to show are wishes.
 _HIDING, _HIDING_BY_LENS = (0, 2, 4), 4
+# Links from image to image (v=0) that are followed; Hugin writes one.
+_MOST_LINKS = 60
+# Images, and masks, of a project at most: a mask of a lens is one of each image taken with it.
+_MOST_IMAGES = 5000
 _PARAMETER = re.compile(r'([A-Za-z]+)("[^"]*"|[^\s"]*)')
 
 
@@ -89,14 +93,19 @@ def read_project(text: str, place: str) -> Project:
                 found.append([number(told.get(key), key, where) for key in "xyXY"])
         elif re.match(r"k\s", line):
             masks.append(_mask(_parameters(line), where))
+    if max(len(images), len(masks)) > _MOST_IMAGES:
+        raise BadRequest(
+            f"{place}: {len(images)} images and {len(masks)} masks; at most {_MOST_IMAGES} of each are read: save a "
+            "project of fewer"
+        )
     entries = [_entry(images, k, places[k]) for k in range(len(images))]
     names = [_name(image, where) for image, where in zip(images, places, strict=True)]
+    lenses = [_lens_number(images, k, "v") for k in range(len(images))]
     for number_, kind, polygon in masks:
         if number_ >= len(images):
             raise BadRequest(f"{place}: a mask is of image {number_}, and there are {len(images)} (the first is 0)")
-        lens = _lens_number(images, number_, "v")
         for k, entry in enumerate(entries):
-            meant = k == number_ or kind == _HIDING_BY_LENS and _lens_number(images, k, "v") == lens
+            meant = k == number_ or kind == _HIDING_BY_LENS and lenses[k] == lenses[number_]
             if polygon and meant:
                 entry.setdefault("ignore", []).append(polygon)
     for n, N, index in points:
@@ -134,7 +143,7 @@ def _name(image: dict[str, str], place: str) -> str:
 
 def _lens_number(images: Sequence[dict[str, str]], k: int, key: str) -> int:
     """The image that image k takes a parameter from (like v=0), itself where it has its own."""
-    for _ in images:
+    for _ in range(_MOST_LINKS):
         value = images[k].get(key, "")
         if not re.fullmatch(r"=\d{1,6}", value) or int(value[1:]) >= len(images):
             break

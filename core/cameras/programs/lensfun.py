@@ -136,7 +136,8 @@ def _profile(lenses: list[ElementTree.Element], name: str, exif: Exif, place: st
     if len(meant) != 1:
         raise BadRequest(
             f"{place}: the lens of {name} ({exif.lens or 'not named by EXIF'}) may be {'several' if meant else 'none'} "
-            f"of those in it, {', '.join((meant or there)[:5])}: give a file that holds the right one alone"
+            f"of those in it, {', '.join(one[:80] for one in (meant or there)[:5])}: give a file that holds the right "
+            "one alone"
         )
     same = [_lens(lens, place) for lens in lenses if _name_of(lens) == meant[0]]
     crop = _crop_of(exif)

@@ -91,4 +91,5 @@ def _pose(frame: dict[str, Any], place: str) -> dict[str, Any]:
     if len(matrix) == 4 and not np.allclose(matrix[3], (0, 0, 0, 1)):
         raise BadRequest(f"{place}: the last row of transform_matrix must be 0, 0, 0, 1")
     R = FLIPPED @ matrix[:3, :3].T
-    return {"R": R, "t": -R @ matrix[:3, 3]}
+    with np.errstate(over="ignore", invalid="ignore"):  # whether both are sound is asked of every camera file
+        return {"R": R, "t": -R @ matrix[:3, 3]}

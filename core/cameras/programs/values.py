@@ -74,8 +74,11 @@ def by_our_names(entries: Mapping[str, Any], names: Sequence[str], place: str) -
     """
     found: dict[str, Any] = {}
     used: set[str] = set()
+    by_stem: dict[str, list[str]] = {}
+    for given in entries:
+        by_stem.setdefault(_stem(given), []).append(given)
     for name in names:
-        ranks = {given: _likeness(given, name) for given in entries}
+        ranks = {given: _likeness(given, name) for given in by_stem.get(_stem(name), ())}
         best = max(ranks.values(), default=(0, 0, 0))
         if not best[0]:
             continue
@@ -87,15 +90,24 @@ def by_our_names(entries: Mapping[str, Any], names: Sequence[str], place: str) -
     return found | {given: entry for given, entry in entries.items() if given not in used and given not in found}
 
 
+def _parts(name: str) -> list[str]:
+    """A path as these programs write it, by folders, without regard to case."""
+    return [part for part in name.replace("\\", "/").casefold().split("/") if part not in ("", ".")]
+
+
+def _stem(name: str) -> str:
+    """What two names share of which one may mean the other's picture: the last part, without its suffix."""
+    return Path((_parts(name) or [""])[-1]).stem
+
+
 def _likeness(given: str, name: str) -> tuple[int, int, int]:
     """How well a name means a picture: whether at all, with the suffix, and by how many folders."""
-    paths = (one.replace("\\", "/").casefold().split("/") for one in (given, name))
-    first, second = ([part for part in path if part not in ("", ".")] for path in paths)
+    first, second = _parts(given), _parts(name)
     if not first or not second:
         return 0, 0, 0
     same_suffix = first[-1] == second[-1]
     if not same_suffix:
-        first[-1], second[-1] = (Path(one).stem if "." in one else one for one in (first[-1], second[-1]))
+        first[-1], second[-1] = (Path(one).stem for one in (first[-1], second[-1]))
     count = 0
     for one, other in zip(reversed(first), reversed(second), strict=False):
         if one != other:

@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 
 from ...measure.placed.placed import PlacedPicture, PlacedSet, RaysAt, shrinking, shrunk, union
 from ...panorama.projection import Projection
+from ...pictures.containers import read_structure
+from ...pictures.decoding import check_size, decode_file, read_file
+from ...pictures.options import READING
 from ...pictures.picture import Picture
 from ...raster.picture_map import PictureMap
 from ...raster.sampling import fetch
@@ -116,21 +119,17 @@ def _layer(
     folder: Path, path: Path, shows: NDArray[np.bool_] | None = None
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
     """R, G, B of a layer, and where it shows something: by its alpha, by a mask beside it, or as given."""
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise UnreadableImage(f"{path}: cannot be read as a picture")
-    image = np.atleast_3d(np.rint(image / 257).astype(np.uint8) if image.dtype == np.uint16 else image)
-    if image.dtype != np.uint8:
-        raise BadRequest(f"{path}: layers have 8 or 16 bits")
-    if image.shape[2] == 4:
-        return np.ascontiguousarray(image[..., 2::-1]), image[..., 3] >= _SHOWN
-    colours = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else np.ascontiguousarray(image[..., ::-1])
+    image = _levels(path)
+    colours = image[..., :1] if image.shape[2] < 3 else image[..., :3]
+    colours = np.repeat(colours, 3, axis=2) if colours.shape[2] == 1 else np.ascontiguousarray(colours)
+    if image.shape[2] in (2, 4):
+        return colours, image[..., -1] >= _SHOWN
     masks = [one for one in _images(folder) if one.stem == f"{path.stem.partition('_')[0]}_mask"]
     if masks:
-        mask = cv2.imread(str(masks[0]), cv2.IMREAD_GRAYSCALE)
-        if mask is None or mask.shape != colours.shape[:2]:
+        mask = _levels(masks[0])
+        if mask.shape[:2] != colours.shape[:2]:
             raise BadRequest(f"{masks[0]}: a mask is a gray picture as large as its layer")
-        return colours, mask >= _SHOWN
+        return colours, mask[..., :3].min(axis=2) >= _SHOWN
     if shows is None:
         mask_name = f"{path.stem.partition('_')[0]}_mask.png"
         raise BadRequest(
@@ -140,6 +139,25 @@ def _layer(
     return colours, shows
 
 
+def _levels(path: Path) -> NDArray[np.uint8]:
+    """Levels (H, W, 1 to 4) of a file, in R, G, B, A order, which is checked before it is decoded as any picture is."""
+    try:
+        data = read_file(path)
+        structure = read_structure(data)
+        if structure is None or structure.kind not in ("png", "tiff", "jpeg"):
+            raise UnreadableImage("cannot be read as a picture; layers and masks are PNG, TIFF or JPEG")
+        if structure.damage:
+            raise UnreadableImage(f"the file is damaged: {structure.damage}; write it again")
+        check_size(structure.width, structure.height, len(data), READING.drawing_pixels_per_byte)
+        raw = decode_file(data, structure).raw
+    except UnreadableImage as error:
+        raise UnreadableImage(f"{path}: {error}") from error
+    levels = np.rint(raw / 257).astype(np.uint8) if raw.dtype == np.uint16 else raw
+    if levels.dtype != np.uint8:
+        raise BadRequest(f"{path}: layers have 8 or 16 bits")
+    return levels
+
+
 def _maps(path: Path, count: int) -> dict[int, PictureMap]:
     """Maps of the whole canvas by the numbers of their pictures, of a file as --warp writes it."""
     if not path.is_file():
@@ -147,6 +165,8 @@ def _maps(path: Path, count: int) -> dict[int, PictureMap]:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
             width, height = (int(side) for side in content["canvas"])
+            if not 0 < width * height <= READING.max_pixels:
+                raise ValueError(f"a canvas of {width} × {height} pixels")
             sizes = content["sizes"]
             found = {}
             for number in range(min(count, len(sizes))):

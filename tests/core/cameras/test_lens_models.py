@@ -128,6 +128,10 @@ def test_a_lens_without_distortion_touches_nothing() -> None:
     assert not cam.bent and cam.lens_known and cam.without_lens().lens == Lens()
 
 
+def test_angular_coefficients_of_no_lens_fold_without_a_word() -> None:
+    assert Lens(EQUIDISTANT, (1e308, -1e308, 1e308, 1e308)).limit < 0.1
+
+
 @pytest.mark.parametrize("ptlens", [(1e308, 0.0, 0.0), (0.0, -1e308, 1e308), (1e308, 1e308, 1e308)])
 def test_coefficients_of_no_lens_fold_on_the_axis_without_a_word(ptlens: tuple[float, ...]) -> None:
     """As damaged files have them: NumPy would warn of what overflows, which pytest makes an error of."""

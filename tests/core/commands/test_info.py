@@ -71,6 +71,18 @@ def test_whether_the_distortion_was_removed(
     assert ("distortion removed already" in capsys.readouterr().out) is removed
 
 
+def test_neither_a_name_nor_exif_steers_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    exif = Image.Exif()
+    exif[271], exif[272] = "\x1b]0;owned\x07", "EOS\x1b[2J"
+    Image.fromarray(NOISE[..., :3]).save(tmp_path / "a\n\x1b[31m.jpg", exif=exif)
+    assert main(["info", str(tmp_path)]) == 0
+    assert main(["info", str(tmp_path / "none\x1b.jpg")]) == 4
+    out, err = capsys.readouterr()
+    assert "a\\n\\x1b[31m.jpg: " in out and "\x1b" not in out + err and len(out.splitlines()) == 2
+    assert main(["stitch", str(tmp_path / "none\x1b.jpg"), "b.png", "-o", str(tmp_path / "o.png")]) == 4
+    assert "none\\x1b.jpg" in capsys.readouterr().err
+
+
 def test_camera_raw_is_called_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.dng").write_bytes(dng(mosaic(NOISE[..., :3] / 255)))
     assert main(["info", str(tmp_path)]) == 0

@@ -79,6 +79,12 @@ def test_what_failed_says_why() -> None:
     assert rows[0]["overlap_psnr_db"] == "20.0" and rows[0]["projectivity_px"] == "" == rows[1]["overlap_psnr_db"]
 
 
+def test_no_name_is_a_formula_in_the_table_for_spreadsheets() -> None:
+    hostile = entry("=1+1", slack=20.0) | {"reference": "@a.png", "target": "a\n=b.png"}
+    (row,) = csv.DictReader(io.StringIO(comparison_csv(summary(hostile))))
+    assert (row["pair"], row["reference"], row["target"]) == ("./=1+1", "./@a.png", "a\\n=b.png")
+
+
 def test_shares_are_shown_in_percent_and_nothing_as_a_dash() -> None:
     assert shown(0.00123, "folds") == "0.123" and shown(math.nan, "folds") == shown(None, "folds") == "–"
 

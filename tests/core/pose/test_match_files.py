@@ -174,6 +174,16 @@ def test_what_is_written_is_read_to_the_same_floats(tmp_path: Path, rows: list[t
     assert matches_csv(back) == written
 
 
+def test_a_name_that_a_spreadsheet_would_calculate_is_none_and_comes_back(tmp_path: Path) -> None:
+    names = '=HYPERLINK("x";1).png', "+1,#.png"
+    matches = Matches(np.array([[0.1, 2.0]]), np.array([[3.0, 1.5]]))
+    written = matches_csv(matches, pictures=[names]).decode()
+    assert written.splitlines()[1] == '"./=HYPERLINK(""x"";1).png","./+1,#.png",0.1,2.0,3.0,1.5,1.0'
+    (tmp_path / "m.csv").write_text(written)
+    back = read_matches(tmp_path / "m.csv", SIZE, SIZE_PRIME, names=names)
+    assert np.array_equal(back.x, matches.x) and np.array_equal(back.y, matches.y)
+
+
 # --- matches that were found ----------------------------------------------------------------------------------------
 
 HEADER = "x,y,x2,y2,weight,state,noise_px\n"

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from edf_stitch.core.pictures.naming import number_of
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
+from edf_stitch.core.pose import match_files
 from edf_stitch.core.pose.match_files import read_matches
 from edf_stitch.core.rig.given_matches import given_matches
 from edf_stitch.core.rig.matching import Matched
@@ -51,6 +53,15 @@ def test_rows_go_to_their_pictures_whichever_comes_first(tmp_path: Path, picture
     }  # fmt: skip
     assert found.given
     assert [len(one) for one in found.points] == [2, 2, 2], "one place is one feature, in whatever pair it is"
+
+
+def test_a_name_is_looked_for_once_however_many_rows_have_it(
+    tmp_path: Path, pictures: list[Picture], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(match_files, "number_of", lambda name, *rest: asked.append(name) or number_of(name, *rest))
+    read(tmp_path, TABLE + "c,b,5,6,7,8,1\n" * 500, pictures)
+    assert sorted(asked) == ["a", "a.png", "b", "b.png", "c", "c.png"], "sixty pictures took minutes"
 
 
 def test_they_follow_the_size_that_is_worked_at(tmp_path: Path, pictures: list[Picture]) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from edf_stitch.core.system.errors import BadRequest, UnreadableImage
-from edf_stitch.core.system.text_files import read_text
+from edf_stitch.core.system.text_files import name_in_table, printable, read_text
 
 
 @pytest.mark.parametrize("written", ["a,b\nä\n".encode(), b"\xef\xbb\xbf" + "a,b\nä\n".encode()])
@@ -26,3 +26,14 @@ def test_what_cannot_be_read_is_another_matter(tmp_path: Path) -> None:
     with pytest.raises(UnreadableImage, match="the list cannot be read") as refused:
         read_text(tmp_path / "none.csv", "the list", "")
     assert refused.value.exit_code == 4
+
+
+def test_others_names_neither_steer_a_terminal_nor_end_a_line() -> None:
+    said = printable("a\x1b[2J\r\nb\x07\x9b1m\u202egnp.exe\u2028\udcff c\u00e9\u3000\U0001f4f7.jpg")
+    assert said == "a\\x1b[2J\\r\\nb\\x07\\x9b1m\\u202egnp.exe\\u2028\\udcff c\u00e9\u3000\U0001f4f7.jpg"
+
+
+@pytest.mark.parametrize("name", ["=1+1.png", "+1.png", "-1.png", "@a.png"])
+def test_no_name_is_a_formula_in_a_table(name: str) -> None:
+    assert name_in_table(name) == f"./{name}" and Path(name_in_table(name)) == Path(name)
+    assert name_in_table("a=1.png") == "a=1.png" and name_in_table("a\n=1.png") == "a\\n=1.png"

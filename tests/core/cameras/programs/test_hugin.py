@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -116,3 +117,17 @@ def test_damage_is_refused_with_its_line(old: str, new: str, said: str, tmp_path
 def test_images_that_refer_to_each_other_in_a_circle_end(tmp_path: Path) -> None:
     with pytest.raises(BadRequest, match="v is"):
         cameras(project(tmp_path, PROJECT.replace("v60", "v=1")))
+
+
+def test_long_chains_of_lenses_and_masks_of_all_take_no_time() -> None:
+    head = 'p f2\ni w8 h6 f0 v50 n"0.png"\n'
+    chain = "".join(f'i w8 h6 f0 v={k} a={k} n"{k + 1}.png"\n' for k in range(3000))
+    began = time.process_time()
+    with pytest.raises(BadRequest, match="v is '=[0-9]+'; a number is needed"):
+        read_cameras(head + chain, "x.pto")
+    alike = "".join(f'i w8 h6 f0 v=0 n"{k + 1}.png"\n' for k in range(1000))
+    masks = "".join(f'k i{k} t4 p"0 0 9 0 9 4"\n' for k in range(1000))
+    assert {len(one["ignore"]) for one in read_cameras(head + alike + masks, "x.pto").values()} == {1000}
+    assert time.process_time() - began < 5, "it took 15 s"
+    with pytest.raises(BadRequest, match="at most 5000 of each"):
+        read_cameras(head + alike * 6, "x.pto")

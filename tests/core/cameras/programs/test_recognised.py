@@ -9,6 +9,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from edf_stitch.core.cameras.programs import values
 from edf_stitch.core.cameras.programs.values import by_our_names
 from edf_stitch.core.cameras.sources import read_camera_file
 from edf_stitch.core.system.errors import BadRequest, StitchError
@@ -80,6 +81,19 @@ def test_names_that_mean_none_stay_and_doubtful_ones_are_refused() -> None:
     assert by_our_names({"..": 1, "": 2, ".": 3}, ["a.png"], "file") == {"..": 1, "": 2, ".": 3}
     with pytest.raises(BadRequest, match=r"file: a.png may be x/a.png, y/a.png"):
         by_our_names({"x/a.png": 1, "y/a.png": 2}, ["a.png"], "file")
+
+
+def test_a_picture_is_compared_with_those_of_its_name_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    compared: list[str] = []
+
+    def likeness(given: str, name: str) -> tuple[int, int, int]:
+        compared.append(given)
+        return 1, 1, len(given)
+
+    monkeypatch.setattr(values, "_likeness", likeness)
+    entries = {f"images/{k}.png": k for k in range(10_000)} | {"other\\7.JPG": -1}
+    assert by_our_names(entries, ["7.png"], "x")["7.png"] == 7
+    assert compared == ["images/7.png", "other\\7.JPG"], "a million images took minutes"
 
 
 def test_a_camera_of_another_size_is_brought_to_the_picture(tmp_path: Path) -> None:

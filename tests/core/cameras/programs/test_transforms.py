@@ -59,6 +59,7 @@ def test_a_fisheye_is_kannala_brandts(tmp_path: Path) -> None:
     ({"frame": {"transform_matrix": [[1, 0], [0, 1]]}}, "frame 0 .*: transform_matrix must be 4×4"),
     ({"frame": {"transform_matrix": np.ones((4, 4)).tolist()}}, "the last row"),
     ({"frame": {"transform_matrix": np.diag([2.0, 1, 1, 1]).tolist()}}, "R is not a rotation"),
+    ({"frame": {"transform_matrix": np.full((3, 4), 1e308).tolist()}}, "R is not a rotation"),
     ({"frame": {"file_path": 3}}, "an object with file_path"),
     ({"frame": {"file_path": "./images/b"}}, "a camera already"),
     ({"fl_x": None, "camera_angle_x": 4}, "camera_angle_x is 4"),

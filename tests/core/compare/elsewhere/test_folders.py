@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +12,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core.compare.elsewhere import folders
 from edf_stitch.core.compare.elsewhere.folders import outside_of, read_folder
 from edf_stitch.core.compare.pairs import PairFiles
 from edf_stitch.core.measure.placed.of_result import placed
 from edf_stitch.core.measure.placed.overlaps import gained_figures, plain_figures
 from edf_stitch.core.measure.placed.straightness import line_figures
 from edf_stitch.core.output.outputs import OutputRequest, write
+from edf_stitch.core.pictures import decoding
 from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.system.errors import BadRequest, UnreadableImage
 from edf_stitch.core.system.output_files import OutputFiles
@@ -122,6 +126,32 @@ def test_damaged_maps_are_said_and_nothing_else_breaks(
     whole = (left / "warp.npz").read_bytes()
     (left / "warp.npz").write_bytes(damage(whole))
     with pytest.raises(BadRequest, match="not a file of maps"):
+        read_folder(left, small_result.pictures)
+
+
+@pytest.mark.parametrize(("name", "data", "said"), [
+    ("jp2", bytes.fromhex("0000000c6a5020200d0a870a") + b"\0" * 200, "layers and masks are PNG, TIFF or JPEG"),
+    ("cut", cv2.imencode(".png", np.zeros((9, 9, 4), np.uint8))[1].tobytes()[:-20], "it is cut off"),
+    ("bomb", cv2.imencode(".png", np.zeros((9, 9, 4), np.uint8))[1].tobytes(), "cannot come out of"),
+])  # fmt: skip
+def test_a_layer_is_checked_before_it_is_decoded(
+    small_result: StitchResult, left: Path, name: str, data: bytes, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if name == "bomb":
+        header = b"IHDR" + struct.pack(">II", 30_000, 10_000) + data[24:29]
+        data = data[:12] + header + struct.pack(">I", zlib.crc32(header)) + data[33:]
+    next(left.glob("01_*.png")).write_bytes(data)
+    monkeypatch.setattr(decoding, "decoded", lambda _: pytest.fail("it was decoded"))
+    monkeypatch.setattr(cv2, "imread", lambda *_: pytest.fail("OpenCV chose its decoder by the content"))
+    with pytest.raises(UnreadableImage, match=said):
+        folders._layer(left, next(left.glob("01_*.png")))
+
+
+def test_maps_of_a_canvas_that_nothing_could_hold_are_refused(small_result: StitchResult, left: Path) -> None:
+    with np.load(left / "warp.npz") as whole:
+        content = dict(whole)
+    np.savez(left / "warp.npz", **(content | {"canvas": np.array([10**6, 10**6])}))
+    with pytest.raises(BadRequest, match="not a file of maps .a canvas of 1000000 × 1000000"):
         read_folder(left, small_result.pictures)
 
 
