@@ -18,7 +18,7 @@ export OPENBLAS_NUM_THREADS := 1
 unexport PYTHONDONTWRITEBYTECODE
 export BLENDER_RUN
 
-.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference docs bench extension package clean
+.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference docs bench extension listing package clean
 
 setup: $(READY)
 
@@ -115,6 +115,10 @@ bench: setup
 extension: setup
 	$(BIN)/python .ci/build_extension.py $(if $(PLATFORM),--platform $(PLATFORM)) $(if $(LOCAL),--local) \
 		--blender "$$BLENDER_RUN" --output-dir dist
+
+# Icon, featured picture and previews for the extension's page into dist/listing/.
+listing: setup
+	$(BIN)/python .ci/listing_pictures.py --output-dir dist/listing
 
 # What is published: the source, the wheel built from that source alone, and the wheel tried in an environment of its own.
 package:
