@@ -120,13 +120,17 @@ extension: setup
 listing: setup
 	$(BIN)/python .ci/listing_pictures.py --output-dir dist/listing
 
-# What is published: the source, the wheel built from that source alone, and the wheel tried in an environment of its own.
+# What is published: the source, the wheel built from that source alone, both as an index takes them, and the wheel tried
+# in an environment of its own.
+CHECKS := twine==7.0.0 check-wheel-contents==0.6.3
 package:
 	rm -rf dist/package build/fresh
 	$(PYTHON) -m venv build/fresh
-	build/fresh/bin/python -m pip install --quiet 'setuptools>=77'
+	build/fresh/bin/python -m pip install --quiet 'setuptools>=77' $(CHECKS)
 	build/fresh/bin/python -c "from setuptools import build_meta; build_meta.build_sdist('dist/package')"
 	build/fresh/bin/python -m pip wheel --quiet --no-deps --wheel-dir dist/package dist/package/*.tar.gz
+	build/fresh/bin/twine check --strict dist/package/*
+	build/fresh/bin/check-wheel-contents dist/package/*.whl
 	rm -rf build/fresh
 	$(PYTHON) -m venv build/fresh
 	build/fresh/bin/python -m pip install --quiet --constraint .ci/constraints.txt dist/package/*.whl
