@@ -15,9 +15,8 @@ start = job.start
 
 
 @pytest.fixture
-def stitched(listed, monkeypatch, tmp_path):  # noqa: F811
+def stitched(listed):  # noqa: F811
     """A set that was stitched, with a cache."""
-    monkeypatch.setenv("EDF_CACHE", str(tmp_path / "cache"))
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     return listed
 

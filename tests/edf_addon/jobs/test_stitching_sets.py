@@ -1,6 +1,6 @@
 """From a list of more than two pictures to a panorama in the file, through the operators and a real worker."""
 
-import os
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -24,7 +24,8 @@ USED = ["1.png", "2.png", "3.png"]
 @pytest.fixture(scope="session")
 def set_folder(tmp_path_factory) -> Path:
     """Three pictures that belong together, and one that belongs to none."""
-    folder = tmp_path_factory.mktemp("set")
+    folder = tmp_path_factory.mktemp("set") / "pictures"
+    folder.mkdir()
     noise = np.random.default_rng(2).random((240, 320, 3))
     pictures = {picture.name: picture.pixels for picture in make_set(3).pictures} | {"4.png": noise}
     for name, pixels in pictures.items():
@@ -33,8 +34,9 @@ def set_folder(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def listed(blender, set_folder) -> SimpleNamespace:
-    """Those that belong together in the list; to be stitched soon."""
+def listed(blender, set_folder, monkeypatch) -> SimpleNamespace:
+    """Those that belong together in the list; to be stitched soon, with what an earlier test's stitch has found."""
+    monkeypatch.setenv("EDF_CACHE", str(set_folder.parent / "cache"))
     assert bpy.ops.edf.add_folder(directory=str(set_folder)) == {"FINISHED"}
     blender.settings.pictures[3].use = blender.settings.dense = False
     return blender
@@ -120,7 +122,7 @@ def test_a_picture_that_is_deleted_while_a_set_is_stitched(listed):
     bpy.data.images.remove(bpy.data.images["2.png"])
     event = SimpleNamespace(type="TIMER", value="NOTHING")
     while working.modal(bpy.context, event) == {"PASS_THROUGH"}:
-        os.sched_yield()
+        time.sleep(0.02)
     assert not modal.is_working() and "Other pictures are chosen" in status.now.message
     (words,) = ownership.missing(listed.settings.result)
     assert words == "“2.png”, picture 2 of this panorama, is no longer in the file"

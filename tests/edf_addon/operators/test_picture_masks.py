@@ -16,9 +16,8 @@ from ..jobs.test_stitching_sets import listed, set_folder  # noqa: E402, F401 (f
 
 
 @pytest.fixture
-def stitched(listed, monkeypatch, tmp_path):  # noqa: F811
+def stitched(listed):  # noqa: F811
     """A set that was stitched, with a cache, and which picture each of its points comes from."""
-    monkeypatch.setenv("EDF_CACHE", str(tmp_path / "cache"))
     listed.settings.take_masks = True
     listed.settings.seam = "GRAPHCUT"
     assert bpy.ops.edf.stitch() == {"FINISHED"}
