@@ -1,7 +1,6 @@
 """From a list of more than two pictures to a panorama in the file, through the operators and a real worker."""
 
 import time
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,31 +14,7 @@ from edf_stitch.edf_addon.jobs import modal  # noqa: E402
 from edf_stitch.edf_addon.operators import stitch  # noqa: E402
 from edf_stitch.edf_addon.scene import take_along  # noqa: E402
 
-from ...sets import make_set  # noqa: E402
-from .. import picture_files  # noqa: E402
-
 USED = ["1.png", "2.png", "3.png"]
-
-
-@pytest.fixture(scope="session")
-def set_folder(tmp_path_factory) -> Path:
-    """Three pictures that belong together, and one that belongs to none."""
-    folder = tmp_path_factory.mktemp("set") / "pictures"
-    folder.mkdir()
-    noise = np.random.default_rng(2).random((240, 320, 3))
-    pictures = {picture.name: picture.pixels for picture in make_set(3).pictures} | {"4.png": noise}
-    for name, pixels in pictures.items():
-        picture_files.write(folder / name, pixels.astype(np.float32))
-    return folder
-
-
-@pytest.fixture
-def listed(blender, set_folder, monkeypatch) -> SimpleNamespace:
-    """Those that belong together in the list; to be stitched soon, with what an earlier test's stitch has found."""
-    monkeypatch.setenv("EDF_CACHE", str(set_folder.parent / "cache"))
-    assert bpy.ops.edf.add_folder(directory=str(set_folder)) == {"FINISHED"}
-    blender.settings.pictures[3].use = blender.settings.dense = False
-    return blender
 
 
 def test_a_list_becomes_a_panorama_that_is_kept_and_stitched_again(listed, tmp_path, pixels_of):
