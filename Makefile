@@ -9,12 +9,16 @@ SUITE ?= quick
 BIN := .venv/bin
 READY := .venv/.ready
 PYTEST := $(BIN)/python -m pytest
+# Each worker takes neighbours, and what is left of the other's when it has done: what a file's tests share is made once.
+PARALLEL := -n $(WORKERS) --dist worksteal
 
 # As the command itself does it: the bytes of a result must not depend on the number of cores.
 export OPENBLAS_NUM_THREADS := 1
+# The tests start hundreds of processes. Where Python may not keep what it has compiled, each compiles the engine: 0.4 s.
+unexport PYTHONDONTWRITEBYTECODE
 export BLENDER_RUN
 
-.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference docs bench extension package clean
+.PHONY: setup demo test test-oldest test-newest slow soak validate end-to-end lint reference docs bench extension listing package clean
 
 setup: $(READY)
 
@@ -31,7 +35,7 @@ demo: setup
 	$(BIN)/edf demo -o demo_output --overwrite
 
 test: setup
-	$(PYTEST) -n $(WORKERS) -m "not slow and not blender"
+	$(PYTEST) $(PARALLEL) -m "not slow and not blender"
 
 # The add-on in the oldest Blender that is supported, as a module: 4.2 LTS, with the NumPy that it carries. rawpy asks for a
 # later one and works with this, so it goes in without being asked.
@@ -46,7 +50,7 @@ $(OLDEST)/.ready: pyproject.toml .ci/constraints.txt
 	touch $@
 
 test-oldest: $(OLDEST)/.ready
-	$(OLDEST)/bin/python -m pytest -n $(WORKERS) tests/edf_addon tests/core/commands/test_worker.py tests/core/output/test_inspection.py
+	$(OLDEST)/bin/python -m pytest $(PARALLEL) tests/edf_addon tests/core/commands/test_worker.py tests/core/output/test_inspection.py
 
 # A fast part of the tests with the newest version of every dependency, as a plain `pip install` brings it.
 NEWEST := .venv-newest
@@ -57,17 +61,17 @@ $(NEWEST)/.ready: pyproject.toml
 	touch $@
 
 test-newest: $(NEWEST)/.ready
-	$(NEWEST)/bin/python -m pytest -n $(WORKERS) -m "not slow and not blender" tests/core/pictures/test_picture.py \
+	$(NEWEST)/bin/python -m pytest $(PARALLEL) -m "not slow and not blender" tests/core/pictures/test_picture.py \
 		tests/core/pictures/test_heif.py tests/core/pictures/test_camera_raw.py tests/core/test_refusals.py tests/core/test_pipeline.py tests/core/pose/test_features.py tests/core/dense \
 		tests/core/compose tests/core/commands/test_worker.py
 
 # pytest exits 5 where no test is marked so.
 slow: setup
-	$(PYTEST) -n $(WORKERS) -m "slow and not soak and not blender" || [ $$? -eq 5 ]
+	$(PYTEST) $(PARALLEL) -m "slow and not soak and not blender" || [ $$? -eq 5 ]
 
 # What may never break, tried thousands of times: damaged files, interruptions, long sessions. Half an hour or so.
 soak: setup
-	$(PYTEST) -n $(WORKERS) -m soak
+	$(PYTEST) $(PARALLEL) -m soak
 
 # SUITE=full: all scenes at 1280×960, 25 minutes from empty on two cores; SUITE=sets: all sets of many pictures. Pictures
 # are kept and made only once.
@@ -112,13 +116,21 @@ extension: setup
 	$(BIN)/python .ci/build_extension.py $(if $(PLATFORM),--platform $(PLATFORM)) $(if $(LOCAL),--local) \
 		--blender "$$BLENDER_RUN" --output-dir dist
 
-# What is published: the source, the wheel built from that source alone, and the wheel tried in an environment of its own.
+# Icon, featured picture and previews for the extension's page into dist/listing/.
+listing: setup
+	$(BIN)/python .ci/listing_pictures.py --output-dir dist/listing
+
+# What is published: the source, the wheel built from that source alone, both as an index takes them, and the wheel tried
+# in an environment of its own.
+CHECKS := twine==7.0.0 check-wheel-contents==0.6.3
 package:
 	rm -rf dist/package build/fresh
 	$(PYTHON) -m venv build/fresh
-	build/fresh/bin/python -m pip install --quiet 'setuptools>=77'
+	build/fresh/bin/python -m pip install --quiet 'setuptools>=77' $(CHECKS)
 	build/fresh/bin/python -c "from setuptools import build_meta; build_meta.build_sdist('dist/package')"
 	build/fresh/bin/python -m pip wheel --quiet --no-deps --wheel-dir dist/package dist/package/*.tar.gz
+	build/fresh/bin/twine check --strict dist/package/*
+	build/fresh/bin/check-wheel-contents dist/package/*.whl
 	rm -rf build/fresh
 	$(PYTHON) -m venv build/fresh
 	build/fresh/bin/python -m pip install --quiet --constraint .ci/constraints.txt dist/package/*.whl

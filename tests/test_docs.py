@@ -60,7 +60,8 @@ def options() -> set[str]:
 
 def commands(page: Path) -> Iterator[list[str]]:
     """The calls of `edf` in its blocks of code, but for what shows how a call is formed."""
-    for line in re.findall(r"^ {4}(?:.*--command )?(edf .*)$", page.read_text("utf-8"), re.MULTILINE):
+    whole = re.sub(r" \\\n +", " ", page.read_text("utf-8"))
+    for line in re.findall(r"^ {4}(?:.*--command )?(edf .*)$", whole, re.MULTILINE):
         call = re.split(r" {2,}|#", line)[0]
         if not re.search(r"\[|…", call):
             yield shlex.split(call)[1:]

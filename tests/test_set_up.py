@@ -8,6 +8,8 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -167,6 +169,21 @@ def test_the_extension_s_page_says_what_the_manifest_says():
     assert len(MANIFEST["tagline"]) <= 64 and list(MANIFEST["permissions"]) == ["files"]
     asked = MANIFEST["permissions"]["files"]
     assert asked[0].lower() + asked[1:] == "read photographs, write panoramas and reports" and "one permission" in text
+
+
+def test_the_pictures_of_the_extension_s_page_have_its_sizes_and_none_is_cut(tmp_path):
+    """An icon of 256 px with round corners; the others 16:9, with all of a picture on the ground."""
+    listing = load("listing_pictures")
+    listing.write_all(tmp_path)
+    found = {path.name: cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in tmp_path.iterdir()}
+    icon = found.pop("icon.png")
+    assert icon.shape == (256, 256, 4) and icon[0, 0, 3] == 0 and icon[128, 128].tolist() == [245, 245, 245, 255]
+    assert {"featured.jpg", "preview_blender.jpg"} <= set(found)
+    assert {picture.shape for picture in found.values()} == {(1080, 1920, 3)}
+    for shape in ((300, 100, 3), (100, 300, 3)):
+        page = listing.on_a_page(np.full(shape, 255, np.uint8)) == 255
+        height, width = page.all(axis=2).any(axis=1).sum(), page.all(axis=2).any(axis=0).sum()
+        assert height / width == pytest.approx(shape[0] / shape[1], rel=0.01) and (height == 1080 or width == 1920)
 
 
 def test_what_lies_about_in_a_checkout_does_not_go_into_a_zip(tmp_path):

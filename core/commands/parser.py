@@ -105,9 +105,8 @@ def edf_parser() -> Parser:
     _add_stitch(commands.add_parser("stitch", help="stitch pictures into one panorama", description=_STITCH))
     add_info(commands.add_parser("info", help="say what was understood of each picture", description=INFO))
     _add_batch(commands.add_parser("batch", help="stitch a list of panoramas and clips", description=_BATCH))
-    _add_compare(
-        commands.add_parser("compare", help="every field on every pair, in one table", description=_COMPARE)
-    )
+    compare = "every field on every pair, every program on every set, in one table"
+    _add_compare(commands.add_parser("compare", help=compare, description=_COMPARE))
     _add_validate(
         commands.add_parser("validate", help="render scenes with known cameras and measure", description=_VALIDATE)
     )

@@ -169,9 +169,10 @@ def test_the_report_counts_in_px_of_the_panorama(at_once: StitchResult, drafted:
     assert second["field"]["leave_one_out_px"] == pytest.approx(first["field"]["leave_one_out_px"], rel=0.3)
 
 
-def test_a_preview_is_made_at_once(large: PictureSet, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_preview_is_made_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(draft, "DRAFT", replace(draft.DRAFT, most_pixels=1))
-    assert stitch(large.pictures, replace(OPTIONS, preview=True, measure=False)).enlarged is None
+    options = replace(OPTIONS, camera=CameraRequest(focal_px=(FOCAL,)), slide=0, preview=True, measure=False)
+    assert stitch(make_set(3).pictures, options).enlarged is None
 
 
 def test_depth_has_the_panoramas_size_and_lies_where_the_drafts_does(drafted: StitchResult) -> None:

@@ -43,8 +43,14 @@ def four() -> PictureSet:
 
 
 @pytest.fixture(scope="session")
-def set_result(four: PictureSet) -> StitchResult:
-    return stitch(four.pictures, KNOWN)
+def kept(tmp_path_factory: pytest.TempPathFactory) -> StitchOptions:
+    """KNOWN where what one stitch has found is kept for the next: for tests of what becomes of it."""
+    return replace(KNOWN, cache=tmp_path_factory.mktemp("kept"))
+
+
+@pytest.fixture(scope="session")
+def set_result(four: PictureSet, kept: StitchOptions) -> StitchResult:
+    return stitch(four.pictures, kept)
 
 
 def numbers_of(result: StitchResult) -> list[int]:
@@ -78,8 +84,8 @@ def test_one_panorama_shows_all_and_misses_no_match(set_result: StitchResult) ->
 
 
 @pytest.fixture(scope="module")
-def dense_result(four: PictureSet) -> StitchResult:
-    return stitch(four.pictures, replace(KNOWN, dense=True))
+def dense_result(four: PictureSet, kept: StitchOptions) -> StitchResult:
+    return stitch(four.pictures, replace(kept, dense=True))
 
 
 def test_dense_refinement_makes_the_pictures_agree(dense_result: StitchResult, set_result: StitchResult) -> None:
@@ -104,8 +110,8 @@ def test_another_order_makes_the_same_dense_panorama(four: PictureSet, dense_res
     assert one.shape == same.shape and psnr(one, same, np.ones(one.shape[:2], bool)) > 45
 
 
-def test_a_dense_panorama_slides_as_well(four: PictureSet, dense_result: StitchResult) -> None:
-    slid = stitch(four.pictures, replace(KNOWN, dense=True, slide=1.0))
+def test_a_dense_panorama_slides_as_well(four: PictureSet, kept: StitchOptions, dense_result: StitchResult) -> None:
+    slid = stitch(four.pictures, replace(kept, dense=True, slide=1.0))
     assert slid.warp.viewpoint is not None and np.isfinite(slid.warp.inverse_depth).all()
     measured = slid.report["measured"]
     assert measured["alignment_median_px"] < 0.5 and measured["folds"] < 0.02
@@ -132,13 +138,13 @@ def test_the_order_changes_names_only(four: PictureSet, set_result: StitchResult
     assert len(other.rig.rays) == len(set_result.rig.rays)
 
 
-def test_it_is_seen_from_the_picture_that_is_asked_for(four: PictureSet) -> None:
-    third = stitch(four.pictures, replace(KNOWN, viewpoint=3))
+def test_it_is_seen_from_the_picture_that_is_asked_for(four: PictureSet, kept: StitchOptions) -> None:
+    third = stitch(four.pictures, replace(kept, viewpoint=3))
     assert numbers_of(third) == [2, 0, 1, 3]
     assert not third.rig.t[0].any()
     turned, moved = pose_errors(four, third)
     assert turned < 0.2 and moved < 0.02
-    assert third.report["options"]["viewpoint"] == 3 and third.report["options"]["fade"] == KNOWN.fade
+    assert third.report["options"]["viewpoint"] == 3 and third.report["options"]["fade"] == kept.fade
 
 
 @pytest.mark.slow
@@ -236,9 +242,11 @@ def test_a_picture_that_does_not_belong_is_left_out_and_named(four: PictureSet) 
         stitch([stranger, picture_from_array(stranger.view[::-1].copy(), "s.png"), four.pictures[0]], KNOWN)
 
 
-def test_cameras_that_were_written_are_held(four: PictureSet, set_result: StitchResult) -> None:
+def test_cameras_that_were_written_are_held(
+    four: PictureSet, kept: StitchOptions, set_result: StitchResult
+) -> None:
     table = plain(camera_table(set_result))
-    again = stitch(four.pictures, replace(KNOWN, camera=CameraRequest(cameras=table)))
+    again = stitch(four.pictures, replace(kept, camera=CameraRequest(cameras=table)))
     for view, before in zip(again.views, set_result.views, strict=True):
         np.testing.assert_allclose(view.K, before.K, rtol=1e-12)
         np.testing.assert_allclose(view.R, before.R, atol=1e-9)
@@ -246,13 +254,15 @@ def test_cameras_that_were_written_are_held(four: PictureSet, set_result: Stitch
     assert all(one["camera"]["source"] == "camera file" for one in again.report["pictures"])
 
 
-def test_poses_of_some_pictures_are_held_in_whatever_frame(four: PictureSet, set_result: StitchResult) -> None:
+def test_poses_of_some_pictures_are_held_in_whatever_frame(
+    four: PictureSet, kept: StitchOptions, set_result: StitchResult
+) -> None:
     table = plain(camera_table(set_result))["cameras"]
     turn, half = rotation_from_vector(np.array([0.1, 0.4, 0.2])), {}
     for name in ("1.png", "3.png"):
         R, t = np.array(table[name]["R"]) @ turn.T, np.array(table[name]["t"])
         half[name] = {**table[name], "R": R, "t": 3 * (t - R @ [1, 2, 3])}
-    again = stitch(four.pictures, replace(KNOWN, camera=CameraRequest(cameras={"cameras": half})))
+    again = stitch(four.pictures, replace(kept, camera=CameraRequest(cameras={"cameras": half})))
     for number, (view, before) in enumerate(zip(again.views, set_result.views, strict=True)):
         given = number in (0, 2)
         np.testing.assert_allclose(view.R, before.R, atol=1e-9 if given else 5e-3)
@@ -332,16 +342,18 @@ def test_warp_and_layers_hold_every_picture(set_result: StitchResult, tmp_path: 
     assert page.count("<image ") == 4 and page.count("<line ") == len(set_result.edges)
 
 
-def test_pictures_are_fetched_by_the_root_of_light(four: PictureSet) -> None:
-    result = stitch(four.pictures, replace(KNOWN, crop="full"))
+def test_pictures_are_fetched_by_the_root_of_light(four: PictureSet, kept: StitchOptions) -> None:
+    result = stitch(four.pictures, replace(kept, crop="full"))
     for picture, one, layer in zip(result.pictures, result.warp.maps, result.layers, strict=True):
         np.testing.assert_array_equal(layer.pixels, layer_of(picture, one, by_root=True).pixels)
 
 
 @pytest.mark.parametrize("slide", [0.0, 1.0])
-def test_the_maps_can_be_made_again_from_the_warps_file(four: PictureSet, slide: float) -> None:
+def test_the_maps_can_be_made_again_from_the_warps_file(
+    four: PictureSet, kept: StitchOptions, slide: float
+) -> None:
     """By the equation that docs/formats.md gives, wherever the viewpoint is."""
-    options = replace(KNOWN, field="strict", slide=slide, projection="cylindrical")
+    options = replace(kept, field="strict", slide=slide, projection="cylindrical")
     with np.load(io.BytesIO(warp_bytes(stitch(four.pictures[:3], options)))) as file:
         warp = dict(file)
     width, height = warp["canvas"]
@@ -371,7 +383,9 @@ def test_the_maps_can_be_made_again_from_the_warps_file(four: PictureSet, slide:
         np.testing.assert_allclose(made[known], values[known], atol=0.02)
 
 
-def test_it_stops_soon_after_it_is_asked_to(four: PictureSet) -> None:
+def test_it_stops_soon_after_it_is_asked_to(four: PictureSet, tmp_path: Path) -> None:
+    """At each stage; what stages before it found is kept, what is interrupted is not."""
+    options = replace(KNOWN, cache=tmp_path)
     for wanted in ("features", "matches", "geometry", "field", "warp", "seam"):
         stage = ""
 
@@ -380,7 +394,7 @@ def test_it_stops_soon_after_it_is_asked_to(four: PictureSet) -> None:
             stage = name
 
         with pytest.raises(Cancelled):
-            stitch(four.pictures[:3], KNOWN, tell, lambda wanted=wanted: stage == wanted)  # type: ignore[misc]  # noqa: B023
+            stitch(four.pictures[:3], options, tell, lambda wanted=wanted: stage == wanted)  # type: ignore[misc]  # noqa: B023
 
 
 def test_whether_to_go_on_is_asked_at_every_picture_of_field_and_maps(four: PictureSet) -> None:

@@ -38,6 +38,30 @@ def chosen(blender: SimpleNamespace, folder: Path) -> SimpleNamespace:
 
 
 @pytest.fixture(scope="session")
+def set_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three pictures that belong together, and one that belongs to none."""
+    from ..sets import make_set
+    from . import picture_files
+
+    folder = tmp_path_factory.mktemp("set") / "pictures"
+    folder.mkdir()
+    noise = np.random.default_rng(2).random((240, 320, 3))
+    pictures = {picture.name: picture.pixels for picture in make_set(3).pictures} | {"4.png": noise}
+    for name, pixels in pictures.items():
+        picture_files.write(folder / name, pixels.astype(np.float32))
+    return folder
+
+
+@pytest.fixture
+def listed(blender: SimpleNamespace, set_folder: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Those that belong together in the list; to be stitched soon, with what an earlier test's stitch has found."""
+    monkeypatch.setenv("EDF_CACHE", str(set_folder.parent / "cache"))
+    assert bpy.ops.edf.add_folder(directory=str(set_folder)) == {"FINISHED"}
+    blender.settings.pictures[3].use = blender.settings.dense = False
+    return blender
+
+
+@pytest.fixture(scope="session")
 def pixels_of():
     """An image's pixels (H, W, 4) as Blender holds them, but with row 0 on top."""
 

@@ -22,6 +22,8 @@ RUN = shlex.split(os.environ.get("BLENDER_RUN", ""))
 SHOT = shlex.split(os.environ.get("BLENDER_SHOT", ""))
 if not SHOT and len(RUN) >= 3 and Path(RUN[0]).name == "real-blender":
     SHOT = [RUN[0], "shot", *RUN[2:]]
+# The pair that `edf demo --no-render` stitches.
+SHIPPED = ROOT / "synthetic_scenes" / "shipped" / "pair"
 # How long the way may take on a machine that does other things too.
 SECONDS = int(os.environ.get("EDF_WINDOW_SECONDS", "180"))
 
@@ -39,27 +41,17 @@ def archive(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def walked(archive, rendered_pair, tmp_path_factory) -> Path:
+def walked(archive, tmp_path_factory) -> Path:
     """The folder that a walk leaves; EDF_WALK names one to keep."""
     out = Path(os.environ.get("EDF_WALK") or tmp_path_factory.mktemp("walk"))
     home = tmp_path_factory.mktemp("window_home")
     script = ROOT / "tests" / "end_to_end" / "walk_in_window.py"
     command = [*SHOT, str(out / "screen.png"), str(SECONDS), "--python", str(script), "--",
-               *map(str, (archive, *rendered_pair, out))]  # fmt: skip
+               *map(str, (archive, SHIPPED / "reference.jpg", SHIPPED / "target.jpg", out))]  # fmt: skip
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(home)}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=SECONDS + 120)
     (out / "output.txt").write_text(done.stdout + done.stderr, "utf-8")
     return out
-
-
-@pytest.fixture(scope="module")
-def rendered_pair(tmp_path_factory) -> tuple[Path, Path]:
-    """What `edf demo` renders."""
-    folder = tmp_path_factory.mktemp("demo")
-    command = [sys.executable, "-m", "edf_stitch", "demo", "-o", str(folder)]
-    subprocess.run(command, check=True, cwd=ROOT.parent, timeout=300, capture_output=True)
-    (pictures,) = (folder / "pictures").iterdir()
-    return pictures / "reference.png", pictures / "target.png"
 
 
 def test_the_whole_way_was_walked(walked):

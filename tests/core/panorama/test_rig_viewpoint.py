@@ -88,11 +88,9 @@ def test_places_change_smoothly_all_around(viewpoint: RigViewpoint) -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000))
-def test_points_and_rays_find_each_other(seed: int) -> None:
+def test_points_and_rays_find_each_other(field: SphereField, viewpoint: RigViewpoint, seed: int) -> None:
     """q / d = C(u) + u / d_u."""
-    rig = walk()
-    field = fit_sphere_field(rig, with_slack=False)
-    viewpoint = viewpoint_of(rig, field).sliding(0.8)
+    viewpoint = viewpoint.sliding(0.8)
     rays = unit_rays(seed, 100, 0.5)
     d = field.at(rays)
     seen, inverse = viewpoint.seen_from(rays, d)

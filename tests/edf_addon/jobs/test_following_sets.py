@@ -9,15 +9,12 @@ from edf_stitch.edf_addon import editor  # noqa: E402
 from edf_stitch.edf_addon.bridge import result  # noqa: E402
 from edf_stitch.edf_addon.jobs import job  # noqa: E402
 
-from .test_stitching_sets import listed, set_folder  # noqa: E402, F401 (fixtures)
-
 start = job.start
 
 
 @pytest.fixture
-def stitched(listed, monkeypatch, tmp_path):  # noqa: F811
+def stitched(listed):
     """A set that was stitched, with a cache."""
-    monkeypatch.setenv("EDF_CACHE", str(tmp_path / "cache"))
     assert bpy.ops.edf.stitch() == {"FINISHED"}
     return listed
 

@@ -1,7 +1,6 @@
 """From a list of more than two pictures to a panorama in the file, through the operators and a real worker."""
 
-import os
-from pathlib import Path
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,29 +14,7 @@ from edf_stitch.edf_addon.jobs import modal  # noqa: E402
 from edf_stitch.edf_addon.operators import stitch  # noqa: E402
 from edf_stitch.edf_addon.scene import take_along  # noqa: E402
 
-from ...sets import make_set  # noqa: E402
-from .. import picture_files  # noqa: E402
-
 USED = ["1.png", "2.png", "3.png"]
-
-
-@pytest.fixture(scope="session")
-def set_folder(tmp_path_factory) -> Path:
-    """Three pictures that belong together, and one that belongs to none."""
-    folder = tmp_path_factory.mktemp("set")
-    noise = np.random.default_rng(2).random((240, 320, 3))
-    pictures = {picture.name: picture.pixels for picture in make_set(3).pictures} | {"4.png": noise}
-    for name, pixels in pictures.items():
-        picture_files.write(folder / name, pixels.astype(np.float32))
-    return folder
-
-
-@pytest.fixture
-def listed(blender, set_folder) -> SimpleNamespace:
-    """Those that belong together in the list; to be stitched soon."""
-    assert bpy.ops.edf.add_folder(directory=str(set_folder)) == {"FINISHED"}
-    blender.settings.pictures[3].use = blender.settings.dense = False
-    return blender
 
 
 def test_a_list_becomes_a_panorama_that_is_kept_and_stitched_again(listed, tmp_path, pixels_of):
@@ -120,7 +97,7 @@ def test_a_picture_that_is_deleted_while_a_set_is_stitched(listed):
     bpy.data.images.remove(bpy.data.images["2.png"])
     event = SimpleNamespace(type="TIMER", value="NOTHING")
     while working.modal(bpy.context, event) == {"PASS_THROUGH"}:
-        os.sched_yield()
+        time.sleep(0.02)
     assert not modal.is_working() and "Other pictures are chosen" in status.now.message
     (words,) = ownership.missing(listed.settings.result)
     assert words == "“2.png”, picture 2 of this panorama, is no longer in the file"

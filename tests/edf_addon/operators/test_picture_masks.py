@@ -12,13 +12,10 @@ from edf_stitch.edf_addon.bridge import result  # noqa: E402
 from edf_stitch.edf_addon.jobs import job, stitching  # noqa: E402
 from edf_stitch.edf_addon.operators import taking  # noqa: E402
 
-from ..jobs.test_stitching_sets import listed, set_folder  # noqa: E402, F401 (fixtures)
-
 
 @pytest.fixture
-def stitched(listed, monkeypatch, tmp_path):  # noqa: F811
+def stitched(listed):
     """A set that was stitched, with a cache, and which picture each of its points comes from."""
-    monkeypatch.setenv("EDF_CACHE", str(tmp_path / "cache"))
     listed.settings.take_masks = True
     listed.settings.seam = "GRAPHCUT"
     assert bpy.ops.edf.stitch() == {"FINISHED"}
