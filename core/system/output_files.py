@@ -7,6 +7,7 @@ import os
 import platform
 import re
 import secrets
+import shutil
 import signal
 import sys
 import threading
@@ -220,7 +221,7 @@ def _probe(folder: Path) -> None:
     except OSError as error:
         raise _unwritable(folder, error) from error
     for path in left:
-        _quietly(path.unlink)
+        _quietly(lambda path=path: shutil.rmtree(path) if path.is_dir() else path.unlink())
 
 
 def _temporary_in(folder: Path) -> Path:
@@ -229,7 +230,7 @@ def _temporary_in(folder: Path) -> Path:
 
 
 def _is_left(entry: os.DirEntry[str]) -> bool:
-    """Whether this is a temporary file of a process that is no more."""
+    """Whether this is a temporary file or folder of a process that is no more."""
     named = _TEMPORARY.fullmatch(entry.name)
     if named is None:
         return False
@@ -242,6 +243,18 @@ def _is_left(entry: os.DirEntry[str]) -> bool:
     except (OSError, OverflowError):  # somebody else's process, or gone already
         return False
     return False
+
+
+@contextmanager
+def temporary_folder(folder: Path) -> Iterator[Path]:
+    """A folder of one's own in a folder that exists, for files that need its space; gone in the end. One that a killed
+    process left goes when somebody asks next whether files could be written beside it."""
+    own = _temporary_in(folder)
+    try:
+        own.mkdir()
+        yield own
+    finally:
+        shutil.rmtree(own, ignore_errors=True)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from .. import editor, idnames, pictures, properties
+from .. import editor, idnames, pictures, properties, status
 from ..bridge import compat, result
 from . import modal, stitching
 
@@ -103,6 +103,7 @@ def _show_again(*_: Any) -> None:
     last = settings.result
     if modal.make_way():
         ask(settings)
+    status.forget_unless(modal.there())
     for _area, space in editor.all_spaces(bpy.context):
         if space.as_pointer() in _shown_in and space.image is None and last is not None:
             space.image = last
