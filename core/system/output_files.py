@@ -15,6 +15,7 @@ import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import IO, TypeVar
@@ -221,7 +222,7 @@ def _probe(folder: Path) -> None:
     except OSError as error:
         raise _unwritable(folder, error) from error
     for path in left:
-        _quietly(lambda path=path: shutil.rmtree(path) if path.is_dir() else path.unlink())
+        _quietly(partial(shutil.rmtree, path) if path.is_dir() else path.unlink)
 
 
 def _temporary_in(folder: Path) -> Path:

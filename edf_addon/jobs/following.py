@@ -143,6 +143,7 @@ _HANDLERS = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
 def register() -> None:
     """Follow from now on."""
     properties.on_reframe.append(changed)
+    pictures.on_joined.append(ask)
     for handlers in _HANDLERS:
         handlers.append(_show_again)
 
@@ -151,6 +152,7 @@ def unregister() -> None:
     """Follow no longer."""
     if changed in properties.on_reframe:
         properties.on_reframe.remove(changed)
+        pictures.on_joined.remove(ask)
     for handlers in _HANDLERS:
         if _show_again in handlers:
             handlers.remove(_show_again)

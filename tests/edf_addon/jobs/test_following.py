@@ -194,3 +194,11 @@ def test_after_an_undo_the_panel_tells_no_longer_of_what_was_undone(blender):
     bpy.data.images.remove(one)
     following._show_again()
     assert not status.now.message
+
+
+def test_guides_and_places_that_are_switched_are_followed(blender, monkeypatch):
+    asked = []
+    monkeypatch.setattr(following, "changed", asked.append)
+    for one in (blender.settings.guides.add(), blender.settings.places.add()):
+        one.use = False
+    assert asked == [blender.settings] * 2
