@@ -118,6 +118,7 @@ class EDF_PT_frame(SubPanel, bpy.types.Panel):  # noqa: N801
             words(self.layout, "Seen from the reference's own place, with every pixel of it", width, NOTE)
         if _is_framed(settings):
             draw_guides(self.layout, settings)
+        self.layout.operator(Operator.FRAME_DRAG, icon="CON_LOCLIMIT")
         self.layout.operator(Operator.REFERENCE_FRAME, icon="IMAGE_REFERENCE")
 
 
