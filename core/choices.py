@@ -19,8 +19,9 @@ FADES = ("continue", "plane", "infinity")
 # The surface that the panorama lies on: chosen by its field of view, the reference's own image plane, a centred plane,
 # Pannini's (with `pannini:D` of a given distance), a cylinder, or a sphere.
 PROJECTIONS = ("auto", "reference", "perspective", "pannini", "cylindrical", "equirectangular")
-# How far the viewpoint slides from the reference's place to the target's: chosen, or a share from 0 to 1.
-Slide = str | float
+# How far the viewpoint slides from the reference's place to the target's: chosen, or a share from 0 to 1; with two
+# more, within the part of the way across the overlap from and to these shares of it.
+Slide = str | float | tuple[float, float, float]
 # The viewpoint that is the picture best connected with all others.
 CENTRE = "centre"
 # How a panorama that is not on the reference's plane is turned: one of LEVELS, or yaw, pitch, roll in degrees.

@@ -224,17 +224,18 @@ def _rig_slide(
     surface: RigSurface, lines: AllEdges, options: StitchOptions, progress: Callable[[float], None]
 ) -> tuple[SlideChoice, RigViewpoint | None]:
     """How far the viewpoint slides among the places of N pictures, as asked for or chosen; None where it stays."""
-    asked, views = options.slide, lines.views
-    if not asked:
+    asked, views = options.slide_by_hand, lines.views
+    if asked is not None and not asked[0]:
         return SlideChoice(0.0, (), "as asked for"), None
     if not any(view.t.any() for view in views):
         return SlideChoice(0.0, (), "the pictures were taken from one place"), None
-    if asked == "auto" and options.surface[0] == "equirectangular":
+    if asked is None and options.surface[0] == "equirectangular":
         return SlideChoice(0.0, (), "a sphere that is asked for is seen from one place"), None
     axes = upright(lines.down)
     viewpoint = rig_viewpoint(views, surface.outlines, axes)
-    if asked != "auto":
-        return SlideChoice(float(asked), (), "as asked for"), viewpoint.sliding(float(asked))
+    if asked is not None:
+        s1 = float(asked[0])
+        return SlideChoice(s1, (), "as asked for"), viewpoint.sliding(s1)
     cylinder = round_projection("cylindrical", views[0].K, axes, CHOICE.base_px_per_radian)
     base = build_rig_warp(surface, cylinder)
     choice = choose_rig_slide(base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None, progress)
@@ -304,19 +305,21 @@ def _slide(
     progress: Callable[[float], None],
 ) -> tuple[SlideChoice, _Sliding | None]:  # fmt: skip
     """How far the viewpoint slides, as asked for or chosen; None where it stays."""
-    asked, views, field = options.slide, known.views, known.field
-    if not asked:
+    asked, views, field = options.slide_by_hand, known.views, known.field
+    if asked is not None and not asked[0]:
         return SlideChoice(0.0, (), "as asked for"), None
-    if not has_depth(field, views) or (asked == "auto" and field.two_view.model != "general"):
+    if not has_depth(field, views) or (asked is None and field.two_view.model != "general"):
         return SlideChoice(0.0, (), "the pictures show one plane, or were taken from one place"), None
-    if asked == "auto" and known.refined is None:
+    if asked is None and known.refined is None:
         return SlideChoice(0.0, (), "the smooth field knows no edges of near things, which a slide would bend"), None
     base = known.base(lines.down, CHOICE.base_px_per_radian)
     viewpoint = viewpoint_between(base, views)
     if viewpoint is None:
         return NO_WAY, None
-    if asked != "auto":
-        return SlideChoice(float(asked), (), "as asked for"), _Sliding(base, viewpoint.sliding(float(asked)))
+    if asked is not None:
+        s1, part = float(asked[0]), (float(asked[1][0]), float(asked[1][1]))
+        sliding = _Sliding(base, viewpoint.within(part).sliding(s1))
+        return SlideChoice(s1, (), "as asked for", part), sliding
     rough = RoughSeam.of(pictures, views, CHOICE.base_px_per_radian)
 
     def seam(warp: Warp) -> float:

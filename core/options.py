@@ -79,9 +79,10 @@ class StitchOptions:
     scale_metres : (int or str, int or str, float), optional
         Two pictures, each by its number, counted from 1, or its name, and how many metres apart they were taken: then
         ranges are in metres. Else they are if the cameras that are given are, and in baselines if nothing is known.
-    slide : float or "auto", default "auto"
+    slide : float, (float, float, float) or "auto", default "auto"
         How far the viewpoint slides from the reference's place to the target's across the overlap: 0 stays, 1 goes all
-        the way, "auto" chooses (docs/method.md).
+        the way, "auto" chooses (docs/method.md). Of a pair with two more shares, from and to: within that part of the
+        way across, as "auto" may choose to and the report's `slide.part` tells.
     projection : str, default "auto"
         The surface that the panorama lies on, one of PROJECTIONS, or "pannini:D" with a distance D from 0 to 1.
         "reference" keeps every pixel of the reference in its place: nothing slides, and nothing is cropped by itself.
@@ -196,6 +197,9 @@ class StitchOptions:
         unfit = {
             f"the field {self.field!r}": (self.field not in ROUND_FIELDS, f"choose from: {', '.join(ROUND_FIELDS)}"),
             "a painted mask": (self.mask is not None, "name what is not to be shown by --ignore NAME=MASK"),
+            "a part of the way that the viewpoint slides": (
+                self.slide_by_hand is not None and self.slide_by_hand[1] != (0, 1), "give one number alone, how far"
+            ),
             "the fade to infinity": (self.fade == "infinity", "choose --fade continue"),
             "a value for either of two cameras": (
                 self.camera.of_two, "give one for all pictures, or each its own by --cameras FILE.json"
@@ -233,7 +237,17 @@ class StitchOptions:
     @property
     def may_slide(self) -> bool:
         """On the reference's own plane the viewpoint stays."""
-        return self.surface[0] != "reference" and self.slide != 0
+        return self.surface[0] != "reference" and (self.slide_by_hand is None or self.slide_by_hand[0] != 0)
+
+    @property
+    def slide_by_hand(self) -> tuple[float, tuple[float, float]] | None:
+        """How far it slides, and within which part of the way, from and to shares of it; None where that is chosen."""
+        if isinstance(self.slide, str):
+            return None
+        if not isinstance(self.slide, tuple):
+            return self.slide, (0.0, 1.0)
+        s1, start, end = self.slide
+        return s1, (start, end)
 
     @property
     def few_features(self) -> bool:
@@ -254,8 +268,7 @@ class StitchOptions:
         ):  # fmt: skip
             if value not in known:
                 raise BadRequest(f"{name} {value!r} is not offered; choose from: {', '.join(known)}")
-        if not (self.slide == "auto" if isinstance(self.slide, str) else 0 <= self.slide <= 1):
-            raise BadRequest(f"a slide of {self.slide}: it is a number from 0 (the reference's place) to 1, or auto")
+        self._check_slide()
         self._check_exposure()
         if not LEAST_SCALE <= self.scale <= 1.0:  # NaN too
             raise BadRequest(f"a scale of {self.scale:g}: it must lie between {LEAST_SCALE:g} and 1 (the full size)")
@@ -291,6 +304,15 @@ class StitchOptions:
     def _check_preview(self) -> None:
         if self.preview and not isinstance(self.crop, str):
             raise BadRequest("a crop in px is one of the full panorama: of a preview leave it out")
+
+    def _check_slide(self) -> None:
+        if isinstance(self.slide, tuple):
+            shares = [0.0, *self.slide[1:], 1.0]
+            if len(self.slide) != 3 or not shares[0] <= shares[1] < shares[2] <= shares[3]:
+                raise BadRequest(f"a slide of {self.slide}: beside how far, it is within a part of the way across the "
+                                 "overlap, FROM,TO with 0 <= FROM < TO <= 1")  # fmt: skip
+        if not (self.slide == "auto" if self.slide_by_hand is None else 0 <= self.slide_by_hand[0] <= 1):
+            raise BadRequest(f"a slide of {self.slide}: it is a number from 0 (the reference's place) to 1, or auto")
 
     def _check_exposure(self) -> None:
         if isinstance(self.exposure, str) and self.exposure not in EXPOSURES:
@@ -357,7 +379,7 @@ class StitchOptions:
         )  # fmt: skip
         for name, given in (
             ("level", not isinstance(self.level, str)), ("centre", self.centre is not None),
-            ("fov", self.fov is not None), ("slide", self.slide not in ("auto", 0)),
+            ("fov", self.fov is not None), ("slide", self.slide_by_hand is not None and self.slide_by_hand[0] != 0),
         ):  # fmt: skip
             if given:
                 other = "projection" if self.projection == "reference" else "field"

@@ -114,7 +114,7 @@ def _made(frame: Frame, geometry: Geometry, options: StitchOptions, progress: St
     def made(by: StitchOptions) -> StitchResult:
         alignment = fit_and_warp(geometry, [frame], by, progress)
         result = compose(frame, alignment, by, progress)
-        if alignment.slide.part == ALL:
+        if by.slide != "auto" or alignment.slide.part == ALL:
             return result
         aside = progress.untold()
         return least_torn(result, lambda: compose(frame, _slid_all_the_way(alignment, frame, by, aside), by, aside))
@@ -234,6 +234,8 @@ def compose(
     labels = made.labels
     ask()
     looks = appearance(made.panorama, made.exposed, labels, any(floats)) if options.measure else {}
+    left, top, *uncropped = canvas.whole
+    where = {"box": [box[0] - left, box[1] - top, *box[2:]], "whole": uncropped}
     panorama, canvas = panorama.within(box), canvas.within(box)
     # of a whole sphere, layers and maps exist only where the pictures lie
     box = common(reduced_box(box, times), (0, 0, whole.canvas.width, whole.canvas.height))
@@ -250,6 +252,7 @@ def compose(
         report, more = make_report(*told, int((hidden & (made.panorama.alpha == 0)).sum()))
     else:
         report, more = make_rig_report(*told, labels, times)
+    report["canvas"] |= where
     named = (line for picture in pictures for line in _named(picture))
     warnings = (*frame.warnings, *named, *alignment.warnings, *more)
     report["warnings"] = list(warnings)

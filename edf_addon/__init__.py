@@ -15,6 +15,7 @@ from . import properties
 from .jobs import command, following, modal
 from .operators import (
     clips,
+    framing,
     guiding,
     mask_painting,
     match_editing,
@@ -27,13 +28,14 @@ from .operators import (
     stitch,
     taking,
 )
-from .overlays import drawing, strokes
+from .overlays import drawing, frame_handles, strokes
 from .panels import elsewhere, presets, sidebar
 
 # Registered in this order, unregistered in the opposite one; each has register() and unregister().
 REGISTERED = (
     properties, modal, following, stitch, opening, picture_list, clips, saving, match_editing, match_pointing,
-    mask_painting, picture_masks, taking, guiding, scene_objects, presets, sidebar, elsewhere, drawing, strokes,
+    mask_painting, picture_masks, taking, guiding, framing, scene_objects, presets, sidebar, elsewhere, drawing,
+    strokes, frame_handles,
 )  # fmt: skip
 _commands: list[Any] = []
 _registered: list[Any] = []

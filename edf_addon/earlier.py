@@ -17,15 +17,16 @@ THEN = {
     "projection": "REFERENCE", "fade": "PLANE", "holes": "TRANSPARENT", "crop": "FULL", "slide_auto": False,
     "slide": 0.0, "centre": (0.0, 0.0), "fov": 0.0, "light": "REFERENCE",
 }  # fmt: skip
-# A setting that only came with version 2.
+# A setting that only came with version 2, and what was meant until one came later.
 _NEW = "slide_auto"
+_SINCE = {"slide_part": (0.0, 1.0)}
 
 
 def kept_now(kept: Mapping[str, Any]) -> dict[str, Any]:
     """Settings by name that a panorama or a preset keeps, of whatever version, as they are written now."""
     if _NEW in kept:
-        return dict(kept)
-    now = {**THEN, "light": _light(kept.get("exposure", True)), **kept}
+        return {**_SINCE, **kept}
+    now = {**THEN, **_SINCE, "light": _light(kept.get("exposure", True)), **kept}
     if now["projection"] == "PERSPECTIVE":
         now["projection"] = "REFERENCE"
     return now

@@ -54,7 +54,11 @@ def settings_then(settings: Any, image: bpy.types.Image | None) -> Any:
     """The settings that an image was made with, as attributes, where it is a panorama of the pictures that are chosen
     now; else None."""
     found = result.read(image) if is_of_chosen(settings, image) else None
-    return None if found is None else SimpleNamespace(**earlier.kept_now(found["settings"]))
+    if image is None or found is None:
+        return None
+    # a picture is known by itself, whatever it is called by now
+    chosen = {"seen_from": ownership.chosen(image).get("seen_from")}
+    return SimpleNamespace(**{**earlier.kept_now(found["settings"]), **chosen})
 
 
 def is_behind(settings: Any, image: bpy.types.Image | None) -> bool:

@@ -23,15 +23,18 @@ def options_of(settings: Any, scale: float | None = None, is_set: bool = False) 
     options["exposure"] = _exposure_of(settings)
     options["scale"] = settings.scale if scale is None else scale
     options |= frame_of(settings, options["scale"])
+    if is_set and isinstance(options["slide"], list):
+        options["slide"] = options["slide"][0]
     options["camera"] = _camera_of(settings, is_set)
     return options
 
 
 def look_of(settings: Any) -> dict[str, Any]:
-    """All that decides how a panorama looks once matches, field and depth are known: the frame and how it is composed.
-    """
+    """All that decides how a panorama looks once matches are known: from where it is seen, its frame, and how it is
+    composed."""
     composed = {name: getattr(settings, name).lower() for name in ("blend", "seam", "holes")}
-    return {**frame_of(settings), **composed, "exposure": _exposure_of(settings)}
+    seen_from = settings.seen_from
+    return {**frame_of(settings), **composed, "exposure": _exposure_of(settings), "seen_from": seen_from}
 
 
 def frame_of(settings: Any, scale: float = 1.0) -> dict[str, Any]:
@@ -45,7 +48,7 @@ def frame_of(settings: Any, scale: float = 1.0) -> dict[str, Any]:
         frame["crop"] = [int(side * scale) for side in settings.crop_box]
     elif is_reference and settings.crop == "AUTO":
         frame["crop"] = "full"
-    frame["slide"] = 0.0 if is_reference else "auto" if settings.slide_auto else settings.slide
+    frame["slide"] = 0.0 if is_reference else "auto" if settings.slide_auto else _slide_of(settings)
     frame["level"] = "auto" if is_reference else settings.level.lower()
     if frame["level"] == "angles":
         frame["level"] = [math.degrees(angle) for angle in settings.level_angles]
@@ -57,6 +60,12 @@ def frame_of(settings: Any, scale: float = 1.0) -> dict[str, Any]:
     fov = min(360.0, math.degrees(settings.fov))
     frame["fov"] = fov if fov >= LEAST_FOV and not is_whole else None
     return frame
+
+
+def _slide_of(settings: Any) -> float | list[float]:
+    """How far the viewpoint slides by hand, and within which part of the way, where that is not all of it."""
+    part = [round(share, 6) for share in sorted(settings.slide_part)]
+    return settings.slide if part == [0.0, 1.0] else [settings.slide, *part]
 
 
 def exr_form_of(settings: Any) -> dict[str, str]:

@@ -48,6 +48,7 @@ class Operator(StrEnum):
     PLACE_REMOVE = "edf.place_remove"
     GUIDE_ADD = "edf.guide_add"
     GUIDE_REMOVE = "edf.guide_remove"
+    FRAME_DRAG = "edf.frame_drag"
     POINTER = "edf.pointer"
     CREATE_CAMERAS = "edf.create_cameras"
     DEPTH_MESH = "edf.depth_mesh"

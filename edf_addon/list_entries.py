@@ -17,6 +17,12 @@ def look_again(_group: Any, _context: Any) -> None:
                 area.tag_redraw()
 
 
+def joined_in(entry: Any, context: Any) -> None:
+    """A guide or a place counts from now on, or no longer: it is drawn so, and whoever follows it is told."""
+    look_again(entry, context)
+    pictures.joined(entry)
+
+
 class EDF_PG_match(bpy.types.PropertyGroup):  # noqa: N801 (Blender's own form)
     """A point of the reference and where the target shows the same, px of the full upright pictures: pixel centres are
     integers, (0, 0) at the top left."""
@@ -68,7 +74,7 @@ class EDF_PG_guide(bpy.types.PropertyGroup):  # noqa: N801
 
     picture: PointerProperty(name="Picture", type=bpy.types.Image, description="The picture that it lies in")
     kind: EnumProperty(name="Kind", items=offered.GUIDES, update=look_again)
-    use: BoolProperty(name="Use", description="Whether level holds to it", default=True, update=look_again)
+    use: BoolProperty(name="Use", description="Whether level holds to it", default=True, update=joined_in)
     ends: FloatVectorProperty(
         name="Ends", description="Column and row of both ends, in pixels of the upright picture", size=4,
         update=look_again,
@@ -79,7 +85,9 @@ class EDF_PG_place(bpy.types.PropertyGroup):  # noqa: N801
     """A place of the panorama that comes from a certain picture."""
 
     picture: PointerProperty(name="Picture", type=bpy.types.Image, description="The picture that it comes from")
-    use: BoolProperty(name="Use", description="Whether the next stitch takes it from there", default=True)
+    use: BoolProperty(
+        name="Use", description="Whether the next stitch takes it from there", default=True, update=joined_in
+    )
     circles: StringProperty(
         name="Circles", description="Where, as JSON: column, row and radius in pixels of the upright picture, of each"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from . import idnames, pair
@@ -13,6 +13,8 @@ PAIRS_ONLY = "This is for two pictures: switch all but two of the list off"
 
 # The masks of a row.
 MASKS = ("ignore", "show")
+# Called with a scene's settings when a guide or a place of its lists is switched on or off.
+on_joined: list[Callable[[Any], None]] = []
 
 
 def used(settings: Any) -> list[Any]:
@@ -129,6 +131,12 @@ def changed(entry: Any, context: Any) -> None:
     """A picture of the list was exchanged, or switched on or off: what the last stitch said of it is no longer so."""
     entry.state, entry.why = "NEW", ""
     pair.chosen(getattr(entry.id_data, idnames.SETTINGS), context)
+
+
+def joined(entry: Any) -> None:
+    """A guide or a place of the lists was switched on or off."""
+    for follow in on_joined:
+        follow(getattr(entry.id_data, idnames.SETTINGS))
 
 
 def fates(names: Sequence[str], report: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -61,7 +61,7 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         options={"SKIP_SAVE"}, update=show_picture,
     )
     seen_from: PointerProperty(
-        name="Seen From", type=bpy.types.Image, update=look_again,
+        name="Seen From", type=bpy.types.Image, update=reframe,
         description="The picture from whose place more than two are seen; without one, the first that connects with "
         "others",
     )
@@ -141,6 +141,10 @@ class EDF_PG_settings(bpy.types.PropertyGroup):  # noqa: N801
         name="Viewpoint", description="Where the panorama is seen from, across the overlap: 0 all of it from the "
         "reference's place; 1 slides to the target's, so that what the target alone shows looks as it was taken",
         default=0.0, min=0.0, max=1.0, subtype="FACTOR", update=reframe,
+    )
+    slide_part: FloatVectorProperty(
+        name="Within", description="From and to which share of the way across the overlap the viewpoint slides; an "
+        "automatic one leaves here what it chose", size=2, default=(0.0, 1.0), min=0.0, max=1.0, update=reframe,
     )
     centre: FloatVectorProperty(
         name="Centre", description="Moves the frame to the right and up, from where it would be; turns nothing",

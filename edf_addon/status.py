@@ -8,7 +8,7 @@ from dataclasses import dataclass
 @dataclass
 class Status:
     """stage: the engine's name of it; share: of everything, 0..1; message: how it went, in words; failed: whether that
-    is an error."""
+    is an error; made: session_uid of the images and clips that it tells of."""
 
     running: bool = False
     cancelling: bool = False
@@ -16,6 +16,7 @@ class Status:
     share: float = 0.0
     message: str = ""
     failed: bool = False
+    made: frozenset[int] = frozenset()
 
 
 now = Status()
@@ -32,6 +33,12 @@ def say(message: str) -> None:
         end(message)
 
 
-def end(message: str, failed: bool = False) -> None:
+def end(message: str, failed: bool = False, made: frozenset[int] = frozenset()) -> None:
     """Work is over."""
-    now.__dict__.update(Status(message=message, failed=failed).__dict__)
+    now.__dict__.update(Status(message=message, failed=failed, made=made).__dict__)
+
+
+def forget_unless(there: frozenset[int]) -> None:
+    """An undo or a redo left these images and clips: what is told of others only is no longer so."""
+    if now.made and not now.made & there:
+        end("")

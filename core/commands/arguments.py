@@ -21,7 +21,6 @@ from ..choices import (
     SEAMS,
     Brackets,
     Exposing,
-    Slide,
 )
 
 if TYPE_CHECKING:
@@ -152,7 +151,7 @@ def _add_alignment(how: argparse._ArgumentGroup) -> None:
     how.add_argument(
         "--slide", default="auto", type=_slide, metavar="SLIDE",
         help="how far the viewpoint slides from REF's place to TARGET's across the overlap, or among the places of "
-        "more pictures: auto (default), or a share from 0 (not at all) to 1",
+        "more pictures: auto (default), or a share from 0 (not at all) to 1; SLIDE,FROM,TO: within a part of the way",
     )  # fmt: skip
     how.add_argument(
         "--projection", default="auto", type=_projection, metavar="PROJECTION",
@@ -376,11 +375,12 @@ def _projection(text: str) -> str:
     return text
 
 
-def _slide(text: str) -> Slide:
+def _slide(text: str) -> Any:
     try:
-        return text if text == "auto" else float(text)
+        given = text if text == "auto" else tuple(float(share) for share in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor a share from 0 to 1") from None
+    return given if len(given) > 1 else given[0]
 
 
 def _exposure(text: str) -> Exposing:

@@ -29,7 +29,7 @@ from ..batch.run import run_batch
 from ..options import StitchOptions
 from ..pictures.listing import SUFFIXES
 from ..system.errors import BadRequest, StitchError, UnreadableImage, UnwritableOutput
-from ..system.output_files import OutputFiles
+from ..system.output_files import OutputFiles, temporary_folder
 
 # How the laid out frames of a camera are called.
 _FRAME = "frame_%06d"
@@ -37,8 +37,6 @@ _FRAME = "frame_%06d"
 _NUMBER = re.compile(r"(\d+)(\D*)$")
 # zlib's fastest: a movie's frames live as long as the job.
 _PNG_LEVEL = 1
-# The folder of laid out frames, beside what is made: no temporary folder is sure to be large enough.
-_LAID_OUT = ".edf_frames"
 
 
 def stitch_clip(
@@ -62,17 +60,18 @@ def stitch_clip(
     Raises
     ------
     StitchError
-        There is no panorama.
+        There is no panorama; BadRequest where there are fewer than two clips, or they have no frame in common.
     """
     began = time.monotonic()
+    if len(clip["cameras"]) < 2:
+        raise BadRequest("a clip is stitched of two clips or more: add those of the other cameras")
     out = Path(clip["folder"])
     with OutputFiles() as files:
         files.check_folder(out)
         files.make_folder(out)
-    laid_out = out / _LAID_OUT
-    shutil.rmtree(laid_out, ignore_errors=True)  # of a run that was killed
     numbers = range(clip["first"], clip["last"] + 1)
-    try:
+    # beside what is made: no other temporary folder is sure to be large enough
+    with temporary_folder(out) as laid_out:
         patterns = [
             lay_out(camera, numbers, laid_out / str(at), say) for at, camera in enumerate(clip["cameras"])
         ]  # fmt: skip
@@ -84,8 +83,6 @@ def stitch_clip(
         (outcome,) = run_batch(
             [item], options, request, lambda what, share: say(what.removeprefix("[1/1] "), share), stopped
         ).outcomes
-    finally:
-        shutil.rmtree(laid_out, ignore_errors=True)
     outcome = replace(outcome, message=_by_source(outcome.message, laid_out, clip["cameras"]))
     made = outcome.frames
     if made is None or made.done + made.skipped == 0:

@@ -111,7 +111,7 @@ fov, blend, seam, exposure, holes, preview, seed
         matches=_file(matches), ignore=() if masks else tuple(map(_file, ignore)), show=shown, guides=guides,
         viewpoint=viewpoint,
         require_all=require_all, brackets=brackets if isinstance(brackets, str) else int(brackets),
-        scale_metres=scale_metres, slide=slide, projection=projection, level=level, centre=centre, fov=fov,
+        scale_metres=scale_metres, slide=_shares(slide), projection=projection, level=level, centre=centre, fov=fov,
         scale=scale, crop=crop, dense=dense, blend=blend, seam=seam, mask=_file(mask),
         exposure=exposure, holes=holes, preview=preview, seed=seed, measure=measure,
         memory_gb=memory, cache=keep, **masks,
@@ -131,7 +131,8 @@ _KINDS: dict[str, tuple[tuple[type, ...], str]] = {
     "scale": (_NUMBER, "a number"), "seed": (_WHOLE, "a whole number"),
     **dict.fromkeys(("fov", "memory"), ((*_NUMBER, _OR_NONE), "a number")),
     **dict.fromkeys(("field", "fade", "projection", "blend", "seam", "holes"), ((str,), "a name")),
-    "slide": ((str, *_NUMBER), "a name or a number"), "exposure": ((str, *_NUMBER), "a name or a number"),
+    "slide": ((str, *_NUMBER, Sequence), "a name, a number, or how far, from and to"),
+    "exposure": ((str, *_NUMBER), "a name or a number"),
     "brackets": ((str, *_WHOLE), "a name or a whole number"),
     "crop": ((str, Sequence), "a name, or x, y, width and height"),
     "level": ((str, Sequence), "a name, or yaw, pitch and roll"), "principal": ((Sequence, np.ndarray), "numbers"),
@@ -152,6 +153,12 @@ def _check_kinds(given: Mapping[str, Any]) -> None:
             raise BadRequest(f"{name} is {value!r}: it takes {words}")
     if given["scale_metres"] is not None and len(given["scale_metres"]) != 3:
         raise BadRequest(f"scale_metres is {given['scale_metres']!r}: it takes two pictures and a distance")
+
+
+def _shares(slide: Any) -> Slide:
+    """How far the viewpoint slides as options take it: several numbers as a tuple."""
+    given: Slide = slide if isinstance(slide, (str, Real)) else tuple(slide)
+    return given
 
 
 def _numbers(name: str, values: Numbers) -> tuple[float, ...]:

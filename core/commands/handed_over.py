@@ -87,10 +87,11 @@ def hand_over(
     files.add_layer("panorama", shown, is_panorama=True)
     take = job.get("take", [])
     about = _of_pair(result.spread_out(), rows, take, files) if result.rig is None else _of_many(result, take, files)
+    share = max(result.cameras[0].size) / max(result.full_sizes[0])  # small pictures give a small panorama
     index = {
         "files": files.names, "report": result.report, "warnings": result.warnings, "bits": result.bits,
         "digests": job.get("digests"), "orientations": turns,
-        "has_depth": inspection.has_depth(result), "seconds": result.seconds, **about,
+        "has_depth": inspection.has_depth(result), "seconds": result.seconds, "share": share, **about,
     }  # fmt: skip
     if index["has_depth"]:
         (folder / "depth.npz").write_bytes(depth_nodes(result, MESH.editable_nodes).to_bytes())

@@ -16,6 +16,9 @@ from ..options import StitchOptions
 from ..pictures.masks import read_mask, read_wanted, without
 from ..pictures.picture import Picture
 from ..pipeline import compose
+from ..rig.pair_edges import reordered_edges
+from ..rig.reframing import reordered
+from ..system.errors import BadRequest
 from ..system.progress import Progress, Stopwatch, stages_of
 from ..system.threads import asking, at_most
 from .options import RECOMPOSING
@@ -55,6 +58,26 @@ class Kept:
         """(W, H) px of the full pictures by their number among those that were given."""
         full = zip(self.frame.names, self.frame.full_sizes, strict=True)
         return {self.given.index(name): size for name, size in full if name in self.given}
+
+    def seen_from(self, viewpoint: int | None) -> Kept:
+        """The same in the frame of another picture, by its number, from 1, among those that were given; None: the first
+        of them that is used. Raises BadRequest where it is not used."""
+        rig = self.geometry.rig
+        if rig is None:
+            return self
+        places = [self.given.index(name) if name in self.given else len(self.given) for name in self.frame.names]
+        asked = min(places) if viewpoint is None else viewpoint - 1
+        if asked not in places:
+            raise BadRequest(
+                f"{self.given[asked]} cannot be the viewpoint, since the panorama does not use it: choose another one"
+            )
+        order = sorted(range(len(places)), key=lambda number: (places[number] != asked, places[number]))
+        if order[0] == 0:
+            return self
+        turned = reordered(rig, order)
+        edges = reordered_edges(self.geometry.edges, turned, order)
+        geometry = replace(self.geometry, cameras=turned.cameras, edges=edges, rig=turned)
+        return replace(self, frame=self.frame.only(order), geometry=geometry)
 
     def masked(self, options: StitchOptions) -> Frame:
         """The frame without what options ignore, and with what they want to see, of the pictures that were given."""
@@ -129,6 +152,7 @@ def recomposed(
     -------
     StitchResult
     """
+    kept = kept.seen_from(options.viewpoint if isinstance(options.viewpoint, int) else None)
     if not isinstance(options.crop, str):
         left, top, width, height = (int(side * kept.share / options.scale) for side in options.crop)
         options = replace(options, crop=(left, top, max(1, width), max(1, height)))

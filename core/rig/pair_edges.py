@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,39 @@ def edges_of(rig: Rig, matched: Matched, numbers: Sequence[int]) -> tuple[Edge, 
         one, other = points[edge.i][index[:, 0]], points[edge.j][index[:, 1]]
         found.append(Edge(edge.i, edge.j, matches, ideal, _two_view(rig, edge, (one == other) & (one >= 0))))
     return tuple(found)
+
+
+def reordered_edges(edges: Sequence[Edge], rig: Rig, order: Sequence[int]) -> tuple[Edge, ...]:
+    """The pairs of a rig whose pictures were put into another order (see `reordered`).
+
+    Parameters
+    ----------
+    edges : sequence of Edge
+        As they were.
+    rig : Rig
+        In the new order.
+    order : sequence of int
+        What number each of its pictures had.
+
+    Returns
+    -------
+    tuple of Edge
+        One for each of the rig's edges, in their order.
+    """
+    before = {(edge.i, edge.j): edge for edge in edges}
+    found = []
+    for edge in rig.edges:
+        one, other = order[edge.i], order[edge.j]
+        known = before.get((one, other)) or before[(other, one)]
+        both = (known.matches, known.ideal)
+        if known.i != one:
+            both = (_swapped(known.matches), _swapped(known.ideal))
+        found.append(Edge(edge.i, edge.j, *both, _two_view(rig, edge, known.two_view.inliers)))
+    return tuple(found)
+
+
+def _swapped(matches: Matches) -> Matches:
+    return replace(matches, x=matches.y, y=matches.x)
 
 
 def _from_to(matches: PictureMatches, first: int) -> NDArray[np.intp]:

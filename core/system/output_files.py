@@ -7,6 +7,7 @@ import os
 import platform
 import re
 import secrets
+import shutil
 import signal
 import sys
 import threading
@@ -14,6 +15,7 @@ import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import IO, TypeVar
@@ -220,7 +222,7 @@ def _probe(folder: Path) -> None:
     except OSError as error:
         raise _unwritable(folder, error) from error
     for path in left:
-        _quietly(path.unlink)
+        _quietly(partial(shutil.rmtree, path) if path.is_dir() else path.unlink)
 
 
 def _temporary_in(folder: Path) -> Path:
@@ -229,7 +231,7 @@ def _temporary_in(folder: Path) -> Path:
 
 
 def _is_left(entry: os.DirEntry[str]) -> bool:
-    """Whether this is a temporary file of a process that is no more."""
+    """Whether this is a temporary file or folder of a process that is no more."""
     named = _TEMPORARY.fullmatch(entry.name)
     if named is None:
         return False
@@ -242,6 +244,18 @@ def _is_left(entry: os.DirEntry[str]) -> bool:
     except (OSError, OverflowError):  # somebody else's process, or gone already
         return False
     return False
+
+
+@contextmanager
+def temporary_folder(folder: Path) -> Iterator[Path]:
+    """A folder of one's own in a folder that exists, for files that need its space; gone in the end. One that a killed
+    process left goes when somebody asks next whether files could be written beside it."""
+    own = _temporary_in(folder)
+    try:
+        own.mkdir()
+        yield own
+    finally:
+        shutil.rmtree(own, ignore_errors=True)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from .. import editor, idnames, pictures, properties
+from .. import editor, idnames, pictures, properties, status
 from ..bridge import compat, result
 from . import modal, stitching
 
@@ -103,6 +103,7 @@ def _show_again(*_: Any) -> None:
     last = settings.result
     if modal.make_way():
         ask(settings)
+    status.forget_unless(modal.there())
     for _area, space in editor.all_spaces(bpy.context):
         if space.as_pointer() in _shown_in and space.image is None and last is not None:
             space.image = last
@@ -142,6 +143,7 @@ _HANDLERS = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
 def register() -> None:
     """Follow from now on."""
     properties.on_reframe.append(changed)
+    pictures.on_joined.append(ask)
     for handlers in _HANDLERS:
         handlers.append(_show_again)
 
@@ -150,6 +152,7 @@ def unregister() -> None:
     """Follow no longer."""
     if changed in properties.on_reframe:
         properties.on_reframe.remove(changed)
+        pictures.on_joined.remove(ask)
     for handlers in _HANDLERS:
         if _show_again in handlers:
             handlers.remove(_show_again)

@@ -194,6 +194,7 @@ class LongWork:
         words, failed = outcome.words, outcome.kind not in (job.DONE, job.CANCELLED)
         if outcome.kind == job.CANCELLED:
             words = self.when_cancelled
+        before = there()
         try:
             if outcome.kind == job.DONE:
                 health.forget()
@@ -204,7 +205,7 @@ class LongWork:
             _end()
         if outcome.kind == health.BROKEN:
             health.remember(words)
-        status.end(words, failed)
+        status.end(words, failed, there() - before)
         redraw(context)
         self.report({"ERROR" if failed else "INFO"}, words)  # type: ignore[attr-defined]
         return {"FINISHED"} if outcome.kind == job.DONE and not failed else {"CANCELLED"}
@@ -215,6 +216,11 @@ class LongWork:
             self._timer = None
         if not self.follows:
             _say_in_status_bar(None)
+
+
+def there() -> frozenset[int]:
+    """The session_uid of every image and movie clip of the file."""
+    return frozenset(one.session_uid for kind in (bpy.data.images, bpy.data.movieclips) for one in kind)
 
 
 def _is_over_editor(context: bpy.types.Context, event: bpy.types.Event) -> bool:

@@ -189,6 +189,7 @@ def take_over(
     if scene is not None:
         settings = properties.settings_of(scene)
         settings.result = image
+        _leave_the_slide(settings, memory, found["report"])
         if [one and one.session_uid for one in pictures.images(settings)] == memory["held"]:
             if spaces is None:  # else that was done before, by the stitch that it follows
                 pictures.mark(settings, pictures.fates([one["name"] for one in memory["pictures"]], found["report"]))
@@ -201,6 +202,13 @@ def take_over(
     for space in spaces or ():
         space.image = image
     return words
+
+
+def _leave_the_slide(settings: Any, memory: dict[str, Any], report: dict[str, Any]) -> None:
+    """A viewpoint that was chosen is where the slider starts when an artist takes it over."""
+    slide = report.get("slide") or {}
+    if settings.slide_auto and memory["settings"]["slide_auto"] and slide.get("s1") is not None:
+        settings.slide, settings.slide_part = slide["s1"], slide.get("part", (0.0, 1.0))
 
 
 def _bring_all(

@@ -59,7 +59,7 @@ class EDF_OT_picture_mask(_OfARow, bpy.types.Operator):  # noqa: N801
         mask = getattr(entry, self.kind)
         if mask is None:
             mask = mask_painting.new_mask(entry.image, longest=LONGEST)
-            mask.name = f"{entry.image.name} {self.kind}"
+            mask.name = f"{entry.image.name} {bpy.types.UILayout.enum_item_name(self, 'kind', self.kind)}"
             setattr(entry, self.kind, mask)
         mask_painting.begin_painting(context, mask)
         return {"FINISHED"}

@@ -222,7 +222,7 @@ def _draw_lines(view: View) -> None:
 def _draw_frame(view: View, settings: Any, panorama: bpy.types.Image | None, side: str) -> None:
     """The outline of the frame that is chosen now, where the panorama was made for another."""
     known: Any = result.read(panorama) if editor.is_behind(settings, panorama) else None
-    rays = None if known is None or "cameras" in known["geometry"] else _frame_rays(settings, panorama, known)
+    rays = None if known is None else _frame_rays(settings, panorama, known)
     if rays is None:
         return
     from . import frame_geometry

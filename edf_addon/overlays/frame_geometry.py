@@ -4,6 +4,7 @@ pictures. From what a result keeps, without a stitch. No bpy.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,8 @@ from ...core.panorama.framing import FrameRequest
 from ...core.raster.arrays import Array
 from ..scene.scene_geometry import matrix, projection_of, viewpoint_of
 from . import overlay_geometry as geometry_of
-from .overlay_geometry import REFERENCE, TARGET
+from .overlay_geometry import TARGET
+from .picture_points import placed_cameras
 
 
 def frame_border(known: dict[str, Any], frame: dict[str, Any], then: dict[str, Any]) -> Array | None:
@@ -27,12 +29,10 @@ def frame_border(known: dict[str, Any], frame: dict[str, Any], then: dict[str, A
     known: a result's `geometry`, `report` and `depth`; frame: see `engine_options.frame_of`; then: the same of what the
     result was made with, of which all that was chosen and is asked for again is kept.
     """
-    cameras, geometry = geometry_of.cameras_of(known["geometry"]), known["geometry"]
-    R, t = matrix(geometry["R"]), matrix(geometry["t"])
-    if not (np.isfinite(R).all() and np.isfinite(t).all()):
+    views = [_view(*one) for one in placed_cameras(known["geometry"])]
+    if not all(np.isfinite(view.R).all() and np.isfinite(view.t).all() for view in views):
         return None
-    views = (_view(cameras[REFERENCE], np.eye(3), np.zeros(3)), _view(cameras[TARGET], R, t))
-    found = frame_outline(_request(known, frame, then), _crop(frame["crop"]), views, _outlines(known, cameras, R, t))
+    found = frame_outline(_request(known, frame, then), _crop(frame["crop"]), views, _outlines(known, views))
     return None if found is None else border_of(*found)
 
 
@@ -95,22 +95,20 @@ def _view(camera: Camera, R: Array, t: Array) -> View:
     return View(camera, camera.K, R, t, nothing, nothing[0])
 
 
-def _outlines(known: dict[str, Any], cameras: dict[str, Camera], R: Array, t: Array) -> list[Array]:
-    """Rays around both pictures as a panorama shows them, what the target alone shows at its usual depth."""
+def _outlines(known: dict[str, Any], views: Sequence[View]) -> list[Array]:
+    """Rays around each picture as a panorama shows them, at its usual depth."""
     viewpoint = viewpoint_of(known)
     depths = matrix(known["depth"]["inverse_depth"])
     near = depths[np.isfinite(depths) & (depths > 0)]
     usual = float(np.median(near)) if near.size else 0.0
-    own, other = (
-        homogeneous(undistort(border(camera.size), camera)) @ np.linalg.inv(camera.K).T for camera in cameras.values()
-    )
-    other = other / np.linalg.norm(other, axis=1, keepdims=True)
-    # a point at x' and inverse depth δ along its ray r' lies at (Rᵀ r' − δ Rᵀ t) / δ
-    other = other @ R - usual * (R.T @ t)
-    if viewpoint is None:
-        return [own, other]
-    depth = np.full(len(own), usual)
-    return [viewpoint.seen_from(rays, depth)[0] for rays in (own, other)]
+    found = []
+    for view in views:
+        own = homogeneous(undistort(border(view.size), view.camera)) @ np.linalg.inv(view.K).T
+        own = own / np.linalg.norm(own, axis=1, keepdims=True)
+        # a point at x and inverse depth d along its ray r lies at (Rᵀ r − d Rᵀ t) / d
+        seen = own @ view.R - usual * (view.R.T @ view.t)
+        found.append(seen if viewpoint is None else viewpoint.seen_from(seen, np.full(len(seen), usual))[0])
+    return found
 
 
 def _pinhole(seen: Array, K: Array) -> Array:

@@ -34,6 +34,10 @@ def _is_framed(settings: Any) -> bool:
     return settings.projection != "REFERENCE"
 
 
+def _has_part(settings: Any) -> bool:
+    return _is_framed(settings) and not settings.slide_auto and not pictures.is_set(settings)
+
+
 def _projection_why_not(settings: Any) -> str:
     if settings.projection not in ("AUTO", "REFERENCE") and settings.field not in offered.ROUND_FIELDS:
         return "This needs a field that knows depth everywhere: Slack or Strict"
@@ -60,6 +64,7 @@ FRAME = (
     Row("pannini_distance", shown=lambda settings: settings.projection == "PANNINI"),
     Row("slide_auto", shown=_is_framed),
     Row("slide", shown=lambda settings: _is_framed(settings) and not settings.slide_auto),
+    Row("slide_part", shown=_has_part),
     Row("level", shown=_is_framed),
     Row("level_angles", shown=lambda settings: _is_framed(settings) and settings.level == "ANGLES"),
     Row("centre", shown=lambda settings: settings.projection not in engine_options.WHOLE),
@@ -113,6 +118,7 @@ class EDF_PT_frame(SubPanel, bpy.types.Panel):  # noqa: N801
             words(self.layout, "Seen from the reference's own place, with every pixel of it", width, NOTE)
         if _is_framed(settings):
             draw_guides(self.layout, settings)
+        self.layout.operator(Operator.FRAME_DRAG, icon="CON_LOCLIMIT")
         self.layout.operator(Operator.REFERENCE_FRAME, icon="IMAGE_REFERENCE")
 
 

@@ -113,6 +113,9 @@ def test_it_slides_within_the_part_that_was_chosen(frame: Frame, monkeypatch: py
         ends.append(viewpoint.ends)
     (start, end), within = ends
     assert within == pytest.approx((start + (end - start) / 4, end - (end - start) / 4))
+    by_hand = align([frame], replace(options, slide=(0.5, 0.25, 0.75)), silent)
+    assert by_hand.slide.part == (0.25, 0.75) and by_hand.warp.viewpoint is not None
+    assert (by_hand.warp.viewpoint.s1, by_hand.warp.viewpoint.ends) == (0.5, within), "goes on from what was chosen"
 
 
 def test_another_slide_set_by_hand_starts_from_what_is_kept(

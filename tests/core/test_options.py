@@ -89,7 +89,9 @@ def test_what_is_offered_is_taken_as_it_is(asked: dict) -> None:
     *(({"projection": name}, (repr(name), "from 0 (a plane) to 1"))
       for name in ("pannini:x", "pannini:", "pannini:-1")),
     *(({"slide": value, "projection": "auto"}, ("slide", "from 0", "to 1, or auto"))
-      for value in ("0", "", -0.1, 1.01, math.nan)),
+      for value in ("0", "", -0.1, 1.01, math.nan, (2.0, 0.0, 1.0))),
+    *(({"slide": value, "projection": "auto"}, ("slide", "FROM,TO with 0 <= FROM < TO <= 1"))
+      for value in ((), (0.5,), (0.5, 0.2), (0.5, 0.5, 0.5), (0.5, -0.1, 1.0), (0.5, 0.0, 1.1), (0.5, math.nan, 1.0))),
     *(({"centre": value, "projection": "auto"}, ("centre", "yaw, pitch"))
       for value in ((1.0,), (1.0, 2.0, 3.0), (math.nan, 0.0), (181.0, 0.0))),
     *(({"fov": value, "projection": "auto"}, ("field of view", "between 1 and 360")) for value in (0.5, 361, math.nan)),
@@ -124,7 +126,9 @@ def test_the_references_plane_has_one_frame_and_one_place(asked: dict) -> None:
 
 def test_a_viewpoint_slides_only_where_depth_is_known_beyond_the_references_plane() -> None:
     assert StitchOptions().may_slide and StitchOptions(slide=0.5).may_slide
-    for stays in ({"slide": 0.0}, {"projection": "reference"}, {"field": "apap"}):
+    in_part = StitchOptions(slide=(0.5, 0.0, 0.5))
+    assert in_part.may_slide and in_part.slide_by_hand == (0.5, (0.0, 0.5))
+    for stays in ({"slide": 0.0}, {"slide": (0.0, 0.0, 0.5)}, {"projection": "reference"}, {"field": "apap"}):
         assert not StitchOptions(**stays).may_slide
 
 

@@ -7,7 +7,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pictures = pytest.importorskip("edf_stitch.edf_addon.pictures")
 from edf_stitch.edf_addon import earlier, editor, properties  # noqa: E402
-from edf_stitch.edf_addon.bridge import compat  # noqa: E402
+from edf_stitch.edf_addon.bridge import compat, ownership, result  # noqa: E402
 
 
 def new(*names: str) -> list:
@@ -127,3 +127,16 @@ def test_two_pictures_of_an_earlier_release_are_the_list(blender, monkeypatch):
     assert (settings.version, settings.projection) == (earlier.VERSION, "REFERENCE")
     properties.bring_up_to_date()
     assert listed(settings) == ["a", "b"]
+
+
+def test_a_panorama_is_behind_where_it_was_seen_from_another_picture(blender):
+    settings, panorama, images = blender.settings, *new("panorama"), new("a", "b", "c")
+    pictures.add(settings, images)
+    result.store(panorama, {"settings": properties.keep(settings), "pictures": [{}] * 3})
+    ownership.hold(panorama, images, {})
+    assert not editor.is_behind(settings, panorama)
+    bpy.ops.edf.see_from(row=1)
+    assert editor.is_behind(settings, panorama)
+    ownership.hold(panorama, images, {"seen_from": images[1]})
+    images[1].name = "renamed"
+    assert not editor.is_behind(settings, panorama), "a picture is known by itself"

@@ -136,6 +136,10 @@ def test_the_frame_is_moved_and_sized_in_degrees_and_the_reference_keeps_its_own
     options = engine_options.options_of(settings)
     assert options["centre"] == pytest.approx([10, -4], abs=1e-5) and options["fov"] == pytest.approx(90, abs=1e-5)
     assert options["slide"] == 0.25
+    settings.slide_part = (0.75, 0.25)
+    assert engine_options.options_of(settings)["slide"] == [0.25, 0.25, 0.75]
+    assert options_in_words(settings).slide_by_hand == (0.25, (0.25, 0.75))
+    assert engine_options.options_of(settings, is_set=True)["slide"] == 0.25, "a set has no such part"
     settings.centre, settings.fov = (math.pi, -math.pi), 2 * math.pi
     assert options_in_words(settings).centre == (180, -180) and options_in_words(settings).fov == 360
     settings.projection = "EQUIRECTANGULAR"

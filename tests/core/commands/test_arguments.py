@@ -84,6 +84,7 @@ def test_what_is_known_of_the_cameras(words: list[str], expected: CameraRequest)
     (["--level", "auto"], {}), (["--level", "none"], {"level": "none"}),
     (["--projection", "auto", "--slide", "auto"], {"projection": "auto", "slide": "auto"}),
     (["--projection", "pannini", "--slide", "0.5"], {"projection": "pannini", "slide": 0.5}),
+    (["--slide", "1,0.25,0.75"], {"slide": (1.0, 0.25, 0.75)}),
     (["--projection", "pannini:.25"], {"projection": "pannini:.25"}),
     (["--projection", "perspective", "--centre=-5,2", "--fov", "80"],
      {"projection": "perspective", "centre": (-5.0, 2.0), "fov": 80.0}),

@@ -8,6 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from edf_stitch.core.batch.list import BatchItem
+from edf_stitch.core.commands import clip_job
 from edf_stitch.core.commands.clip_job import lay_out, stitch_clip
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.system.errors import BadRequest, StitchError, UnreadableImage, UnwritableOutput
@@ -77,7 +79,9 @@ def test_damaged_frames_are_named_by_their_clip(tmp_path: Path) -> None:
     }  # fmt: skip
     with pytest.raises(StitchError, match="frame 1 of left_0012.png: not a picture") as refused:
         stitch_clip(tmp_path, clip, StitchOptions(), silent, lambda: False)
-    assert ".edf_frames" not in str(refused.value)
+    assert ".edf-" not in str(refused.value)
+    with pytest.raises(BadRequest, match="two clips or more"):
+        stitch_clip(tmp_path, {**clip, "cameras": clip["cameras"][:1]}, StitchOptions(), silent, lambda: False)
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(UnwritableOutput, match="is a file, not a folder"):
         stitch_clip(tmp_path, {**clip, "folder": str(tmp_path / "file")}, StitchOptions(), silent, lambda: False)
@@ -122,5 +126,28 @@ def test_clips_that_count_differently_become_one_and_are_gone_on_with(tmp_path: 
     assert (found["frames"], found["done"], found["skipped"], found["failed"]) == ([1, 2], 2, 0, "")
     assert found["path"] == str(tmp_path / "out" / "both" / "both_000001.png") and Path(found["path"]).is_file()
     assert any(what.startswith("frame 2 of 2: ") for what in said)
-    assert not (tmp_path / "out" / ".edf_frames").exists(), "what was laid out goes"
+    assert not list((tmp_path / "out").glob(".edf-*")), "what was laid out goes"
     assert (run()["done"], run()["skipped"]) == (0, 2)
+
+
+def test_two_at_once_into_one_folder_lay_out_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The one that begins later takes nothing from the other."""
+    left, right = (sequence(tmp_path, stem, 1, GRAYS) for stem in ("left_", "right_"))
+    clip = {
+        "cameras": [{"path": str(one), "start": 1} for one in (left, right)],
+        "first": 1, "last": 4, "folder": str(tmp_path / "out"), "name": "one", "suffix": ".png",
+    }  # fmt: skip
+    found: list[list[bool]] = []
+
+    def batch(items: list[BatchItem], *rest: object) -> object:
+        if items[0].name == "one":
+            with pytest.raises(StitchError, match="stopped"):
+                stitch_clip(tmp_path, {**clip, "name": "two"}, StitchOptions(), silent, lambda: False)
+        found.append([path.is_file() for path in items[0].files(2)])
+        raise StitchError("stopped")
+
+    monkeypatch.setattr(clip_job, "run_batch", batch)
+    with pytest.raises(StitchError, match="stopped"):
+        stitch_clip(tmp_path, clip, StitchOptions(), silent, lambda: False)
+    assert found == [[True, True], [True, True]]
+    assert not list((tmp_path / "out").iterdir())

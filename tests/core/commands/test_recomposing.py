@@ -1,6 +1,7 @@
 """A small panorama of a set, composed again of what its stitch found."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from edf_stitch.core.commands.drawn_places import with_circles
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pipeline import StitchResult, stitch
 from edf_stitch.core.system.cache import _plan, _value
+from edf_stitch.core.system.errors import BadRequest
 
 from ...sets import make_set
 
@@ -42,7 +44,10 @@ def test_it_shows_the_same_smaller_without_masks_and_in_px_of_the_full_pictures(
     assert small.canvas.width == pytest.approx(kept.share * result.canvas.width, abs=3)
     assert small.full_sizes == result.full_sizes and small.rig is not None
     box = (20, 10, 200, 100)
-    assert again(kept, crop=box).panorama.alpha.shape == (int(100 * kept.share), int(200 * kept.share))
+    part = again(kept, crop=box)
+    assert part.panorama.alpha.shape == (int(100 * kept.share), int(200 * kept.share))
+    assert part.report["canvas"]["box"] == [int(side * kept.share) for side in box]
+    assert part.report["canvas"]["whole"] == list(small.panorama.alpha.shape[::-1])
 
 
 def test_masks_and_guides_of_now_count(stitched: tuple[StitchResult, recomposing.Kept]) -> None:
@@ -59,6 +64,24 @@ def test_masks_and_guides_of_now_count(stitched: tuple[StitchResult, recomposing
     turned = again(kept, crop="full", guides=((1, "vertical", (150.0, 30.0, 175.0, 200.0)),))
     assert turned.canvas.projection is not None and usual.canvas.projection is not None
     assert not np.allclose(turned.canvas.projection.rotation, usual.canvas.projection.rotation, atol=0.02)
+
+
+def test_it_is_seen_from_another_picture_as_if_it_had_been_stitched_from_there(
+    stitched: tuple[StitchResult, recomposing.Kept]
+) -> None:
+    result, kept = stitched
+    assert kept.seen_from(None) is kept and kept.seen_from(1) is kept
+    other = again(kept, crop="full", viewpoint=3, slide=0.0)
+    assert [picture.name for picture in other.pictures] == ["3.png", "1.png", "2.png"]
+    assert result.rig is not None and other.rig is not None and not other.rig.t[0].any()
+    from_there = result.rig.R[0] @ result.rig.R[2].T
+    assert np.allclose(other.rig.R[1], from_there), "pixel for pixel the geometry that was found"
+    back = kept.seen_from(3).seen_from(None)
+    assert back.frame.names == kept.frame.names and back.geometry.rig is not None
+    assert np.allclose(back.geometry.rig.t, kept.geometry.rig.t)
+    unused = replace(kept, frame=kept.frame.only((0, 1)), geometry=replace(kept.geometry, numbers=(0, 1)))
+    with pytest.raises(BadRequest, match="3.png cannot be the viewpoint"):
+        unused.seen_from(3)
 
 
 def test_circles_are_drawn_over_what_was_painted() -> None:

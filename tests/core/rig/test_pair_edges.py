@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from edf_stitch.core.cameras.projective import sampson_residuals
 from edf_stitch.core.rig.matching import Matched
-from edf_stitch.core.rig.pair_edges import edges_of
+from edf_stitch.core.rig.pair_edges import edges_of, reordered_edges
 from edf_stitch.core.rig.reframing import reordered
 
 from .known_rigs import known_rig
@@ -31,6 +31,19 @@ def test_numbers_are_the_rigs_own_whatever_the_pictures_were_matched_by() -> Non
     for edge in edges:
         assert edge.two_view.inliers.all()
         np.testing.assert_allclose(sampson_residuals(edge.two_view.F, edge.ideal.x, edge.ideal.y), 0, atol=1e-6)
+
+
+def test_in_another_order_they_are_what_they_were() -> None:
+    rig, matched = known_rig()
+    order = [2, 0, 3, 1]
+    turned = reordered(rig, order)
+    found, anew = reordered_edges(edges_of(rig, matched, range(4)), turned, order), edges_of(turned, matched, order)
+    assert [(one.i, one.j) for one in found] == [(one.i, one.j) for one in anew] and len(found) > 3
+    for one, other in zip(found, anew, strict=True):
+        np.testing.assert_array_equal(one.matches.x, other.matches.x)
+        np.testing.assert_allclose(one.ideal.y, other.ideal.y, atol=1e-9)
+        np.testing.assert_allclose(one.two_view.F, other.two_view.F, rtol=1e-9)
+        np.testing.assert_array_equal(one.two_view.inliers, other.two_view.inliers)
 
 
 def test_what_the_bundle_left_out_is_no_inlier() -> None:

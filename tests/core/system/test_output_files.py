@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from edf_stitch.core.system.errors import BadRequest, UnwritableOutput
-from edf_stitch.core.system.output_files import OutputFiles
+from edf_stitch.core.system.output_files import OutputFiles, temporary_folder
 
 
 def everything(folder: Path) -> set[str]:
@@ -141,7 +141,7 @@ def test_a_full_disk(tmp_path: Path) -> None:
     program = f"""
 import resource, signal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-from edf_stitch.core.system.output_files import OutputFiles
+from edf_stitch.core.system.output_files import OutputFiles, temporary_folder
 from edf_stitch.core.system.errors import UnwritableOutput
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 try:
@@ -183,3 +183,20 @@ def test_names_as_long_as_the_file_system_allows(tmp_path: Path) -> None:
     with OutputFiles() as files:
         files.add(tmp_path / ("ü" * 120 + ".png"), b"x")
     assert len(everything(tmp_path)) == 1
+
+
+def test_a_temporary_folder_goes_in_any_case_and_that_of_a_killed_process_later(tmp_path: Path) -> None:
+    with pytest.raises(KeyError), temporary_folder(tmp_path) as own, temporary_folder(tmp_path) as other:
+        assert own.is_dir() and other.is_dir() and own != other
+        (own / "frame.png").touch()
+        with OutputFiles() as files:
+            files.check_folder(tmp_path)
+        assert (own / "frame.png").exists(), "its process lives"
+        raise KeyError
+    assert not list(tmp_path.iterdir())
+    left = own.with_name(own.name.replace(f"-{os.getpid()}-", f"-{2**22 + 1}-"))  # above the highest process id
+    left.mkdir()
+    (left / "frame.png").touch()
+    with OutputFiles() as files:
+        files.check_folder(tmp_path)
+    assert not list(tmp_path.iterdir())

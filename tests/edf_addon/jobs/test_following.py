@@ -27,6 +27,7 @@ def stitched(chosen):
 def test_what_follows_is_made_of_the_same_matches_without_a_search(stitched, monkeypatch):
     settings = stitched.settings
     first, matches = settings.result, len(settings.matches)
+    assert first.session_uid in status.now.made, "what the panel's last line tells of"
     assert not editor.is_behind(settings, first)
     settings.level_angles[0] = math.radians(5)
     assert editor.is_behind(settings, settings.result)
@@ -181,3 +182,23 @@ def test_after_an_undo_the_editor_that_showed_it_shows_the_panorama_of_then(blen
     monkeypatch.setattr(following, "_shown_in", {0: 0.0, 2: 0.0})
     following._show_again()
     assert (mine.image, other.image, busy.image) == (then, None, "something else")
+
+
+def test_after_an_undo_the_panel_tells_no_longer_of_what_was_undone(blender):
+    """What is still there is told of, and errors are."""
+    one = bpy.data.images.new("panorama", 8, 8)
+    for made in (frozenset(), frozenset({one.session_uid, -1})):
+        status.end("panorama: 8 × 8 px", made=made)
+        following._show_again()
+        assert status.now.message
+    bpy.data.images.remove(one)
+    following._show_again()
+    assert not status.now.message
+
+
+def test_guides_and_places_that_are_switched_are_followed(blender, monkeypatch):
+    asked = []
+    monkeypatch.setattr(following, "changed", asked.append)
+    for one in (blender.settings.guides.add(), blender.settings.places.add()):
+        one.use = False
+    assert asked == [blender.settings] * 2

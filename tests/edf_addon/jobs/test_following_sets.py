@@ -38,9 +38,16 @@ def test_a_set_is_composed_again_of_what_its_stitch_kept(stitched, monkeypatch):
         assert editor.is_behind(settings, settings.result), name
         assert bpy.ops.edf.follow() == {"FINISHED"}, name
         assert not editor.is_behind(settings, settings.result), name
+    assert bpy.ops.edf.see_from(row=1) == {"FINISHED"}
+    assert editor.is_behind(settings, settings.result) and bpy.ops.edf.follow() == {"FINISHED"}
+    assert not editor.is_behind(settings, settings.result)
+    assert result.read(settings.result)["report"]["pictures"][0]["name"] == "2.png", "seen from there"
+    bpy.ops.edf.see_from(row=1)
+    assert bpy.ops.edf.follow() == {"FINISHED"}
+    assert result.read(settings.result)["report"]["pictures"][0]["name"] == "1.png", "as before"
     small = result.read(settings.result)
     assert small["kind"] == "preview" and not {"features", "geometry"} & set(small["seconds"])
-    assert small["kept"] == result.read(panorama)["kept"] and len(jobs) == 4
+    assert small["kept"] == result.read(panorama)["kept"] and len(jobs) == 6
     assert small["report"]["canvas"]["projection"]["kind"] == "cylindrical"
     assert [entry.state for entry in settings.pictures][:3] == ["USED"] * 3
     assert panorama.name in bpy.data.images, "the large one stays"

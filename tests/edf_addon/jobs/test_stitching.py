@@ -483,3 +483,14 @@ def test_another_pair_does_not_inherit_the_edited_matches(chosen, folder):
     chosen.settings.target = bpy.data.images.new("other", 8, 8)
     bpy.ops.edf.open_pair(directory=str(folder), files=files)
     assert not chosen.settings.edited_matches
+
+
+def test_the_slider_starts_where_the_viewpoint_was_chosen(blender):
+    """And stays where an artist has put it."""
+    settings, memory = blender.settings, {"settings": {"slide_auto": True}}
+    stitching._leave_the_slide(settings, memory, {"slide": {"s1": 0.5, "part": [0.25, 0.75]}})
+    assert settings.slide == 0.5 and tuple(settings.slide_part) == (0.25, 0.75)
+    stitching._leave_the_slide(settings, memory, {})
+    settings.slide_auto = False
+    stitching._leave_the_slide(settings, memory, {"slide": {"s1": 1.0, "part": [0.0, 1.0]}})
+    assert settings.slide == 0.5

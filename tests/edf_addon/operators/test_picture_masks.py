@@ -28,7 +28,8 @@ def test_a_mask_is_made_for_a_row_small_enough_and_used_by_its_number(blender, m
     assert bpy.ops.edf.picture_mask(row=1, kind="show") == {"FINISHED"}
     assert bpy.ops.edf.picture_mask(row=2, kind="ignore") == {"FINISHED"}
     mask = settings.pictures[1].show
-    assert tuple(mask.size) == (2048, 1024) and mask.name == "b show" and settings.pictures[1].ignore is None
+    assert settings.pictures[2].ignore.name == "c Never Use", "as the panel calls it"
+    assert tuple(mask.size) == (2048, 1024) and mask.name == "b Use Here" and settings.pictures[1].ignore is None
     assert pictures.mask_of(settings, mask) == (settings.pictures[1], "show")
     assert editor.beneath(settings, mask) == settings.pictures[1].image
     assert bpy.ops.edf.picture_mask(row=1, kind="show") == {"FINISHED"}

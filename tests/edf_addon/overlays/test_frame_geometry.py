@@ -40,10 +40,24 @@ def test_the_same_frame_holds_both_pictures_and_is_a_rectangle_of_the_panorama(k
     left, top, right, bottom = box(points)
     edges = np.array([points[:, 0] - left, points[:, 0] - right, points[:, 1] - top, points[:, 1] - bottom])
     assert np.abs(edges).min(axis=0).max() < 1e-6, "every point lies on an edge"
-    R, t = (np.array(known["geometry"][name]) for name in "Rt")
-    for outline in fg._outlines(known, fg.geometry_of.cameras_of(known["geometry"]), R, t):
+    views = [fg._view(*one) for one in fg.placed_cameras(known["geometry"])]
+    for outline in fg._outlines(known, views):
         shown = fg.on_panorama(known, outline)
         assert (shown > [left - 4, top - 4]).all() and (shown < [right + 4, bottom + 4]).all()
+
+
+def test_a_set_has_the_same_outline_whether_its_viewpoint_slides_or_not(known):
+    geometry = known["geometry"]
+    first = {"name": "1", "K": geometry["K"], "R": np.eye(3).tolist(), "t": [0.0] * 3}
+    other = {"name": "2", "K": geometry["K_prime"], "R": geometry["R"], "t": geometry["t"]}
+    of_many = {**geometry, "cameras": [first, other]}
+    asked = {**THEN, "fov": 50.0, "centre": [5.0, 0.0]}
+    expected = fg.frame_border(known, asked, THEN)
+    np.testing.assert_allclose(fg.frame_border({**known, "geometry": of_many}, asked, THEN), expected, atol=1e-9)
+    places = [[0.0] * 3, (-np.array(geometry["R"]).T @ geometry["t"]).tolist()]
+    slid = {**of_many, "viewpoint": {"s1": 1.0, "rotation": np.eye(3).tolist(), "places": places}}
+    whole = [fg.on_panorama(known, fg.frame_border({**known, "geometry": one}, THEN, THEN)) for one in (of_many, slid)]
+    assert np.abs(box(whole[0]) - box(whole[1])).max() < 40 and not np.allclose(*whole)
 
 
 @pytest.mark.parametrize(("frame", "moved"), [
