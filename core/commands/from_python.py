@@ -157,7 +157,7 @@ def _check_kinds(given: Mapping[str, Any]) -> None:
 
 def _shares(slide: Any) -> Slide:
     """How far the viewpoint slides as options take it: several numbers as a tuple."""
-    given: Slide = slide if isinstance(slide, (str, Real)) else tuple(slide)
+    given: Slide = tuple(slide) if np.ndim(slide) else slide
     return given
 
 
