@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pictures.picture import Picture
+from ..system.threads import ask
 from .frame import size_of
 from .options import OVERLAYS
 
@@ -87,6 +88,7 @@ def _compared(pictures: Sequence[Picture], shape: tuple[int, int], reach: int) -
     squares = np.zeros(shape, np.float32)
     beside = np.ones((3, 3), np.uint8)
     for picture in pictures:
+        ask()
         view = cv2.resize(picture.view, shape[::-1], interpolation=cv2.INTER_AREA).reshape(*shape, -1)
         view = np.repeat(view, 3, axis=2) if view.shape[2] == 1 else view
         steep = np.sqrt(sum(np.square(cv2.Sobel(view, cv2.CV_32F, *way)).sum(axis=2) for way in ((1, 0), (0, 1))))
