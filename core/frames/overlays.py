@@ -62,10 +62,12 @@ def _burnt_into(pictures: Sequence[Picture]) -> NDArray[np.bool_] | None:
     shape = max(1, round(height * share)), max(1, round(width * share))
     reach = max(3, round(OVERLAYS.reach * max(shape)))
     compared = _compared(pictures, shape, reach)
+    ask()
     count = compared.shared.sum()
     if count < OVERLAYS.least_outline or count > OVERLAYS.most_agree * compared.any.sum():
         return None
     joined = cv2.morphologyEx(compared.shared.astype(np.uint8), cv2.MORPH_CLOSE, _disc(reach))
+    ask()
     contours = cv2.findContours(joined, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
     dense = OVERLAYS.dense_of_two if len(pictures) == 2 else OVERLAYS.dense
     outlines = [_burnt_in_outline(contour, compared, reach, dense) for contour in contours]
@@ -103,6 +105,7 @@ def _compared(pictures: Sequence[Picture], shape: tuple[int, int], reach: int) -
         levels -= cv2.blur(levels, (2 * reach + 1,) * 2)
         total += levels
         squares += np.square(levels).sum(axis=2)
+    ask()
     count, rim = len(pictures), OVERLAYS.rim
     differ = (squared / count - np.square(sums / count)).max(axis=2)
     shared = (often >= max(2, OVERLAYS.outlined * count)) & (differ <= OVERLAYS.same_level**2)
