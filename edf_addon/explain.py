@@ -129,6 +129,14 @@ def stage(name: str) -> str:
     return STAGES.get(name, name.capitalize())
 
 
+def how_far(name: str, share: float, left: float | None) -> str:
+    """A stage in words, the share of everything that is done, and the seconds that are left, where these are known."""
+    said = f"{stage(name)}  {share:.0%}"
+    if left is None:
+        return said
+    return f"{said}, {left:.0f} s left" if left < 100 else f"{said}, {left / 60:.0f} min left"
+
+
 def lines(text: str, width: float, character: float = 6.6) -> list[str]:
     """A text in lines that fit into `width` px where a character takes so many; one long word keeps a line."""
     return textwrap.wrap(text, max(12, int(width / character)), break_long_words=False) or [""]

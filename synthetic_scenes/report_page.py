@@ -46,7 +46,7 @@ MEASURES = {
 Names = dict[str, tuple[str, str, int]]
 OTHER_NAMES = {
     "lead_db": "whole picture's lead over the best rival",
-    "nearer_share": "share of scenes in which ours is nearer than one homography",
+    "nearer_scenes": "scenes in which ours is nearer than one homography",
     "model": "model", "status": "status",
     "undetermined_said": "undetermined focal length said", "position_px": "Position pass from pixel centres",
     "depth_relative": "Position against Depth, relative", "ray_cast_relative": "ray casts against Depth, relative",
@@ -131,7 +131,8 @@ def check_value(value: object, measure: str) -> str:
     if measure.endswith("_relative"):
         return f"{value:.1e}"
     known = SET_MEASURES | MEASURES
-    digits = known[measure][2] if measure in known else 2 if "_db" in measure else 0 if measure == "scenes" else 4
+    other = 2 if "_db" in measure else 0 if measure.endswith("scenes") else 4
+    digits = known[measure][2] if measure in known else other
     return f"{value:.{digits}f}"
 
 

@@ -126,15 +126,16 @@ def verdict_line(verdict: dict[str, Any]) -> str:
 
 @contextmanager
 def progress_shown(quiet: bool) -> Iterator[Callable[[str, float], None]]:
-    """A progress callable: a bar on a terminal, one plain line for each stage elsewhere, nothing when quiet."""
+    """A progress callable: a bar on a terminal, with the time that is left; elsewhere one plain line for each stage;
+    nothing when quiet."""
     if quiet:
         yield lambda stage, total: None
     elif sys.stderr.isatty():
         from tqdm import tqdm
 
-        with tqdm(
-            total=100, bar_format="{desc:<9}{bar}{percentage:3.0f} % {elapsed}", leave=False, file=sys.stderr
-        ) as bar:
+        # without smoothing what is left is told as fast as all went so far: stages differ
+        form = "{desc:<9}{bar}{percentage:3.0f} % {elapsed}, {remaining} left"
+        with tqdm(total=100, bar_format=form, smoothing=0, miniters=1, leave=False, file=sys.stderr) as bar:
 
             def move(stage: str, total: float) -> None:
                 # tqdm draws ten times a second at most: a new stage is shown all the same

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array, Part
+from ..system.threads import ask
 from .options import LABELS, PLANES
 from .planes import ScenePlane
 from .samples import Samples, Seen
@@ -219,6 +220,7 @@ def _best(
     mirrored = across.swapaxes(2, 3)[:, ::-1].swapaxes(0, 1)
     straight = across.swapaxes(0, 1)
     for _ in range(LABELS.sweeps):
+        ask()
         sideways = cost + from_left + from_right
         from_above = swept(sideways, down)
         from_below = swept(sideways[::-1], turned)[::-1]

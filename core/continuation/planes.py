@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
+from ..system.threads import ask
 from .options import PLANES
 from .samples import Samples
 from .target_grid import TargetGrid
@@ -59,6 +60,7 @@ def find_planes(grid: TargetGrid, samples: Samples, to_border: Array) -> list[Sc
     left = np.ones(count, bool)
     found: list[ScenePlane] = []
     while len(found) < PLANES.most and left.sum() >= PLANES.min_share * count:
+        ask()
         plane, inliers = search.best(np.flatnonzero(left), random)
         if inliers.sum() < PLANES.min_share * count:
             break

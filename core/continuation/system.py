@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..cameras.projective import project
 from ..raster.arrays import NEIGHBOURS, Array, Part
+from ..system.threads import ask
 from .banded import Equations, LeastSquares
 from .options import GRID, SYSTEM
 from .samples import Samples, Seen
@@ -70,6 +71,7 @@ def surface(
     boost, bound, at = np.ones(len(tied)), np.zeros(count), np.zeros(count)
     z = np.zeros(count)
     for number in range(rounds):
+        ask()
         held = SYSTEM.bound_weight * s2 * bound
         z = problem.solved(
             (weights, SYSTEM.membrane * tied * boost, slope * stiffness, straight,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..raster.arrays import Array, Plane, beside, bounds, small_strips, with_margin
 from ..raster.pull_push import filled
-from ..system.threads import each
+from ..system.threads import ask, each
 from .options import CARRY
 from .sphere_chart import SphereChart
 
@@ -94,6 +94,7 @@ def _from_far(values: Plane, halvings: int) -> Plane:
     beyond = np.finfo(np.float32).max  # what OpenCV takes for the border too
     out = np.where(missing, beyond, values)
     for _ in range(CARRY.rounds):
+        ask()
         grown = cv2.erode(out, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
         np.copyto(out, grown, where=missing)
         missing = out == beyond

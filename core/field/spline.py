@@ -14,7 +14,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from ..raster.arrays import Array
-from ..system.threads import ask
+from ..system.threads import ask, beside
 from .options import SPLINE
 
 
@@ -132,6 +132,7 @@ class SmoothingProblem:
         projected[np.arange(n), np.arange(n)] += 8 * np.pi * smoothing
         # symmetric, so its transpose is the column-major matrix that LAPACK expects: no copy
         factor, failed = scipy.linalg.lapack.dpotrf(projected.T, lower=1, clean=0, overwrite_a=1)
+        ask()
         if failed:
             raise np.linalg.LinAlgError(f"the matrix of a spline is not positive definite at λ = {smoothing:g}")
         matrix = cv2.completeSymm(scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)[0].T)
@@ -158,12 +159,14 @@ class SmoothingProblem:
         matrix, affine = self._projected()
         # the affine directions get the lowest eigenvalues, and are dropped
         matrix -= (1 + np.abs(matrix).sum(axis=1).max()) * (affine @ affine.T)
-        eigenvalues, basis = scipy.linalg.eigh(matrix, driver="evd", overwrite_a=True, check_finite=False)
+        # NumPy's leaves the interpreter lock to who waits, SciPy's does not
+        eigenvalues, basis = beside(lambda: np.linalg.eigh(matrix))
         eigenvalues, basis = eigenvalues[affine.shape[1] :], basis[:, affine.shape[1] :]
         squared = basis**2
         projected = basis.T @ (values.T / self.noise).T
         out = np.empty((len(ladder), *values.shape))
         for i, smoothing in enumerate(ladder):
+            ask()
             gain = 1.0 / (np.maximum(eigenvalues, 0.0) + 8 * np.pi * smoothing)
             scale = self.noise / np.maximum(squared @ gain, 1e-300)
             out[i] = ((basis @ (gain * projected.T).T).T * scale).T

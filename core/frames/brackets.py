@@ -136,7 +136,8 @@ def _candidates(pictures: Sequence[Picture]) -> list[tuple[int, int]]:
             kinds.setdefault(kind, []).append(number)
     out = []
     for numbers in kinds.values():
-        small = {number: SmallCopy.of(pictures[number], BRACKETS.thumbnail_px) for number in numbers}
+        copied = in_order(lambda number: SmallCopy.of(pictures[number], BRACKETS.thumbnail_px), numbers)
+        small = dict(zip(numbers, copied, strict=True))
         out += [pair for pair in combinations(numbers, 2)
                 if _may_be_one_view(small[pair[0]], small[pair[1]], _stops_between(pictures, *pair))]  # fmt: skip
     return out

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pictures.picture import Picture
+from ..system.threads import ask
 from .frame import size_of
 from .options import OVERLAYS
 
@@ -74,10 +75,12 @@ def _burnt_into(pictures: Sequence[Picture]) -> NDArray[np.bool_] | None:
     shape = max(1, round(height * share)), max(1, round(width * share))
     reach = max(3, round(OVERLAYS.reach * max(shape)))
     compared = _compared(pictures, shape, reach)
+    ask()
     count = compared.shared.sum()
     if count < OVERLAYS.least_outline or count > OVERLAYS.most_agree * compared.any.sum():
         return None
     joined = cv2.morphologyEx(compared.shared.astype(np.uint8), cv2.MORPH_CLOSE, _disc(reach))
+    ask()
     contours = cv2.findContours(joined, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
     dense = OVERLAYS.dense_of_two if len(pictures) == 2 else OVERLAYS.dense
     outlines = [_burnt_in_outline(contour, compared, reach, dense) for contour in contours]
@@ -99,6 +102,7 @@ def _compared(pictures: Sequence[Picture], shape: tuple[int, int], reach: int) -
     sums, squared = (np.zeros((*shape, 3), np.float32) for _ in range(2))
     beside = np.ones((3, 3), np.uint8)
     for picture in pictures:
+        ask()
         view = _shrunk(picture, shape)
         slopes = [_over_channels(np.square(cv2.Sobel(view, cv2.CV_32F, *way))) for way in ((1, 0), (0, 1))]
         strong = np.sqrt(slopes[0] + slopes[1]) > OVERLAYS.steep
@@ -109,6 +113,7 @@ def _compared(pictures: Sequence[Picture], shape: tuple[int, int], reach: int) -
         levels = view.astype(np.float32)
         sums += levels
         squared += np.square(levels, out=levels)
+    ask()
     count, rim = len(pictures), OVERLAYS.rim
     differ = np.maximum.reduce(cv2.split(squared / count - np.square(sums / count)))
     shared = (often >= max(2, OVERLAYS.outlined * count)) & (differ <= OVERLAYS.same_level**2)

@@ -23,7 +23,7 @@ from ..pictures.raw_clipping import clipping_warnings
 from ..pictures.raw_development import RawExposure, exposure_of_first
 from ..pictures.resized import resized
 from ..system.errors import BadRequest, NoOverlap, UnreadableImage
-from ..system.threads import in_order
+from ..system.threads import ask, in_order
 from .brackets import brackets_in
 from .flatness import usable
 from .frame import Frame, size_of
@@ -188,6 +188,7 @@ def prepare(pictures: Sequence[Picture], options: StitchOptions, copies: dict[in
     shown_by: list[int] = []
     of_spheres: list[str] = []
     for number, picture in enumerate(pictures):
+        ask()
         shown_by.append(shown_by[copies[number]] if number in copies else len(shown))
         if number in copies:
             continue

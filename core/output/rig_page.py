@@ -28,6 +28,14 @@ _POLICY = (
     "style-src 'unsafe-inline'\">"
 )
 
+# Of a kind of scale (`rig_figures.scale_kind`): how it is known how far apart pictures were taken.
+_SCALES = {
+    "measured": "of which three pictures see enough to measure how far apart all were taken",
+    "continuity": "but how far apart some were taken is only guessed, by depth going on from one to the other",
+    "none": "but how far apart some were taken is not known",
+    "one place": "and all pictures were taken from one place",
+}
+
 
 def rig_page(result: StitchResult) -> str:
     """The page as HTML, which opens offline and without scripts; result: has a rig."""
@@ -50,7 +58,8 @@ def rig_page(result: StitchResult) -> str:
         "<h2>How the pictures hang together</h2>",
         "<p class=quiet>Each picture stands where it looks to. The thicker a line, the more matches hold its two "
         "pictures; a dashed one tells no distance.</p>",
-        rig_graph(result.pictures, result.rig), "<h2>Pictures</h2>", _pictures(report["pictures"]),
+        rig_graph(result.pictures, result.rig), _held_together(report["rig"]),
+        "<h2>Pictures</h2>", _pictures(report["pictures"]),
         _left_out(left_out), "<h2>Pairs</h2>", _pairs(report["rig"]["edges"]), "</main>", "</body>", "</html>", "",
     ])  # fmt: skip
 
@@ -78,6 +87,18 @@ def _pictures(entries: list[dict[str, Any]]) -> str:
             f"<td class=n>{one['share']:.1%}</tr>"
         )
     return table(head, rows) + "<p class=quiet>Places in units of the longest baseline.</p>"
+
+
+def _held_together(rig: dict[str, Any]) -> str:
+    """What the report says of all pictures together, line by line."""
+    lines = [f"{rig['points']} points, {_SCALES[rig['scale']]}."]
+    if rig["loop_degrees"] is not None:
+        lines.append(f"The rotations of pairs around the worst loop miss closing by {rig['loop_degrees']:.2f}°.")
+    lines += [f"Taken from one place: {', '.join(station)}." for station in rig["stations"]]
+    if len(rig["focal_guesses"]) > 1:
+        listed = "; ".join(f"{one['focal_px']:.1f} px at {one['cost']:.4f} px²" for one in rig["focal_guesses"])
+        lines.append(f"Focal lengths that explain all pictures almost alike, and what a match costs: {listed}.")
+    return f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
 
 
 def _left_out(entries: list[dict[str, str]]) -> str:

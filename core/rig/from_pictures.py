@@ -14,6 +14,7 @@ from ..pictures.picture import Picture
 from ..pose.mirrored import OFTEN_SO, enough_to_trust, mirrored_among
 from ..system.cache import Cache
 from ..system.progress import ReportProgress
+from ..system.threads import ask
 from .averaging.pairs import chosen_pairs
 from .matching import Matched, content_key, found_features, found_matches
 from .registration import register
@@ -21,7 +22,11 @@ from .registration import register
 
 def content_order(pictures: Sequence[Picture]) -> list[int]:
     """Numbers of the pictures in an order that is the same however they are given."""
-    return sorted(range(len(pictures)), key=lambda number: content_key(pictures[number]))
+    keys = []
+    for picture in pictures:
+        ask()
+        keys.append(content_key(picture))
+    return sorted(range(len(pictures)), key=keys.__getitem__)
 
 
 def matched_pictures(

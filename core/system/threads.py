@@ -109,6 +109,18 @@ def _waited_for(begun: Future[Result]) -> Result:
     return begun.result()
 
 
+def beside(work: Callable[[], Result]) -> Result:
+    """What one long call gives that leaves the interpreter lock to others; Cancelled is raised as soon as it is asked
+    for (see `asking`), and the call then ends by itself."""
+    if getattr(_here, "working", False):  # whoever waits for this thread asks
+        return work()
+    pool = ThreadPoolExecutor(1, "edf", _start)
+    try:
+        return _waited_for(pool.submit(work))
+    finally:
+        pool.shutdown(wait=False)
+
+
 def each(work: Callable[[Part], object], parts: Iterable[Part]) -> None:
     """Does the work on each part, for what it writes."""
     for _ in in_order(work, parts):

@@ -140,7 +140,8 @@ class LongWork:
         redraw(context)
         if outcome is None:
             if not self.follows:
-                _say_in_status_bar(f"EDF Stitch: {explain.stage(status.now.stage)}, {status.now.share:.0%}")
+                far = explain.how_far(status.now.stage, status.now.share, status.seconds_left())
+                _say_in_status_bar(f"EDF Stitch: {far}")
             return {"PASS_THROUGH"}
         self._forget_timer(context)
         return self._take(context, outcome)

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from .. import explain, idnames, pictures
+from .. import explain, idnames, pictures, status
 from ..idnames import Operator
 from ..jobs import health, stitching
 from . import presets
@@ -56,6 +56,6 @@ def _working(layout: Any, _settings: Any, job: Any, width: float) -> None:
     """How far it is."""
     row = layout.row(align=True)
     row.scale_y = 1.5
-    row.progress(factor=job.share, text=f"{explain.stage(job.stage)}  {job.share:.0%}")
+    row.progress(factor=job.share, text=explain.how_far(job.stage, job.share, status.seconds_left()))
     row.operator(Operator.CANCEL, text="", icon="X")
     words(layout, "Cancelling…" if job.cancelling else "ESC over this editor cancels; Blender is free meanwhile", width)

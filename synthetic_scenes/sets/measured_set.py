@@ -29,7 +29,7 @@ from .set_measures import (
 )
 from .set_radiance import radiance_figures
 from .set_seams import seam_figures
-from .set_sliding import beside_figures
+from .set_sliding import sliding_figures
 from .set_stitches import SLID, WAYS, Shared, stitched
 from .set_things import thing_figures
 from .set_thresholds import HUGIN, OPENCV, OURS
@@ -91,10 +91,7 @@ def measured_set(rendered: RenderedSet) -> MeasuredSet:
         if way == OURS:
             used, seen = found.numbers, truth.views_at(found.numbers) > 0
             sliding = Found.of(stitched(rendered, SLID, shared), truth)
-            viewpoint = sliding.result.warp.viewpoint
-            runs[way]["figures"]["s1"] = 0.0 if viewpoint is None else viewpoint.s1
-            for name, one in (("still", found), ("slid", sliding)):
-                runs[way]["figures"] |= {f"{name}_{key}": value for key, value in beside_figures(one).items()}
+            runs[way]["figures"] |= sliding_figures(found, sliding)
             pictures["map_error"] = jpeg(_map_error(found, truth)[_part_of(seen)])
             pictures["from_above"] = jpeg(top_view(found))
     rivals = {OPENCV: stitcher_panorama} | ({HUGIN: hugin_panorama} if installed() else {})

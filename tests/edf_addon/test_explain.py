@@ -96,6 +96,24 @@ def test_every_stage_of_the_engine_has_words():
     assert explain.stage("unheard") == "Unheard"
 
 
+def test_how_far_it_is_is_told_with_what_is_left_of_it():
+    assert explain.how_far("unheard", 0.05, None) == "Unheard  5%"
+    assert explain.how_far("unheard", 0.42, 17.4) == "Unheard  42%, 17 s left"
+    assert explain.how_far("unheard", 0.42, 130.0) == "Unheard  42%, 2 min left"
+
+
+def test_what_is_left_takes_as_long_as_what_was_done(monkeypatch):
+    status = pytest.importorskip("edf_stitch.edf_addon.status")
+    monkeypatch.setattr(status, "now", status.Status())
+    clock = [100.0]
+    monkeypatch.setattr(status.time, "monotonic", lambda: clock[0])
+    status.begin()
+    clock[0] += 12
+    for share, left in ((0.05, None), (0.25, 36.0), (0.75, 4.0), (1.0, 0.0)):
+        status.now.share = share
+        assert status.seconds_left() == left
+
+
 def test_of_more_than_two_pictures_those_left_out_are_named_with_the_reason():
     report = {
         "verdict": {"is": "good"}, "canvas": {"width": 900, "height": 400}, "matches": {"found": 500, "inliers": 400},

@@ -149,11 +149,32 @@ def test_a_suite_says_where_one_homography_is_nearer_beyond_the_overlap() -> Non
     assert nearer_than_homography(scenes) == (3, 4) and not failures(*scenes, complete=True)
     scenes[0]["runs"]["known/slack"]["figures"]["beyond_px"] = 0.3
     assert nearer_than_homography(scenes) == (2, 4)
-    assert failures(*scenes, complete=True) == [(None, "known/slack", "nearer_share")] and not failures(*scenes)
+    assert failures(*scenes, complete=True) == [(None, "known/slack", "nearer_scenes")] and not failures(*scenes)
     scenes[0]["runs"]["known/slack"]["figures"]["beyond_px"] = None
     assert nearer_than_homography(scenes) == (2, 4), "what is missing is not nearer"
     scenes[3]["runs"]["known/homography"] = {"figures": {}, "refused": "no"}
     assert nearer_than_homography(scenes) == (2, 3)
+
+
+@pytest.mark.parametrize(("scenes", "fewest"), [(4, 3), (19, 15), (23, 18)])
+def test_ours_is_nearer_in_fifteen_of_nineteen_scenes(scenes: int, fewest: int) -> None:
+    results = [good() for _ in range(scenes)]
+    for result in results[fewest:]:
+        result["runs"]["known/homography"]["figures"]["beyond_px"] = 0.1
+    assert not failures(*results, complete=True)
+    results[0]["runs"]["known/homography"]["figures"]["beyond_px"] = 0.1
+    assert failures(*results, complete=True) == [(None, "known/slack", "nearer_scenes")]
+
+
+@pytest.mark.parametrize("rival", RIVALS)
+def test_what_the_target_alone_shows_is_at_least_as_near_the_truth_as_any_rivals(rival: str) -> None:
+    result, worse = good(), ("street", "known/slack", f"target_only_psnr_db over {rival}")
+    result["runs"][rival]["figures"]["target_only_psnr_db"] = 25.0
+    for ours, failed in ((25.0, []), (24.999, [worse]), (None, [worse])):
+        result["runs"]["known/slack"]["figures"]["target_only_psnr_db"] = ours
+        assert failures(result) == failed
+    result["runs"][rival].update(refused="too few matches", figures={})
+    assert not failures(result)
 
 
 @pytest.mark.parametrize("scene", CUT_SCENES)

@@ -13,6 +13,7 @@ from ...field.sphere_chart import SphereChart
 from ...raster.arrays import Plane, small_strips
 from ...raster.enlarging import repeated
 from ...raster.grid import Grid
+from ...system.threads import ask
 from .options import CHART
 from .place import Place, Viewed
 
@@ -43,6 +44,7 @@ def fused(viewed: Viewed, places: Sequence[Place], refined: Sequence[RefinedSphe
     shown = owner >= 0
     own, others = (np.full(chart.shape, -1, np.float32) for _ in range(2))
     for place, of_place in zip(places, refined, strict=True):
+        ask()
         _put_from(place, of_place, chart, owner, own, others)
     nearest = np.where(own < 0, others, own)
     alone = repeated(viewed.count < 2, CHART.cell)
@@ -50,6 +52,7 @@ def fused(viewed: Viewed, places: Sequence[Place], refined: Sequence[RefinedSphe
     d = filled_chart(nearest, chart.closed)
     confidence, spread = np.zeros_like(d), deviation.copy()
     for place, of_place in zip(places, refined, strict=True):
+        ask()
         _put_values(place, of_place, chart, owner, d, confidence, spread)
     return RefinedSphere(chart, d, confidence, spread, shown)
 

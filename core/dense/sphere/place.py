@@ -22,6 +22,7 @@ from ...raster.distance import outside
 from ...raster.enlarging import repeated
 from ...raster.grid import Grid
 from ...raster.picture_map import falls_inside
+from ...system.threads import ask
 from .options import CHART
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ class Place:
         own = (viewed.owner == number) & (viewed.count > 1)
         if not own.any():
             return None
+        ask()
         centre = rig.centres[number]
         whole = SphereChart.whole(np.eye(3), cells.height)
         d = cv2.resize(viewed.d, cells.shape[::-1], interpolation=cv2.INTER_AREA)
@@ -147,6 +149,7 @@ def _seen_from(viewed: Viewed, chart: SphereChart, centre: Array) -> Plane:
     rays = chart.rays(grid.ys, grid.xs)
     towards, d = rays @ centre, np.zeros(rays.shape[:2])
     for _ in range(CHART.field_steps):
+        ask()
         seen = rays + d[..., None] * centre
         length = np.linalg.norm(seen, axis=-1)
         columns, rows = (at.astype(np.float32) for at in viewed.chart.places(seen))

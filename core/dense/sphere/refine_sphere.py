@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...field.refined_sphere import RefinedSphere
 from ...field.sphere_chart import SphereChart
 from ...raster.arrays import Plane
-from ...system.threads import in_order
+from ...system.threads import ask, in_order
 from ..filling import filled
 from ..options import REFINE
 from .choice import Compared, compared_on
@@ -201,10 +201,11 @@ def _refined(compared: Compared, hints: Hints) -> _Refined:
 
 def _swept(rig: Rig, pictures: Sequence[Picture], chart: SphereChart) -> list[SweptPicture]:
     """The pictures at the scale of a chart."""
-    return [
-        SweptPicture.of(number, view, picture, chart.per_radian)
-        for number, (view, picture) in enumerate(zip(rig.views, pictures, strict=True))
-    ]
+    out = []
+    for number, (view, picture) in enumerate(zip(rig.views, pictures, strict=True)):
+        ask()
+        out.append(SweptPicture.of(number, view, picture, chart.per_radian))
+    return out
 
 
 def _parts(places: Sequence[Place]) -> list[_Part]:

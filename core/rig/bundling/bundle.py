@@ -163,24 +163,25 @@ def bundle(
     prior : DepthPrior, optional
         Draws ρ; without one, points without parallax are held by the damping alone.
     tick : callable
-        Called at every iteration; ends the work by raising.
+        Called at every step that is tried; ends the work by raising.
 
     Returns
     -------
     Bundled
     """
     structure = Structure(problem, solution, settings, reference)
+    tick()
     seen = reproject(problem, solution, structure.chosen)
     cost = _cost(problem, solution, structure, seen, settings, prior)
     damping, done = BUNDLE.damping, 0
     while done < settings.iterations and len(structure.chosen):
         done += 1
-        tick()
         bases = tangents(solution.rays)
         normal = normal_equations(problem, solution, structure, seen, settings, prior, bases)
         scale = scale_direction(structure, solution)
         before = cost
         for _ in range(BUNDLE.tries):
+            tick()
             try:
                 step = _solved(structure, normal, scale, damping)
             except np.linalg.LinAlgError:  # singular to rounding: more damping makes it regular

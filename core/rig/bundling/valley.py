@@ -20,6 +20,7 @@ def lowest(found: Polished, tick: Tick) -> Polished:
     hollow of the valley is nearest to its start. Where many points lie beyond infinity the lens fits what the places
     should. Nothing is tried where the focal length is well known.
     """
+    tick()
     if found.one_place or not _unsure(found):
         return found
     best, least = found, _cost(found)

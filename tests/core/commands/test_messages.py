@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import io
+import re
+import sys
+import time
+
 import pytest
-from edf_stitch.core.commands.messages import print_summary, verdict_line
+from edf_stitch.core.commands.messages import print_summary, progress_shown, verdict_line
 
 
 @pytest.mark.parametrize(("degrees", "said"), [(0.126, "noise 0.50 px, worst loop 0.13°\n"), (None, "noise 0.50 px\n")])
@@ -54,3 +59,18 @@ def test_a_field_without_smoothing_is_told_too(capsys: pytest.CaptureFixture[str
     }  # fmt: skip
     print_summary(report, {})
     assert "λ -" in capsys.readouterr().err
+
+
+def test_a_terminal_is_told_how_long_it_will_still_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = io.StringIO()
+    monkeypatch.setattr(shown, "isatty", lambda: True)
+    monkeypatch.setattr(sys, "stderr", shown)
+    with progress_shown(False) as show:
+        time.sleep(1.1)
+        show("seam", 0.2)
+        time.sleep(0.2)
+        show("seam", 0.25)
+    told = re.findall(r"seam[^\r]* (\d+) % 00:\d\d, 00:(\d\d) left", shown.getvalue())
+    seconds = [(int(percent), int(left)) for percent, left in told]
+    assert [percent for percent, _ in seconds][-1] == 25, "it moves within a stage too"
+    assert all(left >= 2 for _, left in seconds), "three or four times as much as is done"

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from edf_stitch.core.cameras.projective import homogeneous, rotation_from_vector
 from edf_stitch.core.continuation.continuation import Continuation, continue_beyond
+from edf_stitch.core.continuation.options import LABELS, SYSTEM
 from edf_stitch.core.continuation.target_grid import TargetGrid
 
+from ...asked import counting
 from .plane_worlds import AHEAD, DOWN, GROUND, RIGHT, SIZE, Field, World, world
 
 
@@ -65,6 +67,14 @@ def test_of_two_surfaces_a_ray_shows_the_nearer() -> None:
     ray = grid.panorama_rays(surface.inverse_depth)[pillar & (np.abs(grid.grid.points[..., 1] - 150) < 10)]
     unit = ray / np.linalg.norm(ray, axis=1, keepdims=True)
     assert (surface.at(unit) > 0.4).all()
+
+
+def test_whether_to_go_on_is_asked_at_every_round() -> None:
+    room = world([GROUND, AHEAD])
+    with counting() as count:
+        room.continued()
+    assert count["find_planes"] >= 2 and count["surface"] >= SYSTEM.first_rounds + SYSTEM.rounds
+    assert count["_best"] >= LABELS.sweeps
 
 
 def test_the_outline_lies_on_the_surface() -> None:

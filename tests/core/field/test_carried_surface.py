@@ -7,6 +7,8 @@ import pytest
 from edf_stitch.core.field.carried_surface import filled_surface
 from edf_stitch.core.field.options import CARRY
 
+from ...asked import counting
+
 NEAR, FAR = np.float32(0.07), np.float32(0.03)
 
 
@@ -35,6 +37,8 @@ def test_what_has_no_other_side_goes_on_from_its_own() -> None:
     """Around a near and a far thing, and between the two, further apart than any gap."""
     points = np.full((60, 80 + CARRY.widest_gap_px), -1, np.float32)
     points[10:50, 10:30], points[10:50, -10:] = NEAR, FAR
-    found = filled_surface(points)
+    with counting() as count:
+        found = filled_surface(points)
+    assert count["_from_far"] > CARRY.rounds, "it may take long: whether to go on is asked at every round"
     assert (found[:, :10] == NEAR).all() and (found[:, -9:] == FAR).all()
     assert (found[12:48, 32:60] == NEAR).all()

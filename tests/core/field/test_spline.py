@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import time
+from typing import Any
+
 import numpy as np
 import pytest
 from edf_stitch.core.field.options import SPLINE
 from edf_stitch.core.field.spline import SmoothingProblem, ThinPlateSpline, kernel, spread_points
+from edf_stitch.core.system.errors import Cancelled
+from edf_stitch.core.system.threads import asking
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
@@ -149,6 +154,21 @@ def test_the_inverse_makes_what_the_system_makes_also_of_fewer_points(smoothing:
         assert np.allclose(inverse.residual(values[left]), residual, rtol=1e-7, atol=1e-9)
         whole = np.linalg.inv(few.system(smoothing))[: len(residual), : len(residual)]
         assert np.allclose(inverse.matrix, whole, rtol=1e-6, atol=1e-9 * np.abs(whole).max())
+
+
+def test_whether_to_go_on_is_asked_while_eigenvalues_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take most of a second of a large field."""
+    problem, eigh = SmoothingProblem.build(some_points(1, 30), np.ones(30), UNIT), np.linalg.eigh
+    since = time.monotonic()
+
+    def slow(matrix: np.ndarray) -> Any:
+        time.sleep(0.6)
+        return eigh(matrix)
+
+    monkeypatch.setattr(np.linalg, "eigh", slow)
+    with pytest.raises(Cancelled), asking(lambda: time.monotonic() > since + 0.1):
+        problem.held_out(np.zeros(30), LADDER)
+    assert time.monotonic() < since + 0.4
 
 
 def test_functions_held_out_together_are_those_held_out_alone() -> None:

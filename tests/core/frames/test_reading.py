@@ -12,8 +12,11 @@ from edf_stitch.core.frames.reading import MOST_PICTURES, check_count, read_fram
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import Picture, picture_from_array
+from edf_stitch.core.rig.from_pictures import content_order
 from edf_stitch.core.system.errors import BadRequest, NoOverlap, UnreadableImage
+from edf_stitch.core.system.threads import at_most
 
+from ...asked import counting
 from .exposed_views import HEIGHT, WIDTH, bracket_of, painted_world, view_of
 
 PLAIN = StitchOptions()
@@ -21,6 +24,15 @@ PLAIN = StitchOptions()
 
 def picture(seed: int, name: str, shape: tuple[int, ...] = (30, 40, 3)) -> Picture:
     return picture_from_array(np.random.default_rng(seed).integers(0, 255, shape).astype(np.uint8), name)
+
+
+def test_whether_to_go_on_is_asked_at_every_picture_that_is_read() -> None:
+    """Sixty large ones take seconds."""
+    pictures = [picture(seed, f"{seed}.png", (96, 128, 3)) for seed in range(4)]
+    with counting() as count, at_most(1):
+        content_order(read_frame(pictures, PLAIN).pictures)
+    assert count["prepare"] == count["content_order"] == 4 and count["_compared"] >= 4
+    assert count["in_order"] >= 8, "they are read, and looked at for brackets"
 
 
 def test_two_to_sixty_pictures_are_taken() -> None:

@@ -76,6 +76,10 @@ def test_guesses_of_the_focal_length_are_compared() -> None:
     assert focal_spread(rig) == 0
     guesses = tuple(FocalGuess(focal, 0.0, 1.0) for focal in (471.0, 480.0, 475.0))
     assert focal_spread(replace(rig, guesses=guesses)) == pytest.approx(480 / 471 - 1)
+    tied = with_edges(*((i, i + 1, 99, "measured") for i in range(3)))
+    (warning,) = rig_warnings(replace(tied, guesses=guesses), "abcd")
+    assert "471 px, 480 px, 475 px explain the pictures almost alike" in warning and "--focal35" in warning
+    assert not rig_warnings(replace(tied, guesses=(guesses[0], FocalGuess(474.0, 0.0, 1.0))), "abcd"), "nobody sees it"
 
 
 def test_a_place_that_hardly_anything_ties_is_not_known() -> None:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from edf_stitch.core.raster.arrays import Array
 from edf_stitch.core.rig.averaging.turns import degrees_between, rotations
+from edf_stitch.core.rig.bundling import bundle as bundling
 from edf_stitch.core.rig.bundling.bundle import DepthPrior, Settings, bundle
+from edf_stitch.core.rig.bundling.bundle_options import BUNDLE
 from edf_stitch.core.rig.bundling.reprojection import CAMERA, derivatives, lengths_of_errors, reproject, tangents
 from edf_stitch.core.rig.bundling.solution import LENS
 from hypothesis import given, settings
@@ -166,3 +168,17 @@ def test_equations_that_are_singular_to_rounding_are_damped(monkeypatch: pytest.
     monkeypatch.setattr(np.linalg, "solve", singular_once)
     assert bundle(problem, *begun).cost == pytest.approx(usual.cost, rel=1e-6)
     assert len(tried) > 2
+
+
+def test_whether_to_go_on_is_asked_at_every_step_that_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last iteration tries many that are no better."""
+    problem, true = bundled_scene(0, noise_px=0.3)
+    tried, asked = [], []
+
+    def no_better(*args: object) -> float:
+        tried.append(1)
+        return float(len(tried))
+
+    monkeypatch.setattr(bundling, "_cost", no_better)
+    bundle(problem, true, Settings(), 0, None, lambda: asked.append(1))
+    assert len(asked) >= len(tried) > BUNDLE.tries

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from edf_stitch.core.system import threads
 from edf_stitch.core.system.errors import Cancelled
-from edf_stitch.core.system.threads import asking, at_most, count, each, in_order
+from edf_stitch.core.system.threads import asking, at_most, beside, count, each, in_order
 
 
 @pytest.fixture(autouse=True, params=[1, 3])
@@ -87,6 +87,18 @@ def test_who_waits_for_a_long_part_stops_when_asked_to(at_once: int) -> None:
     assert len(begun) <= at_once
     assert time.monotonic() < since + (0.4 if at_once > 1 else 0.9)
     assert list(in_order(lambda part: part, range(3))) == [0, 1, 2], "only within"
+
+
+def test_who_waits_for_one_long_call_stops_when_asked_to() -> None:
+    since = time.monotonic()
+    with pytest.raises(Cancelled), asking(lambda: time.monotonic() > since + 0.1):
+        beside(lambda: time.sleep(0.6))
+    assert time.monotonic() < since + 0.4
+    with pytest.raises(ZeroDivisionError):
+        beside(lambda: 1 // 0)
+    before = threading.active_count()
+    assert list(in_order(lambda part: beside(lambda: (part, count())), range(3))) == [(0, 1), (1, 1), (2, 1)]
+    assert threading.active_count() <= before
 
 
 def test_what_is_written_by_parts_is_whole() -> None:

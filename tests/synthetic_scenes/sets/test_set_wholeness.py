@@ -18,7 +18,9 @@ from edf_stitch.synthetic_scenes.sets.set_lines import (
     straightness,
 )
 from edf_stitch.synthetic_scenes.sets.set_measures import Found, SetTruth
+from edf_stitch.synthetic_scenes.sets.set_names import SET_MEASURES
 from edf_stitch.synthetic_scenes.sets.set_seams import seam_figures, seam_steps
+from edf_stitch.synthetic_scenes.sets.set_sliding import sliding_figures
 from edf_stitch.synthetic_scenes.sets.set_things import half, shown_things, thing_figures
 
 from .analytic_room import BALL
@@ -75,6 +77,18 @@ def test_uprights_lean_as_far_as_the_panorama_is_turned(truth: SetTruth) -> None
     leaning = replace(found, gauge=TURN @ rotation_from_vector(np.radians([0.0, 2.0, 0.0])))
     figures = line_figures(leaning)
     assert 0.5 < figures["upright_p90_deg"] < 2.1 and figures["line_p90_px"] < 0.1, "leaning, but straight"
+
+
+def test_edges_are_followed_where_the_viewpoint_slides_too(truth: SetTruth) -> None:
+    still, slid = perfect(truth), perfect(truth, aside=(0.2, -0.1, 0.05))
+    figures = sliding_figures(Found.of(still, truth), Found.of(slid, truth))
+    assert figures["s1"] == 0.5 and figures["slid_line_p90_px"] < 0.1 and figures["slid_upright_p90_deg"] < 0.1
+    for number in range(3):
+        bend(slid, number, 1.5)
+    bent = sliding_figures(Found.of(still, truth), Found.of(slid, truth))
+    assert 0.7 < bent["slid_line_p90_px"] < 3 and bent["slid_beside_px"] > 0.3
+    assert bent["still_beside_px"] == figures["still_beside_px"] < 0.02
+    assert set(bent) <= set(SET_MEASURES), "each has its name on the page"
 
 
 def test_points_of_an_edge_are_evenly_spread_and_hidden_ones_left_out(truth: SetTruth) -> None:

@@ -19,6 +19,7 @@ from edf_stitch.core.field.sphere_field import SphereField, fit_sphere_field
 from edf_stitch.core.system import threads
 from edf_stitch.core.system.errors import Cancelled
 
+from ....asked import counting
 from .card_scenes import card_rig, from_one_place, inverse_range, pictures_of
 
 GAINS = (1.0, 0.8, 1.15, 0.9)
@@ -142,6 +143,13 @@ def test_progress_goes_on_and_cancel_ends_it(rig: Rig, field: SphereField) -> No
     with pytest.raises(Cancelled):
         refine_sphere(field, rig, pictures_of(rig), tick)
     assert told == sorted(told) and told[0] < 0.1
+
+
+def test_whether_to_go_on_is_asked_at_every_picture_before_and_after_the_patches(rig: Rig, field: SphereField) -> None:
+    with counting() as count:
+        refine_sphere(field, rig, pictures_of(rig))
+    assert count["_swept"] == 2 * len(rig) and count["of"] > 1 and count["_seen_from"] > count["of"]
+    assert count["fused"] == 2 * count["of"]
 
 
 def comparison(rig: Rig, field: SphereField, gains: tuple[float, ...] = ()) -> Compared | None:
