@@ -71,7 +71,9 @@ def mirrored_among(pictures: Sequence[Picture], asked: Sequence[int]) -> dict[in
         mirror_image = _few_features(pictures[number], True)
         for other, features_of_it in enumerate(plain):
             mirrored = 0 if other == number else _agreeing(features_of_it, mirror_image)
-            if mirrored >= max(MIRROR.least, MIRROR.factor * _agreeing(features_of_it, plain[number])):
+            if mirrored < MIRROR.least:
+                continue
+            if mirrored >= MIRROR.factor * _agreeing(features_of_it, plain[number]):
                 agree.setdefault(number, {})[other] = mirrored
                 agree.setdefault(other, {})[number] = mirrored
     out = {}
