@@ -40,8 +40,8 @@ def straightened(lines: EpipolarLines, along: Plane, edges: Array) -> Plane:
     total, number = (cv2.GaussianBlur(one, (0, 0), STRAIGHT_EDGES.beside_nodes) for one in (total, number))
     total /= np.maximum(number, np.float32(1e-9))
     total *= np.minimum(2 * near, np.float32(1))  # whole on the three nodes across an edge
-    total += along
-    return total
+    moved: Plane = total + along
+    return moved
 
 
 def _nodes_on(lines: EpipolarLines, edges: Array) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
