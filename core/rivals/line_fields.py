@@ -1,17 +1,10 @@
 """SPW and LPC: meshes that keep straight lines straight (Liao and Li, IEEE TIP 2020; Jia et al., CVPR 2021).
 
-Both start from a homography of points and lines (dual features), and then seek a mesh over the target. SPW minimises
-
-    E = E_points + 5 E_lines + 50 E_slopes + 5 E_even + 5 E_straight
-
-with matched points and lines that meet, cross lines that keep the slopes the homography gives them, and are evenly
-divided (along u everywhere, along v beyond the overlap, where a homography stretches most), and detected lines that
-stay straight. LPC has
-
-    E = E_points + 5 E_lines + 50 E_slopes + 100 E_even + 50 E_local + 100 E_global
-
-whose local lines are the detected ones and global those that pieces are joined to. Weights: of the papers' own results
-(SPW's published program; the names of LPC's published results).
+Both start from a homography of points and lines (dual features), and then seek a mesh over the target: matched points
+and the ends of matched lines meet; cross lines keep the slopes that the homography gives them; those that stay parallel
+are evenly divided everywhere, those that converge beyond the overlap, where a homography stretches most; detected lines
+keep their slopes. LPC tells short lines from long ones, detected or joined of pieces. Terms and weights are those of
+the authors' published programs (`LineMethod`; docs/method.md, 4).
 """
 
 from __future__ import annotations
@@ -35,7 +28,7 @@ from ..raster.grid import Grid
 from .homography import direct_linear, knowing_only
 from .line_mesh import Mesh, Terms
 from .lines import MatchedLines, PairLines, joined, matched_lines
-from .options import LINE_MESH
+from .options import LINE_MESH, LineMethod
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,8 +120,9 @@ def _field(
     used = matches.subset(inliers_used)
     alone = direct_linear(used.y, used.x, used.weights)
     same = matched_lines(lines, used, alone)
-    mesh = Mesh.over(target_size, _with_lines(used, same, alone), matches.scale)
-    places = _terms(name, mesh, used, same, lines, size).solved()
+    method = LINE_MESH.spw if name == "spw" else LINE_MESH.lpc
+    mesh = Mesh.over(target_size, _with_lines(used, same, alone), method.cell_px * matches.scale)
+    places = _terms(method, mesh, used, same, lines, size).solved()
     H = np.linalg.inv(mesh.G)
     H *= np.sign(np.median(homogeneous(used.x) @ H[2])) / np.linalg.norm(H)
     fit = Fit(inliers_used, np.nan, FADE.min_px * matches.scale, np.nan, np.nan, np.nan)
@@ -138,19 +132,21 @@ def _field(
 
 
 def _terms(
-    name: str, mesh: Mesh, matches: Matches, same: MatchedLines, lines: PairLines, size: tuple[int, int]
+    method: LineMethod, mesh: Mesh, matches: Matches, same: MatchedLines, lines: PairLines, size: tuple[int, int]
 ) -> Terms:
     """The energy of a method; see above."""
-    weights = LINE_MESH.spw if name == "spw" else LINE_MESH.lpc
     terms, (u, v) = Terms(mesh), mesh.cross_lines()
     terms.points(matches.y, matches.x, matches.weights)
-    terms.on_lines(same.ends, same.lines, weights["lines"])
-    terms.straight(np.concatenate([u, v]), weights["slopes"])
-    terms.evenly_divided(u, weights["even"])
-    terms.evenly_divided(v, weights["even"], beyond=size)
-    terms.straight(lines.target, weights["local"])
-    if weights["global"]:
-        terms.straight(joined(lines.target, matches.scale), weights["global"])
+    terms.on_lines(same.ends, same.lines, method.lines)
+    terms.straight(np.concatenate([u, v]), method.slopes)
+    terms.evenly_divided(u, method.slopes)
+    terms.evenly_divided(v, method.even, beyond=size)
+    every = lines.target if method.long is None else np.concatenate([lines.target, joined(lines.target, matches.scale)])
+    lengths = np.linalg.norm(every[:, 1] - every[:, 0], axis=1) / np.linalg.norm(mesh.cell)
+    is_long = lengths >= (np.inf if method.long is None else method.long_diagonals)
+    terms.straight(every[(lengths >= method.least_diagonals) & ~is_long], method.pieces)
+    if method.long is not None:
+        terms.straight(every[is_long], method.long)
     return terms
 
 

@@ -33,10 +33,10 @@ class Mesh:
     G: Array
 
     @staticmethod
-    def over(size: tuple[int, int], G: Array, scale: float) -> Mesh:
-        """Cells of LINE_MESH.cell_px. Raises DegenerateGeometry where the homography sends part of the target to
-        infinity: the papers have no mesh then."""
-        cell = max(LINE_MESH.cell_px * scale, np.sqrt(size[0] * size[1] / LINE_MESH.max_nodes))
+    def over(size: tuple[int, int], G: Array, cell_px: float) -> Mesh:
+        """Cells of about cell_px. Raises DegenerateGeometry where the homography sends part of the target to infinity:
+        the papers have no mesh then."""
+        cell = max(cell_px, np.sqrt(size[0] * size[1] / LINE_MESH.max_nodes))
         corners = np.array([[0, 0], [size[0] - 1, 0], [0, size[1] - 1], [size[0] - 1, size[1] - 1]], np.float64)
         ahead = homogeneous(np.vstack([corners, corners.mean(axis=0)])) @ G[2]
         if not (ahead * ahead[-1] > LINE_MESH.least_ahead * ahead[-1] ** 2).all():
@@ -45,6 +45,11 @@ class Mesh:
                 "from it; choose another field"
             )
         return Mesh(size, int(np.ceil(size[0] / cell)) + 1, int(np.ceil(size[1] / cell)) + 1, G * np.sign(ahead[-1]))
+
+    @property
+    def cell(self) -> Array:
+        """Sides (2,) of a cell, px of the target."""
+        return (np.array(self.size) - 1.0) / (np.array([self.columns, self.rows]) - 1.0)
 
     @cached_property
     def nodes(self) -> Array:
@@ -66,7 +71,7 @@ class Mesh:
 
     def weights(self, points: Array) -> Any:
         """A sparse matrix (N, n) of bilinear weights of points (N, 2) of the target."""
-        at = points / (np.array(self.size) - 1.0) * (np.array([self.columns, self.rows]) - 1.0)
+        at = points / self.cell
         corner = np.clip(np.floor(at).astype(int), 0, [self.columns - 2, self.rows - 2])
         u, v = (at - corner).T
         first = corner[:, 1] * self.columns + corner[:, 0]
@@ -78,7 +83,7 @@ class Mesh:
 
     def along(self, ends: Array) -> tuple[Array, NDArray[np.intp]]:
         """Points (N, 2) along segments (K, 2, 2), a few in each cell, and the number (N,) of each one's segment."""
-        step = min(self.size[0] / self.columns, self.size[1] / self.rows) / LINE_MESH.samples_per_cell
+        step = self.cell.min() / LINE_MESH.samples_per_cell
         counts = np.maximum(np.ceil(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / step).astype(int) + 1, 3)
         parts = [start + np.linspace(0, 1, n)[:, None] * (end - start)
                  for (start, end), n in zip(ends, counts, strict=True)]  # fmt: skip
@@ -95,12 +100,12 @@ class Mesh:
         return self._across(u, v), self._across(v, u)
 
     def _across(self, way: Array, spread: Array) -> Array:
-        """Lines of a direction, a cell apart along another, cut to the target."""
+        """Lines of a direction, evenly along another, cut to the target."""
         corners = np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * (np.array(self.size) - 1.0)
-        cell = min(self.size[0] / self.columns, self.size[1] / self.rows)
+        apart = self.cell.min() / LINE_MESH.samples_per_cell
         low, high = (corners @ spread).min(), (corners @ spread).max()
         found = []
-        for offset in np.arange(low + cell / 2, high, cell):
+        for offset in np.arange(low + apart / 2, high, apart):
             base = offset * spread
             near, far = -np.inf, np.inf
             for axis in (0, 1):
@@ -111,7 +116,7 @@ class Mesh:
                     continue
                 ends = sorted(((0 - base[axis]) / way[axis], (limit - base[axis]) / way[axis]))
                 near, far = max(near, ends[0]), min(far, ends[1])
-            if far - near > cell / 2:
+            if far - near > apart:
                 found.append([base + near * way, base + far * way])
         return np.array(found).reshape(-1, 2, 2)
 
@@ -131,11 +136,11 @@ class Terms:
         self._add(scipy.sparse.block_diag([B, B]), ((reference - self.mesh.shown(target)) * root[:, None]).T.ravel())
 
     def on_lines(self, ends: Array, lines: Array, weight: float) -> None:
-        """Segments (K, 2, 2) of the target lie on lines (K, 3) of the reference's plane, all along."""
-        points, number = self.mesh.along(ends)
-        if len(points):
-            off = np.sum(lines[number, :2] * self.mesh.shown(points), axis=1) + lines[number, 2]
-            self._across(self.mesh.weights(points), lines[number, :2], -off, weight)
+        """Both ends of segments (K, 2, 2) of the target lie on lines (K, 3) of the reference's plane."""
+        if len(ends):
+            points, twice = ends.reshape(-1, 2), np.repeat(lines, 2, axis=0)
+            off = np.sum(twice[:, :2] * self.mesh.shown(points), axis=1) + twice[:, 2]
+            self._across(self.mesh.weights(points), twice[:, :2], -off, weight)
 
     def straight(self, ends: Array, weight: float) -> None:
         """Segments (K, 2, 2) of the target keep the direction in which the homography shows them, and so stay straight

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -92,12 +90,34 @@ class LineOptions:
     """Degrees by which a piece may be turned from it."""
 
 
-def _spw() -> Mapping[str, float]:
-    return MappingProxyType({"lines": 5.0, "slopes": 50.0, "even": 5.0, "local": 5.0, "global": 0.0})
+@dataclass(frozen=True)
+class LineMethod:
+    """Cells and weights of SPW or LPC, as in the authors' published programs. Weights are of squared px; matched
+    points have 1."""
 
+    cell_px: float
+    """px of a cell's side."""
 
-def _lpc() -> Mapping[str, float]:
-    return MappingProxyType({"lines": 5.0, "slopes": 50.0, "even": 100.0, "local": 50.0, "global": 100.0})
+    even: float
+    """Even division of lines that converge, beyond the overlap."""
+
+    pieces: float
+    """Detected segments that keep the slope which the homography gives them."""
+
+    least_diagonals: float
+    """Diagonals of a cell below which a segment is left out."""
+
+    long: float | None
+    """The same of long lines, detected or joined of pieces; None: nothing is joined, and all count as pieces."""
+
+    long_diagonals: float = 2.0
+    """Diagonals of a cell from which a line is long."""
+
+    lines: float = 5.0
+    """Both ends of matched lines meet the other's line."""
+
+    slopes: float = 50.0
+    """Cross lines keep their slopes; those that stay parallel are evenly divided, too."""
 
 
 @dataclass(frozen=True)
@@ -107,14 +127,11 @@ class LineMeshOptions:
     px are in units of the matches' scale.
     """
 
-    cell_px: float = 40.0
-    """px of a cell's side: SPW's published program has it."""
-
     max_nodes: int = 6000
     """Nodes at most: cells of large pictures are larger, and the mesh as fine as in the papers' pictures."""
 
     samples_per_cell: int = 2
-    """Points along a line for each cell that it crosses: a bilinear cell has no more freedom."""
+    """Points along a line, and cross lines, to a cell's side: as in both programs."""
 
     least_ahead: float = 0.05
     """Third coordinate of a corner, relative to the middle's, below which a homography has no use as a start."""
@@ -129,11 +146,11 @@ class LineMeshOptions:
     far_px: float = 1e7
     """px outside the picture at which a point behind the camera is put."""
 
-    spw: Mapping[str, float] = field(default_factory=_spw)
-    """Weights of SPW's terms beside the points', as in its published program."""
+    spw: LineMethod = LineMethod(cell_px=40.0, even=5.0, pieces=5.0, least_diagonals=1.0, long=None)
+    """SPW's program."""
 
-    lpc: Mapping[str, float] = field(default_factory=_lpc)
-    """Weights of LPC's: those that its published results are named by."""
+    lpc: LineMethod = LineMethod(cell_px=50.0, even=100.0, pieces=50.0, least_diagonals=0.5, long=100.0)
+    """LPC's."""
 
 
 LINES = LineOptions()

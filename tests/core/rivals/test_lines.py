@@ -7,9 +7,10 @@ import pytest
 from edf_stitch.core.cameras.matches import Matches
 from edf_stitch.core.cameras.projective import homogeneous, project
 from edf_stitch.core.fields import fit_field
-from edf_stitch.core.rivals.line_fields import _with_lines
+from edf_stitch.core.rivals.line_fields import _terms, _with_lines
 from edf_stitch.core.rivals.line_mesh import Mesh, Terms
 from edf_stitch.core.rivals.lines import MatchedLines, PairLines, joined, matched_lines
+from edf_stitch.core.rivals.options import LINE_MESH, LineMethod
 from edf_stitch.core.system.errors import DegenerateGeometry
 
 from ..field.test_strict import SIDE, SIZE, curved, some_matches
@@ -61,7 +62,7 @@ def test_pieces_of_one_line_are_joined() -> None:
 
 def test_a_homography_needs_nothing_from_a_mesh() -> None:
     """Where one homography is right, all terms but the even division beyond the overlap agree with it."""
-    mesh = Mesh.over((600, 600), G, 1.0)
+    mesh = Mesh.over((600, 600), G, 40.0)
     terms = Terms(mesh)
     matches, lines = matches_on(G), segments(20)
     terms.points(matches.y, matches.x, matches.weights)
@@ -71,7 +72,7 @@ def test_a_homography_needs_nothing_from_a_mesh() -> None:
 
 
 def test_cross_lines_along_u_stay_parallel_and_those_along_v_do_not() -> None:
-    u, v = Mesh.over((600, 400), G, 1.0).cross_lines()
+    u, v = Mesh.over((600, 400), G, 40.0).cross_lines()
 
     def turns(ends: np.ndarray) -> np.ndarray:
         along = np.diff(through(ends), axis=1)[:, 0]
@@ -82,7 +83,7 @@ def test_cross_lines_along_u_stay_parallel_and_those_along_v_do_not() -> None:
 
 
 def test_beyond_the_overlap_it_is_evenly_divided_where_a_homography_stretches() -> None:
-    mesh = Mesh.over((600, 400), G, 1.0)
+    mesh = Mesh.over((600, 400), G, 40.0)
     terms, (u, v) = Terms(mesh), mesh.cross_lines()
     terms.points(mesh.nodes, mesh.start, np.full(len(mesh.nodes), 1e-3))
     terms.evenly_divided(v, 100.0, beyond=(10, 10))
@@ -90,6 +91,41 @@ def test_beyond_the_overlap_it_is_evenly_divided_where_a_homography_stretches() 
     shown, ways = mesh.shown(points), mesh.weights(points) @ (terms.solved() - mesh.start)
     uneven = [np.abs(np.diff(places, 2, axis=0)).mean() for places in (shown, shown + ways)]
     assert uneven[1] < 0.3 * uneven[0] and len(u)
+
+
+def test_cross_lines_and_points_along_them_are_half_a_cell_apart() -> None:
+    mesh = Mesh.over((600, 400), np.array([[1.0, 0, 0], [0, 1, 0], [1e-4, 0, 1]]), 50.0)
+    assert mesh.cell == pytest.approx((50.0, 50.0), rel=0.01)
+    u, _ = mesh.cross_lines()  # upright: the homography shortens from left to right
+    assert np.abs(np.diff(u[:, 0, 0])) == pytest.approx(25.0, rel=0.01)
+    assert np.abs(np.diff(mesh.along(u[:1])[0], axis=0)).max() == pytest.approx(25.0, rel=0.05)
+
+
+def test_only_the_ends_of_matched_lines_are_pulled_onto_their_lines() -> None:
+    mesh = Mesh.over((601, 401), np.eye(3), 50.0)
+    terms = Terms(mesh)
+    terms.points(mesh.nodes, mesh.start, np.full(len(mesh.nodes), 1e-3))
+    ends = np.array([[[100.0, 200.0], [500.0, 200.0]]])
+    terms.on_lines(ends, np.array([[0.0, 1.0, -210.0]]), 5.0)
+    ways = mesh.weights(mesh.along(ends)[0]) @ (terms.solved() - mesh.start)
+    assert ways[[0, -1], 1] == pytest.approx(10.0, abs=0.1) and np.abs(ways[len(ways) // 2]).max() < 0.1
+
+
+@pytest.mark.parametrize(("method", "expected"), [
+    (LINE_MESH.spw, {80.0: 5.0, 250.0: 5.0}), (LINE_MESH.lpc, {40.0: 50.0, 80.0: 50.0, 250.0: 100.0}),
+])  # fmt: skip
+def test_a_line_counts_by_its_length(
+    method: LineMethod, expected: dict[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """20, 40, 80 and 250 px: 0.4, 0.7, 1.4 and 4.4 diagonals of SPW's cells, 0.3, 0.6, 1.1 and 3.5 of LPC's."""
+    mesh, asked = Mesh.over((601, 401), G, method.cell_px), {}
+    monkeypatch.setattr(Terms, "straight", lambda _, ends, weight: asked.update(
+        {round(float(np.linalg.norm(end - start)), 3): weight for start, end in ends}))  # fmt: skip
+    lines = np.array([[[50, 60 + 80 * k], [50 + length, 60 + 80 * k]] for k, length in enumerate((20, 40, 80, 250))])
+    none = MatchedLines(np.zeros((0, 2, 2)), np.zeros((0, 3)))
+    given = PairLines(np.zeros((0, 2, 2)), lines.astype(float))
+    _terms(method, mesh, matches_on(G), none, given, (600, 400))
+    assert {length: asked[length] for length in (20.0, 40.0, 80.0, 250.0) if length in asked} == expected
 
 
 def test_lines_pull_the_homography_where_points_say_little() -> None:
@@ -130,4 +166,4 @@ def _shape(field) -> tuple[int, int]:
 
 def test_a_homography_that_sends_the_target_to_infinity_is_refused() -> None:
     with pytest.raises(DegenerateGeometry, match="choose another field"):
-        Mesh.over((600, 400), np.array([[1.0, 0, 0], [0, 1, 0], [-2e-3, 0, 1]]), 1.0)
+        Mesh.over((600, 400), np.array([[1.0, 0, 0], [0, 1, 0], [-2e-3, 0, 1]]), 40.0)
