@@ -152,7 +152,7 @@ class SeenPatch:
         x, y, depth = (part + d * along for part, along in zip(self._planes, self.towards, strict=True))
         depth = np.where(depth > 0, depth, np.nan)
         with np.errstate(invalid="ignore", over="ignore"):
-            pixels = np.stack([x / depth, y / depth], axis=-1)
+            pixels: Array = np.stack([x / depth, y / depth], axis=-1)
         return pixels if self.slack is None else pixels + self.slack
 
     def sampled_at(self, d: Array, levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
