@@ -35,7 +35,7 @@ from .frames.frame import Frame, size_of
 from .mapping import map_pictures, map_rig
 from .options import StitchOptions
 from .panorama.choosing_slide import SlideChoice
-from .panorama.upright_edges import edge_ends, straight_edges
+from .panorama.upright_edges import straight_edges
 from .panorama.warp import Warp
 from .pictures.picture import Picture
 from .pose.edge_focal import Edges, focal_by_edges
@@ -349,7 +349,8 @@ def fit_and_warp(
     edges = (replace(edge, two_view=field.two_view),)
     return Alignment(
         cameras, edges, views, field, mapped.warp, (*geometry.warnings, *mapped.warnings), dense, mapped.continuation,
-        mapped.slide, left_out=geometry.left_out, numbers=geometry.numbers, scale=geometry.scale,
+        mapped.slide,
+        left_out=geometry.left_out, numbers=geometry.numbers, scale=geometry.scale,
     )  # fmt: skip
 
 
@@ -396,5 +397,4 @@ def _refined(
         return Dense(None, SMOOTH_CLIP)
     if not isinstance(field, (StrictField, SlackField)):
         return Dense(None, f"the field {field.name!r} is shown as it is")
-    pictures = edge.pair(frames[0].pictures)
-    return refine(field, field.two_view, inliers, pictures, cameras, edge_ends(pictures[0])[0])
+    return refine(field, field.two_view, inliers, edge.pair(frames[0].pictures), cameras)

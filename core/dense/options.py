@@ -218,30 +218,6 @@ class OutlinesOptions:
 
 
 @dataclass(frozen=True)
-class StraightEdgeOptions:
-    """Keeping straight edges straight (`straight_edges`). Nodes lie a pixel of the reference or a little more apart."""
-
-    min_nodes: int = 12
-    """Nodes along an edge below which it is left alone: so few follow any line."""
-
-    huber_px: float = 0.3
-    """px of a move from which a node counts less: dense matches of a clear edge are about as good."""
-
-    agreeing_px: float = 0.65
-    """px up to which a node lies on the line: two standard deviations of such a match."""
-
-    min_share: float = 0.8
-    """Share of an edge's nodes that must lie on it: what does not may be another surface's, and where it is more the
-    edge is no straight line in space."""
-
-    beside_nodes: float = 1.0
-    """Standard deviation, in nodes, of how what lies next to an edge is moved with it."""
-
-    fits: int = 6
-    """Reweighted fits: the last ones hardly change anything."""
-
-
-@dataclass(frozen=True)
 class UnfoldingOptions:
     """Taking out folds that are not occlusions (`unfolding`)."""
 
@@ -347,6 +323,5 @@ MATCHING = MatchingOptions()
 LINES = LinesOptions()
 SMOOTHING = SmoothingOptions()
 OUTLINES = OutlinesOptions()
-STRAIGHT_EDGES = StraightEdgeOptions()
 UNFOLDING = UnfoldingOptions()
 POLISH = PolishOptions()

@@ -21,7 +21,7 @@ from ..field.refined_depth import RefinedDepth
 from ..field.slack import SlackField
 from ..field.strict import StrictField
 from ..pictures.picture import Picture
-from ..raster.arrays import Array, Box, Plane
+from ..raster.arrays import Box, Plane
 from ..raster.options import PARTS
 from ..raster.sampling import fetch
 from ..system.threads import in_order
@@ -34,7 +34,6 @@ from .outlines import at_outlines
 from .polish import likeness, polish
 from .rim import Found, borne_out
 from .rim_options import BEYOND
-from .straight_edges import straightened
 from .unfolding import unfolded
 
 
@@ -66,7 +65,7 @@ class Dense:
 
 def refine(
     field: StrictField | SlackField, two_view: TwoView, matches: Matches, pictures: tuple[Picture, Picture],
-    cameras: tuple[Camera, Camera], edges: Array,
+    cameras: tuple[Camera, Camera],
 ) -> Dense:  # fmt: skip
     """Refines a strict or slack field of a pair of pictures.
 
@@ -81,8 +80,6 @@ def refine(
         Reference and target.
     cameras : (Camera, Camera)
         Of the same, with their lenses.
-    edges : (N, 2, 2) array
-        Ends of straight edges of the reference, px.
 
     Returns
     -------
@@ -127,7 +124,6 @@ def refine(
     both = overlap & _in_both(lines, field_at, np.zeros_like(field_at), pictures)
     along = borne_out(lines, Found(along, polished.across, field_at, confidence), both, guide, views)
     overlap = _in_both(lines, along, polished.across, pictures)
-    along = straightened(lines, along, edges)
     along = unfolded(lines, two_view, cameras[1].size, along, polished.across) - field_at
     refinement = build_refinement(lines, base, along, polished.across, confidence, overlap)
     along_rms, across_rms = (float(np.sqrt(np.square(v[overlap]).mean())) for v in (along, polished.across))
