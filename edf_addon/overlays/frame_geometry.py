@@ -20,7 +20,7 @@ from ...core.raster.arrays import Array
 from ..scene.scene_geometry import matrix, projection_of, viewpoint_of
 from . import overlay_geometry as geometry_of
 from .overlay_geometry import TARGET
-from .picture_points import placed_cameras
+from .picture_points import posed_cameras
 
 
 def frame_border(known: dict[str, Any], frame: dict[str, Any], then: dict[str, Any]) -> Array | None:
@@ -29,7 +29,7 @@ def frame_border(known: dict[str, Any], frame: dict[str, Any], then: dict[str, A
     known: a result's `geometry`, `report` and `depth`; frame: see `engine_options.frame_of`; then: the same of what the
     result was made with, of which all that was chosen and is asked for again is kept.
     """
-    views = [_view(*one) for one in placed_cameras(known["geometry"])]
+    views = [_view(*one) for one in posed_cameras(known["geometry"])]
     if not all(np.isfinite(view.R).all() and np.isfinite(view.t).all() for view in views):
         return None
     found = frame_outline(_request(known, frame, then), _crop(frame["crop"]), views, _outlines(known, views))

@@ -18,7 +18,7 @@ def in_picture(known: dict[str, Any], points: Array, number: int) -> Array:
     """px (N, 2) of a full upright picture of a result where it shows what the panorama shows at px (N, 2); NaN behind
     its camera. number: of the picture among those that are used, the reference's or viewpoint's first."""
     geometry, projection, viewpoint = known["geometry"], projection_of(known), viewpoint_of(known)
-    camera, R, t = placed_cameras(geometry)[number]
+    camera, R, t = posed_cameras(geometry)[number]
     d = depth_at(known, points)
     if projection is not None:
         rays = projection.rays(points)
@@ -34,10 +34,10 @@ def in_picture(known: dict[str, Any], points: Array, number: int) -> Array:
 
 def count(known: dict[str, Any]) -> int:
     """How many pictures a result knows the cameras of."""
-    return len(placed_cameras(known["geometry"]))
+    return len(posed_cameras(known["geometry"]))
 
 
-def placed_cameras(geometry: dict[str, Any]) -> list[tuple[Camera, Array, Array]]:
+def posed_cameras(geometry: dict[str, Any]) -> list[tuple[Camera, Array, Array]]:
     """Camera, rotation and translation of each picture, in the frame of the first; lenses of more than two are straight
     enough for what is pointed at by hand."""
     if "cameras" not in geometry:

@@ -40,7 +40,7 @@ def test_the_same_frame_holds_both_pictures_and_is_a_rectangle_of_the_panorama(k
     left, top, right, bottom = box(points)
     edges = np.array([points[:, 0] - left, points[:, 0] - right, points[:, 1] - top, points[:, 1] - bottom])
     assert np.abs(edges).min(axis=0).max() < 1e-6, "every point lies on an edge"
-    views = [fg._view(*one) for one in fg.placed_cameras(known["geometry"])]
+    views = [fg._view(*one) for one in fg.posed_cameras(known["geometry"])]
     for outline in fg._outlines(known, views):
         shown = fg.on_panorama(known, outline)
         assert (shown > [left - 4, top - 4]).all() and (shown < [right + 4, bottom + 4]).all()
