@@ -80,5 +80,11 @@ def test_nothing_is_done_without_edges_or_where_nothing_is_known(lines: Epipolar
     assert np.array_equal(straightened(lines, along, np.zeros((0, 2, 2))), along)
     assert np.array_equal(straightened(lines, along, np.array([[[50.0, 50], [56, 50]]])), along), "too short"
     assert np.array_equal(straightened(lines, along, EDGE + 500), along), "outside"
-    blind = np.full(lines.shape, np.nan, np.float32)
-    assert np.isnan(straightened(lines, blind, EDGE)).all()
+
+
+def test_what_lies_behind_the_camera_says_nothing_of_the_rest(lines: EpipolarLines) -> None:
+    away, place = from_edge(lines)
+    along = (0.3 * np.sin(25 * place)).astype(np.float32)
+    along[(place > 0.5) & (place < 0.55)] = np.nan
+    rest = (away < 1) & (place > 0.6) & (place < 0.95)
+    assert straightened(lines, along, EDGE)[rest].std() < 0.3 * along[rest].std()
