@@ -50,6 +50,8 @@ class RigViewpoint:
 
     def place(self, rays: NDArray[Any]) -> Array:
         """C (…, 3) from where rays (…, 3) of any length are seen."""
+        if self.s1 == 0:
+            return np.zeros(rays.shape)
         x, _, z = np.moveaxis(rays @ self.rotation, -1, 0)
         count = len(self.places)
         at = (angle_of(x, z) + np.pi) * (count / (2 * np.pi))

@@ -119,7 +119,7 @@ def compared_on(
     """
     margin = int(4 * CHOICE.base_sigma * patch.chart.per_radian) + 2 * CHART.coarse_step
     around = patch.of_chart(place.d, margin)
-    base = patch.at_coarse(cv2.GaussianBlur(around, (0, 0), CHOICE.base_sigma * patch.chart.per_radian), margin)
+    base = patch.at_coarse(_broad(around, CHOICE.base_sigma * patch.chart.per_radian), margin)
     coarse_field = patch.at_coarse(around, margin)
     rays = place.from_viewpoint(patch.coarse_rays, coarse_field)
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
@@ -146,6 +146,16 @@ def compared_on(
     return Compared(
         patch, tuple(seen), tuple(toned), own, (own >= 0) & (count > 1), base, per_px, patch.of_chart(place.d)
     )
+
+
+def _broad(values: Plane, sigma: float) -> Plane:
+    """Values (h, w) smoothed by so many nodes (σ), far more than the coarse ones are apart: by way of these."""
+    height, width = values.shape
+    small = max(1, width // CHART.coarse_step), max(1, height // CHART.coarse_step)
+    shrunk = cv2.resize(values, small, interpolation=cv2.INTER_AREA)
+    smooth = cv2.GaussianBlur(shrunk, (0, 0), sigma * small[0] / width, sigmaY=sigma * small[1] / height)
+    broad: Plane = cv2.resize(smooth, (width, height), interpolation=cv2.INTER_LINEAR)
+    return broad
 
 
 def _shown(seen: SeenPatch, d: Array) -> NDArray[np.bool_]:

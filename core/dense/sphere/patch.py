@@ -100,8 +100,8 @@ class SweptPicture:
         """px (…) across (k = 0) or down (1) of the levels, `NOWHERE` for NaN, of px (…) of the picture's plane."""
         kind = at.dtype.type
         placed: NDArray[Any] = (at + kind(0.5 - self.corner[k])) * kind(self.scale[k]) - kind(0.5)
-        placed = np.clip(np.nan_to_num(placed, copy=False, nan=NOWHERE), NOWHERE, -NOWHERE * 10)
-        return placed
+        # fmax takes the number beside a NaN
+        return np.fmin(np.fmax(placed, kind(NOWHERE)), kind(-NOWHERE * 10))
 
 
 def _without_lens(levels: NDArray[np.uint8], view: View) -> tuple[NDArray[np.uint8], tuple[float, float]]:
@@ -136,6 +136,10 @@ class SeenPatch:
         return SeenPatch(patch, picture, patch.coarse_rays @ (view.K @ view.R).T, view.K @ view.t, slack)
 
     @cached_property
+    def _planes(self) -> NDArray[np.float64]:
+        return np.ascontiguousarray(np.moveaxis(self.infinite, -1, 0))
+
+    @cached_property
     def _infinite(self) -> list[Plane]:
         return self.patch.between(self.infinite)
 
@@ -145,9 +149,10 @@ class SeenPatch:
 
     def coarse_pixels(self, d: Array) -> Array:
         """px (m, n, 2) of the picture itself, before the lens, at inverse ranges (m, n); NaN behind it."""
-        seen = self.infinite + d[..., None] * self.towards
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            pixels: Array = np.where(seen[..., 2:] > 0, seen[..., :2] / seen[..., 2:], np.nan)
+        x, y, depth = (part + d * along for part, along in zip(self._planes, self.towards, strict=True))
+        depth = np.where(depth > 0, depth, np.nan)
+        with np.errstate(invalid="ignore", over="ignore"):
+            pixels = np.stack([x / depth, y / depth], axis=-1)
         return pixels if self.slack is None else pixels + self.slack
 
     def sampled_at(self, d: Array, levels: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -179,4 +179,5 @@ def test_the_sweep_finds_the_card_and_doubts_what_has_no_texture(rig: Rig, field
     assert found.unique.mean() > 0.8
     flat = [np.where(levels[..., 3:] == 255, np.uint8(100), levels) for levels in compared.levels]
     plain = [np.dstack([one[..., :3], levels[..., 3]]) for one, levels in zip(flat, compared.levels, strict=True)]
-    assert swept(replace(compared, levels=tuple(plain)), -20, 40).unique.mean() < 0.1
+    between_levels = compared.field + np.float32(0.3) * compared.per_px  # on one, the field alone decides
+    assert swept(replace(compared, levels=tuple(plain), field=between_levels), -20, 40).unique.mean() < 0.1
