@@ -118,7 +118,8 @@ def test_the_report_agrees_with_the_result(result: StitchResult) -> None:
         "width": result.alpha.shape[1], "height": result.alpha.shape[0], "offset": list(result.warp.canvas.offset),
         "cropped": False, "projection": {
             "kind": "perspective", "focal_px": view.K[0, 0], "rotation": np.eye(3).tolist(), "level": [0.0, 0.0, 0.0],
-            "centre": list(view.K[:2, 2] + result.warp.canvas.offset)}}
+            "centre": list(view.K[:2, 2] + result.warp.canvas.offset)},
+        "box": [0, 0, *result.alpha.shape[::-1]], "whole": list(result.alpha.shape[::-1])}
     assert report["matches"]["found"] == len(result.edges[0].matches)
     assert report["matches"]["inliers"] == view.inliers.sum() <= len(result.edges[0].matches)
     for name in ("K", "K_prime", "R", "t", "F", "H_inf", "e_prime"):
