@@ -56,30 +56,6 @@ class FeatureOptions:
 
 
 @dataclass(frozen=True)
-class CommonPartOptions:
-    """Where features are sought in two pictures (`common_part`)."""
-
-    # px of each picture below which seeking in all of it takes no longer than finding the part.
-    least_pixels: int = 1_000_000
-    # px and features of the small copies: a dozen times fewer pixels than what they spare.
-    pixels: int = 150_000
-    budget: int = 1500
-    # Share of the longer side within which matches agree with a homography: near things are moved by as much.
-    agree_share: float = 0.03
-    # Matches that agree, at least, and their share of all: else all of both pictures is looked at.
-    least_agree: int = 60
-    least_share: float = 0.6
-    # Rounds of RANSAC, at most.
-    rounds: int = 500
-    # Depth of the frame's corners in units of that of the matches, at least: beyond, a homography says nothing.
-    least_depth: float = 0.1
-    # Share of the longer side that is looked at around what a homography says: near things lie beyond it.
-    margin: float = 0.12
-    # Share of both pictures that is left, at most, to be worth it.
-    most_share: float = 0.85
-
-
-@dataclass(frozen=True)
 class FundamentalOptions:
     """Robust F and homography from matches alone, and tests against chance (`fundamental`)."""
 
@@ -306,7 +282,6 @@ class MirrorOptions:
 
 
 FEATURES = FeatureOptions()
-COMMON_PART = CommonPartOptions()
 FUNDAMENTAL = FundamentalOptions()
 REFINEMENT = RefinementOptions()
 ESTIMATION = EstimationOptions()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +13,10 @@ from ..cameras.camera import Camera
 from ..cameras.matches import Matches
 from ..cameras.sources import role
 from ..pictures.picture import Picture
-from ..raster.arrays import Box, cut
 from ..system.errors import NoOverlap, TooFewMatches
 from ..system.progress import ReportProgress
 from ..system.threads import at_most, in_order
 from . import features
-from .common_part import common_parts
 from .match_files import read_matches
 from .options import ESTIMATION, FEATURES
 
@@ -32,11 +29,9 @@ def found_in(frames: Sequence[Sequence[Picture]], progress: ReportProgress, quic
     found = []
     most = (FEATURES.preview_budget, FEATURES.preview_pixels) if quick else (FEATURES.budget, FEATURES.pixels)
     for i, pictures in enumerate(frames):
-        parts: Sequence[Box] = [_whole(picture) for picture in pictures]
-        parts = parts if quick else common_parts(pictures) or parts
         seen = []
-        with at_most(features.at_once(most[1], [part[2] * part[3] for part in parts])):
-            for keypoints in in_order(lambda pair: _features_in(*pair, most), zip(pictures, parts, strict=True)):
+        with at_most(features.at_once(most[1], [picture.view[..., 0].size for picture in pictures])):
+            for keypoints in in_order(lambda p: features.detect(p.view, p.alpha, *most), pictures):
                 seen.append(keypoints)
                 progress("features", (i + 0.9 * len(seen) / len(pictures)) / len(frames))
         found.append(features.match(seen[0], seen[1]))
@@ -44,22 +39,6 @@ def found_in(frames: Sequence[Sequence[Picture]], progress: ReportProgress, quic
             _refuse_scarce(len(found[0]), pictures, [len(one.points) for one in seen])
     x, y = np.concatenate([m.x for m in found]), np.concatenate([m.y for m in found])
     return Matches(x, y, max(m.scale for m in found))
-
-
-def _whole(picture: Picture) -> Box:
-    """The box that holds all of a picture."""
-    height, width = picture.view.shape[:2]
-    return 0, 0, width, height
-
-
-def _features_in(picture: Picture, part: Box, most: tuple[int, int]) -> features.Features:
-    """The features of a part of a picture; most: of the whole of it, and of its px."""
-    share = part[2] * part[3] / picture.view[..., 0].size
-    alpha = None if picture.alpha is None else cut(picture.alpha, part)
-    # more to an area than in the whole, where parts without texture leave theirs to others
-    budget = round(share**0.5 * most[0])
-    found = features.detect(cut(picture.view, part), alpha, budget, round(share * most[1]))
-    return replace(found, points=found.points + part[:2])
 
 
 def _refuse_scarce(matches: int, pictures: Sequence[Picture], details: Sequence[int]) -> None:
