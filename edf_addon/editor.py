@@ -117,6 +117,11 @@ def all_spaces(context: Any) -> list[tuple[bpy.types.Area, bpy.types.SpaceImageE
     ]
 
 
+def may_hold_pointer(context: Any) -> bool:
+    """Whether a tool may hold the pointer: it was started in an Image Editor of a window."""
+    return context.area is not None and context.area.type == "IMAGE_EDITOR" and context.window is not None
+
+
 def let_go(context: Any) -> None:
     """Give the pointer and the status bar back, after a tool that held them."""
     context.workspace.status_text_set(None)

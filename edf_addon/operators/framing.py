@@ -62,7 +62,7 @@ class EDF_OT_frame_drag(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
     def invoke(self, context: Any, _event: Any) -> set[str]:
-        if context.area is None or context.area.type != "IMAGE_EDITOR" or context.window is None:
+        if not editor.may_hold_pointer(context):
             self.report({"ERROR"}, "Frames are dragged in an Image Editor: press the button in its sidebar")
             return {"CANCELLED"}
         panorama = editor.panorama(context)

@@ -48,7 +48,7 @@ class EDF_OT_guide_add(bpy.types.Operator):  # noqa: N801
         return self._keep(context, settings.pictures[self.picture - 1].image, list(self.ends))
 
     def invoke(self, context: Any, _event: Any) -> set[str]:
-        if context.area is None or context.area.type != "IMAGE_EDITOR" or context.window is None:
+        if not editor.may_hold_pointer(context):
             self.report({"ERROR"}, "Guides are set in an Image Editor: press the button in its sidebar")
             return {"CANCELLED"}
         strokes.line.clear()

@@ -52,7 +52,7 @@ class EDF_OT_take_from(bpy.types.Operator):  # noqa: N801
         return self._take(context, [(self.place[0], self.place[1], self.radius)])
 
     def invoke(self, context: Any, _event: Any) -> set[str]:
-        if context.area is None or context.area.type != "IMAGE_EDITOR" or context.window is None:
+        if not editor.may_hold_pointer(context):
             self.report({"ERROR"}, "Places are drawn in an Image Editor: press the button in its sidebar")
             return {"CANCELLED"}
         panorama = editor.panorama(context)
