@@ -122,14 +122,16 @@ def spread_evenly(
 
 
 def match(a: Features, b: Features, ratio: float = FEATURES.ratio) -> Matches:
-    """Match two sets of features: mutual nearest neighbours that pass Lowe's ratio test.
+    """Match two sets of features: mutual nearest neighbours that pass Lowe's ratio test, the same from a and from b.
+
+    The distance to the second nearest is the geometric mean of that from a and that from b.
 
     Parameters
     ----------
     a, b : Features
         Of the reference and of the target.
     ratio : float
-        The most that the distance to the nearest neighbour may be of that to the second nearest.
+        The most that the distance of the two may be of that to the second nearest.
 
     Returns
     -------
@@ -145,11 +147,12 @@ def match_index(a: Features, b: Features, ratio: float = FEATURES.ratio) -> NDAr
     if len(a.points) < 2 or len(b.points) < 2:
         return np.empty((0, 2), np.intp)
     nearest, nearest_score, second = (np.empty(len(a.points), t) for t in (np.intp, np.float32, np.float32))
-    back_score = np.full(len(b.points), -2, np.float32)
     back = np.full(len(b.points), -1, np.intp)
+    back_score, back_second = np.full((2, len(b.points)), -2, np.float32)
 
-    def best_of(start: int) -> tuple[slice, NDArray[np.float32]]:
-        """Fills in what is nearest to some of a; which they are, and how near the nearest of them is to each of b."""
+    def best_of(start: int) -> tuple[slice, NDArray[np.float32], NDArray[np.float32]]:
+        """Fills in what is nearest to some of a; which they are, and how near to each of b the nearest of them is, and
+        the nearest of those whose own nearest it is not."""
         rows = slice(start, start + FEATURES.rows_at_once)
         score = _products(a.descriptors[rows], b.descriptors)
         best = score.max(axis=0)
@@ -158,24 +161,28 @@ def match_index(a: Features, b: Features, ratio: float = FEATURES.ratio) -> NDAr
         nearest_score[rows] = score[index, nearest[rows]]
         score[index, nearest[rows]] = -2
         second[rows] = score.max(axis=1)
-        return rows, best
+        return rows, best, score.max(axis=0)
 
     # in slabs, so that memory stays bounded
-    for rows, best in in_order(best_of, range(0, len(a.points), FEATURES.rows_at_once)):
+    for rows, best, others in in_order(best_of, range(0, len(a.points), FEATURES.rows_at_once)):
         better = best > back_score
         back[better], back_score[better] = -1, best[better]
+        np.maximum(back_second, others, out=back_second)
         # NumPy's argmax along columns takes many times as long as max: only who is nearest to its own nearest counts
         to = nearest[rows]
         mutual = np.flatnonzero(better[to] & (nearest_score[rows] == best[to]))[::-1]
         back[to[mutual]] = mutual + rows.start
+    mutual = back[nearest] == np.arange(len(a.points))
+    np.maximum.at(back_second, nearest[~mutual], nearest_score[~mutual])
     # unit vectors: |a − b|² = 2 − 2 a·b
-    distinct = 2 - 2 * nearest_score < ratio**2 * (2 - 2 * second)
-    keep = np.flatnonzero(distinct & (back[nearest] == np.arange(len(a.points))))
+    apart, apart_second, apart_back = (2 - 2 * score for score in (nearest_score, second, back_second[nearest]))
+    keep = np.flatnonzero(mutual & (apart**2 < ratio**4 * apart_second * apart_back))
+    keep = keep[np.argsort(apart[keep], kind="stable")]
     x, y = a.points[keep], b.points[nearest[keep]]
-    # one place may carry several orientations, hence several identical matches
+    # one place may carry several orientations, hence several identical matches: the nearest of them
     _, first = np.unique(np.round(np.hstack([x, y]), 1), axis=0, return_index=True)
-    first.sort()
-    return np.column_stack([keep, nearest[keep]])[first]
+    keep = np.sort(keep[first])
+    return np.column_stack([keep, nearest[keep]])
 
 
 def _products(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from edf_stitch.core.cameras.matches import Matches
-from edf_stitch.core.pose.features import Features, detect, match, spread_evenly
+from edf_stitch.core.pose.features import Features, detect, match, match_index, spread_evenly
 from edf_stitch.core.pose.options import FEATURES
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -231,21 +231,32 @@ def test_matches_are_mutual_and_pass_the_ratio_test() -> None:
     """Against the definition written out over all pairs, with more points than one slab holds."""
     random = np.random.default_rng(0)
     first = np.abs(random.normal(size=(1300, 128)))
-    first[1100:] = first[:200] + 0.4 * random.normal(size=(200, 128))  # two that look like one there: not mutual
+    first[1100:] = first[:200] + 0.2 * random.normal(size=(200, 128))  # two that look like one there: not mutual
     strangers = np.abs(random.normal(size=(300, 128)))
     second = np.concatenate([first[:900] + 0.5 * random.normal(size=(900, 128)), strangers])
     a, b = described(np.abs(first)), described(np.abs(random.permutation(second)))
     distance = np.sqrt(np.maximum(2 - 2 * a.descriptors.astype(float) @ b.descriptors.astype(float).T, 0))
-    order = np.sort(distance, axis=1)
     forward, backward = distance.argmin(axis=1), distance.argmin(axis=0)
-    for ratio in (0.8, 0.6):
-        clear = order[:, 0] < ratio * order[:, 1]
-        assert np.abs(order[:, 0] - ratio * order[:, 1]).min() > 1e-6  # nothing hangs on rounding
+    nearest, second = np.sort(distance, axis=1)[:, :2].T
+    second_mean = np.sqrt(second * np.sort(distance, axis=0)[1, forward])
+    for ratio in (0.9, 0.8):
+        clear = nearest < ratio * second_mean
+        assert np.abs(nearest - ratio * second_mean).min() > 1e-6  # nothing hangs on rounding
         mutual = backward[forward] == np.arange(len(forward))
         expected = np.flatnonzero(clear & mutual)
         assert 0 < len(expected) < clear.sum() < len(clear)
         found = match(a, b, ratio)
         assert np.array_equal(found.x, a.points[expected]) and np.array_equal(found.y, b.points[forward[expected]])
+        back = match_index(b, a, ratio)[:, ::-1]
+        assert np.array_equal(back[np.argsort(back[:, 0])], match_index(a, b, ratio))
+
+
+def test_pictures_match_alike_from_either_of_them() -> None:
+    whole = texture(340, 440, 5)
+    one, other = (detect(np.ascontiguousarray(part)) for part in (whole[:300, :400], whole[30:330, 25:425, :] // 2))
+    there, back = match(one, other), match(other, one)
+    assert len(there) > 400
+    assert {(*x, *y) for x, y in zip(there.x, there.y)} == {(*x, *y) for x, y in zip(back.y, back.x)}
 
 
 def test_one_place_with_several_orientations_gives_one_match() -> None:
