@@ -122,7 +122,7 @@ def refine(
     if not overlap.any():
         return Dense(None, "the overlap is too small")
     both = overlap & _in_both(lines, field_at, np.zeros_like(field_at), pictures)
-    along = borne_out(lines, Found(along, polished.across, field_at, confidence), both, guide, views)
+    along = borne_out(lines, Found(along, polished.across, field_at, confidence, plain), both, guide, views)
     overlap = _in_both(lines, along, polished.across, pictures)
     along = unfolded(lines, two_view, cameras[1].size, along, polished.across) - field_at
     refinement = build_refinement(lines, base, along, polished.across, confidence, overlap)

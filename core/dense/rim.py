@@ -1,12 +1,14 @@
-"""Doubts what was found near the border of the overlap.
+"""Doubts what was found near the border of the overlap, and where there is no texture.
 
-There a window sees only half of what it needs, what one picture shows may lie beyond the other's border, and whatever
-is wrong is carried on beyond the overlap. So patches that neither the pictures' likeness nor the smooth field bears out
-get what surer nodes say of the same surface, or the field where there are none, unless the pictures differ more then.
+Near the border a window sees only half of what it needs, what one picture shows may lie beyond the other's border, and
+whatever is wrong is carried on beyond the overlap. What has no texture gets its depth from what borders it, a sky that
+of the leaves in front of it. So patches that neither the pictures' likeness nor the smooth field bears out get what
+surer nodes say of the same surface, or the field where there are none, unless the pictures differ more then.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -14,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..field.folding import jacobian
-from ..raster.arrays import Plane
+from ..raster.arrays import Plane, without_specks
 from ..raster.distance import distance_to_border
 from .edge_aware_smoothing import Smoother, edge_weights
 from .epipolar_lines import EpipolarLines
@@ -28,20 +30,22 @@ class Found:
     """What was found along the lines.
 
     along, across (h, w): moves along the lines and across them, px; field (h, w): moves along them that the smooth
-    field asks for; confidence (h, w), 0 to 1.
+    field asks for; confidence (h, w), 0 to 1; plain (h, w): lack of texture, 0 to 1.
     """
 
     along: Plane
     across: Plane
     field: Plane
     confidence: Plane
+    plain: Plane
 
 
 def borne_out(
     lines: EpipolarLines, found: Found, overlap: NDArray[np.bool_], guide: NDArray[np.float32],
     views: tuple[ComparedPicture, ComparedPicture],
 ) -> Plane:  # fmt: skip
-    """The moves along the lines (h, w) px, without those near the overlap's border that nothing bears out.
+    """The moves along the lines (h, w) px, without those that nothing bears out near the overlap's border or where there
+    is no texture.
 
     overlap (h, w): mask of what both pictures show, by these moves and by the field's; guide (h, w, C): colours of the
     reference; views: reference and target.
@@ -51,7 +55,8 @@ def borne_out(
     confidence = cv2.erode(found.confidence, np.ones((RIM.confidence_erosion,) * 2, np.uint8))
     rows, columns = (np.ptp(np.flatnonzero(overlap.any(axis=axis))) + 1 if overlap.any() else 1 for axis in (1, 0))
     width = RIM.width * float(min(rows, columns))
-    patches = _doubtful(moves, confidence, overlap, width)
+    rim = _near_rim(moves, confidence, overlap, width)
+    patches = _numbered([*rim, *_untextured(moves, found.plain, overlap & ~np.logical_or.reduce(rim))])
     if not patches.any():
         return found.along
     sure = np.clip((confidence - RIM.ignored_confidence) / (RIM.trusted_confidence - RIM.ignored_confidence), 0, 1)
@@ -78,19 +83,30 @@ def _better(patches: NDArray[np.int32], before: _Looks, after: _Looks) -> NDArra
     return better
 
 
-def _doubtful(moves: Plane, confidence: Plane, overlap: NDArray[np.bool_], width: float) -> NDArray[np.int32]:
-    """Numbers (h, w), from 1, of the patches in which moves (h, w) px are alike and far from the field's and
-    confidence (h, w) is low, as far as they begin near the border of the overlap (h, w); 0 elsewhere.
-
-    width: how many nodes from the border are doubted.
-    """
+def _near_rim(
+    moves: Plane, confidence: Plane, overlap: NDArray[np.bool_], width: float
+) -> list[NDArray[np.bool_]]:
+    """Masks (h, w), each of one kind of moves: alike and far from the field's where confidence (h, w) is low, as far as
+    they begin near the border of the overlap (h, w). moves (h, w): px; width: how many nodes from it are doubted."""
     distance = distance_to_border(overlap) / np.float32(width)
     doubtful = (confidence < RIM.trusted_confidence) & (np.abs(moves) > RIM.agreeing_px) & (distance < 1)
     begins = _touching(doubtful, distance < RIM.beginning)
     kinds = (moves > 0) + 2 * (np.abs(moves) > RIM.large_px)
-    patches, count = np.zeros(moves.shape, np.int32), 0
-    for kind in range(4):
-        more, numbers = cv2.connectedComponents((begins & (kinds == kind)).astype(np.uint8), connectivity=4)
+    return [begins & (kinds == kind) for kind in range(4)]
+
+
+def _untextured(moves: Plane, plain: Plane, where: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+    """Masks (h, w) of the nodes, where asked, that lack texture (h, w) and are nearer than the field by far, and of
+    those that are farther; moves (h, w): px from it."""
+    far = where & (plain > RIM.plain) & (np.abs(moves) > RIM.plain_px)
+    return [without_specks(far & (side * moves > 0)) for side in (1, -1)]
+
+
+def _numbered(masks: Sequence[NDArray[np.bool_]]) -> NDArray[np.int32]:
+    """Numbers (h, w), from 1, of the connected parts of masks (h, w) that do not overlap; 0 elsewhere."""
+    patches, count = np.zeros(masks[0].shape, np.int32), 0
+    for mask in masks:
+        more, numbers = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
         patches += numbers + np.where(numbers > 0, np.int32(count), np.int32(0))
         count += more - 1
     return patches

@@ -38,7 +38,7 @@ class BeyondOptions:
 
 @dataclass(frozen=True)
 class RimOptions:
-    """What is doubted near the overlap's border (`rim`)."""
+    """What is doubted near the overlap's border, and where there is no texture (`rim`)."""
 
     width: float = 0.05
     """Share of the overlap's shorter side within which moves are doubted."""
@@ -79,6 +79,12 @@ class RimOptions:
 
     shown_share: float = 0.25
     """Share of a patch that has to be shown afterwards, too, for the pictures to be compared."""
+
+    plain: float = 0.5
+    """Lack of texture, 0 to 1, from which a node's depth is only what borders it."""
+
+    plain_px: float = 4.0
+    """px from the smooth field beyond which that is doubted: less is the shape of a surface."""
 
     softness: int = 3
     """Nodes of the side of the window over which what a patch gets and what lies around it pass into each other."""

@@ -1,4 +1,5 @@
-"""What was found near the overlap's border goes where nothing bears it out, and stays where anything does."""
+"""What was found near the overlap's border, or without texture, goes where nothing bears it out, and stays where
+anything does."""
 
 from __future__ import annotations
 
@@ -48,10 +49,12 @@ def patch(lines: EpipolarLines, start: int, stop: int) -> np.ndarray:
 
 def settled(
     pair: Scene, lines: EpipolarLines, along: np.ndarray, confidence: np.ndarray, field: np.ndarray | None = None,
-    guide: np.ndarray | None = None,
+    guide: np.ndarray | None = None, plain: np.ndarray | None = None,
 ) -> np.ndarray:  # fmt: skip
     zero = np.zeros(lines.shape, np.float32)
-    found = Found(along, zero, zero if field is None else field, confidence)
+    found = Found(
+        along, zero, zero if field is None else field, confidence, zero if plain is None else plain.astype(np.float32)
+    )
     overlap = shown(lines) & shown(lines, found.field)
     colours = (pair.reference if guide is None else guide).astype(np.float32)
     return borne_out(lines, found, overlap, colours, pair.views())
@@ -81,6 +84,30 @@ def test_what_is_sure_or_lies_inside_stays(made: tuple[Scene, EpipolarLines], st
     pair, lines = made
     along, confidence = led_astray(lines, patch(lines, start, start + 14), doubted)
     assert np.array_equal(settled(pair, lines, along, confidence), along)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_without_texture_a_patch_inside_goes_where_the_field_looks_better(
+    made: tuple[Scene, EpipolarLines], side: int
+) -> None:
+    """However sure it is: its depth is that of what borders it."""
+    pair, lines = made
+    at = patch(lines, WIDTH + 6, WIDTH + 36)
+    along, confidence = led_astray(lines, at, 0.95)
+    along[at] = side * 7
+    found = settled(pair, lines, along, confidence, plain=at)
+    inner = cv2.erode(at.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    assert np.mean(np.abs(found[inner]) < 0.2) > 0.9, "but for corners of it"
+    assert np.array_equal(settled(pair, lines, along, confidence), along), "with texture it stays"
+
+
+def test_without_texture_a_patch_stays_where_the_field_looks_worse(made: tuple[Scene, EpipolarLines]) -> None:
+    pair, lines = made
+    at = patch(lines, WIDTH + 6, WIDTH + 36)
+    along, field = np.zeros(lines.shape, np.float32), np.zeros(lines.shape, np.float32)
+    field[at] = 7
+    confidence = np.where(at, np.float32(0.95), np.float32(0.2))
+    assert np.array_equal(settled(pair, lines, along, confidence, field, plain=at), along)
 
 
 def test_what_is_right_stays_though_the_field_is_wrong(made: tuple[Scene, EpipolarLines]) -> None:
