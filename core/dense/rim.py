@@ -56,20 +56,24 @@ def borne_out(
     rows, columns = (np.ptp(np.flatnonzero(overlap.any(axis=axis))) + 1 if overlap.any() else 1 for axis in (1, 0))
     width = RIM.width * float(min(rows, columns))
     rim = _near_rim(moves, confidence, overlap, width)
-    patches = _numbered([*rim, *_untextured(moves, found.plain, overlap & ~np.logical_or.reduce(rim))])
+    patches = _numbered(rim)
+    untextured = _numbered(_untextured(moves, found.plain, overlap & (patches == 0)))
+    inside = 1 + int(patches.max())
+    patches += np.where(untextured > 0, untextured + np.int32(inside - 1), np.int32(0))
     if not patches.any():
         return found.along
     sure = np.clip((confidence - RIM.ignored_confidence) / (RIM.trusted_confidence - RIM.ignored_confidence), 0, 1)
     safer = found.field + _from_surface(moves, overlap * (patches == 0) * sure, guide)
-    better = _better(patches, *(_looks(lines, views, along, found.across) for along in (found.along, safer)))
+    better = _better(patches, inside, *(_looks(lines, views, along, found.across) for along in (found.along, safer)))
     share = cv2.blur(better[patches].astype(np.float32), (RIM.softness,) * 2)
     result: Plane = found.along + share * (safer - found.along)
     return result
 
 
-def _better(patches: NDArray[np.int32], before: _Looks, after: _Looks) -> NDArray[np.bool_]:
+def _better(patches: NDArray[np.int32], inside: int, before: _Looks, after: _Looks) -> NDArray[np.bool_]:
     """Which patches (n,) look no worse after: the map folds less there, or no more, and the pictures differ no more, or
-    hardly where it folded. Patches that are hardly shown after only seemed to be part of the overlap."""
+    hardly where it folded. Patches that are hardly shown after only seemed to be part of the overlap. From number
+    `inside` on they have to differ much less: a bare wall looks the same at any depth."""
     both = before.shown & after.shown
     levels, folds = (
         [np.bincount(patches[at], values[at], patches.max() + 1) for values in pair]
@@ -79,6 +83,7 @@ def _better(patches: NDArray[np.int32], before: _Looks, after: _Looks) -> NDArra
     alike = levels[1] <= (1 + RIM.fold_tolerance * folds[0] / size) * levels[0]
     hardly_shown = np.bincount(patches[both], minlength=len(size)) < RIM.shown_share * size
     better: NDArray[np.bool_] = (folds[1] <= folds[0]) & (alike | hardly_shown & (folds[1] < folds[0]))
+    better[inside:] &= levels[1][inside:] < RIM.plain_difference * levels[0][inside:]
     better[0] = False
     return better
 

@@ -86,6 +86,9 @@ class RimOptions:
     plain_px: float = 4.0
     """px from the smooth field beyond which that is doubted: less is the shape of a surface."""
 
+    plain_difference: float = 0.5
+    """Share of their squared difference to which the pictures have to come there for it to be wrong."""
+
     softness: int = 3
     """Nodes of the side of the window over which what a patch gets and what lies around it pass into each other."""
 

@@ -101,6 +101,16 @@ def test_without_texture_a_patch_inside_goes_where_the_field_looks_better(
     assert np.array_equal(settled(pair, lines, along, confidence), along), "with texture it stays"
 
 
+def test_without_texture_a_patch_stays_where_the_field_looks_no_better(made: tuple[Scene, EpipolarLines]) -> None:
+    """Of a bare wall nobody sees how deep it is: it goes with its edges."""
+    pair, lines = made
+    gray = np.full_like(pair.reference, 128)
+    at = patch(lines, WIDTH + 6, WIDTH + 36)
+    along, confidence = led_astray(lines, at, 0.95)
+    bare = replace(pair, reference=gray, target=gray)
+    assert np.array_equal(settled(bare, lines, along, confidence, plain=at), along)
+
+
 def test_without_texture_a_patch_stays_where_the_field_looks_worse(made: tuple[Scene, EpipolarLines]) -> None:
     pair, lines = made
     at = patch(lines, WIDTH + 6, WIDTH + 36)
