@@ -17,6 +17,7 @@ from .cameras.rig import Rig
 from .cameras.view import View
 from .compose.seams.cut_things import without_cut_things
 from .compose.seams.rough_seam import RoughSeam
+from .compose.seams.torn_things import without_torn_things
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
 from .field.refined_depth import RefinedDepth
@@ -258,8 +259,10 @@ def _guide_warnings(lines: AllEdges, options: StitchOptions) -> tuple[str, ...]:
 
 
 def _settled(warp: Warp, known: _Known, pictures: Sequence[Picture]) -> Warp:
-    """The warp without what a border cuts, if depth goes on beyond the border as well."""
-    return warp if known.continuation is None else without_cut_things(warp, known.views, pictures)
+    """The warp without what a border cuts and what it tears, if depth goes on beyond the border as well."""
+    if known.continuation is None:
+        return warp
+    return without_torn_things(without_cut_things(warp, known.views, pictures), known.views, pictures)
 
 
 def has_depth(field: Field, views: Sequence[View]) -> bool:
