@@ -22,7 +22,7 @@ from ...pictures.picture import Picture
 from ...raster.arrays import Part, Plane, dilated, with_margin
 from ...raster.distance import distance_inside, distance_to
 from ...raster.pull_push import filled
-from .refills import Cells, Refill, cells_of, improved, is_better, kept_of, least_gain, zone_of
+from .refills import Cells, Refill, Way, cells_of, improved, is_better, kept_of, least_gain, zone_of
 from .rough_seam import RoughSeam
 from .seam_options import CUT_THINGS
 
@@ -46,8 +46,7 @@ def without_cut_things(
     -------
     Warp
     """
-    ways = [partial(_better, deepest=deepest) for deepest in CUT_THINGS.deepest]
-    return improved(warp, views, lambda focal: rough or RoughSeam.of(pictures, views, focal), ways)
+    return improved(warp, views, lambda focal: rough or RoughSeam.of(pictures, views, focal), WAYS)
 
 
 def _better(cells: Cells, deepest: float) -> tuple[list[Refill], Cells]:
@@ -120,3 +119,7 @@ def _one_cell(cells: Cells, place: Part, around: NDArray[np.bool_]) -> float:
         away = np.hypot(*(b - a for a, b in zip(before, after, strict=True)))[around]
         moved += float(np.nanmedian(away)) / max(view.size) * cells.side
     return float(more) / max(moved, 1e-9)
+
+
+# What lies deeper is tried first (see `refills.improved`).
+WAYS: tuple[Way, ...] = tuple(partial(_better, deepest=deepest) for deepest in CUT_THINGS.deepest)

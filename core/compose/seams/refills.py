@@ -73,10 +73,13 @@ class Refill:
     weight: Plane
 
 
+# Says what it refills, and how all looks with that.
+Way = Callable[[Cells], tuple[list[Refill], Cells]]
+
+
 def improved(
-    warp: Warp, views: Sequence[View], rough_of: Callable[[float], RoughSeam],
-    ways: Iterable[Callable[[Cells], tuple[list[Refill], Cells]]],
-) -> Warp:  # fmt: skip
+    warp: Warp, views: Sequence[View], rough_of: Callable[[float], RoughSeam], ways: Iterable[Way]
+) -> Warp:
     """A warp of two pictures with what some ways of refilling parts of it, one after the other, make better.
 
     Parameters
@@ -86,8 +89,7 @@ def improved(
         What is known of the pictures, the reference first.
     rough_of : callable
         Cuts seams through small pictures that have so many px per radian.
-    ways : iterable of callable
-        Each says what it refills, and how all looks with that.
+    ways : iterable of Way
 
     Returns
     -------

@@ -8,44 +8,30 @@ that is better is decided by what would be seen, part by part, in small pictures
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...cameras.view import View
 from ...field.folding import NO_TURN, cell_areas, turned_over, turning
-from ...panorama.warp import Warp
-from ...pictures.picture import Picture
 from ...raster.arrays import NEIGHBOURS, Part, dilated, larger_parts, with_margin
 from ...raster.distance import distance_inside
 from ...raster.lazy import whole
 from ...raster.log_encoding import log_encode
 from ...raster.pull_push import filled
-from .refills import Cells, Refill, cells_of, improved, is_better, joined, kept_of, zone_of
-from .rough_seam import RoughSeam
+from .refills import Cells, Refill, cells_of, is_better, joined, kept_of, least_gain, zone_of
 from .seam_options import CUT_THINGS, TORN_THINGS
 from .tears import tears
 
 
-def without_torn_things(warp: Warp, views: Sequence[View], pictures: Sequence[Picture]) -> Warp:
-    """Give what the map tears a smooth depth, where that shows less.
-
-    Parameters
-    ----------
-    warp : Warp
-        Of two pictures.
-    views : sequence of View
-        What is known of the pictures, the reference first.
-    pictures : sequence of Picture
-
-    Returns
-    -------
-    Warp
-    """
-    ways = [_untorn] * TORN_THINGS.rounds
-    return improved(warp, views, lambda focal: RoughSeam.of(pictures, views, focal), ways)
+def untorn(cells: Cells) -> tuple[list[Refill], Cells]:
+    """Give what the map tears a smooth depth, where that shows less (see `refills.improved`)."""
+    kept: list[Refill] = []
+    for _ in range(TORN_THINGS.rounds):
+        refills, cells = _untorn(cells)
+        if not refills:
+            break
+        kept += refills
+    return kept, cells
 
 
 def _untorn(cells: Cells) -> tuple[list[Refill], Cells]:
@@ -68,7 +54,7 @@ def _untorn(cells: Cells) -> tuple[list[Refill], Cells]:
 
 
 def _parts(cells: Cells) -> list[tuple[Part, NDArray[np.bool_]]]:
-    """Parts (h, w) of the canvas that hold a thing which is torn, and where they are."""
+    """Where things are torn and something is seen of it, and which parts (h, w) of these places they take up."""
     both = cells.look.shown[0] & cells.look.shown[1]
     torn = _torn(cells) & both
     things = joined(
@@ -83,7 +69,9 @@ def _parts(cells: Cells) -> list[tuple[Part, NDArray[np.bool_]]]:
             continue
         box = slice(int(top), int(top + height)), slice(int(left), int(left + width))
         place = with_margin(box, round((CUT_THINGS.grown + CUT_THINGS.ring) * cells.side) + 2, both.shape)
-        out.append((place, dilated(number[place] == label, cells_of(CUT_THINGS.grown, cells.side)) & both[place]))
+        part = dilated(number[place] == label, cells_of(CUT_THINGS.grown, cells.side)) & both[place]
+        if cells.seen[place][zone_of(part, cells.side)].sum() > least_gain(part):
+            out.append((place, part))
     return out
 
 

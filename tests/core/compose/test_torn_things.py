@@ -9,7 +9,9 @@ import pytest
 from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.compose.seams import torn_things
-from edf_stitch.core.compose.seams.torn_things import without_torn_things
+from edf_stitch.core.compose.seams.refills import improved
+from edf_stitch.core.compose.seams.rough_seam import RoughSeam
+from edf_stitch.core.compose.seams.torn_things import untorn
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.other_depth import seen_at
 from edf_stitch.core.panorama.viewpoint import Viewpoint
@@ -64,9 +66,14 @@ def ragged() -> Warp:
     return warped(depth)
 
 
+def mended(warp: Warp, moved: bool = True, of: tuple[View, View] | None = None) -> Warp:
+    pictures = picture(0, moved), picture(1, moved)
+    return improved(warp, of or views(), lambda focal: RoughSeam.of(pictures, views(), focal), [untorn])
+
+
 def test_who_moved_is_shown_whole() -> None:
     before = ragged()
-    after = without_torn_things(before, views(), (picture(0, True), picture(1, True)))
+    after = mended(before)
     assert after.refilled is not None and after.refilled[PART].mean() > 0.98
     there = after.refilled[PART][:, 1:] & after.refilled[PART][:, :-1]
     for number in (0, 1):
@@ -81,7 +88,7 @@ def test_who_moved_is_shown_whole() -> None:
 def test_where_the_pictures_agree_nothing_is_refilled() -> None:
     depth = np.full((H, W + SHIFT - 8), FAR, np.float32)
     warp = warped(depth)
-    assert without_torn_things(warp, views(), (picture(0, False), picture(1, False))) is warp
+    assert mended(warp, moved=False) is warp
 
 
 def test_nothing_takes_a_depth_that_draws_it_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,10 +103,10 @@ def test_nothing_takes_a_depth_that_draws_it_out(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(torn_things, "_refill", drawn_out)
     warp = ragged()
-    assert without_torn_things(warp, views(), (picture(0, True), picture(1, True))) is warp
+    assert mended(warp) is warp
 
 
 def test_without_a_baseline_there_is_nothing_to_do() -> None:
     warp, (first, second) = ragged(), views()
     still = (first, replace(second, t=np.zeros(3), e_prime=np.zeros(3)))
-    assert without_torn_things(warp, still, (picture(0, True), picture(1, True))) is warp
+    assert mended(warp, of=still) is warp
