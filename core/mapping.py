@@ -15,8 +15,11 @@ import numpy as np
 
 from .cameras.rig import Rig
 from .cameras.view import View
+from .compose.seams.cut_things import WAYS as CUT_WAYS
 from .compose.seams.cut_things import without_cut_things
+from .compose.seams.refills import improved
 from .compose.seams.rough_seam import RoughSeam
+from .compose.seams.torn_things import untorn
 from .continuation.continuation import Continuation, continue_beyond
 from .field.field import Field
 from .field.refined_depth import RefinedDepth
@@ -258,8 +261,11 @@ def _guide_warnings(lines: AllEdges, options: StitchOptions) -> tuple[str, ...]:
 
 
 def _settled(warp: Warp, known: _Known, pictures: Sequence[Picture]) -> Warp:
-    """The warp without what a border cuts, if depth goes on beyond the border as well."""
-    return warp if known.continuation is None else without_cut_things(warp, known.views, pictures)
+    """The warp without what a border cuts and what it tears, if depth goes on beyond the border as well."""
+    if known.continuation is None:
+        return warp
+    views = known.views
+    return improved(warp, views, lambda focal: RoughSeam.of(pictures, views, focal), [*CUT_WAYS, untorn])
 
 
 def has_depth(field: Field, views: Sequence[View]) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ..system.errors import Cancelled, StitchError
+from .options import VERDICT
 from .verdict import NOT_USABLE, TORN
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def first_usable(made: Callable[[StitchOptions], StitchResult], options: StitchO
 
 def least_torn(first: StitchResult, all_the_way: Callable[[], StitchResult]) -> StitchResult:
     """The stitch whose viewpoint slides within a part of the overlap, or the one in which it slides all the way where
-    that leaves less torn: the choice among them looks at a coarse map only.
+    that leaves much less torn: the choice among them looks at a coarse map only.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def least_torn(first: StitchResult, all_the_way: Callable[[], StitchResult]) -> 
     if not torn:
         return first
     other = all_the_way()
-    if not _is_usable(other) or _torn_px(other) >= torn:
+    if not _is_usable(other) or _torn_px(other) > VERDICT.much_less_torn * torn:
         return first
     took = first.seconds, other.seconds
     return replace(other, seconds={stage: sum(one.get(stage, 0.0) for one in took) for stage in {**took[0], **took[1]}})

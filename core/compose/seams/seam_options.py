@@ -160,7 +160,37 @@ class CutThingsOptions:
     """Or the share of the worst place before."""
 
 
+@dataclass(frozen=True)
+class TornThingsOptions:
+    """Things that the map tears (`torn_things`). Shares are of a picture's longer side."""
+
+    jump: float = 6.0
+    """Times the median area of the picture that a cell shows: the map jumps there. As in the verdict."""
+
+    least_cells: int = 3
+    """Cells of a jump or fold at least: fewer are rounding of a coarse map."""
+
+    near: float = 0.02
+    """Share from a tear within which places where the pictures differ are of the same thing."""
+
+    joined: float = 0.01
+    """Share across which parts are joined: arms and legs of one person."""
+
+    percentiles: tuple[tuple[float, float], ...] = ((0.0, 100.0), (0.0, 30.0), (70.0, 100.0))
+    """Percentiles of inverse depth around a thing that it may take: all of it, the far, or the near part."""
+
+    rounds: int = 2
+    """How often what is still torn is looked for: parts grow together."""
+
+    least_step: float = 0.4
+    """px of a small picture from one cell to the next, below which it is drawn out. Usual: 1."""
+
+    most_smeared: float = 0.01
+    """Share of a part's cells by which more may be drawn out than before."""
+
+
 SEAM = SeamOptions()
 ROUGH_SEAM = RoughSeamOptions()
 TEARS = TearOptions()
 CUT_THINGS = CutThingsOptions()
+TORN_THINGS = TornThingsOptions()
