@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.measure.metrics import psnr
+from ..core.measure.metrics import psnr, ssim
 from ..core.pipeline import StitchResult
 from ..core.raster.arrays import dilated
 from ..core.raster.colour import decode, encode
@@ -25,21 +25,35 @@ RIM_PX = 3
 def finished(result: StitchResult, pair: RenderedPair, truth: Truth) -> dict[str, float]:
     """Figures of a panorama on the reference's plane, made with all that the defaults do.
 
-    delivered_target_only_psnr_db: see `target_only`; things_half, of worlds that name things: see `things_half`.
+    delivered_target_only_psnr_db, delivered_target_only_ssim: see `target_only`; things_half, of worlds that name
+    things: see `things_half`.
     """
     found = {f"delivered_{key}": value for key, value in target_only(result, truth).items()}
     return found | ({"things_half": things_half(result, pair, truth)} if pair.things else {})
 
 
 def target_only(result: StitchResult, truth: Truth) -> dict[str, float]:
-    """target_only_psnr_db: what the target alone sees, against the true panorama; what is not shown is black. One gain
-    per channel is allowed for: no picture says which exposure is the true one."""
-    alone = truth.in_target & ~truth.in_reference
-    if not alone.any():
-        return {"target_only_psnr_db": math.nan}
+    """target_only_psnr_db, target_only_ssim: what the target alone sees, against the true panorama; what is not shown
+    is black. One gain per channel is allowed for: no picture says which exposure is the true one."""
     picture, _ = on_the_wide_canvas(result, truth)
+    return _alone(picture, truth, np.ones(truth.in_target.shape, bool), "target_only")
+
+
+def target_only_together(
+    picture: NDArray[np.uint8], common: NDArray[np.bool_], truth: Truth
+) -> dict[str, float]:
+    """target_only_common_psnr_db, target_only_common_ssim: the same of a picture as the true panorama lies, over what
+    all show of it (H, W): a map that stretches too far leaves nothing black, and is no better for that."""
+    return _alone(picture, truth, common, "target_only_common")
+
+
+def _alone(picture: NDArray[np.uint8], truth: Truth, where: NDArray[np.bool_], name: str) -> dict[str, float]:
+    alone = truth.in_target & ~truth.in_reference & where
+    if not alone.any():
+        return {f"{name}_psnr_db": math.nan, f"{name}_ssim": math.nan}
     exposed = evened(decode(picture), truth.picture, truth.in_reference)
-    return {"target_only_psnr_db": psnr(exposed, truth.picture, alone)}
+    return {f"{name}_psnr_db": psnr(exposed, truth.picture, alone),
+            f"{name}_ssim": ssim(exposed, truth.picture, alone)}  # fmt: skip
 
 
 def evened(light: NDArray[np.float32], true: NDArray[np.uint8], where: NDArray[np.bool_]) -> NDArray[np.uint8]:

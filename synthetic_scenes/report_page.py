@@ -40,8 +40,10 @@ MEASURES = {
     **{f"slid_{how}_{of}_{name}": (f"viewpoint slides {said}: the {of} beside the truth's rays, {what}", "px", 3)
        for how, said in (("auto", "as chosen"), ("half", "half-way")) for of in ("reference", "target")
        for name, what in (("px", "median"), ("p95_px", "95th"))},
-    "target_only_psnr_db": ("what the target alone shows, PSNR", "dB", 2),
-    "delivered_target_only_psnr_db": ("delivered: what the target alone shows, PSNR", "dB", 2),
+    **{f"{made}target_only{where}_{name}": (f"{said}what the target alone shows{of}, {name[:4].upper()}", unit, digits)
+       for made, said, where, of in (("", "", "", ""), ("", "", "_common", ", of it what all show"),
+                                     ("delivered_", "delivered: ", "", ""))
+       for name, unit, digits in (("psnr_db", "dB", 2), ("ssim", "", 4))},
 }  # fmt: skip
 Names = dict[str, tuple[str, str, int]]
 OTHER_NAMES = {

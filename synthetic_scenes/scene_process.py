@@ -17,7 +17,7 @@ from ..core.output.json_file import json_bytes
 from ..core.system.errors import StitchError
 from ..core.system.json_values import plain
 from ..core.system.output_files import OutputFiles
-from .finished import finished, target_only
+from .finished import finished, target_only, target_only_together
 from .measures import Truth, composition, figures, meeting, on_the_wide_canvas, truth_of, whole_picture
 from .recipes import parse_scene
 from .rendered import RenderedPair, rendered_pair
@@ -65,6 +65,7 @@ def measure_scene(scene: str, size: tuple[int, int], folder: Path, made_from: st
         measured = figures(result, truth) | target_only(result, truth)
         if common is not None:
             measured |= whole_picture(placed[way][0], common, truth)
+            measured |= target_only_together(placed[way][0], common, truth)
         if way == COMPOSED:
             measured |= composition(result, truth) | finished(delivered(pair, way, shared), pair, truth)
             measured |= _slid_figures(pair, truth, shared)

@@ -254,8 +254,9 @@ class SystemOptions:
 class TakeoverOptions:
     """Over how much the continuation takes over from the field beyond the reference's border (`continuation`)."""
 
-    shares: tuple[float, float] = (0.05, 0.15)
-    """Shares of the reference's longer side: the usual one, which hides errors at the border, and the most."""
+    shares: tuple[float, float] = (0.015, 0.15)
+    """Shares of the reference's longer side: the usual one, which hides errors at the border, and the most. Beyond the
+    border the field knows less than the continuation: dense refinement ends there, and it fades to its plane."""
 
     px_per_px: float = 1.7
     """px of it at least for each px by which the two differ at the border: a smooth transition has a slope of 1.5, and

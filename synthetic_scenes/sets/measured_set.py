@@ -16,6 +16,7 @@ from ..scene_pictures import error_colours, jpeg
 from .hugin import hugin_panorama
 from .opencv_stitcher import stitcher_panorama
 from .rendered_set import RenderedSet
+from .set_hidden import hidden_figures
 from .set_lines import line_figures
 from .set_measures import (
     Found,
@@ -31,6 +32,7 @@ from .set_radiance import radiance_figures
 from .set_seams import seam_figures
 from .set_sliding import sliding_figures
 from .set_stitches import SLID, WAYS, Shared, stitched
+from .set_thin import thin_figures
 from .set_things import thing_figures
 from .set_thresholds import HUGIN, OPENCV, OURS
 from .top_view import top_view
@@ -83,7 +85,7 @@ def measured_set(rendered: RenderedSet) -> MeasuredSet:
         maps, by_picture = map_figures(found)
         by_picture = [line | pose for line, pose in zip(by_picture, poses(found), strict=True)]
         figures = pose_figures(found) | maps | range_figures(found) | line_figures(found) | thing_figures(found)
-        figures |= radiance_figures(found)
+        figures |= radiance_figures(found) | hidden_figures(found)
         left = [path.stem for number, path in enumerate(rendered.pictures) if number not in found.numbers]
         runs[way] = _run("", result.warnings, len(found.numbers), left, figures, by_picture)
         panoramas[way] = _Shown(*on_the_sphere(found), found)
@@ -111,6 +113,7 @@ def measured_set(rendered: RenderedSet) -> MeasuredSet:
             **figures, "covered": float(own.sum() / max(int(seen.sum()), 1)),
             **{f"common_{name}": value for name, value in beside.items()},
             **(seam_figures(panorama.found, exposed, own) if panorama.found else {}),
+            **(thin_figures(panorama.found, exposed, own) if panorama.found else {}),
         }  # fmt: skip
         pictures[f"panorama {way}".replace(" ", "_")] = jpeg(np.where(panorama.where[..., None], exposed, 0)[part])
         if way == OURS:

@@ -28,6 +28,8 @@ from .sphere_truth import in_frame, seen_by
 # Steps of a map, px a pixel of the sphere, beyond which it jumps to the panorama's other end.
 JUMP_PX = 20.0
 KINDS = ("overlap", "alone", "hidden")
+# Confidence of dense refinement, 0 to 1, above which what it says of ranges is judged by itself.
+CONFIDENT = 0.5
 
 
 @dataclass(frozen=True)
@@ -190,12 +192,12 @@ def poses(found: Found) -> list[dict[str, float]]:
 def map_figures(found: Found) -> tuple[dict[str, float], list[dict[str, float]]]:
     """How far the maps are from the true ones, px of each picture: overlap_px, overlap_p90_px (what several cameras
     see: median, 90th percentile), alone_px, alone_p90_px (what one camera alone sees), hidden_px, hidden_p90_px (what a
-    picture's frame holds but something nearer hides); mapped: share of what cameras see that their maps show at all;
-    hidden_precision, hidden_recall: of what the stitch says is hidden. Second, the medians of each picture."""
+    picture's frame holds but something nearer hides); mapped: share of what cameras see that their maps show at all.
+    Second, the medians of each picture."""
     views, at = found.truth.views_at(found.numbers).ravel(), found.on_maps().reshape(-1, 2)
     errors: dict[str, list[Array]] = {kind: [] for kind in KINDS}
     pictures = []
-    said_right = said_all = hidden_all = mapped = asked = 0
+    mapped = asked = 0
     for order, number in enumerate(found.numbers):
         seen = found.truth.seen[number]
         off = np.linalg.norm(found.result.warp.maps[order].arrays().between(at[seen.index]) - seen.pixels, axis=1)
@@ -206,38 +208,33 @@ def map_figures(found: Found) -> tuple[dict[str, float], list[dict[str, float]]]
             errors[kind].append(off[part & shown])
         medians = {f"{kind}_px": percentile(parts[-1], 50) for kind, parts in errors.items()}
         pictures.append({"picture": float(number), **medians})
-        x, y = at[seen.index].astype(np.float32).T[:, None]
-        said = fetch(found.result.occluded[order].astype(np.uint8)[..., None], x, y, cv2.INTER_NEAREST)[0, :, 0] > 0
-        said_right += int((said & ~seen.visible & shown).sum())
-        said_all, hidden_all = said_all + int((said & shown).sum()), hidden_all + int((~seen.visible & shown).sum())
         mapped, asked = mapped + int((seen.visible & shown).sum()), asked + int(seen.visible.sum())
     together = {kind: np.concatenate(parts) for kind, parts in errors.items()}
     figures = {f"{kind}{name}": percentile(together[kind], share) for kind in KINDS
                for name, share in (("_px", 50), ("_p90_px", 90))}  # fmt: skip
-    return {
-        **figures, "mapped": mapped / max(asked, 1),
-        "hidden_precision": said_right / said_all if said_all else math.nan,
-        "hidden_recall": said_right / hidden_all if hidden_all else math.nan,
-    }, pictures  # fmt: skip
+    return {**figures, "mapped": mapped / max(asked, 1)}, pictures
 
 
 def range_figures(found: Found) -> dict[str, float]:
     """range_log, range_log_p90: |ln| of the found range by the true one, where several cameras see something at a
-    finite range (median, 90th percentile); range_log_sure: median of the half whose inverse range is surest by the
-    stitch's own deviation. NaN where all is said to be at one place."""
+    finite range (median, 90th percentile); range_log_confident: median where the stitch's confidence is above
+    CONFIDENT, and confident: at which share that is; range_log_sure: median of the half whose inverse range is surest
+    by the stitch's own deviation. NaN where all is said to be at one place."""
     scale, warp = found.places[1], found.result.warp
     true = found.truth.rendered.distance
     where = (found.truth.views_at(found.numbers) > 1) & np.isfinite(true)
-    if not scale or not where.any() or warp.deviation is None:
-        return {"range_log": math.nan, "range_log_p90": math.nan, "range_log_sure": math.nan}
+    if not scale or not where.any() or warp.deviation is None or warp.confidence is None:
+        names = ("range_log", "range_log_p90", "range_log_confident", "confident", "range_log_sure")
+        return dict.fromkeys(names, math.nan)
     x, y = found.on_maps()[where].astype(np.float32).T[:, None]
-    layers = np.dstack([warp.inverse_depth, warp.deviation[:, :]]).astype(np.float32)
-    d, deviation = fetch(layers, x, y, cv2.INTER_LINEAR)[0].T
+    layers = np.dstack([warp.inverse_depth, warp.deviation[:, :], warp.confidence]).astype(np.float32)
+    d, deviation, confidence = fetch(layers, x, y, cv2.INTER_LINEAR)[0].T
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         off = np.where(d > 0, np.abs(np.log(scale / np.where(d > 0, d, 1) / true[where])), np.inf)
-    sure = deviation <= np.median(deviation)
+    sure, confident = deviation <= np.median(deviation), confidence > CONFIDENT
     return {
         "range_log": float(np.median(off)), "range_log_p90": float(np.quantile(off, 0.9, method="lower")),
+        "range_log_confident": percentile(off[confident], 50), "confident": float(confident.mean()),
         "range_log_sure": float(np.median(off[sure])),
     }  # fmt: skip
 

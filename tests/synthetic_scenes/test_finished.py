@@ -9,9 +9,10 @@ import pytest
 from edf_stitch.core.panorama.layers import Layer
 from edf_stitch.core.pipeline import StitchResult
 from edf_stitch.core.raster.colour import decode
-from edf_stitch.synthetic_scenes.finished import finished, things_half
-from edf_stitch.synthetic_scenes.measures import Truth, common_part, truth_of
+from edf_stitch.synthetic_scenes.finished import finished, target_only, target_only_together, things_half
+from edf_stitch.synthetic_scenes.measures import Truth, common_part, on_the_wide_canvas, truth_of
 from edf_stitch.synthetic_scenes.rendered import RenderedPair
+from edf_stitch.synthetic_scenes.report_page import MEASURES
 from edf_stitch.synthetic_scenes.stitches import delivered
 
 # Rows and columns of the reference (320 × 240) that a thing takes, far from the overlap's rim.
@@ -45,6 +46,27 @@ def test_light_that_is_off_beyond_the_overlap_costs_and_one_gain_does_not(
         for light in ((1.0, 1.0), (0.7, 1.0), (1.0, 0.8))
     )
     assert min(same, brighter) > 45 and wrong < 30
+
+
+def test_what_is_left_black_costs_beyond_the_overlap_but_not_over_what_all_show(
+    result: StitchResult, truth: Truth
+) -> None:
+    right = with_light(result, truth, 1.0, 1.0)
+    here, there = common_part(result, truth)
+    alone = (truth.in_target & ~truth.in_reference)[there]
+    last = int(np.flatnonzero(alone.any(axis=0))[-1])
+    alpha = right.panorama.alpha.copy()
+    alpha[here][:, last - 19 : last + 1] = 0
+    less = replace(right, panorama=Layer(right.panorama.light * (alpha > 0)[..., None], alpha))
+    whole, cut = target_only(right, truth), target_only(less, truth)
+    assert cut["target_only_psnr_db"] < whole["target_only_psnr_db"] - 10
+    assert cut["target_only_ssim"] < whole["target_only_ssim"] - 0.01
+    picture, shown = on_the_wide_canvas(less, truth)
+    together = target_only_together(picture, shown, truth)
+    assert together["target_only_common_psnr_db"] > 45 and together["target_only_common_ssim"] > 0.99
+    nothing = target_only_together(picture, np.zeros_like(shown), truth)
+    assert np.isnan(list(nothing.values())).all()
+    assert set(whole) | set(together) <= set(MEASURES), "each has its name on the page"
 
 
 def test_a_thing_is_whole_or_gone_or_half_there(result: StitchResult, rendered: RenderedPair, truth: Truth) -> None:

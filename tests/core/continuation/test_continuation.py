@@ -100,7 +100,7 @@ def test_it_takes_over_more_slowly_where_the_field_is_far_off_at_the_border() ->
     def step(points: np.ndarray) -> np.ndarray:
         return room.depth(points) + 0.12 * (points[..., 0] > SIZE[0] - 12)
 
-    assert calm.takeover_px == pytest.approx(0.05 * SIZE[0])
+    assert calm.takeover_px == pytest.approx(0.015 * SIZE[0])
     assert room.continued(step).takeover_px > 1.5 * calm.takeover_px
 
 

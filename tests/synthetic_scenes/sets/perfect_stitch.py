@@ -70,7 +70,8 @@ def perfect(
     return SimpleNamespace(
         rig=rig, canvas=canvas, occluded=[np.zeros((height, width), bool) for _ in numbers],
         warp=SimpleNamespace(
-            maps=maps, canvas=canvas, inverse_depth=unit / away, deviation=deviation, viewpoint=viewpoint
+            maps=maps, canvas=canvas, inverse_depth=unit / away, deviation=deviation, viewpoint=viewpoint,
+            confidence=np.ones(away.shape, np.float32),
         ),
         labels=labels, alpha=np.ones(away.shape, np.float32),
         pixels=passes_along(place, directions, np.ones(away.shape)).light,

@@ -92,28 +92,15 @@ def test_maps_are_judged_where_several_one_or_no_camera_sees(truth: SetTruth) ->
     assert np.isnan(map_figures(Found.of(only, truth))[0]["overlap_px"]), "one picture has no overlap"
 
 
-def test_what_is_said_to_be_hidden_is_held_against_each_cameras_depth(truth: SetTruth) -> None:
-    result = perfect(truth)
-    found = Found.of(result, truth)
-    assert np.isnan(map_figures(found)[0]["hidden_precision"]) and map_figures(found)[0]["hidden_recall"] == 0
-    at = np.rint(found.on_maps().reshape(-1, 2)).astype(int)
-    for order in range(3):
-        seen = truth.seen[order]
-        x, y = at[seen.index[~seen.visible]].T
-        result.occluded[order][y % 283, x % 565] = True
-    maps, _ = map_figures(found)
-    assert maps["hidden_recall"] > 0.99 and maps["hidden_precision"] > 0.7
-    for order in range(3):
-        result.occluded[order][:] = True
-    maps, _ = map_figures(found)
-    assert maps["hidden_recall"] == 1 and maps["hidden_precision"] < 0.2
-
-
 def test_ranges_are_judged_in_metres_by_the_scale_of_the_places(truth: SetTruth) -> None:
     result = perfect(truth, unit=2.0)
     result.warp.inverse_depth = result.warp.inverse_depth * 1.1
     figures = range_figures(Found.of(result, truth))
     assert figures["range_log"] == pytest.approx(np.log(1.1), abs=1e-3)
+    result.warp.inverse_depth = result.warp.inverse_depth * np.where(result.warp.deviation < 0.015, 1 / 1.1, 1.0)
+    result.warp.confidence = np.where(result.warp.deviation < 0.015, 0.6, 0.4).astype(np.float32)
+    figures = range_figures(Found.of(result, truth))
+    assert figures["range_log_confident"] < 1e-3 and 0.1 < figures["confident"] < 0.9, "the half that it is sure of"
     result.warp.inverse_depth = np.where(result.warp.deviation < 0.015, result.warp.inverse_depth, -1.0)
     figures = range_figures(Found.of(result, truth))
     assert figures["range_log_p90"] == np.inf, "behind the viewpoint nothing is in the right place"
