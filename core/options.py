@@ -124,8 +124,8 @@ class StitchOptions:
         can be trusted.
     memory_gb : float, optional
         GB (of 10⁹ bytes) that a stitch may take: fewer threads work at once where they need more together, and pictures
-        that do not fit even so are refused. By default half of what is free; refused is what is more than all of it.
-        The outcome is the same.
+        that do not fit even so are refused. By default half of what is free, and refused is what is more than all
+        of it; of a pair as much as it takes. The outcome is the same.
     cache : Path, optional
         Folder where features, geometry and fields are kept for the next stitch of the same pictures; the outcome is the
         same. None: they are not kept.

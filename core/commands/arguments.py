@@ -226,8 +226,8 @@ def _add_repetition(how: argparse._ArgumentGroup) -> None:
     )  # fmt: skip
     how.add_argument(
         "--memory", type=float, metavar="GB",
-        help="GB that may be taken (default: half of what is free): with less, less is done at once; the outcome is "
-        "the same",
+        help="GB that may be taken (default: half of what is free, for a pair as much as it takes): with less, less is "
+        "done at once; the outcome is the same",
     )  # fmt: skip
     how.add_argument("--seed", type=int, default=0, metavar="N", help="seed of every random choice (default 0)")
 

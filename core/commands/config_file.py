@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..system.errors import BadRequest, UnreadableImage
+from ..system.text_files import read_with_end
 
 # Options that a file cannot give.
 _ON_THE_LINE = ("config", "help", "help-all")
@@ -52,7 +53,7 @@ def _table(path: Path) -> dict[str, Any]:
     import tomllib
 
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return tomllib.loads(read_with_end(path).decode("utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
         if isinstance(error, (ValueError, RecursionError)):
             raise BadRequest(f'{path}: not TOML, with lines like crop = "full": {error}') from error

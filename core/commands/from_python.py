@@ -75,7 +75,7 @@ def stitch(
     cache : bool, str or Path
         Whether features, geometry and field are kept for the next stitch of the same pictures, or in which folder.
     memory : float, optional
-        GB that may be taken; by default half of what is free.
+        GB that may be taken; by default half of what is free, for a pair as much as it takes.
     measure : bool
         Whether the report also compares the pictures in the overlap, which takes time.
     scale_metres, viewpoint, require_all, brackets, scale, crop, field, fade, dense, slide, projection, level, centre, \

@@ -94,6 +94,12 @@ def _report_error(error: BaseException) -> int:
         return _fail("Broken", f"a library of EDF Stitch cannot be loaded ({error}); reinstall EDF Stitch", 3)
     if isinstance(error, MemoryError):
         return _fail("OutOfMemory", "not enough memory for pictures of this size; stitch them at a smaller scale", 3)
+    if isinstance(error, OSError):
+        place = error.filename or "the folder for temporary files"
+        return _fail(
+            "UnwritableOutput", f"{place} cannot be read or written: {error.strerror or error}; free some space on its "
+            "disk, or choose another folder for temporary files in Blender's preferences, File Paths", 4,
+        )  # fmt: skip
     exit_code = getattr(error, "exit_code", None)
     if exit_code is None:
         return _fail("Bug", f"internal error, please report it: {type(error).__name__}: {error}", 3)

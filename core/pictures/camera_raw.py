@@ -45,6 +45,8 @@ def raw_bytes(path: Path) -> bytes | None:
     """
     suffix = path.suffix.lower()
     try:
+        if not path.is_file():  # to open a pipe would be to wait for whoever writes into it
+            return None
         with open(path, "rb") as file:
             head = file.read(64)
             if not head.startswith(_TIFF) and not is_raw(head, suffix):

@@ -14,6 +14,13 @@ _NOT_SHOWN = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\ud
 _FORMULA = ("=", "+", "-", "@")
 
 
+def read_with_end(path: Path) -> bytes:
+    """The bytes of a file or a pipe. Raises OSError where it cannot be read, and for a device, which may have no end."""
+    if path.is_char_device() or path.is_block_device():
+        raise OSError(f"{path} is a device, not a file; name a file")
+    return path.read_bytes()
+
+
 def read_text(path: Path, what: str, layout: str) -> str:
     """A file in UTF-8, with or without a byte order mark.
 
@@ -25,7 +32,7 @@ def read_text(path: Path, what: str, layout: str) -> str:
             with open(0, "rb", closefd=False) as stream:
                 data = stream.read()
         else:
-            data = path.read_bytes()
+            data = read_with_end(path)
     except (OSError, ValueError) as error:
         raise UnreadableImage(f"{what} cannot be read: {error}") from error
     try:

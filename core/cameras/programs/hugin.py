@@ -54,7 +54,10 @@ def is_project(text: str) -> bool:
 
 
 def project_in(path: Path) -> Project | None:
-    """The project that a file holds; None where it holds something else, or cannot be read as a text."""
+    """The project that a file holds; None where it holds something else, is a pipe, or cannot be read as a
+    text."""
+    if not path.is_file():  # a pipe can be read only once, by whoever reads it as what it is
+        return None
     try:
         text = path.read_text("utf-8-sig")
     except (OSError, ValueError):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...system.errors import BadRequest, UnreadableImage
+from ...system.text_files import read_with_end
 
 # Files of cameras are lists of numbers; sixty pictures with a million points take less.
 MOST_BYTES = 1 << 30
@@ -20,7 +21,7 @@ def read_data(path: Path) -> bytes:
     try:
         if path.stat().st_size > MOST_BYTES:
             raise BadRequest(f"{path}: {path.stat().st_size >> 20} MB are more than a file of cameras takes")
-        return path.read_bytes()
+        return read_with_end(path)
     except (OSError, ValueError) as error:
         raise UnreadableImage(f"the camera file cannot be read: {error}") from error
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from ...options import StitchOptions
 from ...pictures.camera_raw import is_raw, raw_size
 from ...pictures.containers import read_structure
+from ...pictures.decoding import read_file
 from ...pictures.exr import exr_size
 from ...pictures.picture import Picture
-from ...system.errors import NotEnoughMemory
+from ...system.errors import NotEnoughMemory, UnreadableImage
 from ...system.memory import free_bytes
 from ...system.threads import count
 from .draft import draft_times
@@ -142,8 +143,8 @@ def _facts(source: Any) -> tuple[Size, int]:
     if isinstance(source, np.ndarray):
         return _of_array(source)
     try:
-        data = Path(source).read_bytes()
-    except (OSError, ValueError):
+        data = read_file(Path(source))
+    except UnreadableImage:
         return (0, 0), 0
     if is_raw(data, Path(source).suffix.lower()):
         return raw_size(data), MEMORY.raw_bytes

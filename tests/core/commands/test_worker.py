@@ -243,3 +243,21 @@ def test_where_nobody_listens_any_more_its_folder_goes_too(job, tmp_path):
         assert worker.wait(timeout=300) != 0
         worker.stdin.close()
     assert not (tmp_path / "job").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits files as Linux does")
+def test_a_full_disk_is_said_in_words(job, tmp_path):
+    full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))"
+    with prepared(tmp_path / "job", job, full) as worker:
+        said = [json.loads(line) for line in worker.stdout]
+        assert worker.wait(timeout=300) == 4
+        worker.stdin.close()
+    assert said[-1]["kind"] == "UnwritableOutput"
+    assert "File too large; free some space on its disk" in said[-1]["error"]
+
+
+def test_a_picture_that_is_gone_is_said_in_words(job, tmp_path):
+    gone = {"name": "a.png", "path": str(tmp_path / "a.png"), "digest": True}
+    status, said, index = run(tmp_path / "job", {**job, "pictures": [gone, job["pictures"][1]]})
+    assert status == 4 and index == {}
+    assert said[-1]["kind"] == "UnreadableImage" and "no such file; check the name" in said[-1]["error"]

@@ -37,3 +37,9 @@ def test_others_names_neither_steer_a_terminal_nor_end_a_line() -> None:
 def test_no_name_is_a_formula_in_a_table(name: str) -> None:
     assert name_in_table(name) == f"./{name}" and Path(name_in_table(name)) == Path(name)
     assert name_in_table("a=1.png") == "a=1.png" and name_in_table("a\n=1.png") == "a\\n=1.png"
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="a device of Unix")
+def test_a_device_which_may_have_no_end_is_not_read() -> None:
+    with pytest.raises(UnreadableImage, match="the list cannot be read: /dev/zero is a device, not a file"):
+        read_text(Path("/dev/zero"), "the list", "a,b")
