@@ -16,7 +16,6 @@ import numpy as np
 from .cameras.rig import Rig
 from .cameras.view import View
 from .compose.seams.cut_things import WAYS as CUT_WAYS
-from .compose.seams.cut_things import without_cut_things
 from .compose.seams.refills import improved
 from .compose.seams.rough_seam import RoughSeam
 from .compose.seams.torn_things import untorn
@@ -264,12 +263,13 @@ def _guide_warnings(lines: AllEdges, options: StitchOptions) -> tuple[str, ...]:
     return guide_warnings(lines.down, lines.guides, lines.down_by_edges)
 
 
-def _settled(warp: Warp, known: _Known, pictures: Sequence[Picture]) -> Warp:
-    """The warp without what a border cuts and what it tears, if depth goes on beyond the border as well."""
+def _settled(warp: Warp, known: _Known, pictures: Sequence[Picture], rough: RoughSeam | None = None) -> Warp:
+    """The warp without what a border cuts and what it tears, if depth goes on beyond the border as well; rough: with
+    pictures as small as the warp, if that is coarse already."""
     if known.continuation is None:
         return warp
     views = known.views
-    return improved(warp, views, lambda focal: RoughSeam.of(pictures, views, focal), [*CUT_WAYS, untorn])
+    return improved(warp, views, lambda focal: rough or RoughSeam.of(pictures, views, focal), [*CUT_WAYS, untorn])
 
 
 def has_depth(field: Field, views: Sequence[View]) -> bool:
@@ -333,8 +333,8 @@ def _slide(
     rough = RoughSeam.of(pictures, views, CHOICE.base_px_per_radian)
 
     def seam(warp: Warp) -> float:
-        """px of a rough seam that is seen, without what a border cuts, as it will be (see `_settled`)."""
-        return rough(without_cut_things(warp, views, pictures, rough) if known.continuation else warp)
+        """px of a rough seam that is seen, without what a border cuts and what is torn, as it will be."""
+        return rough(_settled(warp, known, pictures, rough))
 
     down = lines.down if lines.down_is_sure else None
     choice = choose_slide(base, views, viewpoint, lines.each, down, seam, progress)

@@ -13,7 +13,7 @@ from ..system.errors import UnreadableImage
 
 
 def digests_of(folder: Path, job: dict[str, Any]) -> list[str]:
-    """For each picture whose entry asks for its `digest` that of its file, or shape and digest of its array; "" of a file
+    """For each picture whose entry asks for its `digest` that of its file, or shape and digest of its array; "" of one
     that cannot be read, which reading will say."""
     return [_digest(folder, entry) if entry.get("digest") else "" for entry in job["pictures"]]
 

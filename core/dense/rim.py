@@ -44,8 +44,8 @@ def borne_out(
     lines: EpipolarLines, found: Found, overlap: NDArray[np.bool_], guide: NDArray[np.float32],
     views: tuple[ComparedPicture, ComparedPicture],
 ) -> Plane:  # fmt: skip
-    """The moves along the lines (h, w) px, without those that nothing bears out near the overlap's border or where there
-    is no texture.
+    """The moves along the lines (h, w) px, without those that nothing bears out near the overlap's border or without
+    texture.
 
     overlap (h, w): mask of what both pictures show, by these moves and by the field's; guide (h, w, C): colours of the
     reference; views: reference and target.

@@ -8,45 +8,18 @@ is decided by what would be seen, part by part, in small pictures.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...cameras.view import View
 from ...panorama.other_depth import seen_at
-from ...panorama.warp import Warp
-from ...pictures.picture import Picture
 from ...raster.arrays import Part, Plane, dilated, with_margin
 from ...raster.distance import distance_inside, distance_to
 from ...raster.pull_push import filled
-from .refills import Cells, Refill, Way, cells_of, improved, is_better, kept_of, least_gain, zone_of
-from .rough_seam import RoughSeam
+from .refills import Cells, Refill, Way, cells_of, is_better, kept_of, least_gain, zone_of
 from .seam_options import CUT_THINGS
-
-
-def without_cut_things(
-    warp: Warp, views: Sequence[View], pictures: Sequence[Picture], rough: RoughSeam | None = None
-) -> Warp:
-    """Give what a picture's border cuts the depth of its background, where that shows less.
-
-    Parameters
-    ----------
-    warp : Warp
-        Of two pictures.
-    views : sequence of View
-        What is known of the pictures, the reference first.
-    pictures : sequence of Picture
-    rough : RoughSeam, optional
-        With pictures as small as the warp, if that is coarse already.
-
-    Returns
-    -------
-    Warp
-    """
-    return improved(warp, views, lambda focal: rough or RoughSeam.of(pictures, views, focal), WAYS)
 
 
 def _better(cells: Cells, deepest: float) -> tuple[list[Refill], Cells]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import cv2
@@ -11,8 +12,10 @@ from edf_stitch.core.cameras.camera import Camera
 from edf_stitch.core.cameras.view import View
 from edf_stitch.core.compose.composition import Composition, composed
 from edf_stitch.core.compose.seams import cut_things
-from edf_stitch.core.compose.seams.cut_things import without_cut_things
+from edf_stitch.core.compose.seams.cut_things import WAYS
 from edf_stitch.core.compose.seams.min_cut import FIRST, SECOND
+from edf_stitch.core.compose.seams.refills import improved
+from edf_stitch.core.compose.seams.rough_seam import RoughSeam
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.panorama.canvas import Canvas
 from edf_stitch.core.panorama.layers import layer_of
@@ -87,6 +90,10 @@ class World:
             maps.append(PictureMap(x.astype(np.float32), y.astype(np.float32), view.size))
         return replace(warp, maps=tuple(maps))
 
+    def without_cut_things(self, warp: Warp, views: Sequence[View] | None = None) -> Warp:
+        of = self.views if views is None else views
+        return improved(warp, of, lambda focal: RoughSeam.of(self.pictures, of, focal), WAYS)
+
     def composed(self, warp: Warp, painted: np.ndarray | None = None) -> Composition:
         layers = [layer_of(picture, one) for picture, one in zip(self.pictures, warp.maps, strict=True)]
         options = StitchOptions(exposure="none", holes="transparent")
@@ -112,7 +119,7 @@ def test_what_a_border_cuts_gives_way_to_what_is_behind_it(by: int, size: int) -
     world = World(by, size)
     before = world.warp()
     assert world.off(world.composed(before)) > 0.12, "or the test tells nothing"
-    after = without_cut_things(before, world.views, world.pictures)
+    after = world.without_cut_things(before)
     assert after.refilled is not None
     inside = world.at(np.s_[112:168, 394:438])
     assert after.refilled[inside].all() and np.allclose(after.inverse_depth[inside], FAR, rtol=0.1)
@@ -128,7 +135,7 @@ def test_what_a_border_cuts_gives_way_to_what_is_behind_it(by: int, size: int) -
 @pytest.mark.parametrize("by", [0, 1])
 def test_an_artists_mask_wins(by: int) -> None:
     world = World(by)
-    after = without_cut_things(world.warp(), world.views, world.pictures)
+    after = world.without_cut_things(world.warp())
     painted = np.zeros(after.inverse_depth.shape, np.int8)
     painted[CUT] = SECOND if by else FIRST
     assert world.dark(world.composed(after, painted), CUT) == 1
@@ -139,7 +146,7 @@ def test_what_is_shown_well_stays() -> None:
     world = World(0)
     warp = world.warp()
     flat = replace(warp, depth=np.full_like(warp.inverse_depth, FAR))
-    assert without_cut_things(flat, world.views, world.pictures) is flat
+    assert world.without_cut_things(flat) is flat
 
 
 def test_nothing_is_refilled_that_would_be_seen_more(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,14 +161,14 @@ def test_nothing_is_refilled_that_would_be_seen_more(monkeypatch: pytest.MonkeyP
         return replace(found, depth=rags)
 
     monkeypatch.setattr(cut_things, "_refill", ragged)
-    assert without_cut_things(warp, world.views, world.pictures) is warp
+    assert world.without_cut_things(warp) is warp
 
 
 def test_without_a_baseline_there_is_nothing_to_do() -> None:
     world = World(0)
     warp, (first, second) = world.warp(), world.views
     still = (first, replace(second, t=np.zeros(3), e_prime=np.zeros(3)))
-    assert without_cut_things(warp, still, world.pictures) is warp
+    assert world.without_cut_things(warp, still) is warp
 
 
 def test_what_was_refilled_is_free_to_the_seam() -> None:
