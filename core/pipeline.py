@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,7 @@ from .measure.rig_report import make_rig_report
 from .measure.verdict import judge
 from .options import StitchOptions
 from .panorama.canvas import Canvas
-from .panorama.choosing_slide import ALL
+from .panorama.choosing_slide import SlideChoice
 from .panorama.layers import Layer, layer_of
 from .pictures.masks import has_shape, painted_over
 from .pictures.picture import Picture
@@ -114,23 +115,22 @@ def _made(frame: Frame, geometry: Geometry, options: StitchOptions, progress: St
     def made(by: StitchOptions) -> StitchResult:
         alignment = fit_and_warp(geometry, [frame], by, progress)
         result = compose(frame, alignment, by, progress)
-        if by.slide != "auto" or alignment.slide.part == ALL:
+        if by.slide != "auto":
             return result
         aside = progress.untold()
-        return least_torn(result, lambda: compose(frame, _slid_all_the_way(alignment, frame, by, aside), by, aside))
+        others = (_slid_by(choice, alignment, frame, by, aside) for choice in alignment.slide.others())
+        return least_torn(result, (partial(compose, frame, one, by, aside) for one in others))
 
     return first_usable(made, options) if geometry.rig is None else made(options)
 
 
-def _slid_all_the_way(
-    alignment: Alignment, frame: Frame, options: StitchOptions, progress: Stopwatch
+def _slid_by(
+    choice: SlideChoice, alignment: Alignment, frame: Frame, options: StitchOptions, progress: Stopwatch
 ) -> Alignment:
-    """The alignment of a pair whose viewpoint slides within a part of the overlap, with one that slides all the way."""
-    choice = alignment.slide.all_the_way()
+    """The alignment of a pair with another slide."""
     refined = None if alignment.dense is None else alignment.dense.refined
-    by = replace(options, slide=choice.s1)
+    by = replace(options, slide=(choice.s1, *choice.part))
     mapped = map_pictures(alignment.pair_field, alignment.views, refined, frame.pictures, by, progress)
-    choice = replace(choice, why=f"{choice.why} all the way; within a part of it the picture would be torn")
     return replace(alignment, warp=mapped.warp, continuation=mapped.continuation, slide=choice)
 
 

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NoReturn
 
 from ..system.errors import Cancelled, StitchError, UnwritableOutput
+from ..system.memory import check_address_space
 from ..system.streams import messages_may_be_lost, silence
 from ..system.text_files import printable
 from .arguments import numbered, options_from
@@ -84,6 +85,7 @@ def _run(argv: Sequence[str] | None) -> int:
     try:
         args = edf_parser().parse_args(argv)
         args.given = list(sys.argv[1:] if argv is None else argv)
+        check_address_space()
         return _COMMANDS[args.command](args)
     except SystemExit as leaving:
         return int(leaving.code or 0)

@@ -13,8 +13,8 @@ from ..system.errors import UnreadableImage
 
 
 def digests_of(folder: Path, job: dict[str, Any]) -> list[str]:
-    """For each picture whose entry asks for its `digest` that of its file, or shape and digest of its array; "" of one
-    that cannot be read, which reading will say."""
+    """For each picture whose entry asks for its `digest` that of its file, or shape and digest of its array; "" of a
+    file that cannot be read, which reading will say."""
     return [_digest(folder, entry) if entry.get("digest") else "" for entry in job["pictures"]]
 
 

@@ -108,8 +108,10 @@ def _report_error(error: BaseException) -> int:
 
 def _work(folder: Path, stop: _Stop, waits: bool) -> None:
     """Reads the job, stitches, and writes everything asked for."""
+    from ..system.memory import check_address_space
     from ..system.output_files import undisturbed
 
+    check_address_space()
     with undisturbed():  # interrupted while it loads, NumPy prints a traceback
         from ..pipeline import stitch  # noqa: F401 (so that all is loaded here)
         from ..system.memory import use_again

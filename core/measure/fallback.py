@@ -3,7 +3,7 @@ something simpler, which less can go wrong in."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -56,24 +56,31 @@ def first_usable(made: Callable[[StitchOptions], StitchResult], options: StitchO
     return first
 
 
-def least_torn(first: StitchResult, all_the_way: Callable[[], StitchResult]) -> StitchResult:
-    """The stitch whose viewpoint slides within a part of the overlap, or the one in which it slides all the way where
-    that leaves much less torn: the choice among them looks at a coarse map only.
+def least_torn(first: StitchResult, others: Iterable[Callable[[], StitchResult]]) -> StitchResult:
+    """The stitch by the slide that costs least, or by another that costs about as much where that leaves much less torn:
+    the choice among them sees a coarse map only.
 
     Parameters
     ----------
     first : StitchResult
-    all_the_way : callable
-        Makes the other.
+    others : iterable of callables
+        Each makes one. They are made until nothing is torn.
+
+    Returns
+    -------
+    StitchResult
+        Its seconds are those of all that were made.
     """
-    torn = _torn_px(first)
-    if not torn:
-        return first
-    other = all_the_way()
-    if not _is_usable(other) or _torn_px(other) > VERDICT.much_less_torn * torn:
-        return first
-    took = first.seconds, other.seconds
-    return replace(other, seconds={stage: sum(one.get(stage, 0.0) for one in took) for stage in {**took[0], **took[1]}})
+    best, made = first, [first]
+    for make in others:
+        torn = _torn_px(best)
+        if not torn:
+            break
+        made.append(make())
+        if _is_usable(made[-1]) and _torn_px(made[-1]) <= VERDICT.much_less_torn * torn:
+            best = made[-1]
+    stages = {stage: None for one in made for stage in one.seconds}
+    return replace(best, seconds={stage: sum(one.seconds.get(stage, 0.0) for one in made) for stage in stages})
 
 
 def _torn_px(result: StitchResult) -> int:

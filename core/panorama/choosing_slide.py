@@ -88,10 +88,22 @@ class SlideChoice:
     why: str
     part: tuple[float, float] = ALL
 
-    def all_the_way(self) -> SlideChoice:
-        """The choice among those that slide all the way across the overlap."""
-        best = _least(tuple(one for one in self.costs if one.part == ALL))
-        return replace(best, costs=self.costs)
+    def others(self) -> tuple[SlideChoice, ...]:
+        """What else costs about as much, the cheapest first, and is unlike this and unlike each other."""
+        if not self.costs:
+            return ()
+        taken = [next(one for one in self.costs if (one.s1, one.part) == (self.s1, self.part))]
+        most = CHOICE.others_cost * taken[0].cost
+        possible = [one for one in self.costs if one.seam_px is not None and _possible(one, self.costs[0])]
+        found = []
+        for one in sorted(possible, key=lambda one: one.cost):
+            if one.cost > most or len(found) == CHOICE.most_others:
+                break
+            if all(one.part != other.part or abs(one.s1 - other.s1) >= CHOICE.unlike for other in taken):
+                taken.append(one)
+                why = f"costs {one.cost:.3f} px of bend, about as little as any; with the least the picture would be torn"
+                found.append(replace(self, s1=one.s1, part=one.part, why=why))
+        return tuple(found)
 
 
 # Where there is nothing to slide along.

@@ -256,6 +256,16 @@ class ChoiceOptions:
     per_hole: float = 40.0
     """Price of all being holes."""
 
+    others_cost: float = 1.5
+    """Times its cost up to which others are made where the panorama is torn: so much two sets of matches of one pair
+    differ in what they say of a slide."""
+
+    most_others: int = 2
+    """Others that are made at most: each takes about a quarter of the time of all."""
+
+    unlike: float = 0.5
+    """Slides of the same part of the way that differ by less make much the same panorama."""
+
     hole_radius: float = 0.03
     """Radians from what is shown within which what is not shown, on all sides, is a hole."""
 

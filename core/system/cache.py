@@ -72,25 +72,29 @@ class Cache:
 
         Returns
         -------
-        The result, equal bit for bit whether it was stored or not.
+        The result, equal bit for bit whether it was stored or not, and whatever is worked out of it.
         """
-        if self._folder is None:
-            return make()
-        try:
-            path = self._folder / f"{_digest(what, decided_by)}.npz"
-        except _Unknown:
-            return make()
-        found: Result | None = _read(path)
+        path = None
+        if self._folder is not None:
+            with suppress(_Unknown):
+                path = self._folder / f"{_digest(what, decided_by)}.npz"
+        found: Result | None = None if path is None else _read(path)
         if found is not None:
             return found
         made = make()
-        with suppress(_Unknown):
-            self._keep(path, made)
-        return made
-
-    def _keep(self, path: Path, value: Any) -> None:
         arrays: list[NDArray[Any]] = []
-        plan = _plan(value, arrays)
+        try:
+            plan = _plan(made, arrays)
+        except _Unknown:
+            return made
+        if path is not None:
+            self._keep(path, plan, arrays)
+        if all(array.flags.forc for array in arrays):
+            return made
+        result: Result = _value(plan, [_as_kept(array) for array in arrays])
+        return result
+
+    def _keep(self, path: Path, plan: Any, arrays: list[NDArray[Any]]) -> None:
         size = sum(array.nbytes + 300 for array in arrays) + 1000
         if size > self._limit // SYSTEM.cache_entry_part:
             return
@@ -207,6 +211,12 @@ def _value(plan: Any, arrays: list[NDArray[Any]]) -> Any:
     if not ours:
         raise ValueError("no dataclass of this package")
     return kind(**{name: _value(part, arrays) for name, part in plan["fields"].items()})
+
+
+def _as_kept(array: NDArray[Any]) -> NDArray[Any]:
+    """An array as it lies in memory once it has been kept: sums and products of one that lies otherwise, like every
+    second column of another, are rounded otherwise."""
+    return array if array.flags.forc else np.ascontiguousarray(array)
 
 
 def _digest(what: str, decided_by: tuple[Any, ...]) -> str:

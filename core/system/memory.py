@@ -10,11 +10,27 @@ import ctypes
 import sys
 from pathlib import Path
 
+from .errors import NotEnoughMemory
 from .options import SYSTEM
 
 # mallopt's names (malloc.h) for from where on an array has pages of its own, how much may stay free on top, and the
 # number of heaps.
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
+
+
+def check_address_space() -> None:
+    """Raises NotEnoughMemory where this process may not even map the program's libraries, to be called before they are
+    loaded: OpenBLAS asks for its buffers again and again, without an end, where it gets none."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if most != resource.RLIM_INFINITY and most < SYSTEM.least_address_bytes:
+        raise NotEnoughMemory(
+            f"this process may map {most / 1e6:.0f} MB (ulimit -v), and the program alone takes "
+            f"{SYSTEM.least_address_bytes / 1e6:.0f} MB: raise the limit, and use --memory to bound what a stitch takes"
+        )
 
 
 def use_again() -> None:

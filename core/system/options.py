@@ -15,6 +15,8 @@ class SystemOptions:
     ask_seconds: float = 0.05
     # Bytes from which the allocator gives an array pages of its own, and that it keeps when they are freed.
     large_bytes: int = 1 << 30
+    # Bytes of address space below which nothing is begun: the libraries map 0.4 GB, and OpenBLAS further buffers.
+    least_address_bytes: int = 500_000_000
     # Bytes of all cache entries together; the least recently used go first.
     cache_bytes: int = 2 << 30
     # An entry takes at most one part in so many of the former: a larger one would drive out most others.

@@ -15,7 +15,7 @@ _FORMULA = ("=", "+", "-", "@")
 
 
 def read_with_end(path: Path) -> bytes:
-    """The bytes of a file or a pipe. Raises OSError where it cannot be read, and for a device, which may have no end."""
+    """The bytes of a file or a pipe. Raises OSError where it cannot be read, and for a device: it may have no end."""
     if path.is_char_device() or path.is_block_device():
         raise OSError(f"{path} is a device, not a file; name a file")
     return path.read_bytes()

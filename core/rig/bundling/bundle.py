@@ -312,6 +312,8 @@ def _solved(structure: Structure, normal: Normal, scale: Array, damping: float) 
     left[np.diag_indices(size)] += BUNDLE.regular * usual
     left += BUNDLE.scale_stiffness * usual * np.outer(scale, scale)
     step = np.linalg.solve(left, gradient_fill - normal.gradient)
+    if not np.isfinite(step).all():  # the solver leaves NaN where products of its rows overflow, and says nothing
+        raise np.linalg.LinAlgError("no finite step")
     by_camera = (structure.chooser @ step).reshape(-1, CAMERA)[structure.picture]
     pulled = structure.summed_by_point(np.matmul(normal.between, by_camera[:, :, None])[:, :, 0])
     points = -np.matmul(inverses, (normal.point_gradients + pulled)[:, :, None])[:, :, 0]

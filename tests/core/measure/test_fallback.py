@@ -47,26 +47,32 @@ def costs(s1: float, cost: float, part: tuple[float, float] = (0.0, 1.0)) -> Sli
     return SlideCost(s1, cost, 0.0, 0.0, 0.0, 0.0, 0.0, cost, part)
 
 
-@pytest.mark.parametrize(("torn", "slides_all_the_way"), [
-    (((4, 4), (2, 4)), True), (((4, 4), (3, 4)), False), (((4, 4), ()), True), (((), (4, 4)), False),
+PART = (0.25, 0.75)
+EVERY = (costs(0.0, 1.3), costs(0.5, 1.2), costs(1.0, 4.0), costs(1.0, 1.0, PART))
+
+
+@pytest.mark.parametrize(("torn", "chosen", "made"), [
+    (((4, 4), (2, 4), (4, 4)), 1, 3), (((2, 4), (4, 4), (3, 3)), 0, 3), (((4, 4), (3, 3), (2, 3)), 2, 3),
+    (((4, 4), ()), 1, 2), (((), (4, 4)), 0, 1), (((4, 4), (4, 4), (3, 4)), 0, 3),
 ])  # fmt: skip
-def test_what_tears_within_a_part_of_the_overlap_slides_all_the_way_where_that_tears_much_less(
-    torn: tuple[tuple[int, ...], ...], slides_all_the_way: bool, monkeypatch: pytest.MonkeyPatch, small_pair: Pair,
+def test_of_slides_that_cost_about_as_much_another_is_shown_where_much_less_is_torn(
+    torn: tuple[tuple[int, ...], ...], chosen: int, made: int, monkeypatch: pytest.MonkeyPatch, small_pair: Pair,
     known: StitchOptions,
 ) -> None:  # fmt: skip
-    places = iter([Place((0, 0, *size), TORN, 1.0)] if size else [] for size in torn)
-    monkeypatch.setattr(pipeline, "judge", lambda *_: Verdict("look", "it is torn", "mend it", tuple(next(places))))
-    part = (0.25, 0.75)
-    every = (costs(0.0, 3.0), costs(0.5, 2.0), costs(1.0, 4.0), costs(1.0, 1.0, part))
-    monkeypatch.setattr(mapping, "choose_slide", lambda *given: SlideChoice(1.0, every, "the least", part))
+    places = [[Place((0, 0, *size), TORN, 1.0)] if size else [] for size in torn]
+    left = iter(places)
+    monkeypatch.setattr(pipeline, "judge", lambda *_: Verdict("look", "it is torn", "mend it", tuple(next(left))))
+    monkeypatch.setattr(mapping, "choose_slide", lambda *given: SlideChoice(1.0, EVERY, "the least", PART))
     told: list[float] = []
     options = replace(known, projection="auto", slide="auto", dense=True)
     pictures = small_pair.reference, small_pair.target
     result = stitch(pictures, options, lambda _, share: told.append(share))
     slide = result.report["slide"]
-    assert (slide["s1"], tuple(slide["part"])) == ((0.5, (0.0, 1.0)) if slides_all_the_way else (1.0, part))
-    assert len(slide["costs"]) == 4 and ("would be torn" in slide["why"]) == slides_all_the_way
-    assert result.warp.viewpoint is not None and result.warp.viewpoint.s1 == slide["s1"]
+    expected = [(1.0, PART), (0.5, (0.0, 1.0)), (0.0, (0.0, 1.0))][chosen]
+    assert (slide["s1"], tuple(slide["part"])) == expected
+    assert len(list(left)) == len(torn) - made
+    assert len(slide["costs"]) == 4 and ("would be torn" in slide["why"]) == (chosen > 0)
+    assert (0.0 if result.warp.viewpoint is None else result.warp.viewpoint.s1) == slide["s1"]
     assert result.report["options"]["slide"] == "auto" and told == sorted(told)
     assert {"read", "features", "dense", "warp"} <= result.seconds.keys(), "of all that was done"
 

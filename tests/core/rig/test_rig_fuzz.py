@@ -47,6 +47,12 @@ def tried(numbers: range) -> int:
     return count
 
 
+@pytest.mark.slow
+def test_rigs_that_once_broke_it() -> None:
+    """74: a step of the bundle that is not finite, which made NumPy warn."""
+    tried(range(74, 75))
+
+
 def test_hostile_rigs_are_found_or_refused() -> None:
     assert 0 < tried(range(12)) < 12
 

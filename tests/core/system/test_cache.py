@@ -103,6 +103,15 @@ def test_whatever_decides_is_part_of_the_key(tmp_path: Path, what: str, decided_
     assert Cache(tmp_path).remember(what, decided_by, lambda: other) is other
 
 
+def test_arrays_lie_as_if_they_had_been_kept(tmp_path: Path) -> None:
+    """Products of arrays that lie otherwise are rounded otherwise: a second stitch of a set gave another report."""
+    columns = replace(MATCHES, x=np.arange(15.0).reshape(3, 5)[:, 1:3])
+    caches = Cache(None), Cache(tmp_path), Cache(tmp_path)
+    found = [cache.remember("matches", ("a",), lambda: columns).x for cache in caches]
+    assert len({array.strides for array in found}) == 1 and found[0].flags.c_contiguous
+    assert all(np.array_equal(array, columns.x) for array in found) and not columns.x.flags.forc
+
+
 def test_other_code_makes_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Cache(tmp_path).remember("matches", (), lambda: MATCHES)
     Cache(tmp_path).remember("matches", (), never)
