@@ -57,36 +57,36 @@ def first_usable(made: Callable[[StitchOptions], StitchResult], options: StitchO
 
 
 def least_torn(first: StitchResult, others: Iterable[Callable[[], StitchResult]]) -> StitchResult:
-    """The stitch by the slide that costs least, or by another that costs about as much where that leaves much less torn:
-    the choice among them sees a coarse map only.
+    """The stitch by the slide that costs least, or where that is torn another that costs about as much and leaves much
+    less to look at: the choice among them sees a coarse map only.
 
     Parameters
     ----------
     first : StitchResult
     others : iterable of callables
-        Each makes one. They are made until nothing is torn.
+        Each makes one. They are made until there is nothing to look at.
 
     Returns
     -------
     StitchResult
         Its seconds are those of all that were made.
     """
+    if not any(place["what"] == TORN for place in first.report["verdict"]["places"]):
+        return first
     best, made = first, [first]
     for make in others:
-        torn = _torn_px(best)
-        if not torn:
-            break
         made.append(make())
-        if _is_usable(made[-1]) and _torn_px(made[-1]) <= VERDICT.much_less_torn * torn:
+        if _is_usable(made[-1]) and _px_to_look_at(made[-1]) <= VERDICT.much_less * _px_to_look_at(best):
             best = made[-1]
+        if not _px_to_look_at(best):
+            break
     stages = {stage: None for one in made for stage in one.seconds}
     return replace(best, seconds={stage: sum(one.seconds.get(stage, 0.0) for one in made) for stage in stages})
 
 
-def _torn_px(result: StitchResult) -> int:
-    """px of the places where the panorama is torn."""
-    places = result.report["verdict"]["places"]
-    return sum(place["box"][2] * place["box"][3] for place in places if place["what"] == TORN)
+def _px_to_look_at(result: StitchResult) -> int:
+    """px of the places to look at."""
+    return sum(place["box"][2] * place["box"][3] for place in result.report["verdict"]["places"])
 
 
 def _is_usable(result: StitchResult) -> bool:

@@ -179,8 +179,9 @@ class VerdictOptions:
     torn_share: float = 4e-5
     """Of the longer side's square, torn so: good pictures, foliage among them, have up to 3e-5."""
 
-    much_less_torn: float = 0.5
-    """Share of what is torn that another slide may leave to be shown instead of the one that bends least."""
+    much_less: float = 0.5
+    """Share of what there is to look at that another slide may leave, to be shown instead of a torn one that bends
+    least."""
 
     smooth_share: float = 0.012
     """Of the longer side: half the width over which a map is smoothed, outlines with it, to see where it bends."""

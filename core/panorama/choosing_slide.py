@@ -89,19 +89,21 @@ class SlideChoice:
     part: tuple[float, float] = ALL
 
     def others(self) -> tuple[SlideChoice, ...]:
-        """What else costs about as much, the cheapest first, and is unlike this and unlike each other."""
+        """What else costs about as much and is unlike this and unlike each other, that which slides least first."""
         if not self.costs:
             return ()
         taken = [next(one for one in self.costs if (one.s1, one.part) == (self.s1, self.part))]
         most = CHOICE.others_cost * taken[0].cost
-        possible = [one for one in self.costs if one.seam_px is not None and _possible(one, self.costs[0])]
-        found = []
-        for one in sorted(possible, key=lambda one: one.cost):
-            if one.cost > most or len(found) == CHOICE.most_others:
-                break
-            if all(one.part != other.part or abs(one.s1 - other.s1) >= CHOICE.unlike for other in taken):
+        possible = [
+            one for one in self.costs
+            if one.seam_px is not None and one.cost <= most and _possible(one, self.costs[0])
+        ]  # fmt: skip
+        found: list[SlideChoice] = []
+        for one in sorted(possible, key=lambda one: (one.part != ALL, one.s1, one.cost)):
+            unlike = all(one.part != other.part or abs(one.s1 - other.s1) >= CHOICE.unlike for other in taken)
+            if unlike and len(found) < CHOICE.most_others:
                 taken.append(one)
-                why = f"costs {one.cost:.3f} px of bend, about as little as any; with the least the picture would be torn"
+                why = f"costs {one.cost:.3f} px of bend, about as little as any; with the least it would be torn"
                 found.append(replace(self, s1=one.s1, part=one.part, why=why))
         return tuple(found)
 
