@@ -291,8 +291,10 @@ def fill_matches(settings: Any, matches: dict[str, Any], edited: bool) -> None:
 
 
 def show(context: bpy.types.Context, image: bpy.types.Image) -> None:
-    """The image in the editor that the work was started from, else in the first Image Editor of the window."""
-    areas = [context.area, *(context.window.screen.areas if context.window else ())]
+    """The image in the editor that the work was started from, else in the first Image Editor of the window, else of any
+    other."""
+    windows = [*((context.window,) if context.window else ()), *context.window_manager.windows]
+    areas = [context.area, *(area for window in windows for area in window.screen.areas)]
     for area in areas:
         if area is not None and area.type == "IMAGE_EDITOR" and area.spaces.active.mode != "MASK":
             area.spaces.active.image = image

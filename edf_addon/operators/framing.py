@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, FloatVectorProperty
 
 from .. import editor, idnames, properties
 from ..bridge import result
-from ..overlays import frame_handles
+from ..overlays import frame_handles, free_view
 from .match_pointing import to_picture, under
 
 # px of the screen before the interface's scale within which an edge or the horizon is caught.
@@ -66,7 +66,7 @@ class EDF_OT_frame_drag(bpy.types.Operator):  # noqa: N801
             self.report({"ERROR"}, "Frames are dragged in an Image Editor: press the button in its sidebar")
             return {"CANCELLED"}
         panorama = editor.panorama(context)
-        context.space_data.image = panorama
+        free_view.fit_in(context, panorama)
         self._drags = False
         _show(context, "MIDDLE", (0.0, 0.0), (0.0, 0.0))
         context.workspace.status_text_set("Drag an edge, the middle or the horizon  ·  Esc")

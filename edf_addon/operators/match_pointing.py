@@ -7,7 +7,7 @@ import bpy
 
 from .. import editor, idnames, pictures, properties
 from ..bridge import photo
-from ..overlays import drawing
+from ..overlays import drawing, free_view
 from . import match_editing
 
 # How near to a match a click has to be to mean it; px of the screen, before the interface's scale.
@@ -204,12 +204,11 @@ def under(context: Any, event: Any) -> tuple[Any, Any, tuple[float, float]] | No
                 continue
             if region.type != "WINDOW":  # the sidebar lies over it
                 return None
-            covered = [
-                one for one in area.regions
-                if one.type in {"UI", "TOOLS", "HEADER", "TOOL_HEADER"} and one.width > 1 and one.height > 1
-                and one.x <= event.mouse_x < one.x + one.width and one.y <= event.mouse_y < one.y + one.height
-            ]  # fmt: skip
-            return None if covered else (space, region, (x, y))
+            is_covered = any(
+                one.x <= event.mouse_x < one.x + one.width and one.y <= event.mouse_y < one.y + one.height
+                for one in free_view.lying_over(area)
+            )
+            return None if is_covered else (space, region, (x, y))
     return None
 
 

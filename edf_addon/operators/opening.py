@@ -8,9 +8,12 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
-from .. import idnames, pictures, properties
+from .. import editor, idnames, pictures, properties
 from ..bridge import images, stand_ins
 from ..jobs import modal, stitching
+
+# Seconds in which Blender draws a new window.
+UNTIL_DRAWN = 0.2
 
 
 class Browsing:
@@ -123,6 +126,10 @@ class EDF_OT_stitch_files(Browsing, bpy.types.Operator):  # noqa: N801
     as_empty: BoolProperty(
         name="Add to the Scene", description="As an image empty at the 3D cursor", options={"SKIP_SAVE"}
     )
+    as_world: BoolProperty(
+        name="Light the Scene", description="Make a whole sphere of them, and a World that shows it",
+        options={"SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, _context: Any) -> bool:
@@ -133,13 +140,18 @@ class EDF_OT_stitch_files(Browsing, bpy.types.Operator):  # noqa: N801
         if len(paths) < 2:
             self.report({"ERROR"}, "Choose two pictures or more: hold Shift or Ctrl to choose several.")
             return {"CANCELLED"}
+        if self.is_browsed and not self.as_empty and not self.as_world:
+            _have_an_editor(context)
         opened = self.put_into_list(context, paths, instead=True)
         if opened != {"FINISHED"}:
             return opened
         if modal.is_working():
             self.report({"WARNING"}, "The pictures are being developed: press Stitch when they are in the list.")
             return {"FINISHED"}
-        done: set[str] = bpy.ops.edf.stitch(self.how, as_empty=self.as_empty)
+        if self.as_world:
+            done: set[str] = bpy.ops.edf.stitch_environment(self.how)
+        else:
+            done = bpy.ops.edf.stitch(self.how, as_empty=self.as_empty)
         return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
 
 
@@ -182,6 +194,31 @@ def _listed(context: Any, opened: list[bpy.types.Image], instead: bool) -> str:
     if opened:
         stitching.show(context, opened[0])
     return f"{count} picture{'s' * (count != 1)} added to the list."
+
+
+def _have_an_editor(context: Any) -> None:
+    """Where no window has an Image Editor, opens one in a window of its own with the sidebar's tab, as renders do: what
+    comes of an import would be seen nowhere."""
+    if bpy.app.background or editor.all_spaces(context):
+        return
+    bpy.ops.wm.window_new()
+    area = context.window_manager.windows[-1].screen.areas[0]
+    area.type = "IMAGE_EDITOR"
+    area.spaces.active.show_region_ui = True
+    bpy.app.timers.register(_show_tab, first_interval=UNTIL_DRAWN)
+
+
+def _show_tab() -> float | None:
+    """The sidebar of the newest window shows the tab, which it knows once it was drawn."""
+    area = bpy.context.window_manager.windows[-1].screen.areas[0]
+    sidebar = next((region for region in area.regions if region.type == "UI"), None)
+    if area.type == "IMAGE_EDITOR" and sidebar is not None and sidebar.active_panel_category != idnames.TAB:
+        try:
+            sidebar.active_panel_category = idnames.TAB
+        except TypeError:  # there is no tab yet
+            return UNTIL_DRAWN
+        area.tag_redraw()
+    return None
 
 
 CLASSES = (EDF_OT_add_pictures, EDF_OT_add_folder, EDF_OT_open_pair, EDF_OT_stitch_files,

@@ -9,7 +9,7 @@ from bpy.props import FloatProperty, FloatVectorProperty, IntProperty
 from .. import editor, idnames, pictures, properties
 from ..bridge import ownership, result
 from ..jobs import following
-from ..overlays import strokes
+from ..overlays import free_view, strokes
 from .match_pointing import to_picture, under
 
 # Radius of the brush, px of the screen before the interface's scale.
@@ -57,7 +57,7 @@ class EDF_OT_take_from(bpy.types.Operator):  # noqa: N801
             return {"CANCELLED"}
         panorama = editor.panorama(context)
         if editor.side_of(properties.settings_of(context.scene), context.space_data.image) != editor.PANORAMA:
-            context.space_data.image = panorama
+            free_view.fit_in(context, panorama)
         strokes.pending.clear()
         self._draws = False
         self._say(context)

@@ -47,6 +47,7 @@ def in_add_menu(self: Any, _context: Any) -> None:
 def in_import_menu(self: Any, _context: Any) -> None:
     """File ▸ Import."""
     self.layout.operator(Operator.STITCH_FILES, text="Photographs as Panorama")
+    self.layout.operator(Operator.STITCH_FILES, text="Photographs as HDRI Environment").as_world = True
 
 
 MENUS = (("IMAGE_MT_image", in_image_menu), ("VIEW3D_MT_image_add", in_add_menu),

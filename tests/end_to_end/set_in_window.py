@@ -78,6 +78,28 @@ def way() -> Iterator[float]:
     yield 1.0
     shoot("3_followed")
 
+    show(area, settings.result)  # the sidebar lies over its right side
+    yield 1.0
+    before = settings.result.session_uid
+    width, height = settings.result.size
+    with in_editor(area):
+        timed("frame_drag", bpy.ops.edf.frame_drag, "INVOKE_DEFAULT")
+    yield 1.0
+    for share in (1.0, 0.95, 0.9):
+        point_at(area, *in_area(area, share * width - 2, 0.5 * height))
+        subprocess.run(["xdotool", "mousedown", "1"], check=True) if share == 1 else None
+        yield 0.7
+    shoot("3b_dragging")
+    subprocess.run(["xdotool", "mouseup", "1"], check=True)
+    yield from until(lambda: bpy.context.scene.edf_stitch.result.session_uid != before)
+    settings = bpy.context.scene.edf_stitch
+    walk["facts"]["cropped"] = [settings.crop, settings.result.size[0] / width]
+    with in_editor(area):
+        bpy.ops.ed.undo()
+    yield 1.0
+    settings = bpy.context.scene.edf_stitch
+    walk["facts"]["crop_after_one_undo"] = settings.crop
+
     settings.picture_index = 0
     show(area, settings.result)
     yield 1.0

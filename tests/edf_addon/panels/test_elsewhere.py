@@ -25,7 +25,7 @@ class Layout:
 
 @pytest.mark.parametrize(("entries", "names"), [
     (elsewhere.in_image_menu, ["edf.stitch", "edf.stitch_files", "edf.stitch_environment", "edf.use_as_world"]),
-    (elsewhere.in_add_menu, ["edf.stitch_files"]), (elsewhere.in_import_menu, ["edf.stitch_files"]),
+    (elsewhere.in_add_menu, ["edf.stitch_files"]), (elsewhere.in_import_menu, ["edf.stitch_files"] * 2),
 ])  # fmt: skip
 def test_each_menu_has_its_entries(blender, entries, names):
     layout = Layout()
@@ -33,6 +33,8 @@ def test_each_menu_has_its_entries(blender, entries, names):
     assert [name for name, _ in layout.drawn] == names
     if entries is elsewhere.in_add_menu:
         assert layout.drawn[0][1].as_empty, "what is added is in the scene"
+    if entries is elsewhere.in_import_menu:
+        assert layout.drawn[1][1].as_world, "an environment lights the scene"
 
 
 def test_blenders_menus_hold_them(blender):
@@ -59,3 +61,11 @@ def test_files_become_a_panorama_that_an_empty_shows(blender, folder):
     assert bpy.ops.edf.stitch_files(directory=str(folder), files=files, as_empty=True) == {"FINISHED"}
     (empty,) = bpy.context.selected_objects
     assert empty.data == blender.settings.result and empty.empty_display_type == "IMAGE"
+
+
+def test_files_become_an_environment_that_lights_the_scene(blender, folder):
+    blender.settings.dense = False
+    files = [{"name": "target.png"}, {"name": "reference.png"}]
+    assert bpy.ops.edf.stitch_files(directory=str(folder), files=files, as_world=True) == {"FINISHED"}
+    assert blender.settings.result.size[0] == 2 * blender.settings.result.size[1], "a whole sphere"
+    assert blender.scene.world.name == blender.settings.result.name
