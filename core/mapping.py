@@ -237,8 +237,12 @@ def _rig_slide(
         s1 = float(asked[0])
         return SlideChoice(s1, (), "as asked for"), viewpoint.sliding(s1)
     cylinder = round_projection("cylindrical", views[0].K, axes, CHOICE.base_px_per_radian)
-    base = build_rig_warp(surface, cylinder)
-    choice = choose_rig_slide(base, views, viewpoint, lines.each, lines.down if lines.down_is_sure else None, progress)
+    down = lines.down if lines.down_is_sure else None
+    # who changes the frame by hand sees the same slide again
+    choice = lines.cache.remember(
+        "slide", (surface.field, surface.refined, tuple(views), viewpoint, tuple(lines.each), down, cylinder),
+        lambda: choose_rig_slide(build_rig_warp(surface, cylinder), views, viewpoint, lines.each, down, progress),
+    )  # fmt: skip
     return choice, viewpoint.sliding(choice.s1) if choice.s1 else None
 
 

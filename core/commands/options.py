@@ -49,7 +49,7 @@ class RecomposingOptions:
     """The small panorama of a set that follows what is changed in the window (`recomposing`)."""
 
     pixels: float = 1.5e5
-    """px of the panorama: 18 pictures take 2.2 s of one processor's time, 5 take 1.2 s."""
+    """px of the panorama: 18 pictures take 2.2 s of one processor's time, 5 take 1.3 s."""
 
     threads: int = 1
     """That work on it: so little is to be done that handing it out takes more time than doing it."""

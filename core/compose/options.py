@@ -157,6 +157,10 @@ class PlacingOptions:
     samples: int = 10_000
     """Pixels of a picture that the order is decided by: more take time and change nothing."""
 
+    whole_px: int = 1 << 18
+    """Pixels up to which all of a part is read, although not all are needed: a line by itself costs about as much as
+    ten times its pixels."""
+
     step_px: int = 8
     """px from one place to the next at which that is worked out for labels: it changes slowly."""
 

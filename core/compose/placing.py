@@ -81,8 +81,11 @@ def adding_order(placing: Placing, layers: Sequence[Layer], windows: Sequence[Wi
 
 
 def _every(step: int, values: AnyImage, part: Part) -> Plane:
-    """Values of rows and columns, every so many px; lines in between are not read."""
+    """Values of rows and columns, every so many px; lines in between are not read, unless there are so few that all of
+    them take less time than one after the other."""
     rows, columns = part
+    if (rows.stop - rows.start) * (columns.stop - columns.start) <= PLACING.whole_px:
+        return np.asarray(values[rows, columns])[::step, ::step]
     return np.concatenate([np.asarray(values[row : row + 1, columns]) for row in range(rows.start, rows.stop, step)])[
         :, ::step
     ]

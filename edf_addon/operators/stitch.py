@@ -143,13 +143,16 @@ class EDF_OT_stitch_sphere(_Stitching, bpy.types.Operator):  # noqa: N801
     height: FloatProperty(**scene_objects.GROUND)
 
     def prepare(self, context: Any, folder: Path) -> dict[str, Any]:
-        instead = {"projection": "EQUIRECTANGULAR", "crop": "FULL", "holes": self.holes}
-        job, self.memory = stitching.make_job(context, folder, instead=instead)
+        self.instead = {"projection": "EQUIRECTANGULAR", "crop": "FULL", "holes": self.holes}
+        job, self.memory = stitching.make_job(context, folder, instead=self.instead)
         return {**job, "fill": self.fill}
 
     def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
         words = super().finish(context, folder, found)
-        image = properties.settings_of(context.scene).result
+        settings = properties.settings_of(context.scene)
+        image = settings.result
+        for name, value in self.instead.items():  # else a small flat panorama would follow, and take the sphere's place
+            setattr(settings, name, value)
         world = take_along.use_as_world(context.scene, image, self.replace)
         if self.height > 0:
             take_along.select(context, [take_along.ground(context.scene, image, self.height)])

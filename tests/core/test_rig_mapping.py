@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from edf_stitch.core import mapping
@@ -48,6 +50,22 @@ def test_a_slide_is_chosen_on_a_coarse_map(monkeypatch: pytest.MonkeyPatch) -> N
     assert found.slide.why == "by somebody"
     assert isinstance(found.warp.viewpoint, RigViewpoint)
     assert found.warp.viewpoint.s1 == 0.75
+
+
+def test_with_a_cache_another_frame_has_the_same_slide_and_another_direction_of_down_its_own(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[float] = []
+
+    def choose(*_: object) -> SlideChoice:
+        asked.append(0.25 * (len(asked) + 1))
+        return SlideChoice(asked[-1], (), "by somebody")
+
+    monkeypatch.setattr(mapping, "choose_rig_slide", choose)
+    found = [mapped(WALK, cache=tmp_path, centre=(away, 0.0)).slide.s1 for away in (0.0, 5.0)]
+    assert found == [0.25, 0.25]
+    monkeypatch.setattr(mapping.AllEdges, "down_is_sure", True)
+    assert mapped(WALK, cache=tmp_path).slide.s1 == 0.5
 
 
 @pytest.mark.parametrize(("yaws", "moves", "options", "why"), [

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from edf_stitch.core.compose import placing as placing_module
+from edf_stitch.core.compose.options import PLACING
 from edf_stitch.core.compose.placing import Placing, adding_order
 from edf_stitch.core.compose.window import window_of
 from hypothesis import given, settings
@@ -44,10 +48,13 @@ def test_the_nearest_to_the_viewpoint_comes_first() -> None:
         assert adding_order(placing, layers, [*windows[:3], None, *windows[4:]]) == [1, 5, 6, 0, 4, 2]
 
 
-def test_what_is_looked_at_more_coarsely_is_the_same() -> None:
+def test_what_is_looked_at_more_coarsely_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     placing = Placing(warp_of(depth=0.2, deviation=0.01), views_at([[0.3, 0.2, 0.1]]))
     part = slice(100, 203), slice(50, 333)
-    assert np.allclose(placing.at(0, part, 8), placing.at(0, part)[::8, ::8], rtol=1e-5)
+    whole = placing.at(0, part, 8)
+    assert np.allclose(whole, placing.at(0, part)[::8, ::8], rtol=1e-5)
+    monkeypatch.setattr(placing_module, "PLACING", replace(PLACING, whole_px=0))
+    assert np.array_equal(placing.at(0, part, 8), whole), "line by line"
 
 
 def test_a_step_towards_what_is_seen_misplaces_nothing() -> None:

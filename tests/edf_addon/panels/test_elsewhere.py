@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 bpy = pytest.importorskip("bpy")
+editor = pytest.importorskip("edf_stitch.edf_addon.editor")
 elsewhere = pytest.importorskip("edf_stitch.edf_addon.panels.elsewhere")
 
 
@@ -69,3 +70,4 @@ def test_files_become_an_environment_that_lights_the_scene(blender, folder):
     assert bpy.ops.edf.stitch_files(directory=str(folder), files=files, as_world=True) == {"FINISHED"}
     assert blender.settings.result.size[0] == 2 * blender.settings.result.size[1], "a whole sphere"
     assert blender.scene.world.name == blender.settings.result.name
+    assert not editor.is_behind(blender.settings, blender.settings.result), "no small flat panorama takes its place"
