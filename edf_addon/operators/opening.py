@@ -215,7 +215,7 @@ def _show_tab() -> float | None:
     if area.type == "IMAGE_EDITOR" and sidebar is not None and sidebar.active_panel_category != idnames.TAB:
         try:
             sidebar.active_panel_category = idnames.TAB
-        except TypeError:  # there is no tab yet
+        except (AttributeError, TypeError):  # no tabs are there yet, or not this one
             return UNTIL_DRAWN
         area.tag_redraw()
     return None

@@ -76,7 +76,7 @@ class EDF_PT_overlays(SubPanel, bpy.types.Panel):  # noqa: N801
 
 class EDF_PT_take_along(SubPanel, bpy.types.Panel):  # noqa: N801
     bl_idname = idnames.Panel.TAKE_ALONG
-    bl_label = "Take Along"
+    bl_label = "Into the Scene"
 
     def draw_rows(self, context: Any, settings: Any, width: float) -> None:
         image, layout = editor.panorama(context), self.layout
