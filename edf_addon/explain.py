@@ -120,7 +120,7 @@ def viewpoint(report: dict[str, Any] | None) -> str:
     told = (report or {}).get("slide")
     if not told:
         return "How far it slides is chosen by the next stitch"
-    chosen = f"Chosen: {told['s1']:.2f}"
+    chosen = f"Viewpoint chosen: {told['s1']:.2f}"
     return f"{chosen} ({told['why']})" if told.get("why") else chosen
 
 

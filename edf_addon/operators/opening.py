@@ -140,13 +140,15 @@ class EDF_OT_stitch_files(Browsing, bpy.types.Operator):  # noqa: N801
         if len(paths) < 2:
             self.report({"ERROR"}, "Choose two pictures or more: hold Shift or Ctrl to choose several.")
             return {"CANCELLED"}
-        if self.is_browsed and not self.as_empty and not self.as_world:
+        goes_on_in_panel = any(map(stand_ins.is_needed, paths))
+        if self.is_browsed and (goes_on_in_panel or not (self.as_empty or self.as_world)):
             _have_an_editor(context)
         opened = self.put_into_list(context, paths, instead=True)
         if opened != {"FINISHED"}:
             return opened
         if modal.is_working():
-            self.report({"WARNING"}, "The pictures are being developed: press Stitch when they are in the list.")
+            button = "Stitch Environment" if self.as_world else "Stitch"
+            self.report({"WARNING"}, f"The pictures are being developed: press {button} when they are in the list.")
             return {"FINISHED"}
         if self.as_world:
             done: set[str] = bpy.ops.edf.stitch_environment(self.how)

@@ -77,7 +77,7 @@ def test_the_viewpoint_is_told_and_how_it_was_chosen():
     assert explain.viewpoint_facts({"s1": 0.5, "part": [0.0, 1.0]}) == explain.viewpoint_facts({"s1": 0.5})
     assert explain.viewpoint_facts({"s1": 0.0}) == [("Viewpoint", "the reference's place")]
     assert explain.viewpoint_facts({}) == []
-    assert explain.viewpoint({"slide": {"s1": 0.5, "why": "least bends"}}) == "Chosen: 0.50 (least bends)"
+    assert explain.viewpoint({"slide": {"s1": 0.5, "why": "least bends"}}) == "Viewpoint chosen: 0.50 (least bends)"
     assert "next stitch" in explain.viewpoint(None)
 
 
