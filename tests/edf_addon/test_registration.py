@@ -29,6 +29,22 @@ def test_every_operator_that_is_named_is_there(blender):
         assert verb in dir(getattr(bpy.ops, room)), name
 
 
+# Operators that change nothing of the file, or only call others that do.
+NO_STEP = {"CANCEL", "ENVIRONMENT", "MASK_DONE", "MATCH_EDIT", "PICTURE_STATE", "POINTER", "PRESET_ADD", "SAVE",
+           "STITCH_CLIPS", "STITCH_FILES"}  # fmt: skip
+
+
+def test_one_undo_takes_back_what_any_operator_changes(blender):
+    from edf_stitch.edf_addon import idnames
+
+    without = set()
+    for name in idnames.Operator:
+        kind = getattr(bpy.types, "EDF_OT_" + name.partition(".")[2])
+        if not {"UNDO", "UNDO_GROUPED"} & getattr(kind, "bl_options", set()):
+            without.add(name.name)
+    assert without == NO_STEP
+
+
 @pytest.mark.skipif(bool(bpy.app.binary_path), reason="a whole Blender's Python has no bpy of its own")
 def test_registering_loads_nothing_of_the_engine():
     """What it loads is Blender's own; what takes time is the worker's."""
