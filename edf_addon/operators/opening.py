@@ -54,6 +54,7 @@ class Browsing:
 
 def into_list(operator: Any, context: Any, paths: Sequence[Path], how: str, instead: bool = False) -> set[str]:
     """Puts files into the list, or instead of it, for an operator, which reports it. how: see `Browsing.how`."""
+    paths = [path.absolute() for path in paths]  # a worker stands in a folder of its own
     if any(map(stand_ins.is_needed, paths)):
         done = bpy.ops.edf.develop_pictures(how, paths="\n".join(map(str, paths)), instead=instead)
         return {"FINISHED"} if done == {"RUNNING_MODAL"} else done

@@ -140,3 +140,9 @@ def test_a_panorama_is_behind_where_it_was_seen_from_another_picture(blender):
     ownership.hold(panorama, images, {"seen_from": images[1]})
     images[1].name = "renamed"
     assert not editor.is_behind(settings, panorama), "a picture is known by itself"
+
+
+def test_a_path_from_where_a_script_stands_is_one_for_the_worker_too(blender, folder: Path, monkeypatch):
+    monkeypatch.chdir(folder.parent)
+    assert bpy.ops.edf.add_pictures(directory=folder.name, files=[{"name": "target.png"}]) == {"FINISHED"}
+    assert Path(blender.settings.pictures[0].image.filepath) == folder / "target.png"
