@@ -9,6 +9,7 @@ from bpy.props import EnumProperty, FloatVectorProperty
 
 from .. import editor, idnames, properties
 from ..bridge import result
+from ..jobs import following
 from ..overlays import frame_handles, free_view
 from .match_pointing import to_picture, under
 
@@ -57,6 +58,7 @@ class EDF_OT_frame_drag(bpy.types.Operator):  # noqa: N801
             self.report({"ERROR"}, _PLANE)
             return {"CANCELLED"}
         words = apply(settings, known, self.part, list(self.start), list(self.end))
+        following.ask(settings)
         if words:
             self.report({"INFO"}, words)
         return {"FINISHED"}

@@ -8,6 +8,7 @@ from bpy.props import EnumProperty, IntProperty
 
 from .. import editor, idnames, pair, pictures, properties, switches
 from ..bridge import result
+from ..jobs import following
 
 WHICH = (
     ("SHOWN", "Shown Image", "The image that the editor shows"),
@@ -111,6 +112,7 @@ class EDF_OT_see_from(bpy.types.Operator):  # noqa: N801
             return {"CANCELLED"}
         image = settings.pictures[self.row].image
         settings.seen_from = None if settings.seen_from == image else image
+        following.ask(settings)
         return {"FINISHED"}
 
 
