@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import signal
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +18,7 @@ from edf_stitch.core.commands.cli import main
 from edf_stitch.core.pictures.encoding import encode_picture
 from edf_stitch.core.pictures.picture import picture_from_array
 from edf_stitch.core.pipeline import StitchOptions, StitchResult
+from edf_stitch.core.system.output_files import OutputFiles
 
 from ...pairs import KNOWN_WORDS
 
@@ -30,6 +33,20 @@ def lasting(folder: Path) -> dict[str, bytes]:
         name: data for name, data in files(folder).items()
         if not (name.endswith(".timing.json") or name.startswith((".edf/", "batch.")))
     }  # fmt: skip
+
+
+def killed_at(place: int) -> None:
+    """This process goes when it would put its n-th file in place."""
+    original, calls = OutputFiles._place, 0
+
+    def put(self: OutputFiles, temporary: Path, target: Path) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == place:
+            os.kill(os.getpid(), signal.SIGKILL)
+        original(self, temporary, target)
+
+    OutputFiles._place = put
 
 
 def summary(folder: Path, name: str = "batch.json") -> dict:

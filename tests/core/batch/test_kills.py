@@ -16,11 +16,10 @@ from pathlib import Path
 import pytest
 from edf_stitch.core.batch.pieces import read_json
 from edf_stitch.core.commands.cli import main
-from edf_stitch.core.system.output_files import OutputFiles
 
 from ...pairs import KNOWN_WORDS
 from . import batch_work
-from .batch_work import files, lasting, run
+from .batch_work import files, killed_at, lasting, run
 
 work, quick = batch_work.work, batch_work.quick
 
@@ -45,7 +44,7 @@ def test_a_kill_between_any_two_files_is_survived(
             (work / out / "p1.report.json").write_bytes(b"as other options had it")
         child = os.fork()
         if not child:
-            _killed_at(place)
+            killed_at(place)
             os._exit(run(work, "--quiet", "--layers", "--resume", out=out))
         status = os.waitpid(child, 0)[1]
         for name, data in lasting(work / out).items():
@@ -59,20 +58,6 @@ def test_a_kill_between_any_two_files_is_survived(
         kills += 1
         assert quick == ["reference1"] or set(files(work / out)) == set(files(work / "whole"))
     assert kills > len(whole), "a summary, two stamps, and each of the files"
-
-
-def _killed_at(place: int) -> None:
-    """This process goes when it would put its n-th file in place."""
-    original, calls = OutputFiles._place, 0
-
-    def put(self: OutputFiles, temporary: Path, target: Path) -> None:
-        nonlocal calls
-        calls += 1
-        if calls == place:
-            os.kill(os.getpid(), signal.SIGKILL)
-        original(self, temporary, target)
-
-    OutputFiles._place = put
 
 
 @needs_kill

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,10 +12,9 @@ from edf_stitch.core.batch import run as batch
 from edf_stitch.core.commands.cli import main
 from edf_stitch.core.options import StitchOptions
 from edf_stitch.core.pipeline import StitchResult, stitch
-from edf_stitch.core.system.output_files import OutputFiles
 
 from ...sets import make_set
-from .batch_work import lasting, save
+from .batch_work import killed_at, lasting, save
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")
 
@@ -42,20 +40,6 @@ def made(of_three: StitchResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     return run
 
 
-def _killed_at(place: int) -> None:
-    """This process goes when it would put its n-th file in place."""
-    original, calls = OutputFiles._place, 0
-
-    def put(self: OutputFiles, temporary: Path, target: Path) -> None:
-        nonlocal calls
-        calls += 1
-        if calls == place:
-            os.kill(os.getpid(), signal.SIGKILL)
-        original(self, temporary, target)
-
-    OutputFiles._place = put
-
-
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 @pytest.mark.parametrize("place", [
     pytest.param(place, marks=() if place in (4, 12) else (pytest.mark.slow, pytest.mark.soak))
@@ -69,7 +53,7 @@ def test_a_set_whose_files_are_half_in_place_is_made_again(
     whole = lasting(tmp_path / "whole")
     child = os.fork()
     if not child:
-        _killed_at(place)
+        killed_at(place)
         os._exit(made("out"))
     assert os.WIFSIGNALED(os.waitpid(child, 0)[1]), "it had not come to its end"
     for name, data in lasting(tmp_path / "out").items():
