@@ -188,7 +188,7 @@ def test_a_thing_that_moved_disturbs_unless_it_is_masked(
     masked = replace(smooth, ignore=(first, second))
     open_eyed, blind = (stitch((pair.reference, pair.target), options) for options in (smooth, masked))
     spoilt, clean, best = (errors_beside(pair, one, first) for one in (open_eyed, blind, small_result))
-    assert np.median(best) < 0.2 and np.median(spoilt) > 2, "it is large enough to lead astray"
+    assert np.median(best) < 0.2 and np.median(spoilt) > 5 * np.median(best), "it is large enough to lead astray"
     assert np.median(clean) < 0.3 and np.percentile(clean, 75) < 0.75
     for x, mask in ((blind.edges[0].matches.x, first), (blind.edges[0].matches.y, second)):
         column, row = np.rint(x).astype(int).T
