@@ -234,7 +234,8 @@ def range_figures(found: Found) -> dict[str, float]:
     sure, confident = deviation <= np.median(deviation), confidence > CONFIDENT
     return {
         "range_log": float(np.median(off)), "range_log_p90": float(np.quantile(off, 0.9, method="lower")),
-        "range_log_confident": percentile(off[confident], 50), "confident": float(confident.mean()),
+        "range_log_confident": float(np.median(off[confident])) if confident.any() else math.nan,
+        "confident": float(confident.mean()),
         "range_log_sure": float(np.median(off[sure])),
     }  # fmt: skip
 

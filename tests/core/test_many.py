@@ -188,21 +188,22 @@ def test_depth_and_mesh_of_a_set_are_written(set_result: StitchResult, tmp_path:
 
 @pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_preview_is_small_and_the_full_panorama_has_its_geometry(
-    four: PictureSet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
+    larger: tuple[PictureSet, StitchResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
 ) -> None:
     """Nothing is found twice, and the full one is that of a call without a preview before it."""
+    pictures = larger[0].pictures[:count]
     options = replace(KNOWN, projection="cylindrical", cache=tmp_path)
     for number in (preview, pipeline):
         monkeypatch.setattr(number, "PREVIEW", replace(PREVIEW, pixels=30_000, least_pixels=20_000, most_pixels=45_000))
-    small = stitch(four.pictures[:count], replace(options, preview=True))
+    small = stitch(pictures, replace(options, preview=True))
     height, width = small.alpha.shape
     assert 20_000 < width * height < 45_000 and small.report["options"]["preview"]
     found: list[str] = []
     real = features.detect
     monkeypatch.setattr(features, "detect", lambda *asked: found.append("features") or real(*asked))
-    full = stitch(four.pictures[:count], options)
+    full = stitch(pictures, options)
     assert not found, "its features are kept"
-    assert np.array_equal(full.panorama.pixels, stitch(four.pictures[:count], replace(options, cache=None)).pixels)
+    assert np.array_equal(full.panorama.pixels, stitch(pictures, replace(options, cache=None)).pixels)
     assert full.alpha.size > 2 * small.alpha.size
     for one, other in zip(small.views, full.views, strict=True):
         np.testing.assert_array_equal(one.R, other.R)
