@@ -75,6 +75,19 @@ def turned_over(turns: NDArray[np.int8]) -> NDArray[np.bool_]:
     return unmirrored
 
 
+def breaks(picture_map: PictureMap, shown: NDArray[np.bool_], jump: float) -> NDArray[np.bool_]:
+    """Where (H, W) a map, as far as it is shown (H, W), is turned over, or jumps: a pixel takes up more than `jump`
+    times the area of the picture that the median pixel does."""
+    turns = turning(picture_map)
+    counts: NDArray[np.bool_] = shown & (turns != NO_TURN)
+    if not counts.any():
+        return counts
+    areas = np.zeros(shown.shape, np.float32)
+    areas[:-1, :-1] = np.abs(cell_areas(picture_map.x, picture_map.y))
+    found: NDArray[np.bool_] = (counts & (areas > jump * np.median(areas[counts]))) | (turned_over(turns) & shown)
+    return found
+
+
 def jacobian(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
     """Area (H, W) that a map's (x, y) takes up for each of its pixels, by central differences; its sign changes where
     the map turns over. NaN beside what is not finite."""

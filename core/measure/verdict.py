@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cameras.sources import called
-from ..field.folding import NO_TURN, cell_areas, turned_over, turning
+from ..field.folding import breaks
 from ..raster.arrays import NEIGHBOURS, Box, Plane, dilated, eroded
 from .look import Levels, Look
 from .options import RIG, VERDICT
@@ -272,16 +272,10 @@ def _torn_places(look: Look, pairs: Sequence[_Pair], shift: tuple[int, int]) -> 
     not agree."""
     torn = np.zeros(look.hidden.shape, bool)
     for number, one in enumerate(look.maps):
-        shown, turns = look.shown(number), turning(one)
-        areas = np.zeros(shown.shape, np.float32)
-        areas[:-1, :-1] = np.abs(cell_areas(one.x, one.y))
-        counts = shown & (turns != NO_TURN)
-        if counts.any():
-            large = counts & (areas > VERDICT.jump * np.median(areas[counts]))
-            broken = large | (turned_over(turns) & shown)
-            others = [pair.unlike > VERDICT.torn_step for pair in pairs if number in pair.numbers]
-            if others:
-                torn |= broken & _detailed(look.tones[number]) & np.logical_or.reduce(others)
+        apart = breaks(one, look.shown(number), VERDICT.jump)
+        others = [pair.unlike > VERDICT.torn_step for pair in pairs if number in pair.numbers]
+        if apart.any() and others:
+            torn |= apart & _detailed(look.tones[number]) & np.logical_or.reduce(others)
     for part in _parts(torn, VERDICT.torn_share * look.side * look.side):
         yield Place(look.box(part, shift), TORN, float(part.sum()))
 

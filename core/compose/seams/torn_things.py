@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...field.folding import NO_TURN, cell_areas, turned_over, turning
+from ...field.folding import breaks
 from ...raster.arrays import NEIGHBOURS, Part, dilated, larger_parts, with_margin
 from ...raster.distance import distance_inside
 from ...raster.lazy import whole
@@ -82,14 +82,7 @@ def _torn(cells: Cells) -> NDArray[np.bool_]:
     unlike = dilated(cells.unlike, 1)
     for number, (picture, seen) in enumerate(zip(cells.rough.pictures, cells.look.maps, strict=True)):
         shown = _shown(cells, number)
-        turns = turning(seen)
-        counts = shown & (turns != NO_TURN)
-        if not counts.any():
-            continue
-        areas = np.zeros(shown.shape, np.float32)
-        areas[:-1, :-1] = np.abs(cell_areas(seen.x, seen.y))
-        broken = (counts & (areas > TORN_THINGS.jump * np.median(areas[counts]))) | (turned_over(turns) & shown)
-        torn |= larger_parts(broken & unlike, TORN_THINGS.least_cells)
+        torn |= larger_parts(breaks(seen, shown, TORN_THINGS.jump) & unlike, TORN_THINGS.least_cells)
         torn |= tears(log_encode(whole(picture.light)).mean(axis=2), seen, shown) & dilated(cells.bad, 1)
     return torn
 
