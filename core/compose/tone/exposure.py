@@ -173,6 +173,8 @@ def match_tones(
         return plain, replace(plain, why_not=too_different(fit.gain))
     moved = 0.0 if radiance else -TONE.reference_share * float(np.log2(np.median(fit.gain)))
     common = 2.0 ** (stops + np.clip(moved, -TONE.most_reference_stops, TONE.most_reference_stops))
+    if not radiance:
+        common = common * _whiter(fit.gain, *shared.overexposed)
     spread = fit.spread.astype(np.float32)
     first, second = (
         Exposure(
@@ -185,6 +187,14 @@ def match_tones(
     if radiance:
         return first, second
     return _with_clipped((first, second), layers, maps, hidden)
+
+
+def _whiter(gain: Array, reference: float, target: float) -> Array:
+    """The gains (C,) of both pictures that bring the reference's white balance to the target's, as far as the reference
+    is the worse exposed; gain: of the target, to the reference's; then the shares of both that are over-exposed."""
+    share = float(np.clip((reference - target) / TONE.worse_exposed, 0.0, 1.0))
+    whiter: Array = (np.exp(np.log(gain).mean()) / gain) ** share
+    return whiter
 
 
 def _with_clipped(

@@ -19,6 +19,11 @@ class ToneOptions:
     most_reference_stops: float = 0.7
     """Stops that it goes at most: beyond two stops of difference one of the two is wrong, and it may be the target."""
 
+    worse_exposed: float = 0.1
+    """By how much more of what both show has to be clipped in the reference alone than in the target alone, as a share,
+    for the panorama to have the target's white balance: what is clipped has none, and the target's light in its place
+    would be tinted."""
+
     max_gain: float = 64.0
     """Factor (six stops) beyond which it is no exposure: of 8 bits hardly anything is left."""
 

@@ -227,6 +227,26 @@ def test_an_over_exposed_picture_learns_its_clipped_light_from_the_other() -> No
         assert np.abs(both[0] - both[1])[:116].max() < 0.05, "the sky is the same in both"
 
 
+def with_gray_sky(rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Two pictures of different white balance; in the first, the second's gray sky is white."""
+    light = scene(top=0.3)
+    light[:rows] = 0.8
+    return np.clip(light * np.float32([2.4, 2.2, 1.6]), 0, 1), light
+
+
+def test_white_balance_is_that_of_the_better_exposed() -> None:
+    over, well = with_gray_sky(80)
+    exposures = meet(over, well)
+    assert np.ptp(exposures[1].gain) == pytest.approx(0, abs=1e-5)
+    first, second = shown(exposures, over, well)
+    assert np.ptp(second[:80], axis=2).max() < 0.01
+    assert np.allclose(first[80:], second[80:], atol=0.02)
+    assert np.ptp(meet(well, over)[0].gain) == pytest.approx(0, abs=1e-5)
+    # as good as equally exposed: the reference's
+    little = meet(*with_gray_sky(8))
+    assert np.ptp(np.log(little[0].gain)) < 0.5 * np.ptp(np.log(little[1].gain))
+
+
 def test_what_cannot_be_matched_is_said() -> None:
     light = scene(top=0.6)
     assert all(one.why_not == "" for one in meet(light, light / 16))
