@@ -23,7 +23,7 @@ from ..system.progress import ReportProgress
 from .contradicted import without_contradicted
 from .decided import Decided
 from .growing import Panorama, SetPanorama
-from .inpaint import closed_holes, inpainted
+from .inpaint import fillable_holes, inpainted
 from .options import EXPOSURE, INPAINT
 from .placing import Placing, adding_order
 from .tone.exposure import Exposure, exposures_for
@@ -133,7 +133,7 @@ def composed(
         found[number] = panorama.add(number, found[number], fetched, painted, (decided is not None, keep), report)
     out, labels = panorama.layer, panorama.labels(found)
     if options.holes == "auto":
-        filled = closed_holes(out.alpha > 0, True, goes_round(warp.canvas))[0]
+        filled = fillable_holes(out, goes_round(warp.canvas))
     else:
         filled = panorama.open_holes()
     return Composition(_without_holes(out, filled, warp), tuple(exposed), tuple(found), labels, filled)

@@ -70,6 +70,33 @@ def closed_holes(
     return holes, boxes
 
 
+def fillable_holes(panorama: Layer, goes_round: bool) -> NDArray[np.bool_]:
+    """Closed holes (H, W) that are hardly seen once filled: small ones, and larger ones in plain surroundings, as a sky
+    has; goes_round: see `closed_holes`."""
+    shows = panorama.alpha > 0
+    holes, large = (closed_holes(shows, small, goes_round)[0] for small in (True, False))
+    count, number, about, _ = cv2.connectedComponentsWithStats(large.view(np.uint8), connectivity=4)
+    reach = INPAINT.reach_px
+    for one in range(1, count):
+        left, top, width, height, area = about[one].tolist()
+        if area > INPAINT.plain_share * shows.size:
+            continue
+        box = slice(max(0, top - reach), top + height + reach), slice(max(0, left - reach), left + width + reach)
+        missing = number[box] == one
+        if _plain(panorama.light[box], dilated(missing, reach) & shows[box]):
+            holes[box] |= missing
+    return holes
+
+
+def _plain(light: NDArray[np.float32], beside: NDArray[np.bool_]) -> bool:
+    """Whether the tones of light (h, w, C) rise and fall as a plane does where `beside` (h, w) is true."""
+    places = np.argwhere(beside)
+    plane = np.column_stack([places - places.mean(axis=0), np.ones(len(places))])
+    tones = log_encode(light[beside]).astype(np.float64)
+    left_over = np.abs(tones - plane @ np.linalg.lstsq(plane, tones, rcond=None)[0])
+    return bool(np.percentile(left_over, INPAINT.plain_percentile) <= INPAINT.plain_tones)
+
+
 def inpainted(panorama: Layer, holes: NDArray[np.bool_], inverse_depth: AnyImage) -> Layer:
     """Fill holes with a smooth continuation of what lies around them, opaque; all other pixels keep their bits.
 

@@ -137,6 +137,15 @@ class InpaintOptions:
     """Share of the canvas up to which a closed hole is small: filled, it is hardly seen, and left open it would cut the
     inscribed rectangle in two."""
 
+    plain_share: float = 0.01
+    """The same of a hole in plain surroundings, which a smooth continuation matches."""
+
+    plain_tones: float = 0.04
+    """By how much tones, 0 to 1, lie off a plane at most in plain surroundings: ten of 255 levels, a soft cloud."""
+
+    plain_percentile: float = 95.0
+    """Percentile of these differences that counts."""
+
 
 @dataclass(frozen=True)
 class CropOptions:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from edf_stitch.core.compose.inpaint import closed_holes, inpainted
+from edf_stitch.core.compose.inpaint import closed_holes, fillable_holes, inpainted
 from edf_stitch.core.panorama.layers import Layer
 
 SHAPE = 80, 120
@@ -86,6 +86,28 @@ def test_small_closed_holes_are_told_from_large_and_open_ones() -> None:
         for of in (True, False):
             found, boxes = closed_holes(none, of)
             assert not found.any() and found.shape == none.shape and not boxes
+
+
+def with_holes(rough: float) -> Layer:
+    """A sky above the middle, ground with a pattern below; a hole of half a hundredth in both, one of a thousandth in
+    the ground, one of two hundredths in the sky, and one in the sky that reaches the border."""
+    rows, columns = np.mgrid[:200, :300]
+    light = np.where(rows < 100, 0.5 + 0.002 * rows + rough * ((rows + columns) % 2), 0.3 + 0.2 * (columns // 4 % 2))
+    shows = np.ones(light.shape, bool)
+    shows[30:45, 40:60] = shows[140:155, 40:60] = False
+    shows[140:146, 200:210] = False
+    shows[30:60, 200:240] = False
+    shows[:10, 100:110] = False
+    return Layer(np.where(shows[..., None], np.repeat(light[..., None], 3, axis=2), 0).astype(np.float32), shows)
+
+
+def test_holes_in_plain_surroundings_may_be_larger() -> None:
+    plain = np.zeros((200, 300), bool)
+    small = plain.copy()
+    plain[30:45, 40:60] = True
+    small[140:146, 200:210] = True
+    assert np.array_equal(fillable_holes(with_holes(rough=0.02), goes_round=False), plain | small)
+    assert np.array_equal(fillable_holes(with_holes(rough=0.3), goes_round=False), small)
 
 
 def test_holes_far_from_each_other_are_filled_each_from_its_surroundings() -> None:
