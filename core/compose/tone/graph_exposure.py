@@ -94,7 +94,9 @@ def graph_exposures(
     lenses = fit_vignetting(overlaps, lenses_of(cameras)) if wanted != "reference" else (NO_VIGNETTING,) * len(layers)
     ratios = [_ratio(one, lenses) for one in overlaps]
     usable = [one for one in ratios if np.abs(one.middle).max() <= np.log(GRAPH_EXPOSURE.max_gain)]
-    gains = _solved([one.between(body) for one in usable], body.max() + 1, channels, kept)
+    overexposed = [] if kept else [_overexposed(blocks, body, number) for number in range(body.max() + 1)]
+    well = None if kept else np.array([1 - min(one[0] / GRAPH_EXPOSURE.worse_exposed, 1) for one in overexposed])
+    gains = _solved([one.between(body) for one in usable], body.max() + 1, channels, well)
     gains += np.log(2) * (0.0 if isinstance(wanted, str) else wanted)
     exposures = []
     for number in range(len(layers)):
@@ -110,7 +112,7 @@ def graph_exposures(
             np.exp(gains[body[number]]).astype(np.float32), spread.astype(np.float32), sum(counts), lenses[number],
             keeps_white=not kept, why_not=why_not,
         ))  # fmt: skip
-    return tuple(exposures) if kept else _with_clipped(exposures, body, blocks, layers, maps, hidden)
+    return tuple(exposures) if kept else _with_clipped(exposures, body, overexposed, layers, maps, hidden)
 
 
 def lenses_of(cameras: Sequence[Camera]) -> list[int | None]:
@@ -138,9 +140,9 @@ def _ratio(shared: SharedBlocks, lenses: Sequence[Vignetting]) -> _Ratio:
     return _Ratio(shared.i, shared.j, middle, spread, len(shared.blocks))
 
 
-def _solved(ratios: Sequence[_Ratio], count: int, channels: int, to_reference: bool) -> Array:
-    """Logarithms (N, C) of the gains; the median of the pictures that hang together stays as it is, or the reference.
-    """
+def _solved(ratios: Sequence[_Ratio], count: int, channels: int, well: Array | None) -> Array:
+    """Logarithms (N, C) of the gains; the median of the pictures that hang together stays as it is, each counted by how
+    well (N,) it is exposed, 0 to 1, or without that the reference."""
     first, second = (np.array([getattr(one, name) for one in ratios], np.intp) for name in ("i", "j"))
     links = coo_matrix((np.ones(len(ratios)), (first, second)), shape=(count, count))
     groups, group = connected_components(links, directed=False)
@@ -160,15 +162,30 @@ def _solved(ratios: Sequence[_Ratio], count: int, channels: int, to_reference: b
             trust = 1 / (1 + (np.array(left) / scale) ** 2) ** 2
     for number in range(groups):
         own = group == number
-        gains[own] -= gains[0] if to_reference and own[0] else np.median(gains[own], axis=0)
+        gains[own] -= gains[0] if well is None and own[0] else _median(gains[own], None if well is None else well[own])
     return gains
 
 
+def _median(values: Array, weights: Array | None) -> Array:
+    """The median (C,) of values (N, C) by weights (N,), as the mean of a narrow middle so that no weight makes it jump;
+    without weights, or where none is above 0, all count alike."""
+    if weights is None or not weights.any():
+        weights = np.ones(len(values))
+    order = np.argsort(values, axis=0, kind="stable")
+    upper = np.cumsum(weights[order], axis=0) / weights.sum()
+    lower = np.vstack([np.zeros(values.shape[1]), upper[:-1]])
+    middle = 0.5 - GRAPH_EXPOSURE.middle / 2, 0.5 + GRAPH_EXPOSURE.middle / 2
+    share = np.maximum(np.minimum(upper, middle[1]) - np.maximum(lower, middle[0]), 0) / GRAPH_EXPOSURE.middle
+    median: Array = (share * np.take_along_axis(values, order, axis=0)).sum(axis=0)
+    return median
+
+
 def _with_clipped(
-    exposures: Sequence[Exposure], body: NDArray[np.intp], blocks: Sequence[PictureBlocks | None],
+    exposures: Sequence[Exposure], body: NDArray[np.intp], overexposed: Sequence[tuple[float, list[tuple[int, int]]]],
     layers: Sequence[Layer], maps: Sequence[CanvasMap], hidden: Sequence[NDArray[np.bool_]],
 ) -> tuple[Exposure, ...]:  # fmt: skip
-    """The same with how much of each picture is over-exposed, and what others tell of its clipped light."""
+    """The same with how much of each picture is over-exposed, and what others tell of its clipped light; overexposed:
+    see `_overexposed`, for each body."""
 
     def told_of(number: int, other: int) -> ToldLight:
         shown = [(layers[k].alpha > OVERLAP.opaque_alpha) & ~hidden[k] for k in (number, other)]
@@ -176,8 +193,7 @@ def _with_clipped(
         return ToldLight(layers[number].light, toned, reference, shown[0] & shown[1])
 
     found: dict[int, tuple[float, ClippedLight | None]] = {}
-    for number in range(body.max() + 1):
-        share, tellers = _overexposed(blocks, body, number)
+    for number, (share, tellers) in enumerate(overexposed):
         told = clipped_light(told_of(*both) for both in tellers) if share >= CLIPPED.least_share else None
         found[number] = share, told
     return tuple(

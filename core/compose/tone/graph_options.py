@@ -23,6 +23,14 @@ class GraphExposureOptions:
     """Logarithms of light, round after round, from which on an overlap that contradicts the others counts less: what it
     shows is not the same thing twice. The last is more than a ring of overlaps fails to close by."""
 
+    worse_exposed: float = 0.1
+    """Share of what a picture and others show that is clipped in it alone from which on its exposure and white balance
+    count for nothing: the light that only the others tell would be blown, or tinted."""
+
+    middle: float = 0.1
+    """Share of the pictures, by what they count, whose mean is their median: of nine or fewer that count alike it is the
+    middle one."""
+
     blocks_of_overlap: int = 1500
     """Blocks of an overlap that vignetting is fitted on, at most."""
 

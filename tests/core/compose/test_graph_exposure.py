@@ -72,6 +72,17 @@ def test_stops_are_added_and_none_is_none() -> None:
     assert all((one.gain == 1).all() and not one.blocks for one in exposures(lit(gains), "none"))
 
 
+def test_what_is_over_exposed_does_not_set_the_exposure() -> None:
+    """Four of seven pictures lack a quarter of the wall, which is white there; the other three tell of it."""
+    wall_too = wall()
+    wall_too[ROWS][:35] += 0.6
+    gains = np.float32([[2.4, 2.2, 1.8]] * 4 + [[0.8] * 3, [0.7] * 3, [0.6] * 3])
+    order = [0, 4, 1, 5, 2, 6, 3]
+    layers = layers_of([np.minimum(wall_too * gain, 1) for gain in gains[order]])
+    found = stops_of(exposures(layers))
+    assert np.allclose(found + np.log2(gains[order]), np.log2(0.7), atol=0.05)
+
+
 def test_radiance_is_kept_at_the_references_exposure() -> None:
     gains = 2 ** np.random.default_rng(3).uniform(-2, 2, (7, 3))
     found = exposures(lit(40 * gains), floats=True)
