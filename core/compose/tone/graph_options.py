@@ -28,8 +28,8 @@ class GraphExposureOptions:
     count for nothing: the light that only the others tell would be blown, or tinted."""
 
     middle: float = 0.1
-    """Share of the pictures, by what they count, whose mean is their median: of nine or fewer that count alike it is the
-    middle one."""
+    """Share of the pictures, by what they count, whose mean is their median: of nine or fewer that count alike it is
+    the middle one."""
 
     blocks_of_overlap: int = 1500
     """Blocks of an overlap that vignetting is fitted on, at most."""
