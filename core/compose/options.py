@@ -75,7 +75,11 @@ class MovingThingsOptions:
     """Tones below which the pictures agree."""
 
     surroundings_cells: int = 5
-    """Cells around a thing in which the pictures have to agree, and across which its parts are joined."""
+    """Cells around a thing in which the pictures have to agree, and across which parts side by side are joined."""
+
+    joined_rows: int = 25
+    """Cells across which parts one above the other are joined: people are upright, and a quarter of one may look like
+    what is behind, or like another."""
 
     min_agreeing: float = 0.7
     """Share of these surroundings that must agree: people walk past one another, too."""

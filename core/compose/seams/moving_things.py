@@ -56,10 +56,9 @@ def moving_labels(
     apart = (visible & (largest > MOVING_THINGS.min_difference)).astype(np.uint8)
     thin, around = MOVING_THINGS.min_width_cells, MOVING_THINGS.surroundings_cells
     things = cv2.morphologyEx(apart, cv2.MORPH_OPEN, np.ones((thin, thin), np.uint8))
-    # parts of one thing, such as head and legs, are joined
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(
-        cv2.morphologyEx(things, cv2.MORPH_CLOSE, np.ones((around, around), np.uint8)), connectivity=8
-    )
+    # parts of one thing are joined, such as head and legs of somebody of whom both pictures seem to show the belt
+    joined = cv2.morphologyEx(things, cv2.MORPH_CLOSE, np.ones((MOVING_THINGS.joined_rows, around), np.uint8))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
     here = np.s_[rows.start : rows.stop : step, columns.start : columns.stop : step]
     moves = [values[here] for values in (picture_map.x, picture_map.y)]
     shows_before, shows = before.alpha[::step, ::step] > 0, layer.alpha[::step, ::step] > 0

@@ -59,6 +59,17 @@ def test_who_moved_belongs_to_the_picture_that_is_alone_nearer_by(across: int, m
     assert (when != 0).sum() < 2 * 72 * 34, "and nothing further than 6 px off did"
 
 
+def test_legs_are_not_moved_without_the_body() -> None:
+    """The belt looks like the ground behind it, and a shadow lies around the body in one of the pictures."""
+    reference, target = ground(), ground()
+    reference[80:115, 225:277] *= 0.6
+    legs, body = np.s_[130:160, 240:262], np.s_[90:110, 240:262]
+    for part in (legs, body):
+        reference[part] = 0.02
+    when = found(reference, target)
+    assert (when[legs] != 0).mean() == pytest.approx((when[body] != 0).mean(), abs=0.1)
+
+
 def test_who_moved_where_the_added_picture_shows_nothing_alone_belongs_to_what_does() -> None:
     reference, target = ground(), ground()
     reference[WALKER], target[FAR] = 0.02, 0.9
