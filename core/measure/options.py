@@ -145,6 +145,9 @@ class VerdictOptions:
     least_alpha: float = 0.5
     """Alpha from which a picture shows something."""
 
+    focal_spread: float = 0.05
+    """Share by which guesses of a set's focal length differ at least to be seen: at 4 % of skyline nothing is."""
+
     evened_share: float = 0.03
     """Half the width of what changes slowly, of the longer side: the bands that even out light are about as wide."""
 

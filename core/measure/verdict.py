@@ -140,7 +140,7 @@ def _doubts(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "the scene is too near and deep for the points that were found", MORE
     if (report["measured"]["folds"] or 0.0) > VERDICT.folded:
         yield f"the map folds over in {report['measured']['folds']:.0%} of a picture: depth is doubtful there", MORE
-    if report["rig"]["focal_spread"] > RIG.same_focal:
+    if report["rig"]["focal_spread"] > VERDICT.focal_spread:
         yield "the focal length is not sure", "give the focal length (--focal35, --focal-px)"
 
 

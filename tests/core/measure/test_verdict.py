@@ -293,13 +293,17 @@ def test_the_picture_whose_border_cuts_a_thing_is_named() -> None:
 @pytest.mark.parametrize(("changes", "why", "advice"), [
     ({"left_out": [{"name": "d.png", "why": ""}]}, "left out: d.png", "take more pictures"),
     ({"rig": {**SURE["rig"], "scale": "none"}}, "how far apart", "take more pictures"),
-    ({"rig": {**SURE["rig"], "focal_spread": 0.03}}, "focal length is not sure", "--focal35"),
+    ({"rig": {**SURE["rig"], "focal_spread": 0.06}}, "focal length is not sure", "--focal35"),
     ({"measured": {"alignment_p95_px": 1.0, "folds": 0.2}}, "folds over in 20%", "take more pictures"),
     ({"field": {"leave_one_out_px": 2.5}}, "too near and deep", "take more pictures"),
 ])  # fmt: skip
 def test_what_is_doubtful_about_the_cameras_is_said(changes: dict, why: str, advice: str) -> None:
     found = judge(look_of_three(), (0, 0), {**SURE, **changes})
     assert found.rating == "look" and why in found.because and advice in found.what_to_do and not found.places
+
+
+def test_guesses_of_the_focal_length_that_nobody_tells_apart_are_no_doubt() -> None:
+    assert judge(look_of_three(), (0, 0), {**SURE, "rig": {**SURE["rig"], "focal_spread": 0.04}}).rating == "good"
 
 
 def test_given_matches_that_contradict_each_other_are_not_good() -> None:
