@@ -76,7 +76,9 @@ def least_torn(first: StitchResult, others: Iterable[Callable[[], StitchResult]]
     best, made = first, [first]
     for make in others:
         made.append(make())
-        if _is_usable(made[-1]) and _px_to_look_at(made[-1]) <= VERDICT.much_less * _px_to_look_at(best):
+        less = _px_to_look_at(made[-1]) <= VERDICT.much_less * _px_to_look_at(best)
+        # what a crop leaves out is not mended
+        if less and _is_usable(made[-1]) and _px_kept(made[-1]) >= VERDICT.least_kept * _px_kept(first):
             best = made[-1]
         if not _px_to_look_at(best):
             break
@@ -87,6 +89,11 @@ def least_torn(first: StitchResult, others: Iterable[Callable[[], StitchResult]]
 def _px_to_look_at(result: StitchResult) -> int:
     """px of the places to look at."""
     return sum(place["box"][2] * place["box"][3] for place in result.report["verdict"]["places"])
+
+
+def _px_kept(result: StitchResult) -> int:
+    """px of the panorama as it is cropped."""
+    return result.canvas.width * result.canvas.height
 
 
 def _is_usable(result: StitchResult) -> bool:

@@ -186,6 +186,10 @@ class VerdictOptions:
     """Share of what there is to look at that another slide may leave, to be shown instead of a torn one that bends
     least."""
 
+    least_kept: float = 0.85
+    """Share of the px of that one's panorama, cropped, that the other's has at least: slides show a little more or
+    less."""
+
     smooth_share: float = 0.012
     """Of the longer side: half the width over which a map is smoothed, outlines with it, to see where it bends."""
 

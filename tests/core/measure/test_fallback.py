@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from edf_stitch.core import mapping, pipeline
+from edf_stitch.core.measure.fallback import least_torn
 from edf_stitch.core.measure.verdict import GOOD, NOT_USABLE, TORN, Place, Verdict
 from edf_stitch.core.panorama.choosing_slide import SlideChoice, SlideCost
 from edf_stitch.core.pipeline import StitchOptions, StitchResult, stitch
@@ -75,6 +78,29 @@ def test_of_slides_that_cost_about_as_much_another_is_shown_where_much_less_is_t
     assert (0.0 if result.warp.viewpoint is None else result.warp.viewpoint.s1) == slide["s1"]
     assert result.report["options"]["slide"] == "auto" and told == sorted(told)
     assert {"read", "features", "dense", "warp"} <= result.seconds.keys(), "of all that was done"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """As much of a result as is looked at: with a place that is torn, of so many px, and a panorama of so many."""
+
+    torn: int
+    side: int
+    seconds: dict[str, float] = dataclass_field(default_factory=dict)
+
+    @property
+    def report(self) -> dict:
+        return {"verdict": {"is": "look", "places": [{"what": TORN, "box": (0, 0, self.torn, 1)}]}}
+
+    @property
+    def canvas(self) -> SimpleNamespace:
+        return SimpleNamespace(width=self.side, height=100)
+
+
+@pytest.mark.parametrize(("side", "taken"), [(100, True), (86, True), (84, False)])
+def test_a_slide_that_is_less_torn_because_the_crop_leaves_that_out_is_not_taken(side: int, taken: bool) -> None:
+    first, other = Shown(50, 100), Shown(5, side)
+    assert least_torn(first, [lambda: other]).side == (side if taken else 100)
 
 
 def test_what_was_asked_to_be_simple_is_left_alone(
