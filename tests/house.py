@@ -130,7 +130,8 @@ def statements(tree: ast.Module) -> Iterator[tuple[ast.stmt, tuple[ast.AST, ...]
         node, within = waiting.pop()
         if isinstance(node, ast.stmt):
             yield node, within
-        inner = [one for block in ("body", "orelse", "finalbody", "handlers", "cases") for one in getattr(node, block, ())]
+        blocks = [getattr(node, name, ()) for name in ("body", "orelse", "finalbody", "handlers", "cases")]
+        inner = [one for block in blocks for one in block]
         waiting += [(one, (*within, node)) for one in reversed(inner)]
 
 
