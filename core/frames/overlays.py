@@ -141,7 +141,7 @@ def _burnt_in_outline(contour: NDArray[np.int32], compared: _Compared, reach: in
     width, height = cv2.boundingRect(contour)[2:]
     if min(width, height) < OVERLAYS.least_width or width * height > OVERLAYS.most_share * compared.any.size:
         return 0
-    around, inside = _around(contour, compared, reach)
+    around, inside = _surroundings(contour, compared, reach)
     shared, strong = compared.shared[around], compared.any[around]
     near, beside = inside > 0, cv2.dilate(inside, _disc(2 * reach)) == 0
     own = int((near & shared).sum())
@@ -151,12 +151,12 @@ def _burnt_in_outline(contour: NDArray[np.int32], compared: _Compared, reach: in
 
 def _is_alike(contour: NDArray[np.int32], compared: _Compared, reach: int) -> bool:
     """Whether what a contour holds is the same in all pictures."""
-    around, inside = _around(contour, compared, reach)
+    around, inside = _surroundings(contour, compared, reach)
     products, squares = (values[around][inside > 0].sum() for values in compared.products_and_squares)
     return bool(products / max(1e-6, float(squares)) >= OVERLAYS.least_alike)
 
 
-def _around(
+def _surroundings(
     contour: NDArray[np.int32], compared: _Compared, reach: int
 ) -> tuple[tuple[slice, slice], NDArray[np.uint8]]:
     """The part of the pictures around a contour, and its inside there, filled with 1."""
