@@ -106,6 +106,7 @@ def stitch(
 def panorama_of(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:
     """The panorama of pictures whose geometry is known, as `stitch` makes it: of a pair the first that is usable, of a
     large set by what is decided on small pictures. frame: the pictures of the geometry. Raises as `stitch` does."""
+    give_back()  # what features took lies between what stays
     return (_made if geometry.rig is None else _of_many)(frame, geometry, options, progress)
 
 
@@ -136,7 +137,6 @@ def _slid_by(
 
 def _of_many(frame: Frame, geometry: Geometry, options: StitchOptions, progress: Stopwatch) -> StitchResult:
     """The panorama of more than two pictures: of large ones by what is decided on small ones."""
-    give_back()  # what features took lies between what stays
     times = draft_times(frame.sizes, options)
     small = frame.resized(1 / times)
     alignment = fit_and_warp(geometry.of_resized(small.sizes), [small], options, progress)

@@ -90,6 +90,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory, small_pair: Pair) -> Path:
     return out
 
 
+@pytest.fixture(scope="session")
+def found_before(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache for tests of what comes after features and geometry: only the first of them looks for these."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def with_cache(found_before: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stitches from here on, of other processes too, use that cache."""
+    monkeypatch.setenv("EDF_CACHE", str(found_before))
+
+
 @dataclass(frozen=True)
 class GivenField:
     """A displacement field that is a function of reference pixels (…, 2)."""

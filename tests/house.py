@@ -7,7 +7,7 @@ add-on those inside functions do: they are late only so that Blender starts soon
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -99,8 +99,7 @@ def room_of(module: str) -> str:
 def imports(core: Path = CORE, late: bool = False) -> Graph:
     """Which modules of core each module imports when it is loaded; late: inside functions too."""
     known = modules(core)
-    trees = {name: ast.parse(path.read_text("utf-8")) for name, path in known.items()}
-    return {name: set(_imported(name, tree, known, late)) for name, tree in trees.items()}
+    return {name: set(_imported(name, _tree(path), known, late)) for name, path in known.items()}
 
 
 def by_room(graph: Graph) -> Graph:
@@ -112,19 +111,32 @@ def by_room(graph: Graph) -> Graph:
 
 
 def _imported(name: str, tree: ast.Module, known: Iterable[str], late: bool) -> Iterable[str]:
-    kept_out = [
-        node for node in ast.walk(tree)
-        if _is_type_checking(node) or isinstance(node, ast.FunctionDef) and not late
-    ]  # fmt: skip
-    skipped = {id(inner) for node in kept_out for inner in ast.walk(node)}
     folder = name.split("/")[:-1]
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.ImportFrom) or id(node) in skipped or not 1 <= node.level <= len(folder) + 1:
+    for node, within in statements(tree):
+        if not isinstance(node, ast.ImportFrom) or not 1 <= node.level <= len(folder) + 1:
+            continue
+        if any(_is_type_checking(outer) or isinstance(outer, ast.FunctionDef) and not late for outer in within):
             continue
         base = folder[: len(folder) + 1 - node.level] + (node.module.split(".") if node.module else [])
         for target in ["/".join(base)] + ["/".join([*base, alias.name]) for alias in node.names]:
             if target in known:
                 yield target
+
+
+def statements(tree: ast.Module) -> Iterator[tuple[ast.stmt, tuple[ast.AST, ...]]]:
+    """Every statement, each with those that it stands in; expressions, which hold none, are not walked through."""
+    waiting: list[tuple[ast.AST, tuple[ast.AST, ...]]] = [(tree, ())]
+    while waiting:
+        node, within = waiting.pop()
+        if isinstance(node, ast.stmt):
+            yield node, within
+        blocks = [getattr(node, name, ()) for name in ("body", "orelse", "finalbody", "handlers", "cases")]
+        inner = [one for block in blocks for one in block]
+        waiting += [(one, (*within, node)) for one in reversed(inner)]
+
+
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text("utf-8"))
 
 
 def _is_type_checking(node: ast.AST) -> bool:
@@ -165,7 +177,7 @@ def old_names(core: Path = CORE) -> list[str]:
     """Modules, classes and functions that still bear a name of the first layout."""
     found = [name for name in modules(core) if name.rpartition("/")[2] in RENAMED]
     for name, path in modules(core).items():
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        for node, _ in statements(_tree(path)):
             if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name.strip("_") in RENAMED:
                 found.append(f"{name}: {node.name}")
     return found

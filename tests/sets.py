@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from edf_stitch.core.cameras.projective import rotation_from_vector
@@ -21,6 +22,7 @@ class PictureSet:
     cameras: tuple[SceneCamera, ...]
 
 
+@cache
 def make_set(count: int = 4, size: tuple[int, int] = (320, 240), turn: float = 14.0, step: float = 0.25) -> PictureSet:
     """Each picture is taken `step` m further right, a little up or down and nearer, turned right by `turn` degrees."""
     K = np.array([[FOCAL, 0, (size[0] - 1) / 2], [0, FOCAL, (size[1] - 1) / 2], [0, 0, 1.0]])

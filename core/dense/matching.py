@@ -19,6 +19,7 @@ from ..cameras.matches import Matches
 from ..field.transfer import inverse_depths
 from ..raster.arrays import Array, Plane, eroded
 from ..raster.coarse import COARSE_STEP, coarse_places, in_between
+from ..system.memory import give_back
 from ..system.threads import each, in_order
 from .epipolar_lines import EpipolarLines, SparseMap
 from .epipolar_rows import EpipolarRows
@@ -151,6 +152,7 @@ def search(
     a[neither] = b[neither] = 128
     # half the size searches twice as far, and tells whether that is worth while
     coarse_disparity, coarse_found = _matched_at_half(a, b, 2 * count)
+    give_back()  # its costs: those at full size do not fit where they were
     usual = count / 2
     least, count = _range(a, coarse_disparity, coarse_found, count)
     coarse_found &= (coarse_disparity >= least) & (coarse_disparity <= least + count)

@@ -56,7 +56,7 @@ class _Compared:
     @cached_property
     def products_and_squares(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Of how pixels (H, W) differ from what is around them the mean over all products of two pictures, and over all
-        squares; few pictures share outlines that ask for it."""
+        squares; only outlines that may be burnt in, one of them large enough, ask for it."""
         total, squares = np.zeros((*self.any.shape, 3), np.float32), np.zeros(self.any.shape, np.float32)
         for picture in self.pictures:
             levels = _shrunk(picture, self.any.shape).astype(np.float32)
@@ -86,9 +86,10 @@ def _burnt_into(pictures: Sequence[Picture]) -> NDArray[np.bool_] | None:
     outlines = [_burnt_in_outline(contour, compared, reach, dense) for contour in contours]
     mask = np.zeros(shape, np.uint8)
     if max(outlines) >= OVERLAYS.least_outline:  # where one is, smaller ones are of its kind
-        for contour, outline in zip(contours, outlines, strict=True):
-            if outline >= OVERLAYS.least_further:
-                cv2.drawContours(mask, [contour], 0, 1, cv2.FILLED)
+        some = [(contour, outline) for contour, outline in zip(contours, outlines, strict=True)
+                if outline >= OVERLAYS.least_further and _is_alike(contour, compared, reach)]  # fmt: skip
+        if max((outline for _, outline in some), default=0) >= OVERLAYS.least_outline:
+            cv2.drawContours(mask, [contour for contour, _ in some], -1, 1, cv2.FILLED)
     if not mask.any() or mask.mean() > OVERLAYS.most_share:
         return None
     grown = cv2.dilate(mask, _disc(max(2, round(OVERLAYS.margin * max(shape)))))
@@ -135,23 +136,35 @@ def _over_channels(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _burnt_in_outline(contour: NDArray[np.int32], compared: _Compared, reach: int, dense: float) -> int:
-    """px beside outlines that are the same in all pictures in a contour, 0 unless it looks burnt in: densely filled
-    with them, alike in all pictures, and unlike what is around it."""
-    left, top, width, height = cv2.boundingRect(contour)
+    """px beside outlines that are the same in all pictures in a contour, 0 unless it may be burnt in: densely filled
+    with them, and unlike what is around it."""
+    width, height = cv2.boundingRect(contour)[2:]
     if min(width, height) < OVERLAYS.least_width or width * height > OVERLAYS.most_share * compared.any.size:
         return 0
-    around = np.s_[max(0, top - 4 * reach) : top + height + 4 * reach,
-                   max(0, left - 4 * reach) : left + width + 4 * reach]  # fmt: skip
+    around, inside = _surroundings(contour, compared, reach)
     shared, strong = compared.shared[around], compared.any[around]
-    offset = -around[1].start, -around[0].start
-    inside = cv2.drawContours(np.zeros(shared.shape, np.uint8), [contour], 0, 1, cv2.FILLED, offset=offset)
     near, beside = inside > 0, cv2.dilate(inside, _disc(2 * reach)) == 0
     own = int((near & shared).sum())
     moving = float((beside & shared).sum()) / max(1, int((beside & strong).sum()))
-    if own < dense * near.sum() or moving > OVERLAYS.most_agree:
-        return 0
-    products, squares = (values[around][near].sum() for values in compared.products_and_squares)
-    return own if products / max(1e-6, float(squares)) >= OVERLAYS.least_alike else 0
+    return 0 if own < dense * near.sum() or moving > OVERLAYS.most_agree else own
+
+
+def _is_alike(contour: NDArray[np.int32], compared: _Compared, reach: int) -> bool:
+    """Whether what a contour holds is the same in all pictures."""
+    around, inside = _surroundings(contour, compared, reach)
+    products, squares = (values[around][inside > 0].sum() for values in compared.products_and_squares)
+    return bool(products / max(1e-6, float(squares)) >= OVERLAYS.least_alike)
+
+
+def _surroundings(
+    contour: NDArray[np.int32], compared: _Compared, reach: int
+) -> tuple[tuple[slice, slice], NDArray[np.uint8]]:
+    """The part of the pictures around a contour, and its inside there, filled with 1."""
+    left, top, width, height = cv2.boundingRect(contour)
+    around = (slice(max(0, top - 4 * reach), top + height + 4 * reach),
+              slice(max(0, left - 4 * reach), left + width + 4 * reach))  # fmt: skip
+    empty, offset = np.zeros(compared.any[around].shape, np.uint8), (-around[1].start, -around[0].start)
+    return around, cv2.drawContours(empty, [contour], 0, 1, cv2.FILLED, offset=offset)
 
 
 def _disc(radius: int) -> NDArray[np.uint8]:

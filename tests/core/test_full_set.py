@@ -28,7 +28,7 @@ from edf_stitch.core.system.output_files import OutputFiles
 
 from ..sets import FOCAL, PictureSet, make_set
 
-OPTIONS = StitchOptions(camera=CameraRequest(focal_px=(2 * FOCAL,)), dense=False)
+KNOWN = StitchOptions(camera=CameraRequest(focal_px=(2 * FOCAL,)), dense=False)
 
 
 @pytest.fixture(scope="module")
@@ -45,16 +45,22 @@ def large() -> PictureSet:
 
 
 @pytest.fixture(scope="module")
-def at_once(large: PictureSet) -> StitchResult:
-    return stitch(large.pictures, OPTIONS)
+def options(tmp_path_factory: pytest.TempPathFactory) -> StitchOptions:
+    """KNOWN where features and geometry, which are those of the full pictures, are found once."""
+    return replace(KNOWN, cache=tmp_path_factory.mktemp("cache"))
 
 
 @pytest.fixture(scope="module")
-def drafted(large: PictureSet) -> Iterator[StitchResult]:
+def at_once(large: PictureSet, options: StitchOptions) -> StitchResult:
+    return stitch(large.pictures, options)
+
+
+@pytest.fixture(scope="module")
+def drafted(large: PictureSet, options: StitchOptions) -> Iterator[StitchResult]:
     """The same as if these were more pixels than are decided about at once."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draft, "DRAFT", replace(draft.DRAFT, most_pixels=400_000))
-        yield stitch(large.pictures, OPTIONS)
+        yield stitch(large.pictures, options)
 
 
 def shown(result: StitchResult) -> np.ndarray:
@@ -144,10 +150,12 @@ def test_nothing_in_the_panorama_is_open(drafted: StitchResult) -> None:
     assert not black.any()
 
 
-def test_the_outline_is_that_of_the_pictures(large: PictureSet, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_outline_is_that_of_the_pictures(
+    large: PictureSet, options: StitchOptions, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(draft, "DRAFT", replace(draft.DRAFT, most_pixels=400_000))
     whole_frame = {"crop": "full", "projection": "cylindrical", "slide": 0, "holes": "transparent"}
-    result = stitch(large.pictures, replace(OPTIONS, **whole_frame))
+    result = stitch(large.pictures, replace(options, **whole_frame))
     layers = [result.full_layer(number).within(result.spread).alpha for number in range(4)]
     anything, alpha = np.logical_or.reduce(layers), result.panorama.alpha > 0
     assert (alpha & ~anything).mean() < 0.0005, "gaps between two pictures that are narrower than a small pixel"
@@ -171,8 +179,8 @@ def test_the_report_counts_in_px_of_the_panorama(at_once: StitchResult, drafted:
 
 def test_a_preview_is_made_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(draft, "DRAFT", replace(draft.DRAFT, most_pixels=1))
-    options = replace(OPTIONS, camera=CameraRequest(focal_px=(FOCAL,)), slide=0, preview=True, measure=False)
-    assert stitch(make_set(3).pictures, options).enlarged is None
+    options = replace(KNOWN, camera=CameraRequest(focal_px=(FOCAL,)), slide=0, preview=True, measure=False)
+    assert stitch(make_set(3, size=(240, 180)).pictures, options).enlarged is None
 
 
 def test_depth_has_the_panoramas_size_and_lies_where_the_drafts_does(drafted: StitchResult) -> None:

@@ -24,7 +24,7 @@ from edf_stitch.synthetic_scenes.two_planes import Pair
 # Thousands of pixels that each works out; of features px looked through, of matching px times disparities, of cuts px
 # that are decided.
 THOUSANDS = {
-    "remap": 2647, "resize": 3798, "blur": 6466, "GaussianBlur": 955, "dilate": 5965, "medianBlur": 555,
+    "remap": 2647, "resize": 3553, "blur": 6226, "GaussianBlur": 955, "dilate": 5814, "medianBlur": 555,
     "features": 480, "matching": 10986, "cuts": 25,
 }  # fmt: skip
 # The most that NumPy's arrays take at once with one thread.

@@ -30,8 +30,8 @@ def leftovers() -> list[Path]:
 
 
 @pytest.fixture
-def chosen(blender: SimpleNamespace, folder: Path) -> SimpleNamespace:
-    """The small pair's two files, chosen in the scene."""
+def chosen(blender: SimpleNamespace, folder: Path, with_cache: None) -> SimpleNamespace:
+    """The small pair's two files, chosen in the scene; to be stitched with what an earlier test's stitch has found."""
     for side in ("reference", "target"):
         setattr(blender.settings, side, bpy.data.images.load(str(folder / f"{side}.png")))
     return blender

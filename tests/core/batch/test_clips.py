@@ -23,6 +23,9 @@ from .batch_work import files, lasting, raw, run, save, summary
 
 said = batch_work.said
 
+# What the clip's pictures show together is found by the first test that stitches it.
+pytestmark = pytest.mark.usefixtures("with_cache")
+
 FRAMES = (7, 8, 9, 10)
 SIDE = 48
 
@@ -225,7 +228,7 @@ def test_a_clip_of_three_cameras_has_one_alignment(tmp_path: Path) -> None:
     (tmp_path / "clip.csv").write_text(
         "reference,target,picture3,picture4,name\na_%04d.png,b_%04d.png,c_%04d.png,d_%04d.png,shot\n", "utf-8"
     )
-    options = StitchOptions(camera=CameraRequest(focal_px=(FOCAL,)), blend="feather", slide=0.0)
+    options = StitchOptions(camera=CameraRequest(focal_px=(FOCAL,)), blend="feather", slide=0.0, dense=False)
     summed_up = batch.run_batch(read_list(tmp_path / "clip.csv"), options, BatchRequest(tmp_path / "out"))
     (outcome,) = summed_up.outcomes
     assert outcome.status == "done", outcome.message

@@ -509,9 +509,9 @@ sys.exit(cli.main())
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 @pytest.mark.parametrize("stage", ["read", "features", "geometry", "write", "written"])
 def test_a_signal_in_the_middle_leaves_nothing(
-    folder: Path, tmp_path: Path, number: signal.Signals, stage: str
+    folder: Path, tmp_path: Path, found_before: Path, number: signal.Signals, stage: str
 ) -> None:
-    (python, *_), env = edf()
+    (python, *_), env = edf(**({"EDF_CACHE": str(found_before)} if stage.startswith("writ") else {}))
     line = [python, "-c", THINKING, stage, "stitch", folder / "reference.png", folder / "target.png",
             "-o", tmp_path / "out.png", "--report", tmp_path / "report.json", "--layers", tmp_path / "new" / "layers"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}

@@ -253,6 +253,16 @@ def test_matching_band_by_band_finds_what_matching_at_once_does(monkeypatch: pyt
     assert (sure != sure_too).mean() < 0.01 and (np.abs(at_once - banded)[sure & sure_too] > 0.5).mean() < 0.002
 
 
+def test_the_costs_of_half_the_size_go_before_those_of_the_full_size_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    """glibc's heap keeps what is freed, and larger costs do not fit there: both would be resident."""
+    events: list[str] = []
+    compute, given_back = matching._matched, matching.give_back
+    monkeypatch.setattr(matching, "_matched", lambda *asked: events.append("costs") or compute(*asked))
+    monkeypatch.setattr(matching, "give_back", lambda: events.append("given back") or given_back())
+    searched(scene("sideways"))
+    assert events == ["costs", "given back", "costs"]
+
+
 def test_it_looks_as_far_as_it_is_told() -> None:
     """OpenCV looks at 16 places more, or not: what is just within reach must not be what it leaves out."""
     pair = scene("sideways")

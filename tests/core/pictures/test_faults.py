@@ -64,6 +64,7 @@ def disk(tmp_path: Path) -> Iterator[Path]:
 
 
 @linux
+@pytest.mark.usefixtures("with_cache")
 def test_a_disk_that_fills_up(folder: Path, tmp_path: Path, disk: Path) -> None:
     wanted = ["-o", disk / "out.png", "--layers", disk / "layers", "--warp", disk / "warp.npz"]
     code, last = end(start(folder, *wanted, cwd=tmp_path))
@@ -72,12 +73,14 @@ def test_a_disk_that_fills_up(folder: Path, tmp_path: Path, disk: Path) -> None:
 
 
 @linux
+@pytest.mark.usefixtures("with_cache")
 def test_a_disk_that_may_only_be_read(folder: Path, tmp_path: Path, disk: Path) -> None:
     subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
     code, last = end(start(folder, "-o", disk / "out.png", cwd=tmp_path))
     assert code == 4 and last == f"edf: {disk} cannot be written: Read-only file system; choose another place"
 
 
+@pytest.mark.usefixtures("with_cache")
 def test_names_in_any_script_long_relative_and_through_links(folder: Path, tmp_path: Path) -> None:
     deep = tmp_path / "\u5199\u771f \U0001f4f7 \u00fc e\u0301" / ("x" * 200) / ("y" * 200)
     deep.mkdir(parents=True)
@@ -137,6 +140,7 @@ def test_where_there_are_no_links_files_are_renamed(tmp_path: Path, monkeypatch:
     assert names(tmp_path) == {"a.png"}
 
 
+@pytest.mark.usefixtures("with_cache")
 def test_two_processes_on_one_output(folder: Path, tmp_path: Path) -> None:
     jobs = [start(folder, "-o", tmp_path / "out.png", "--quiet", cwd=tmp_path) for _ in range(2)]
     ends = sorted(end(job) for job in jobs)

@@ -48,6 +48,7 @@ def edf(arguments: str, redirect: str, folder: Path) -> subprocess.CompletedProc
 
 
 @posix
+@pytest.mark.usefixtures("with_cache")
 @pytest.mark.parametrize("redirect", ["<&-", "2>&-", "<&- >&- 2>&-", "2>/dev/full"])
 def test_a_stitch_needs_nobody_to_listen(folder: Path, tmp_path: Path, redirect: str) -> None:
     pair = f"'{folder / 'reference.png'}' '{folder / 'target.png'}'"
@@ -57,6 +58,7 @@ def test_a_stitch_needs_nobody_to_listen(folder: Path, tmp_path: Path, redirect:
 
 
 @posix
+@pytest.mark.usefixtures("with_cache")
 def test_a_stitch_outlives_who_reads_its_messages(folder: Path, tmp_path: Path) -> None:
     pair = f"'{folder / 'reference.png'}' '{folder / 'target.png'}'"
     edf(f"stitch {pair} --focal-px 228 -o out.png", "2>&1 | head -n 1", tmp_path)
