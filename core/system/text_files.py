@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,9 +16,16 @@ _FORMULA = ("=", "+", "-", "@")
 
 
 def read_with_end(path: Path) -> bytes:
-    """The bytes of a file or a pipe. Raises OSError where it cannot be read, and for a device: it may have no end."""
+    """The bytes of a file, or of a pipe that this process was given open (/dev/fd/N).
+
+    Raises OSError where it cannot be read, for a device, which may have no end, and for a pipe with a name, whose
+    writer may never come.
+    """
     if path.is_char_device() or path.is_block_device():
         raise OSError(f"{path} is a device, not a file; name a file")
+    # an open pipe has no name: what /dev/fd/N links to does not exist
+    if path.is_fifo() and os.path.exists(os.path.realpath(path)):
+        raise OSError(f"{path} is a named pipe, not a file; name a file")
     return path.read_bytes()
 
 

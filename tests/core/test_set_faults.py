@@ -98,7 +98,7 @@ def test_a_pipe_that_nobody_writes_into_is_no_picture(
 
 @pytest.mark.usefixtures("soon")
 @pytest.mark.parametrize("option", ["--matches", "--cameras", "--config"])
-def test_a_device_without_an_end_is_not_read(
+def test_what_may_have_no_end_is_not_read(
     three: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], option: str
 ) -> None:
     pictures = [str(three / f"{number}.png") for number in (1, 2, 3)]
@@ -106,6 +106,11 @@ def test_a_device_without_an_end_is_not_read(
     said = capfd.readouterr().err
     assert code == 4 and said.count("\n") == 1 and "/dev/zero is a device, not a file; name a file" in said
     assert not list(tmp_path.iterdir())
+    os.mkfifo(tmp_path / "pipe")
+    code = main(["stitch", *pictures, option, str(tmp_path / "pipe"), "-o", str(tmp_path / "out.png"), "--quiet"])
+    said = capfd.readouterr().err
+    assert code == 4 and said.count("\n") == 1 and "pipe is a named pipe, not a file; name a file" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
 
 
 def test_with_no_room_for_the_program_nothing_is_begun(three: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -43,3 +44,17 @@ def test_no_name_is_a_formula_in_a_table(name: str) -> None:
 def test_a_device_which_may_have_no_end_is_not_read() -> None:
     with pytest.raises(UnreadableImage, match="the list cannot be read: /dev/zero is a device, not a file"):
         read_text(Path("/dev/zero"), "the list", "a,b")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes of Unix")
+def test_a_pipe_is_read_where_its_writer_is_there(tmp_path: Path) -> None:
+    """What a shell's <(...) hands over; a pipe with a name waited for its writer for ever."""
+    out, into = os.pipe()
+    os.write(into, b"a,b\n")
+    os.close(into)
+    if Path(f"/dev/fd/{out}").is_fifo():
+        assert read_text(Path(f"/dev/fd/{out}"), "the list", "") == "a,b\n"
+    os.close(out)
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(UnreadableImage, match=r"pipe\.csv is a named pipe, not a file; name a file"):
+        read_text(tmp_path / "pipe.csv", "the list", "a,b")
