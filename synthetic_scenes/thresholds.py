@@ -64,8 +64,11 @@ LEAD = Limit(OURS, "whole_psnr_db", "dB", at_least=-0.2)
 BEYOND_RUN, BEYOND_MEASURES, PLAIN_RUN = "known/slack", ("beyond_px", "beyond_p90_px"), "known/homography"
 # A whole suite: in so many of its scenes, by the median, ours is nearer; parts of a scene do not count.
 NEARER_SHARE = 15 / 19
-# Every scene with parallax: what the target alone shows is at least as near to the true panorama as any rival's.
-ALONE = Limit(BEYOND_RUN, "target_only_psnr_db", "dB", at_least=0.0)
+# Every scene with parallax: what the target alone shows is at least as near the truth as any rival's, over what
+# all of them show, as of the whole picture. Whose map stretches too little ends a few px early there, which is the
+# panorama's outline and seen by nobody; with those px black, the sign of an error would decide. What is missing is
+# held by the scene's own bar (`pair_bars`: target_only_psnr_db counts it as black).
+ALONE = Limit(BEYOND_RUN, "target_only_common_psnr_db", "dB", at_least=0.0)
 # Scenes with a thing that a picture's border cuts: it is whole in the panorama or gone, but for a tenth of it, which is
 # what its rim takes. Of what the target alone shows there must be a figure.
 CUT_SCENES = ("cut_branch", "cut_person")

@@ -219,8 +219,8 @@ def _add_validate(parser: argparse.ArgumentParser) -> None:
         "many, 640×480)",
     )  # fmt: skip
     parser.add_argument(
-        "--scene", nargs="+", default=[], metavar="NAME",
-        help="these only; NAME:baseline=2,turn=1.5,overlap=0.4,noise=3 makes a scene harder, "
+        "--scene", nargs="+", action="extend", default=[], metavar="NAME",
+        help="these only, of one switch or several; NAME:baseline=2,turn=1.5,overlap=0.4,noise=3 makes a scene harder, "
         "NAME:n=12,spread=0.3,noise=3 a set",
     )  # fmt: skip
     parser.add_argument("--shard", type=shard, default=(1, 1), metavar="I/N", help="the I-th of N runs sharing OUTDIR")

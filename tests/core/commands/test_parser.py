@@ -36,3 +36,10 @@ def test_the_commands_help_says_all_exit_codes(capsys: pytest.CaptureFixture[str
     text = " ".join(said(capsys, "--help").split())
     for code in ("0 done", "1 measured", "2 the call", "3 the pictures", "4 a file", "130 interrupted"):
         assert code in text
+
+
+def test_scenes_of_every_switch_are_taken_and_no_call_keeps_those_of_another() -> None:
+    line = ["validate", "-o", "out", "--scene", "street", "relief", "--scene", "toe_in"]
+    for _ in range(2):
+        assert edf_parser().parse_args(line).scene == ["street", "relief", "toe_in"]
+    assert edf_parser().parse_args(line[:3]).scene == []
