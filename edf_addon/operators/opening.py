@@ -1,7 +1,8 @@
 """Photographs are opened, from files or a folder, and stand in the list of pictures."""
 
 # No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ from .. import editor, idnames, pictures, properties
 from ..bridge import images, stand_ins
 from ..jobs import modal, stitching
 
-# Seconds in which Blender draws a new window.
-UNTIL_DRAWN = 0.2
+# Seconds in which Blender draws a new window, and how often its tab is asked for before that is given up: 5 s.
+UNTIL_DRAWN, MOST_TRIES = 0.2, 25
 
 
 class Browsing:
@@ -208,18 +209,19 @@ def _have_an_editor(context: Any) -> None:
     area = context.window_manager.windows[-1].screen.areas[0]
     area.type = "IMAGE_EDITOR"
     area.spaces.active.show_region_ui = True
-    bpy.app.timers.register(_show_tab, first_interval=UNTIL_DRAWN)
+    bpy.app.timers.register(partial(_show_tab, iter(range(MOST_TRIES))), first_interval=UNTIL_DRAWN)
 
 
-def _show_tab() -> float | None:
-    """The sidebar of the newest window shows the tab, which it knows once it was drawn."""
+def _show_tab(tries: Iterator[int]) -> float | None:
+    """The sidebar of the newest window shows the tab, which it knows once it was drawn. Returns seconds until it is to be
+    tried again, None where it is done or no tries are left."""
     area = bpy.context.window_manager.windows[-1].screen.areas[0]
     sidebar = next((region for region in area.regions if region.type == "UI"), None)
     if area.type == "IMAGE_EDITOR" and sidebar is not None and sidebar.active_panel_category != idnames.TAB:
         try:
             sidebar.active_panel_category = idnames.TAB
         except (AttributeError, TypeError):  # no tabs are there yet, or not this one
-            return UNTIL_DRAWN
+            return None if next(tries, None) is None else UNTIL_DRAWN
         area.tag_redraw()
     return None
 
