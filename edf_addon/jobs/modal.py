@@ -92,6 +92,8 @@ class LongWork:
     when_cancelled = "Cancelled. Nothing was changed."
     _job: job.Job
     _timer: Any = None
+    # What was said last of how far the work is.
+    _said = ""
 
     def prepare(self, context: bpy.types.Context, folder: Path) -> dict[str, Any]:
         """The job (core/commands/worker.py), with all its files in `folder`. Raises Unusable."""
@@ -137,11 +139,8 @@ class LongWork:
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         outcome = self._look()
-        redraw(context)
         if outcome is None:
-            if not self.follows:
-                far = explain.how_far(status.now.stage, status.now.share, status.seconds_left())
-                _say_in_status_bar(f"EDF Stitch: {far}")
+            self._say_how_far(context)
             return {"PASS_THROUGH"}
         self._forget_timer(context)
         return self._take(context, outcome)
@@ -151,6 +150,15 @@ class LongWork:
         if _current is self._job:
             stop("Cancelled. Nothing was changed.")
         self._forget_timer(context)
+
+    def _say_how_far(self, context: bpy.types.Context) -> None:
+        """In the status bar and the panels, where that is not what they say already: drawing takes time of the work."""
+        now = status.now
+        far = "Cancelling…" if now.cancelling else explain.how_far(now.stage, now.share, status.seconds_left())
+        if not self.follows and far != self._said:
+            self._said = far
+            _say_in_status_bar(f"EDF Stitch: {far}")
+            redraw(context)
 
     def _look(self) -> job.Outcome | None:
         outcome = self._job.poll()
