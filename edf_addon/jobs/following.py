@@ -3,7 +3,8 @@ it is composed, a small one takes the place of the one that is shown.
 
 A pair's is made of the matches that the last panorama stands on, so nothing is searched for; the engine keeps geometry,
 field and depth of that size, so that only the first one has to find them. Of a set the stitch itself keeps small
-pictures, geometry and depth (`kept`). Each change ends what was begun for the one before.
+pictures and geometry (`kept`), and a worker that waits for the first change finds field and depth meanwhile. Each
+change ends what was begun for the one before.
 """
 
 from __future__ import annotations
@@ -84,6 +85,18 @@ def take_over(context: bpy.types.Context, folder: Path, found: dict[str, Any], m
         _shown_in[space.as_pointer()] = width
         _as_wide(context, area, space, width)
     return words
+
+
+def be_ready(request: dict[str, Any]) -> None:
+    """A panorama was made by this job: have a worker ready for what is changed of it first, and of a set the field and
+    the depth that this takes. Nothing follows under `-b`."""
+    if bpy.app.background:
+        return
+    first = None
+    if "kept" in request and not request.get("small"):
+        first = {"kept": request["kept"], "pictures": request["pictures"],
+                 "options": {**request["options"], "measure": False}}  # fmt: skip
+    modal.start_ahead(first)
 
 
 def _as_wide(context: bpy.types.Context, area: bpy.types.Area, space: bpy.types.SpaceImageEditor, width: float) -> None:

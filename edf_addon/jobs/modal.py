@@ -28,11 +28,13 @@ def is_working() -> bool:
     return _current is not None and not _is_following
 
 
-def start_ahead() -> None:
-    """Have a worker ready for the picture that follows the frame, if none is."""
+def start_ahead(first: dict[str, Any] | None = None) -> None:
+    """Have a worker ready for the picture that follows the frame, if none is. first: see `job.start_ahead`."""
     global _ahead
+    if _ahead is not None and _ahead.poll() is not None:
+        end_ahead()  # it has waited long enough
     if _ahead is None:
-        _ahead = job.start_ahead(job.new_folder(bpy.app.tempdir))
+        _ahead = job.start_ahead(job.new_folder(bpy.app.tempdir), first)
 
 
 def end_ahead() -> None:
@@ -91,6 +93,7 @@ class LongWork:
     makes = "the panorama"
     when_cancelled = "Cancelled. Nothing was changed."
     _job: job.Job
+    _request: dict[str, Any]
     _timer: Any = None
     # What was said last of how far the work is.
     _said = ""
@@ -173,13 +176,14 @@ class LongWork:
             return False
         make_way()
         ahead, folder = _take_ahead() if self.follows else None, None
+        end_ahead()  # what it does ahead is of the panorama before
         try:
             folder = job.new_folder(bpy.app.tempdir) if ahead is None else ahead.folder
-            request = self.prepare(context, folder)
+            self._request = self.prepare(context, folder)
             if ahead is None:
-                self._job = _current = job.start(request, folder)
+                self._job = _current = job.start(self._request, folder)
             else:
-                job.hand_over(request, folder)
+                job.hand_over(self._request, folder)
                 self._job = _current = ahead
         except Exception as error:
             if ahead is not None:

@@ -213,8 +213,8 @@ def _have_an_editor(context: Any) -> None:
 
 
 def _show_tab(tries: Iterator[int]) -> float | None:
-    """The sidebar of the newest window shows the tab, which it knows once it was drawn. Returns seconds until it is to be
-    tried again, None where it is done or no tries are left."""
+    """The sidebar of the newest window shows the tab, which it knows once it was drawn. Returns seconds until it is
+    to be tried again, None where it is done or no tries are left."""
     area = bpy.context.window_manager.windows[-1].screen.areas[0]
     sidebar = next((region for region in area.regions if region.type == "UI"), None)
     if area.type == "IMAGE_EDITOR" and sidebar is not None and sidebar.active_panel_category != idnames.TAB:

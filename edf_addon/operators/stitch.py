@@ -22,6 +22,12 @@ class _Stitching(modal.LongWork):
         job, self.memory = stitching.make_job(context, folder)
         return job
 
+    def _take(self, context: Any, outcome: Any) -> set[str]:
+        done = super()._take(context, outcome)
+        if done == {"FINISHED"}:
+            following.be_ready(self._request)
+        return done
+
     def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
         return stitching.take_over(context, folder, found, self.memory, self.kind)
 

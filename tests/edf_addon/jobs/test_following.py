@@ -113,7 +113,8 @@ def test_it_makes_way_for_other_work_and_other_work_never_for_it(chosen, working
     assert other._start(bpy.context), "the one before is ended"
     assert one.modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
     third = Modal()
-    assert third._start(bpy.context) and modal.is_working()
+    modal.start_ahead()
+    assert third._start(bpy.context) and modal.is_working() and modal._ahead is None
     modal.stop("Stopped.")
 
 
@@ -142,6 +143,13 @@ def test_a_worker_that_waits_in_vain_is_ended(blender):
         pass
     assert modal._take_ahead() is None, "it has died meanwhile"
     modal.start_ahead()
+    modal._ahead._process.kill()
+    modal._ahead._process.wait()
+    while modal._ahead.poll() is None:
+        pass
+    dead = modal._ahead
+    modal.start_ahead()
+    assert modal._ahead is not dead and not dead.folder.exists(), "another one waits"
     modal.stop("Another file is opened.")
     assert modal._ahead is None
 
