@@ -1,5 +1,7 @@
 """From clips in the panel to frames on disk, a movie clip and an image sequence, through a real worker."""
 
+from pathlib import Path
+
 import cv2
 import pytest
 
@@ -7,7 +9,7 @@ bpy = pytest.importorskip("bpy")
 
 from edf_stitch.edf_addon import status  # noqa: E402
 from edf_stitch.edf_addon.jobs import clip_stitching, job, modal  # noqa: E402
-from edf_stitch.edf_addon.operators.clips import EDF_OT_stitch_clip_frames  # noqa: E402
+from edf_stitch.edf_addon.operators.clips import EDF_OT_stitch_clip_frames, first_frames  # noqa: E402
 
 
 @pytest.fixture
@@ -38,6 +40,13 @@ def test_clips_become_frames_a_movie_clip_and_a_sequence(clips, tmp_path):
     assert bpy.ops.edf.stitch_clips(last=2) == {"FINISHED"}
     assert [one for one in bpy.data.movieclips if "stitched" in one.filepath] == [clip] and clip.frame_duration == 2
     assert "2 frames" in status.now.message and "1 of them new" in status.now.message, "it went on"
+
+
+def test_all_frames_of_a_sequence_are_one_clip_and_each_movie_is_one():
+    names = ("left_2.png", "left_10.png", "right_2.png", "left_2.exr", "take 1.mp4", "take 2.mp4", "a.png", "2_a.png",
+             "1_a.png")  # fmt: skip
+    found = first_frames(Path("in", name) for name in names)
+    assert [path.name for path in found] == [name for name in names if name not in ("left_10.png", "1_a.png")]
 
 
 def test_the_scenes_frames_count(clips):
