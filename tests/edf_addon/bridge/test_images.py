@@ -296,3 +296,17 @@ def test_saving_refuses_what_it_cannot_do(blender, tmp_path):
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(OSError, match="file"):
         images.save(image, tmp_path / "file" / "x.png")
+
+
+def test_a_png_of_the_workers_is_not_decoded_until_it_is_looked_at_and_half_a_one_is_refused(blender, tmp_path):
+    path = tmp_path / "0.png"
+    picture_files.write(path, np.full((30, 40, 3), 0.5, np.float32))
+    image = images.bring(path, "difference", pack=True, fake_user=False)
+    assert not image.has_data and image.packed_file is not None
+    path.write_bytes(path.read_bytes()[:-5])
+    with pytest.raises(images.Unusable, match="is the disk full"):
+        images.bring(path, "half", pack=True, fake_user=False)
+    assert "half" not in bpy.data.images and tuple(image.size) == (40, 30), "it is packed"
+    path.write_bytes(b"")
+    with pytest.raises(images.Unusable, match="is the disk full"):
+        images.bring(path, "nothing", pack=True, fake_user=False)
