@@ -259,7 +259,7 @@ def _in_memory(loaded: bpy.types.Image) -> bpy.types.Image:
 
 def save(image: bpy.types.Image, path: Path) -> None:
     """Writes an image with its values kept, whole or not at all: .exr 32-bit float, .hdr float without alpha, .png
-    and .tif 8 bit, or 16 for float images. Raises Unusable (no pixels, or a kind that is not written), OSError."""
+    and .tif 8 bit, or 16 for float images. Raises Unusable."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise Unusable(f"pictures are not saved as {path.suffix or 'files of no kind'}: use {', '.join(KINDS)}")
@@ -267,12 +267,22 @@ def save(image: bpy.types.Image, path: Path) -> None:
         raise Unusable(f"“{image.name}” has no pixels to save")
     beside = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
-        _write(image, beside, kind)
-        os.replace(beside, path)
-    except RuntimeError as error:
-        raise OSError(f"{path} cannot be written: {error}") from error
-    finally:
-        beside.unlink(missing_ok=True)
+        try:
+            _write(image, beside, kind)
+            os.replace(beside, path)
+        finally:
+            beside.unlink(missing_ok=True)
+    except (RuntimeError, OSError) as error:
+        said = error.strerror if isinstance(error, OSError) else str(error).removeprefix("Error: ").partition("\n")[0]
+        raise Unusable(f"{path} cannot be written: {said}; choose another place") from error
+
+
+def place_of(chosen: str) -> Path:
+    """Where an artist wants something written. Raises Unusable where that is beside a .blend file that is nowhere yet,
+    since Blender then takes it for a path from where it was started."""
+    if chosen.startswith("//") and not bpy.data.filepath:
+        raise Unusable(f"“{chosen}” lies beside the .blend file, which is nowhere yet: save it or choose another place")
+    return Path(bpy.path.abspath(chosen)).absolute()
 
 
 KINDS = {".exr": "OPEN_EXR", ".hdr": "HDR", ".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF"}

@@ -231,6 +231,17 @@ class LongWork:
             _say_in_status_bar(None)
 
 
+def hand_on(operator: Any, call: Any, how: str, **given: Any) -> set[str]:
+    """Leaves the work of an operator to another one; what that one refuses, this one reports, and Blender shows no
+    traceback. how: see `opening.Browsing.how`."""
+    try:
+        done: set[str] = call(how, **given)
+    except RuntimeError as error:
+        operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+        return {"CANCELLED"}
+    return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+
+
 def there() -> frozenset[int]:
     """The session_uid of every image and movie clip of the file."""
     return frozenset(one.session_uid for kind in (bpy.data.images, bpy.data.movieclips) for one in kind)

@@ -99,10 +99,8 @@ class EDF_OT_stitch_clips(bpy.types.Operator):  # noqa: N801
     def execute(self, context: Any) -> set[str]:
         self._suggest(context)
         how = "INVOKE_DEFAULT" if self.is_asked and not bpy.app.background else "EXEC_DEFAULT"
-        done: set[str] = bpy.ops.edf.stitch_clip_frames(
-            how, first=self.first, last=self.last, folder=self.folder, kind=self.kind
-        )
-        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+        given = {"first": self.first, "last": self.last, "folder": self.folder, "kind": self.kind}
+        return modal.hand_on(self, bpy.ops.edf.stitch_clip_frames, how, **given)
 
     def _suggest(self, context: Any) -> None:
         """The frames that all clips show, and a folder beside the first one, where nothing was said."""

@@ -57,8 +57,8 @@ def into_list(operator: Any, context: Any, paths: Sequence[Path], how: str, inst
     """Puts files into the list, or instead of it, for an operator, which reports it. how: see `Browsing.how`."""
     paths = [path.absolute() for path in paths]  # a worker stands in a folder of its own
     if any(map(stand_ins.is_needed, paths)):
-        done = bpy.ops.edf.develop_pictures(how, paths="\n".join(map(str, paths)), instead=instead)
-        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+        given = {"paths": "\n".join(map(str, paths)), "instead": instead}
+        return modal.hand_on(operator, bpy.ops.edf.develop_pictures, how, **given)
     try:
         opened = [_loaded(path) for path in paths]
     except images.Unusable as error:
@@ -153,10 +153,8 @@ class EDF_OT_stitch_files(Browsing, bpy.types.Operator):  # noqa: N801
             self.report({"WARNING"}, f"The pictures are being developed: press {button} when they are in the list.")
             return {"FINISHED"}
         if self.as_world:
-            done: set[str] = bpy.ops.edf.stitch_environment(self.how)
-        else:
-            done = bpy.ops.edf.stitch(self.how, as_empty=self.as_empty)
-        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+            return modal.hand_on(self, bpy.ops.edf.stitch_environment, self.how)
+        return modal.hand_on(self, bpy.ops.edf.stitch, self.how, as_empty=self.as_empty)
 
 
 class EDF_OT_develop_pictures(modal.LongWork, bpy.types.Operator):  # noqa: N801
