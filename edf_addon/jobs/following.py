@@ -146,7 +146,6 @@ def _begin() -> float | None:
             getattr(bpy.ops.edf, idnames.Operator.FOLLOW.partition(".")[2])("INVOKE_DEFAULT", joins=joins)
         return None
     _asked = False
-    modal.end_ahead()
     return None
 
 

@@ -131,12 +131,10 @@ def test_a_worker_that_waits_does_the_next_job_that_follows(stitched, monkeypatc
     assert not waiting.folder.exists()
 
 
-def test_a_worker_that_waits_in_vain_is_ended(blender):
+def test_a_worker_waits_for_the_next_change_and_another_takes_the_place_of_a_dead_one(blender):
     modal.start_ahead()
     waiting = modal._ahead
-    assert following._begin() is None and modal._ahead is None, "there is nothing to follow"
-    assert waiting._process.poll() is not None and not waiting.folder.exists()
-    modal.start_ahead()
+    assert following._begin() is None and modal._ahead is waiting, "there is nothing to follow by now"
     modal._ahead._process.kill()
     modal._ahead._process.wait()
     while modal._ahead.poll() is None:
