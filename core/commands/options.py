@@ -43,6 +43,9 @@ class WorkerOptions:
     max_share: float = 0.99
     """The share told at most before everything is done."""
 
+    longest_wait: float = 180.0
+    """Seconds that one which was started ahead waits for a job: it holds 150 MB, and starting another takes 1.5 s."""
+
 
 @dataclass(frozen=True)
 class RecomposingOptions:

@@ -1,9 +1,10 @@
 """One stitch for a program that watches, as a process of its own: `python -m edf_stitch.core.commands.worker FOLDER`.
 
-FOLDER/job.json says what to do; with a second argument `wait` it may come later. Everything made lies in FOLDER
-afterwards, with result.json as its index. stdout carries one JSON object a line: {"stage", "share"} while working, at
-the end {"done": true} or {"error", "kind", "exit_code"}. The work ends on SIGINT (Windows: CTRL_BREAK) and when stdin
-closes, so that it never outlives whoever started it; FOLDER goes then too. Exit status as the command's.
+FOLDER/job.json says what to do; with a second argument `wait` it may come later, and ahead.json may say of which set a
+small panorama is to be composed meanwhile. Everything made lies in FOLDER afterwards, with result.json as its index.
+stdout carries one JSON object a line: {"stage", "share"} while working, at the end {"done": true} or {"error", "kind",
+"exit_code"}. The work ends on SIGINT (Windows: CTRL_BREAK) and when stdin closes, so that it never outlives whoever
+started it; FOLDER goes then too. Exit status as the command's.
 
 job.json: `pictures`, of two the reference first: {"name"} and {"path"} of a file, or {"array"} of an .npy, rows as
 shown; "exif_of": a file whose EXIF (orientation included) belongs to the array; "digest": whether result.json is to
@@ -28,6 +29,7 @@ import signal
 import sys
 import threading
 import time
+from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -120,7 +122,7 @@ def _work(folder: Path, stop: _Stop, waits: bool) -> None:
     use_again()
     _say({"stage": "read", "share": 0.0})
     if waits:
-        _await(folder / "job.json", stop)
+        _await(folder, stop)
     job = json.loads((folder / "job.json").read_text("utf-8"))
     if job.get("try"):
         for name in LIBRARIES:
@@ -155,13 +157,10 @@ def _stitched(folder: Path, job: dict[str, Any], stop: _Stop) -> tuple[Any, tupl
     result = stitch(pictures, options, _say_share, lambda: stop.asked)
     if job.get("kept") and result.rig is not None:
         from ..system.cache import Cache
-        from .recomposing import kept_of, recomposed
+        from .recomposing import kept_of
 
         _say({"stage": "write", "share": WORKER.stitch_share})
-        kept = Cache(options.cache).remember(
-            "kept", (job["kept"],), lambda: kept_of(result, pictures, options, turns)
-        )
-        recomposed(kept, options, _say_nothing, lambda: stop.asked)  # which keeps its field and depth
+        Cache(options.cache).remember("kept", (job["kept"],), lambda: kept_of(result, pictures, options, turns))
     return result, turns, rows
 
 
@@ -268,14 +267,33 @@ def _show(folder: Path, paths: list[str]) -> None:
     (folder / "result.json").write_text(json.dumps({"files": files}), "utf-8")
 
 
-def _await(job: Path, stop: _Stop) -> None:
-    """Loads what a stitch loads sooner or later, and returns when the job is there."""
+def _await(folder: Path, stop: _Stop) -> None:
+    """Loads what a stitch loads sooner or later, does what is to be done ahead, and returns when the job is there. Ends
+    as if asked to stop where none comes."""
     for name in (*LIBRARIES, f"{__package__}.handed_over", f"{__package__}.recomposing"):
         import_module(name)
-    while not job.exists():
-        if stop.asked:
+    if (folder / "ahead.json").exists():
+        _compose_ahead(folder, stop)
+    until = time.monotonic() + WORKER.longest_wait
+    while not (folder / "job.json").exists():
+        if stop.asked or time.monotonic() > until:
             raise KeyboardInterrupt
         time.sleep(0.01)
+
+
+def _compose_ahead(folder: Path, stop: _Stop) -> None:
+    """Composes a small panorama of what is kept of a set, for the field and the depth that the cache then has."""
+    from ..system.cache import Cache, default_folder
+    from .recomposing import Kept, recomposed
+
+    def anew() -> Kept:
+        raise LookupError("it is no longer kept")
+
+    job = json.loads((folder / "ahead.json").read_text("utf-8"))
+    with suppress(LookupError):
+        kept = Cache(default_folder()).remember("kept", (job["kept"],), anew)
+        options, _ = _options(folder, job, (), kept.turns, kept.sizes)
+        recomposed(kept, options, _say_nothing, lambda: stop.asked)
 
 
 def cameras_of(entries: list[dict[str, Any]], pictures: tuple[Any, ...]) -> dict[str, Any]:

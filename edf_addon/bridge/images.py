@@ -28,6 +28,8 @@ READABLE = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", 
 FILE, PIXELS = "file ", "pixels "
 # Bits per pixel, over all channels, of images without alpha.
 OPAQUE_DEPTHS = (8, 24, 48, 96)
+# The chunk that every PNG ends with.
+PNG_END = b"\x00\x00\x00\x00IEND\xaeB`\x82"
 
 
 class Unusable(Exception):
@@ -215,7 +217,7 @@ def bring(path: Path, name: str, pack: bool, fake_user: bool) -> bpy.types.Image
     """A picture that the worker made as a new image: packed, or in memory only, so that Blender asks before it is
     lost. Raises Unusable where it cannot be read."""
     image = bpy.data.images.load(str(path))
-    if not all(image.size):  # Blender loads damaged files without a word
+    if not _is_whole(path, image):  # Blender loads damaged files without a word
         bpy.data.images.remove(image)
         raise Unusable(f"the picture {path.name} that the worker made cannot be read; is the disk full?")
     if path.suffix == ".exr":
@@ -228,6 +230,16 @@ def bring(path: Path, name: str, pack: bool, fake_user: bool) -> bpy.types.Image
     image.name = name
     image.use_fake_user = fake_user
     return image
+
+
+def _is_whole(path: Path, image: bpy.types.Image) -> bool:
+    """Whether a file was written to its end. A PNG is not decoded for that: .3 s for 12 MP, in which the window stands
+    still, and what lies over a panorama may never be looked at."""
+    if path.suffix != ".png":
+        return all(image.size)
+    with open(path, "rb") as file:
+        file.seek(max(0, path.stat().st_size - len(PNG_END)))
+        return file.read() == PNG_END
 
 
 def _in_memory(loaded: bpy.types.Image) -> bpy.types.Image:
@@ -247,7 +259,7 @@ def _in_memory(loaded: bpy.types.Image) -> bpy.types.Image:
 
 def save(image: bpy.types.Image, path: Path) -> None:
     """Writes an image with its values kept, whole or not at all: .exr 32-bit float, .hdr float without alpha, .png
-    and .tif 8 bit, or 16 for float images. Raises Unusable (no pixels, or a kind that is not written), OSError."""
+    and .tif 8 bit, or 16 for float images. Raises Unusable."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise Unusable(f"pictures are not saved as {path.suffix or 'files of no kind'}: use {', '.join(KINDS)}")
@@ -255,12 +267,22 @@ def save(image: bpy.types.Image, path: Path) -> None:
         raise Unusable(f"“{image.name}” has no pixels to save")
     beside = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
-        _write(image, beside, kind)
-        os.replace(beside, path)
-    except RuntimeError as error:
-        raise OSError(f"{path} cannot be written: {error}") from error
-    finally:
-        beside.unlink(missing_ok=True)
+        try:
+            _write(image, beside, kind)
+            os.replace(beside, path)
+        finally:
+            beside.unlink(missing_ok=True)
+    except (RuntimeError, OSError) as error:
+        said = error.strerror if isinstance(error, OSError) else str(error).removeprefix("Error: ").partition("\n")[0]
+        raise Unusable(f"{path} cannot be written: {said}; choose another place") from error
+
+
+def place_of(chosen: str) -> Path:
+    """Where an artist wants something written. Raises Unusable where that is beside a .blend file that is nowhere yet,
+    since Blender then takes it for a path from where it was started."""
+    if chosen.startswith("//") and not bpy.data.filepath:
+        raise Unusable(f"“{chosen}” lies beside the .blend file, which is nowhere yet: save it or choose another place")
+    return Path(bpy.path.abspath(chosen)).absolute()
 
 
 KINDS = {".exr": "OPEN_EXR", ".hdr": "HDR", ".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF"}

@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from .. import engine_options, explain, offered, properties
+from ..bridge import images
 from ..bridge.images import Unusable
 
 # The kinds of files that frames are written as.
@@ -63,7 +64,7 @@ def make_job(scene: bpy.types.Scene, first: int, last: int, folder: str, kind: s
         "options": engine_options.options_of(kept, is_set=len(clips) > 2),
         "clip": {
             "cameras": [{"path": str(_path(clip)), "start": clip.frame_start - clip.frame_offset} for clip in clips],
-            "first": first, "last": last, "folder": bpy.path.abspath(folder), "suffix": f".{kind.lower()}",
+            "first": first, "last": last, "folder": str(images.place_of(folder)), "suffix": f".{kind.lower()}",
             "name": bpy.path.clean_name(Path(clips[0].name).stem.rstrip("0123456789_-. ")) or "clip",
         },
     }  # fmt: skip

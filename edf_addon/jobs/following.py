@@ -3,7 +3,8 @@ it is composed, a small one takes the place of the one that is shown.
 
 A pair's is made of the matches that the last panorama stands on, so nothing is searched for; the engine keeps geometry,
 field and depth of that size, so that only the first one has to find them. Of a set the stitch itself keeps small
-pictures, geometry and depth (`kept`). Each change ends what was begun for the one before.
+pictures and geometry (`kept`), and a worker that waits for the first change finds field and depth meanwhile. Each
+change ends what was begun for the one before.
 """
 
 from __future__ import annotations
@@ -86,6 +87,18 @@ def take_over(context: bpy.types.Context, folder: Path, found: dict[str, Any], m
     return words
 
 
+def be_ready(request: dict[str, Any]) -> None:
+    """A panorama was made by this job: have a worker ready for what is changed of it first, and of a set the field and
+    the depth that this takes. Nothing follows under `-b`."""
+    if bpy.app.background:
+        return
+    first = None
+    if "kept" in request and not request.get("small"):
+        first = {"kept": request["kept"], "pictures": request["pictures"],
+                 "options": {**request["options"], "measure": False}}  # fmt: skip
+    modal.start_ahead(first)
+
+
 def _as_wide(context: bpy.types.Context, area: bpy.types.Area, space: bpy.types.SpaceImageEditor, width: float) -> None:
     """Shows the image of an editor so many px of the screen wide."""
     window = next((one for one in context.window_manager.windows if area in one.screen.areas[:]), None)
@@ -133,7 +146,6 @@ def _begin() -> float | None:
             getattr(bpy.ops.edf, idnames.Operator.FOLLOW.partition(".")[2])("INVOKE_DEFAULT", joins=joins)
         return None
     _asked = False
-    modal.end_ahead()
     return None
 
 

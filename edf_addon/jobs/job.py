@@ -145,8 +145,11 @@ def start(job: dict[str, Any], folder: Path) -> Job:
     return Job(folder, *command.worker_command([str(folder)], WORKER))
 
 
-def start_ahead(folder: Path) -> Job:
-    """A worker that loads what it takes, and waits for a job in a folder (see `hand_over`)."""
+def start_ahead(folder: Path, first: Mapping[str, Any] | None = None) -> Job:
+    """A worker that loads what it takes, and waits for a job in a folder (see `hand_over`). first: the job of a set,
+    of which it composes a small panorama meanwhile."""
+    if first is not None:
+        (folder / "ahead.json").write_text(json.dumps(first), "utf-8")
     return Job(folder, *command.worker_command([str(folder), "wait"], WORKER))
 
 

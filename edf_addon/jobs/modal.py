@@ -28,11 +28,13 @@ def is_working() -> bool:
     return _current is not None and not _is_following
 
 
-def start_ahead() -> None:
-    """Have a worker ready for the picture that follows the frame, if none is."""
+def start_ahead(first: dict[str, Any] | None = None) -> None:
+    """Have a worker ready for the picture that follows the frame, if none is. first: see `job.start_ahead`."""
     global _ahead
+    if _ahead is not None and _ahead.poll() is not None:
+        end_ahead()  # it has waited long enough
     if _ahead is None:
-        _ahead = job.start_ahead(job.new_folder(bpy.app.tempdir))
+        _ahead = job.start_ahead(job.new_folder(bpy.app.tempdir), first)
 
 
 def end_ahead() -> None:
@@ -91,7 +93,10 @@ class LongWork:
     makes = "the panorama"
     when_cancelled = "Cancelled. Nothing was changed."
     _job: job.Job
+    _request: dict[str, Any]
     _timer: Any = None
+    # What was said last of how far the work is.
+    _said = ""
 
     def prepare(self, context: bpy.types.Context, folder: Path) -> dict[str, Any]:
         """The job (core/commands/worker.py), with all its files in `folder`. Raises Unusable."""
@@ -137,11 +142,8 @@ class LongWork:
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         outcome = self._look()
-        redraw(context)
         if outcome is None:
-            if not self.follows:
-                far = explain.how_far(status.now.stage, status.now.share, status.seconds_left())
-                _say_in_status_bar(f"EDF Stitch: {far}")
+            self._say_how_far(context)
             return {"PASS_THROUGH"}
         self._forget_timer(context)
         return self._take(context, outcome)
@@ -151,6 +153,15 @@ class LongWork:
         if _current is self._job:
             stop("Cancelled. Nothing was changed.")
         self._forget_timer(context)
+
+    def _say_how_far(self, context: bpy.types.Context) -> None:
+        """In the status bar and the panels, where that is not what they say already: drawing takes time of the work."""
+        now = status.now
+        far = "Cancelling…" if now.cancelling else explain.how_far(now.stage, now.share, status.seconds_left())
+        if not self.follows and far != self._said:
+            self._said = far
+            _say_in_status_bar(f"EDF Stitch: {far}")
+            redraw(context)
 
     def _look(self) -> job.Outcome | None:
         outcome = self._job.poll()
@@ -165,13 +176,14 @@ class LongWork:
             return False
         make_way()
         ahead, folder = _take_ahead() if self.follows else None, None
+        end_ahead()  # what it does ahead is of the panorama before
         try:
             folder = job.new_folder(bpy.app.tempdir) if ahead is None else ahead.folder
-            request = self.prepare(context, folder)
+            self._request = self.prepare(context, folder)
             if ahead is None:
-                self._job = _current = job.start(request, folder)
+                self._job = _current = job.start(self._request, folder)
             else:
-                job.hand_over(request, folder)
+                job.hand_over(self._request, folder)
                 self._job = _current = ahead
         except Exception as error:
             if ahead is not None:
@@ -217,6 +229,17 @@ class LongWork:
             self._timer = None
         if not self.follows:
             _say_in_status_bar(None)
+
+
+def hand_on(operator: Any, call: Any, how: str, **given: Any) -> set[str]:
+    """Leaves the work of an operator to another one; what that one refuses, this one reports, and Blender shows no
+    traceback. how: see `opening.Browsing.how`."""
+    try:
+        done: set[str] = call(how, **given)
+    except RuntimeError as error:
+        operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+        return {"CANCELLED"}
+    return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
 
 
 def there() -> frozenset[int]:

@@ -1,6 +1,8 @@
 """Clips of cameras that stand still: put into the list, and stitched frame by frame."""
 
 # No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
+import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from .opening import Browsing
 
 
 class EDF_OT_add_clips(Browsing, bpy.types.Operator):  # noqa: N801
-    """Add clips of cameras that stand still to the list: movies, or one frame of each image sequence"""
+    """Add clips of cameras that stand still to the list: movies, or image sequences, of which one frame will do"""
 
     bl_idname = idnames.Operator.ADD_CLIPS
     bl_label = "Add Clips"
@@ -23,7 +25,7 @@ class EDF_OT_add_clips(Browsing, bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: Any) -> set[str]:
         clips = properties.settings_of(context.scene).clips
-        for path in self.paths():
+        for path in first_frames(self.paths()):
             try:
                 loaded = bpy.data.movieclips.load(str(path), check_existing=True)
             except RuntimeError as error:
@@ -46,6 +48,17 @@ class EDF_OT_remove_clip(bpy.types.Operator):  # noqa: N801
     def execute(self, context: Any) -> set[str]:
         properties.settings_of(context.scene).clips.remove(self.row)
         return {"FINISHED"}
+
+
+def first_frames(paths: Iterable[Path]) -> list[Path]:
+    """Movies, and of each image sequence the first frame that is among these files, sorted as people count: Blender
+    finds the others by the last number in its name."""
+    kept: dict[object, Path] = {}
+    for path in paths:
+        numbered = re.fullmatch(r"(.*?)\d+(\D*)", path.stem)
+        is_movie = path.suffix.lower() in bpy.path.extensions_movie
+        kept.setdefault(path if is_movie or numbered is None else (path.parent, *numbered.groups(), path.suffix), path)
+    return list(kept.values())
 
 
 _FIRST = {"name": "First Frame", "default": 1, "min": 0, "options": {"SKIP_SAVE"},
@@ -86,10 +99,8 @@ class EDF_OT_stitch_clips(bpy.types.Operator):  # noqa: N801
     def execute(self, context: Any) -> set[str]:
         self._suggest(context)
         how = "INVOKE_DEFAULT" if self.is_asked and not bpy.app.background else "EXEC_DEFAULT"
-        done: set[str] = bpy.ops.edf.stitch_clip_frames(
-            how, first=self.first, last=self.last, folder=self.folder, kind=self.kind
-        )
-        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+        given = {"first": self.first, "last": self.last, "folder": self.folder, "kind": self.kind}
+        return modal.hand_on(self, bpy.ops.edf.stitch_clip_frames, how, **given)
 
     def _suggest(self, context: Any) -> None:
         """The frames that all clips show, and a folder beside the first one, where nothing was said."""

@@ -1,7 +1,8 @@
 """Photographs are opened, from files or a folder, and stand in the list of pictures."""
 
 # No `from __future__ import annotations` here: Blender reads the annotations of properties as they are.
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ from .. import editor, idnames, pictures, properties
 from ..bridge import images, stand_ins
 from ..jobs import modal, stitching
 
-# Seconds in which Blender draws a new window.
-UNTIL_DRAWN = 0.2
+# Seconds in which Blender draws a new window, and how often its tab is asked for before that is given up: 5 s.
+UNTIL_DRAWN, MOST_TRIES = 0.2, 25
 
 
 class Browsing:
@@ -56,8 +57,8 @@ def into_list(operator: Any, context: Any, paths: Sequence[Path], how: str, inst
     """Puts files into the list, or instead of it, for an operator, which reports it. how: see `Browsing.how`."""
     paths = [path.absolute() for path in paths]  # a worker stands in a folder of its own
     if any(map(stand_ins.is_needed, paths)):
-        done = bpy.ops.edf.develop_pictures(how, paths="\n".join(map(str, paths)), instead=instead)
-        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+        given = {"paths": "\n".join(map(str, paths)), "instead": instead}
+        return modal.hand_on(operator, bpy.ops.edf.develop_pictures, how, **given)
     try:
         opened = [_loaded(path) for path in paths]
     except images.Unusable as error:
@@ -152,10 +153,8 @@ class EDF_OT_stitch_files(Browsing, bpy.types.Operator):  # noqa: N801
             self.report({"WARNING"}, f"The pictures are being developed: press {button} when they are in the list.")
             return {"FINISHED"}
         if self.as_world:
-            done: set[str] = bpy.ops.edf.stitch_environment(self.how)
-        else:
-            done = bpy.ops.edf.stitch(self.how, as_empty=self.as_empty)
-        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+            return modal.hand_on(self, bpy.ops.edf.stitch_environment, self.how)
+        return modal.hand_on(self, bpy.ops.edf.stitch, self.how, as_empty=self.as_empty)
 
 
 class EDF_OT_develop_pictures(modal.LongWork, bpy.types.Operator):  # noqa: N801
@@ -208,18 +207,19 @@ def _have_an_editor(context: Any) -> None:
     area = context.window_manager.windows[-1].screen.areas[0]
     area.type = "IMAGE_EDITOR"
     area.spaces.active.show_region_ui = True
-    bpy.app.timers.register(_show_tab, first_interval=UNTIL_DRAWN)
+    bpy.app.timers.register(partial(_show_tab, iter(range(MOST_TRIES))), first_interval=UNTIL_DRAWN)
 
 
-def _show_tab() -> float | None:
-    """The sidebar of the newest window shows the tab, which it knows once it was drawn."""
+def _show_tab(tries: Iterator[int]) -> float | None:
+    """The sidebar of the newest window shows the tab, which it knows once it was drawn. Returns seconds until it is
+    to be tried again, None where it is done or no tries are left."""
     area = bpy.context.window_manager.windows[-1].screen.areas[0]
     sidebar = next((region for region in area.regions if region.type == "UI"), None)
     if area.type == "IMAGE_EDITOR" and sidebar is not None and sidebar.active_panel_category != idnames.TAB:
         try:
             sidebar.active_panel_category = idnames.TAB
         except (AttributeError, TypeError):  # no tabs are there yet, or not this one
-            return UNTIL_DRAWN
+            return None if next(tries, None) is None else UNTIL_DRAWN
         area.tag_redraw()
     return None
 

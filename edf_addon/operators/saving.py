@@ -43,9 +43,9 @@ class EDF_OT_save(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: Any) -> set[str]:
         try:
-            path = Path(bpy.path.abspath(self.filepath))
+            path = images.place_of(self.filepath)
             images.save(self._image(context), path)
-        except (images.Unusable, OSError) as error:
+        except images.Unusable as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.report({"INFO"}, f"Saved {path}")

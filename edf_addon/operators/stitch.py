@@ -22,6 +22,12 @@ class _Stitching(modal.LongWork):
         job, self.memory = stitching.make_job(context, folder)
         return job
 
+    def _take(self, context: Any, outcome: Any) -> set[str]:
+        done = super()._take(context, outcome)
+        if done == {"FINISHED"}:
+            following.be_ready(self._request)
+        return done
+
     def finish(self, context: Any, folder: Path, found: dict[str, Any]) -> str:
         return stitching.take_over(context, folder, found, self.memory, self.kind)
 
@@ -124,10 +130,8 @@ class EDF_OT_stitch_environment(bpy.types.Operator):  # noqa: N801
 
     def execute(self, _context: Any) -> set[str]:
         how = "INVOKE_DEFAULT" if self.is_asked and not bpy.app.background else "EXEC_DEFAULT"
-        done: set[str] = bpy.ops.edf.stitch_sphere(
-            how, holes=self.holes, fill=self.fill, replace=self.replace, height=self.height
-        )
-        return {"FINISHED"} if done == {"RUNNING_MODAL"} else done
+        given = {"holes": self.holes, "fill": self.fill, "replace": self.replace, "height": self.height}
+        return modal.hand_on(self, bpy.ops.edf.stitch_sphere, how, **given)
 
 
 class EDF_OT_stitch_sphere(_Stitching, bpy.types.Operator):  # noqa: N801
@@ -156,7 +160,8 @@ class EDF_OT_stitch_sphere(_Stitching, bpy.types.Operator):  # noqa: N801
         world = take_along.use_as_world(context.scene, image, self.replace)
         if self.height > 0:
             take_along.select(context, [take_along.ground(context.scene, image, self.height)])
-        return f"{words} The World “{world.name}” shows it."
+        seen = ": look at it in Rendered shading" if self.replace else ""
+        return f"{words} The World “{world.name}” shows it{seen}."
 
 
 class EDF_OT_restitch(_Stitching, bpy.types.Operator):  # noqa: N801

@@ -22,9 +22,12 @@ class EDF_PT_clips(SubPanel, bpy.types.Panel):  # noqa: N801
         column = layout.column(align=True)
         for number, entry in enumerate(settings.clips):
             row = column.row(align=True)
-            row.prop(entry, "clip", text="")
+            if entry.clip is None:
+                row.label(text="No longer in the file", icon="ERROR")
+            else:
+                row.label(text=f"{entry.clip.name}: {entry.clip.frame_duration} frames", icon="SEQUENCE")
             row.operator(Operator.REMOVE_CLIP, text="", icon="X").row = number
         layout.operator(Operator.ADD_CLIPS, icon="FILE_MOVIE")
         layout.operator(Operator.STITCH_CLIPS, icon="SEQUENCE")
-        if settings.clips and (reason := clip_stitching.why_not(settings)):
+        if reason := clip_stitching.why_not(settings):
             words(layout, explain.sentence(reason), width, NOTE)

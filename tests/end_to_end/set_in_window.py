@@ -66,6 +66,8 @@ def way() -> Iterator[float]:
     panorama = settings.result.name
     show(area, settings.result)
     yield 2.0
+    ahead = sys.modules[f"{ADD_ON}.edf_addon.jobs.modal"]._ahead
+    walk["facts"]["worker_waits"] = ahead is not None and ahead.poll() is None
     shoot("2_panorama")
 
     began = time.monotonic()

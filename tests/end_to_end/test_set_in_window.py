@@ -53,5 +53,5 @@ def test_a_small_panorama_follows_and_frame_and_places_are_drawn_and_undone(walk
     crop, share = facts["cropped"]
     assert crop == "BOX" and 0.8 < share < 0.95, "the right edge, from beneath the sidebar"
     assert facts["crop_after_one_undo"] == "AUTO"
-    assert all(name.endswith("preview") for name in facts["followed"])
+    assert facts["worker_waits"] and all(name.endswith("preview") for name in facts["followed"])
     assert facts["places"] == ["1.png"] and facts["places_after_one_undo"] == 0

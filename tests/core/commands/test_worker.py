@@ -236,6 +236,18 @@ def test_an_interruption_that_gets_lost_on_the_way_stops_it_all_the_same(job, tm
     assert said[-1]["kind"] == "Cancelled"
 
 
+def test_one_that_waits_in_vain_ends_by_itself(job, tmp_path):
+    code = (
+        "import dataclasses\n"
+        "worker.WORKER = dataclasses.replace(worker.WORKER, longest_wait=0.1)\n"
+        "(Path(sys.argv[1]) / 'job.json').unlink()\n"
+        "sys.exit(worker.main(Path(sys.argv[1]), True))"
+    )
+    with prepared(tmp_path / "job", job, code) as worker:
+        said = [json.loads(line) for line in worker.stdout]
+        assert worker.wait(timeout=300) == 130 and said[-1]["kind"] == "Cancelled"
+
+
 def test_where_nobody_listens_any_more_its_folder_goes_too(job, tmp_path):
     """Of a parent that dies stdout may be gone a moment before stdin is."""
     with prepared(tmp_path / "job", job, "") as worker:

@@ -294,5 +294,33 @@ def test_saving_refuses_what_it_cannot_do(blender, tmp_path):
     with pytest.raises(images.Unusable, match="not saved as .jpx"):
         images.save(image, tmp_path / "x.jpx")
     (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(OSError, match="file"):
+    with pytest.raises(images.Unusable, match="file"):
         images.save(image, tmp_path / "file" / "x.png")
+
+
+def test_a_png_of_the_workers_is_not_decoded_until_it_is_looked_at_and_half_a_one_is_refused(blender, tmp_path):
+    path = tmp_path / "0.png"
+    picture_files.write(path, np.full((30, 40, 3), 0.5, np.float32))
+    image = images.bring(path, "difference", pack=True, fake_user=False)
+    assert not image.has_data and image.packed_file is not None
+    path.write_bytes(path.read_bytes()[:-5])
+    with pytest.raises(images.Unusable, match="is the disk full"):
+        images.bring(path, "half", pack=True, fake_user=False)
+    assert "half" not in bpy.data.images and tuple(image.size) == (40, 30), "it is packed"
+    path.write_bytes(b"")
+    with pytest.raises(images.Unusable, match="is the disk full"):
+        images.bring(path, "nothing", pack=True, fake_user=False)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+@pytest.mark.parametrize("pack", [True, False])
+def test_a_place_that_cannot_be_written_is_said_and_nothing_is_left(blender, tmp_path, pack, suffix):
+    picture_files.write(tmp_path / f"x{suffix}", np.full((30, 40, 3), 0.5, np.float32))
+    image = images.bring(tmp_path / f"x{suffix}", "panorama", pack, fake_user=False)
+    blender.settings.result = image
+    (tmp_path / "file").touch()
+    with pytest.raises(RuntimeError, match=r"file/out.* cannot be written: .*; choose another place"):
+        bpy.ops.edf.save(image=image.name, filepath=str(tmp_path / "file" / f"out{suffix}"))
+    with pytest.raises(RuntimeError, match=r"beside the \.blend file, which is nowhere yet"):
+        bpy.ops.edf.save(image=image.name, filepath=f"//out{suffix}")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", f"x{suffix}"]

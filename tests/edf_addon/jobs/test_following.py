@@ -113,7 +113,8 @@ def test_it_makes_way_for_other_work_and_other_work_never_for_it(chosen, working
     assert other._start(bpy.context), "the one before is ended"
     assert one.modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
     third = Modal()
-    assert third._start(bpy.context) and modal.is_working()
+    modal.start_ahead()
+    assert third._start(bpy.context) and modal.is_working() and modal._ahead is None
     modal.stop("Stopped.")
 
 
@@ -130,18 +131,23 @@ def test_a_worker_that_waits_does_the_next_job_that_follows(stitched, monkeypatc
     assert not waiting.folder.exists()
 
 
-def test_a_worker_that_waits_in_vain_is_ended(blender):
+def test_a_worker_waits_for_the_next_change_and_another_takes_the_place_of_a_dead_one(blender):
     modal.start_ahead()
     waiting = modal._ahead
-    assert following._begin() is None and modal._ahead is None, "there is nothing to follow"
-    assert waiting._process.poll() is not None and not waiting.folder.exists()
-    modal.start_ahead()
+    assert following._begin() is None and modal._ahead is waiting, "there is nothing to follow by now"
     modal._ahead._process.kill()
     modal._ahead._process.wait()
     while modal._ahead.poll() is None:
         pass
     assert modal._take_ahead() is None, "it has died meanwhile"
     modal.start_ahead()
+    modal._ahead._process.kill()
+    modal._ahead._process.wait()
+    while modal._ahead.poll() is None:
+        pass
+    dead = modal._ahead
+    modal.start_ahead()
+    assert modal._ahead is not dead and not dead.folder.exists(), "another one waits"
     modal.stop("Another file is opened.")
     assert modal._ahead is None
 

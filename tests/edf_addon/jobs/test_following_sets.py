@@ -1,5 +1,7 @@
 """The small panorama of more than two pictures that follows the settings, of what their stitch has kept."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ bpy = pytest.importorskip("bpy")
 
 from edf_stitch.edf_addon import editor  # noqa: E402
 from edf_stitch.edf_addon.bridge import result  # noqa: E402
-from edf_stitch.edf_addon.jobs import job  # noqa: E402
+from edf_stitch.edf_addon.jobs import following, job, modal  # noqa: E402
 
 start = job.start
 
@@ -62,3 +64,21 @@ def test_what_is_no_longer_kept_is_found_again(stitched, monkeypatch, tmp_path):
     settings.crop = "FULL"
     assert bpy.ops.edf.follow() == {"FINISHED"}
     assert settings.result.name.endswith("preview") and not editor.is_behind(settings, settings.result)
+
+
+def test_the_worker_that_waits_for_the_first_change_has_found_the_depth_meanwhile(listed, monkeypatch):
+    """So that the panorama is not held back by it, nor the first change."""
+    listed.settings.dense, requests, be_ready = True, [], following.be_ready
+    monkeypatch.setattr(following, "be_ready", requests.append)
+    assert bpy.ops.edf.stitch() == {"FINISHED"} and len(requests) == 1
+    assert "dense" in result.read(listed.settings.result)["seconds"]
+    with monkeypatch.context() as in_a_window:
+        told = {name: getattr(bpy.app, name) for name in ("tempdir", "binary_path")}
+        in_a_window.setattr(following.bpy, "app", SimpleNamespace(background=False, **told))
+        be_ready(requests[0])
+    waiting = modal._ahead
+    listed.settings.blend = "FEATHER"
+    assert bpy.ops.edf.follow() == {"FINISHED"} and modal._ahead is None and not waiting.folder.exists()
+    assert "dense" not in result.read(listed.settings.result)["seconds"]
+    be_ready(requests[0])
+    assert modal._ahead is None, "nothing follows under -b"

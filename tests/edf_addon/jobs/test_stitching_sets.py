@@ -66,6 +66,7 @@ def test_cameras_and_mesh_of_a_set_stand_where_its_pictures_were_taken(listed):
 def test_an_environment_surrounds_the_scene_and_one_undo_brings_all_back(listed, pixels_of):
     before = listed.scene.world = bpy.data.worlds.new("mine")
     assert bpy.ops.edf.stitch_environment(holes="INPAINT", replace=True) == {"FINISHED"}
+    assert status.now.message.endswith("shows it: look at it in Rendered shading.")
     panorama, world = listed.settings.result, listed.scene.world
     assert (pixels_of(panorama)[..., 3] == 1).all(), "filled above and below"
     assert panorama.size[0] == 2 * panorama.size[1] and world[take_along.OF] == panorama

@@ -122,10 +122,17 @@ def test_each_picture_of_the_list_has_its_thumbnail(chosen):
     assert len(shown) == 2 and set(shown) <= set(layout.notes.said)
 
 
-def test_the_clips_of_the_list_are_rows_and_what_they_lack_is_said(draw, blender):
+def test_the_clips_of_the_list_are_rows_and_what_they_lack_is_said(draw, blender, tmp_path):
+    assert "Choose two clips or more" in text(draw(clips.EDF_PT_clips))
+    for number in (1, 2):
+        image = bpy.data.images.new("frame", 8, 8)
+        image.filepath_raw, image.file_format = str(tmp_path / f"frame_{number}.png"), "PNG"
+        image.save()
+    blender.settings.clips.add().clip = bpy.data.movieclips.load(str(tmp_path / "frame_1.png"))
     blender.settings.clips.add()
     notes = draw(clips.EDF_PT_clips)
-    assert "clip" in notes.props and ("edf.remove_clip", True) in notes.buttons
+    assert {"frame_1.png: 2 frames", "No longer in the file"} <= set(notes.said)
+    assert ("edf.remove_clip", True) in notes.buttons
     assert "Choose two clips or more" in text(notes)
 
 
