@@ -44,7 +44,7 @@ class WorkerOptions:
     """The share told at most before everything is done."""
 
     longest_wait: float = 180.0
-    """Seconds that one which was started ahead waits for a job: it holds 150 MB, and starting another takes 1.5 s."""
+    """Seconds that one which was started ahead waits for a job: it holds 230 MB, and starting another takes 1.5 s."""
 
 
 @dataclass(frozen=True)
