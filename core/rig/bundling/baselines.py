@@ -47,12 +47,14 @@ def guessed_places(
 
 def _rigid_groups(found: Polished) -> list[set[int]]:
     """Pictures between which all lengths are in one proportion."""
-    seen = _visibility(found)
-    if len(seen) == 2:
-        return [{0, 1}]  # the only length is the unit
+    places, at = np.unique(found.problem.place, return_inverse=True)
+    seen = np.zeros((len(places), len(found.problem.tracks)), bool)
+    np.logical_or.at(seen, at, _visibility(found))
+    if len(places) <= 2:
+        return [set(range(len(at)))]  # the only length is the unit
     part = parts_of_pairs(seen, np.ones(seen.shape[1]))
-    sizes = np.bincount(part[np.triu_indices(len(seen), 1)])
-    return [{int(k) for k in np.argwhere(part == one).ravel()} for one in np.flatnonzero(sizes > 1)]
+    sizes = np.bincount(part[np.triu_indices(len(places), 1)])
+    return [set(np.flatnonzero(np.isin(at, np.argwhere(part == one))).tolist()) for one in np.flatnonzero(sizes > 1)]
 
 
 def _visibility(found: Polished) -> NDArray[np.bool_]:

@@ -184,6 +184,9 @@ class JudgeOptions:
     # more than this share of their extent: it has not come out of a wrong start then. At most so many times.
     astray: float = 0.1
     most_anew: int = 3
+    # Times the cost up to which places found anew are taken where no points tie all lengths: the bundle leaves those
+    # lengths where it began, which by averaged rotations was anywhere, and its cost does not tell.
+    as_cheap: float = 1.002
     # No parallax can be seen where these percentiles of them are below so many px each: matches of pixels err by that
     # much, a few of a hundred by more. A skyline from places far apart has 0.55 and 0.9 px, and keeps its places.
     no_parallax_percentiles: tuple[float, ...] = (80.0, 95.0)

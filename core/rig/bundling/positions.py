@@ -69,8 +69,9 @@ class _Positioning:
         self.sigma = problem.noise_px
         self.weight = np.ones(len(tracks.point))
         self.inside = pairs_within(tracks.point)
-        self.part = part_of_points(tracks, self.count)
+        self.part = part_of_points(tracks, problem.place)
         self.centres: Array | None = None
+        self.place = problem.place
         _, number = np.unique(problem.place, return_inverse=True)
         self.at = (number[:, None] == np.arange(number.max() + 1)).astype(float)
         self.spread = np.kron(self.at, np.eye(3))
@@ -79,7 +80,7 @@ class _Positioning:
         for round_ in range(POSITIONS.rounds):
             if round_ == 0 or round_ in POSITIONS.choosing_rounds:
                 depths = self.chosen_depths()
-                near = neighbours_of(self.tracks, self.part, depths.measured)
+                near = neighbours_of(self.tracks, self.part, depths.measured, self.place, self.w)
                 of_depth = self.depth_blocks(depths)
             before = self.centres
             if before is not None and round_ == POSITIONS.newton_round:
@@ -96,18 +97,20 @@ class _Positioning:
         return Positions(self.centres, float((z < 0).mean()) if len(z) else 0.0)
 
     def chosen_depths(self) -> _Depths:
-        """Each point's two views of most parallax, among those that fit if there are two."""
+        """Each point's two views of most parallax, from two places and among those that fit if there are two."""
         first, second = self.inside
+        apart = self.place[self.tracks.picture[first]] != self.place[self.tracks.picture[second]]
         cosine = (self.w[first] * self.w[second]).sum(axis=1)
         doubted = np.minimum(self.weight[first], self.weight[second]) <= POSITIONS.least_weight
-        order = np.lexsort((cosine + 4.0 * doubted, self.tracks.point[first]))
+        order = np.lexsort((cosine + 4.0 * doubted + 8.0 * ~apart, self.tracks.point[first]))
         _, begins = np.unique(self.tracks.point[first[order]], return_index=True)
         left, right = first[order[begins]], second[order[begins]]
         normal = np.cross(self.w[left], self.w[right])
         sine = np.linalg.norm(normal, axis=1)
         g = np.cross(self.w[right], normal) / np.maximum(sine, 1e-9)[:, None] ** 2
         sigmas = sine * self.focal[left] / (np.sqrt(2) * self.sigma)
-        return _Depths(left, right, g, sine, sigmas, sigmas > POSITIONS.measured_sigmas)
+        measured = (sigmas > POSITIONS.measured_sigmas) & apart[order[begins]]
+        return _Depths(left, right, g, sine, sigmas, measured)
 
     def depths_along(self, depths: _Depths, centres: Array) -> Array:
         """z (P,) along the left views."""
@@ -201,7 +204,7 @@ class _Positioning:
         if len(parts) == 1:
             return centres
         _, _, depth = self.away(depths, centres)
-        sizes = np.exp(log_sizes(near, picture, part[self.tracks.point], depth))
+        sizes = np.exp(log_sizes(near, self.place[picture], part[self.tracks.point], depth))
         i, j = (picture[ends] for ends in self.inside)
         i, j, k = np.unique([i, j, part[self.tracks.point[self.inside[0]]]], axis=1)
         apart = sizes[k][:, None] * (centres[i] - centres[j])

@@ -12,6 +12,7 @@ from ...system.progress import Tick
 from ..averaging.averaged import PairGeometry
 from ..averaging.graph import components
 from .bundle_options import JUDGE
+from .parts import part_of_points
 from .polishing import Polished, cost_of_start, polish, polish_rotations
 from .positions import SamePlace, place_pictures
 from .reprojection import lengths_of_errors
@@ -113,10 +114,12 @@ def _placed_and_polished(
 ) -> Polished:  # fmt: skip
     """Places and bundle in turn, as long as the bundle's rotations give other places than it ends with, and a lower
     cost from there: averaged rotations can be degrees off, and so are places by them. It begins with what is known
-    already where that costs less than the first places, and ends where its parameters alone count for more than `most`:
-    no bundle of them would be taken."""
+    already where points tie all lengths and that costs less than the first places, which know how depth goes on, and
+    ends where its parameters alone count for more than `most`: no bundle of them would be taken. Where points do not
+    tie all lengths, places found anew may cost a little more."""
     begun = replace(start, centres=framed(place_pictures(problem, start, same).centres))
-    if known is not None:
+    tied = _is_tied(problem)
+    if known is not None and tied:
         begun = min((begun, known), key=lambda one: cost_of_start(problem, one))
     best = polish(problem, begun, tick)
     for _ in range(JUDGE.most_anew):
@@ -127,10 +130,18 @@ def _placed_and_polished(
         if _apart(centres, solution.centres) < JUDGE.astray:
             break
         again = polish(problem, replace(solution, centres=centres), tick)
-        if again.cost >= best.cost:
+        if again.cost >= best.cost * (1.0 if tied else JUDGE.as_cheap):
             break
         best = again
     return best
+
+
+def _is_tied(problem: Problem) -> bool:
+    """Whether points tie all lengths between different places."""
+    place = problem.place[problem.tracks.picture]
+    starts = problem.tracks.starts
+    several = np.maximum.reduceat(place, starts) > np.minimum.reduceat(place, starts)
+    return len(np.unique(part_of_points(problem.tracks, problem.place)[several])) <= 1
 
 
 def _joined(problem: Problem, solution: Solution) -> Solution:

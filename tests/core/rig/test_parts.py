@@ -45,13 +45,20 @@ def test_pairs_are_of_one_part_if_triangles_join_them() -> None:
     assert part[0, 1] == part[1, 2] == part[0, 2] and len({part[0, 1], part[2, 3], part[1, 3]}) == 3
 
 
+def test_a_side_between_pictures_of_one_place_ties_no_triangles() -> None:
+    tracks = tracks_of(*[(0, 1, 2)] * 6, *[(0, 1, 3)] * 6, (0, 1))
+    assert len(set(part_of_points(tracks, np.arange(5)).tolist())) == 1
+    part = part_of_points(tracks, np.array([7, 7, 2, 3, 4]))
+    assert len(set(part[:6].tolist())) == len(set(part[6:12].tolist())) == 1 and len(set(part.tolist())) == 3
+
+
 def test_too_few_points_of_three_pictures_keep_two() -> None:
     few = tracks_of(*[(0, 1)] * 9, *[(1, 2)] * 5, *[(0, 1, 2)] * 3)
     assert seen_in(supported(few, 5)) == sorted([(0, 1)] * 12 + [(1, 2)] * 5)
-    assert len(set(part_of_points(supported(few, 5), 5).tolist())) == 2
+    assert len(set(part_of_points(supported(few, 5), np.arange(5)).tolist())) == 2
     enough = tracks_of(*[(0, 1)] * 9, *[(1, 2)] * 5, *[(0, 1, 2)] * 4)
     assert supported(enough, 5) is enough
-    assert len(set(part_of_points(enough, 5).tolist())) == 1
+    assert len(set(part_of_points(enough, np.arange(5)).tolist())) == 1
 
 
 def test_a_long_track_keeps_what_its_part_tells() -> None:
@@ -62,11 +69,22 @@ def test_a_long_track_keeps_what_its_part_tells() -> None:
 def test_neighbours_are_of_two_parts_and_each_counts_once() -> None:
     """Across a gap in which nothing is, too."""
     tracks = tracks_of(*[(0, 1)] * 30, *[(1, 2)] * 30)
-    part = part_of_points(tracks, 5)
-    near = neighbours_of(tracks, part, np.ones(60, bool))
+    part = part_of_points(tracks, np.arange(5))
+    near = neighbours_of(tracks, part, np.ones(60, bool), np.arange(5), np.zeros((len(tracks.picture), 3)))
     assert (tracks.picture[near.first] == 1).all() and (tracks.picture[near.second] == 1).all()
     assert (part[tracks.point[near.first]] != part[tracks.point[near.second]]).all()
     assert len(near.first) == 30 == len(set(near.first.tolist())) == len(set(near.second.tolist()))
+
+
+def test_parts_that_meet_at_a_place_and_in_none_of_its_pictures_have_neighbours_there() -> None:
+    """Pictures 0 and 1 are of one place; 2 shares points with the one, 3 with the other."""
+    tracks = tracks_of(*[(0, 2)] * 6, *[(1, 3)] * 6)
+    angle = np.where(tracks.point < 6, 0.0, 1.0) + 0.01 * tracks.point
+    directions = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    for place, count in ((np.arange(5), 0), (np.array([0, 0, 2, 3, 4]), 6)):
+        near = neighbours_of(tracks, part_of_points(tracks, place), np.ones(12, bool), place, directions)
+        assert len(near.first) == count
+        assert {*tracks.picture[near.first], *tracks.picture[near.second]} <= {0, 1}
 
 
 def spread_of_lengths(rig: SyntheticRig) -> float:
@@ -120,5 +138,5 @@ def test_loops_tell_lengths_better_than_depth() -> None:
             kept = rig.identity[pair.i][pair.index[:, 0]] % 3 == number % 3
             links.append(replace(pair, index=pair.index[kept]))
     problem, begun = problem_of(replace(rig, matches=links))
-    assert len(np.unique(part_of_points(problem.tracks, 11))) == 11
+    assert len(np.unique(part_of_points(problem.tracks, np.arange(11)))) == 11
     assert off(place_pictures(problem, begun).centres, rig).max() < 0.15 * rig.extent

@@ -70,6 +70,15 @@ def test_pictures_of_one_place_get_one() -> None:
     assert off(placed, rig).max() < 0.2 * rig.extent
 
 
+@pytest.mark.parametrize("seed", [2, 3])
+def test_points_that_one_place_sees_measure_no_depth_though_its_rotations_are_off(seed: int) -> None:
+    rig = make_rig("half", seed, points=4000)
+    problem, begun = problem_of(rig)
+    turned = rotations(np.random.default_rng(seed).normal(0, np.radians(0.15), (11, 3)))
+    placed = place_pictures(problem.with_stations([tuple(range(6))]), replace(begun, R=turned @ begun.R))
+    assert off(placed.centres, rig).max() < 0.12 * rig.extent
+
+
 def test_triangulation_finds_what_was_seen() -> None:
     rig = make_rig("ring", 0, points=3000, noise_px=0.0)
     problem, begun = problem_of(rig)
